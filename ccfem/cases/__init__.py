@@ -1,0 +1,1 @@
+"""Cases: ready problems, one file a case."""

@@ -1,0 +1,1 @@
+"""Linear elasticity on tetrahedra: problem, assembly, solvers, recovery."""

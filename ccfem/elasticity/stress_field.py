@@ -1,0 +1,98 @@
+"""The result of a solve: displacement, stress, reactions, and the record of the solve."""
+
+from dataclasses import dataclass
+
+from ccfem.arrays import FloatArray, read_only
+from ccfem.elasticity.problem import Problem
+from ccfem.layers.layer import Layer
+from ccfem.mesh import TetMesh
+
+__all__ = ["LayerStress", "SolveRecord", "StressField"]
+
+
+@dataclass(frozen=True)
+class SolveRecord:
+    """How a solve went.
+
+    Attributes
+    ----------
+    backend : str
+    iterations : int
+        0 for a direct solve.
+    residual : float
+        Relative residual ``|f - K u| / |f|`` over the free components.
+    assembly_seconds, solve_seconds : float
+    unknowns : int
+        Free components of the displacement.
+    """
+
+    backend: str
+    iterations: int
+    residual: float
+    assembly_seconds: float
+    solve_seconds: float
+    unknowns: int
+
+
+@dataclass(frozen=True)
+class StressField:
+    """Displacement and stress of one load case.
+
+    Attributes
+    ----------
+    problem : Problem
+    case : str
+        Name of the load case.
+    displacement : (n, 3) array, mm
+    stress : (m, 3, 3) array, MPa
+        Per cell (P2: at the centroid).
+    nodal : (n, 3, 3) array, MPa
+        Recovered at the nodes: volume-weighted average of the cells round each.
+    reactions : (n, 3) array, N
+        Force that the supports put on the part; zero away from them.
+    strain_energy : float, N mm
+    record : SolveRecord
+    """
+
+    problem: Problem
+    case: str
+    displacement: FloatArray
+    stress: FloatArray
+    nodal: FloatArray
+    reactions: FloatArray
+    strain_energy: float
+    record: SolveRecord
+
+    def __post_init__(self) -> None:
+        for name in ("displacement", "stress", "nodal", "reactions"):
+            object.__setattr__(self, name, read_only(getattr(self, name)))
+
+    @property
+    def mesh(self) -> TetMesh:
+        """Mesh of the problem."""
+        return self.problem.mesh
+
+    def on(self, layer: Layer) -> "LayerStress":
+        """Stress on one layer of the part."""
+        return LayerStress(layer, self.stress[layer.cell], layer.interpolate(self.nodal), part=self)
+
+
+@dataclass(frozen=True)
+class LayerStress:
+    """Stress on a layer.
+
+    Attributes
+    ----------
+    layer : Layer
+    cell : (t, 3, 3) array, MPa
+        Stress of the tetrahedron that each triangle was cut from.
+    nodal : (n, 3, 3) array, MPa
+        Recovered stress at the layer's points.
+    part : StressField
+        The field of the whole part.
+    """
+
+    layer: Layer
+    cell: FloatArray
+    nodal: FloatArray
+    part: StressField

@@ -1,0 +1,1 @@
+"""The shared evaluator: every strategy is measured the same way."""

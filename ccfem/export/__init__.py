@@ -1,0 +1,1 @@
+"""Exports: toolpaths in the formats of other programs."""

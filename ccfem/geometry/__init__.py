@@ -1,0 +1,1 @@
+"""Geometry of polylines, isocontours, offsets and hatches in the plane."""

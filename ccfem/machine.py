@@ -1,0 +1,56 @@
+"""The printer: what a path has to respect, and what it costs."""
+
+from dataclasses import dataclass
+
+from ccfem.errors import InputError
+
+__all__ = ["Machine"]
+
+
+@dataclass(frozen=True)
+class Machine:
+    """A printer of continuous fibre.
+
+    The defaults are the machine of Chen et al. 2021 (paper 000, section 5).
+
+    Attributes
+    ----------
+    fibre_width : float, mm
+        W, the least distance between neighbouring strands.
+    deposited_width : float, mm
+        Width of a strand once pressed.
+    fibre_height : float, mm
+        Height of a fibre layer.
+    matrix_height : float, mm
+        Height of a matrix layer between two fibre layers.
+    filament_area : float, mm^2
+        Cross-section of one strand.
+    minimum_length : float, mm
+        Shortest strand that the cutter allows.
+    minimum_radius : float, mm
+        Tightest turn that a strand follows without folding; 0.26 1/mm in curvature.
+    fibre_speed, matrix_speed, travel_speed : float, mm/s
+    fibre_temperature, matrix_temperature : float, degrees Celsius
+    """
+
+    fibre_width: float = 1.0
+    deposited_width: float = 1.2
+    fibre_height: float = 0.05
+    matrix_height: float = 0.8
+    filament_area: float = 0.1075
+    minimum_length: float = 42.0
+    minimum_radius: float = 3.85
+    fibre_speed: float = 5.0
+    matrix_speed: float = 12.0
+    travel_speed: float = 80.0
+    fibre_temperature: float = 250.0
+    matrix_temperature: float = 200.0
+
+    def __post_init__(self) -> None:
+        for name, value in vars(self).items():
+            if not value >= 0.0 or value == float("inf"):
+                raise InputError(
+                    f"machine.{name} must be a finite number >= 0; got {value!r}: correct it"
+                )
+        if self.fibre_width == 0.0:
+            raise InputError("machine.fibre_width must be above 0; got 0: give the strand width")

@@ -1,0 +1,167 @@
+"""Toolpaths: the polylines that every strategy returns and every index is computed from."""
+
+from collections.abc import Iterable, Iterator, Sequence
+from dataclasses import dataclass, replace
+from typing import Any
+
+import numpy as np
+
+from ccfem.arrays import BoolArray, FloatArray, IntArray, read_only
+from ccfem.layers.layer import Layer
+
+__all__ = ["FIBRE", "KINDS", "MATRIX", "SUPPORT", "TRAVEL", "Toolpaths"]
+
+KINDS = ("fibre", "matrix", "support", "travel")
+FIBRE, MATRIX, SUPPORT, TRAVEL = range(4)
+
+
+@dataclass(frozen=True)
+class Toolpaths:
+    """Polylines of a whole part, stored as one array of points with offsets (as in CSR).
+
+    Attributes
+    ----------
+    points : (P, 3) array, mm
+        In the frame of the mesh. A closed path repeats its first point at its end.
+    normals : (P, 3) array
+        Unit normal of the layer at each point.
+    offsets : (K + 1,) int array
+        Path k holds ``points[offsets[k]:offsets[k + 1]]``.
+    layer : (K,) int array
+        Index of the layer (`Layer.index`) that each path lies on.
+    kind : (K,) int array
+        FIBRE, MATRIX, SUPPORT or TRAVEL (index into `KINDS`).
+    closed : (K,) bool array
+        Whether the path is a closed curve.
+    """
+
+    points: FloatArray
+    normals: FloatArray
+    offsets: IntArray
+    layer: IntArray
+    kind: IntArray
+    closed: BoolArray
+
+    def __post_init__(self) -> None:
+        for name, dtype in (
+            ("points", np.float64),
+            ("normals", np.float64),
+            ("offsets", np.int64),
+            ("layer", np.int64),
+            ("kind", np.int64),
+            ("closed", np.bool_),
+        ):
+            object.__setattr__(self, name, read_only(getattr(self, name), dtype))
+        count = len(self.layer)
+        if self.points.shape != self.normals.shape or self.points.ndim != 2:
+            raise ValueError(
+                f"points and normals must both have shape (P, 3); got {self.points.shape} "
+                f"and {self.normals.shape}"
+            )
+        if self.offsets.shape != (count + 1,) or self.offsets[-1] != len(self.points):
+            raise ValueError("offsets must have one entry more than there are paths and end at P")
+        if not np.isfinite(self.points).all():
+            raise ValueError("points must be finite; got NaN or infinity")
+
+    @classmethod
+    def empty(cls) -> "Toolpaths":
+        """No path at all."""
+        none = np.zeros(0, dtype=np.int64)
+        start = np.zeros(1, dtype=np.int64)
+        return cls(np.zeros((0, 3)), np.zeros((0, 3)), start, none, none, none.astype(bool))
+
+    @classmethod
+    def from_plane(
+        cls,
+        lines: Sequence[FloatArray],
+        layer: Layer,
+        closed: Sequence[bool] | None = None,
+        kind: int = FIBRE,
+    ) -> "Toolpaths":
+        """Paths on one flat layer from polylines in its plane coordinates.
+
+        Parameters
+        ----------
+        lines : sequence of (n_i, 2) arrays, mm
+            Polylines with at least two points; others are dropped.
+        layer : Layer
+            A flat layer.
+        closed : sequence of bool, optional
+            By default a line is closed when its last point equals its first.
+        kind : int, default FIBRE
+        """
+        keep = [k for k, line in enumerate(lines) if len(line) >= 2]
+        if not keep:
+            return cls.empty()
+        if closed is None:
+            closed = [bool(np.array_equal(line[0], line[-1])) for line in lines]
+        sizes = [len(lines[k]) for k in keep]
+        points = layer.to_space(np.concatenate([lines[k] for k in keep]))
+        return cls(
+            points=points,
+            normals=np.broadcast_to(layer.frame[2], points.shape),
+            offsets=np.concatenate([[0], np.cumsum(sizes)]),
+            layer=np.full(len(keep), layer.index),
+            kind=np.full(len(keep), kind),
+            closed=np.array([closed[k] for k in keep]),
+        )
+
+    @classmethod
+    def concatenate(cls, parts: Iterable["Toolpaths"]) -> "Toolpaths":
+        """All paths of `parts`, in their order."""
+        found = [part for part in parts if len(part)]
+        if not found:
+            return cls.empty()
+        sizes = np.concatenate([np.diff(part.offsets) for part in found])
+
+        def joined(name: str) -> Any:
+            return np.concatenate([getattr(part, name) for part in found])
+
+        return cls(
+            joined("points"),
+            joined("normals"),
+            np.concatenate([[0], np.cumsum(sizes)]),
+            joined("layer"),
+            joined("kind"),
+            joined("closed"),
+        )
+
+    def __len__(self) -> int:
+        return len(self.layer)
+
+    def __iter__(self) -> Iterator[FloatArray]:
+        """Iterate over the paths as (n_i, 3) arrays, mm."""
+        for start, end in zip(self.offsets[:-1], self.offsets[1:], strict=True):
+            yield self.points[start:end]
+
+    def select(self, wanted: BoolArray) -> "Toolpaths":
+        """Only the paths where the (K,) mask `wanted` is true."""
+        mask = np.repeat(np.asarray(wanted, dtype=bool), np.diff(self.offsets))
+        sizes = np.diff(self.offsets)[wanted]
+        return replace(
+            self,
+            points=self.points[mask],
+            normals=self.normals[mask],
+            offsets=np.concatenate([[0], np.cumsum(sizes)]).astype(np.int64),
+            layer=self.layer[wanted],
+            kind=self.kind[wanted],
+            closed=self.closed[wanted],
+        )
+
+    def on_layer(self, index: int) -> "Toolpaths":
+        """Only the paths of one layer."""
+        return self.select(self.layer == index)
+
+    def of_kind(self, kind: int) -> "Toolpaths":
+        """Only the paths of one kind (FIBRE, MATRIX, SUPPORT or TRAVEL)."""
+        return self.select(self.kind == kind)
+
+    @property
+    def lengths(self) -> FloatArray:
+        """Length of each path, (K,), mm."""
+        if not len(self):
+            return np.zeros(0)
+        steps = np.zeros(len(self.points))
+        steps[1:] = np.linalg.norm(np.diff(self.points, axis=0), axis=1)
+        steps[self.offsets[:-1]] = 0.0
+        return np.add.reduceat(steps, self.offsets[:-1])
