@@ -1,0 +1,46 @@
+"""A case: a problem with everything that a comparison of strategies needs."""
+
+from collections.abc import Mapping
+from dataclasses import dataclass, field
+from types import MappingProxyType
+from typing import Any
+
+from ccfem.elasticity.problem import Problem
+from ccfem.machine import Machine
+
+__all__ = ["Case"]
+
+
+@dataclass(frozen=True)
+class Case:
+    """A part with its loads, how it is layered, and the machine that prints it.
+
+    Attributes
+    ----------
+    name : str
+    title : str
+        One line for tables and reports.
+    problem : Problem
+    build : tuple of 3 floats, default z
+        Build direction in the frame of the mesh.
+    layers : int
+        Number of fibre layers, spread evenly over the height.
+    machine : Machine
+    parameters : mapping of strategy name to parameters
+        Where a strategy should not use its defaults on this part.
+    source : str
+        Paper or person that the case comes from.
+    """
+
+    name: str
+    title: str
+    problem: Problem
+    build: tuple[float, float, float] = (0.0, 0.0, 1.0)
+    layers: int = 12
+    machine: Machine = field(default_factory=Machine)
+    parameters: Mapping[str, Mapping[str, Any]] = field(default_factory=dict)
+    source: str = ""
+
+    def __post_init__(self) -> None:
+        parameters = {name: MappingProxyType(dict(p)) for name, p in self.parameters.items()}
+        object.__setattr__(self, "parameters", MappingProxyType(parameters))
