@@ -247,7 +247,7 @@ def _border_edges(triangles: IntArray, n: int) -> IntArray:
 
 
 def _chain(border: IntArray) -> tuple[IntArray, ...]:
-    """Chain directed edges to closed loops; where loops touch in a point, each edge is used once."""
+    """Chain directed edges to closed loops; each edge is used once where loops touch."""
     leaving: dict[int, list[int]] = {}
     for start, end in border.tolist():
         leaving.setdefault(start, []).append(end)

@@ -1,0 +1,83 @@
+"""The incompatibility filter: where neighbouring vectors disagree [paper 000, Eq. 2]."""
+
+from typing import Literal
+
+import numpy as np
+from numba import njit
+
+from ccfem.arrays import BoolArray, FloatArray, IntArray
+from ccfem.errors import InputError
+
+__all__ = ["Incompatible", "incompatible"]
+
+Incompatible = Literal["any", "majority", "all", "none"]
+
+
+def incompatible(
+    direction: FloatArray,
+    cells: IntArray,
+    defined: BoolArray,
+    rule: Incompatible = "any",
+    limit: float = 0.5,
+) -> BoolArray:
+    """Mark the cells whose vector disagrees with those of the cells round them.
+
+    Two cells are neighbours when they share a node; they disagree when ``v . v* <= limit``.
+
+    Parameters
+    ----------
+    direction : (m, 3) array
+        Oriented unit vectors.
+    cells : (m, 4) int array
+        Corner nodes.
+    defined : (m,) bool array
+        Cells without a vector are neither marked nor asked.
+    rule : {"any", "majority", "all", "none"}, default "any"
+        Which share of the neighbours has to disagree. The paper prints "for all", which marks next
+        to nothing; "any" gives its figures.
+    limit : float, default 0.5
+        The paper's eta.
+
+    Returns
+    -------
+    (m,) bool array
+    """
+    if rule == "none":
+        return np.zeros(len(cells), dtype=bool)
+    if rule not in ("any", "majority", "all"):
+        raise InputError(
+            f"incompatible must be one of any, majority, all, none; got {rule!r}: choose one"
+        )
+    nodes = cells.ravel()
+    order = np.argsort(nodes, kind="stable")
+    start = np.searchsorted(nodes[order], np.arange(int(nodes.max()) + 2))
+    against, asked = _disagreeing(direction, cells, defined, order // 4, start, limit)
+    if rule == "any":
+        return defined & (against > 0)
+    if rule == "majority":
+        return defined & (2 * against > asked)
+    return defined & (against == asked) & (asked > 0)
+
+
+@njit(cache=True)
+def _disagreeing(direction, cells, defined, cell_of, start, limit):  # type: ignore[no-untyped-def]
+    count = len(cells)
+    against = np.zeros(count, np.int64)
+    asked = np.zeros(count, np.int64)
+    seen = np.full(count, -1)
+    for e in range(count):
+        if not defined[e]:
+            continue
+        seen[e] = e
+        for node in cells[e]:
+            for k in range(start[node], start[node + 1]):
+                other = cell_of[k]
+                if seen[other] == e or not defined[other]:
+                    continue
+                seen[other] = e
+                asked[e] += 1
+                product = 0.0
+                for axis in range(3):
+                    product += direction[e, axis] * direction[other, axis]
+                against[e] += product <= limit
+    return against, asked

@@ -1,0 +1,96 @@
+"""Direction and stress everywhere on a layer, also where the tension is undefined or noisy."""
+
+import numpy as np
+import scipy.sparse as sparse
+
+from ccfem.arrays import BoolArray, FloatArray
+from ccfem.fields.surface import Surface, positive_definite
+
+__all__ = ["fill_laplacian", "fill_screened"]
+
+
+def fill_laplacian(
+    surface: Surface,
+    direction: FloatArray,
+    stress: FloatArray,
+    defined: BoolArray,
+    iterations: int = 50,
+) -> tuple[FloatArray, FloatArray]:
+    """Fill by repeated averaging over neighbouring triangles [paper 000, Eq. 3-4], as printed.
+
+    The face of the largest stress is held. The energy that this descends has a constant minimiser,
+    so more iterations keep degrading the field: `fill_screened` does not.
+
+    Parameters
+    ----------
+    surface : Surface
+    direction : (t, 2) array
+        Oriented vectors; those of undefined triangles are ignored.
+    stress : (t,) array, MPa
+    defined : (t,) bool array
+    iterations : int, default 50
+
+    Returns
+    -------
+    direction : (t, 2) array
+        Unit vectors.
+    stress : (t,) array, MPa
+    """
+    count = len(surface.triangles)
+    i, j = surface.neighbours.T
+    adjacency = sparse.coo_array((np.ones(len(i)), (i, j)), shape=(count, count)).tocsr()
+    adjacency = adjacency + adjacency.T
+    degree = np.maximum(adjacency.sum(axis=1), 1.0)[:, None]
+    held = int(np.argmax(np.where(defined, stress, -np.inf)))
+    values = np.column_stack([np.where(defined[:, None], direction, 0.0), stress])
+    fixed = values[held].copy()
+    for _ in range(iterations):
+        values = adjacency @ values / degree
+        values[held] = fixed
+    length = np.linalg.norm(values[:, :2], axis=1)
+    unit = values[:, :2] / np.maximum(length, 1e-300)[:, None]
+    return np.where(length[:, None] > 0.0, unit, [1.0, 0.0]), values[:, 2]
+
+
+def fill_screened(
+    surface: Surface,
+    direction: FloatArray,
+    stress: FloatArray,
+    confidence: FloatArray,
+    length: float = 3.0,
+) -> tuple[FloatArray, FloatArray]:
+    """Fill by one screened Poisson problem at the points of the layer.
+
+    Solves ``(M_c + length^2 L) x = M_c x0`` with the mass M_c weighted by the confidence and the
+    Laplacian L, for the direction in double-angle form (a line has no sign there) and for the
+    stress. Where the confidence is high the field is kept, elsewhere it is carried on from there,
+    over about `length`.
+
+    Parameters
+    ----------
+    surface : Surface
+    direction : (n, 2) array
+        Unit vectors at the points, of any sign.
+    stress : (n,) array, MPa
+    confidence : (n,) array in [0, 1]
+    length : float, mm, default 3.0
+
+    Returns
+    -------
+    direction : (t, 2) array
+        Unit vectors on the triangles, of any sign.
+    stress : (t,) array, MPa
+    """
+    angle = np.arctan2(direction[:, 1], direction[:, 0])
+    double = np.column_stack([np.cos(2.0 * angle), np.sin(2.0 * angle)])
+    mass = surface.lumped(np.ones(len(surface.triangles)))
+    weighted = mass * confidence
+    metric = length**2 * surface.areas[:, None, None] * np.eye(2)
+    laplacian = surface.energy(metric)
+    floor = 1e-9 * mass.mean() + 1e-6 * mass
+    lines = positive_definite(laplacian + sparse.diags_array(weighted + floor, format="csc"))
+    filled = np.column_stack([lines.solve(weighted * column) for column in double.T])
+    size = lines.solve((weighted + floor) * stress)
+    mean = surface.mean(filled)
+    angle = 0.5 * np.arctan2(mean[:, 1], mean[:, 0])
+    return np.column_stack([np.cos(angle), np.sin(angle)]), surface.mean(size)

@@ -1,0 +1,70 @@
+"""Consistent signs for a field of lines along a minimum spanning tree [paper 000, Eq. 1]."""
+
+import numpy as np
+from numba import njit
+
+from ccfem.arrays import FloatArray, IntArray
+
+__all__ = ["orient"]
+
+
+def orient(direction: FloatArray, pairs: IntArray) -> FloatArray:
+    """Flip vectors so that neighbours point the same way wherever that is possible.
+
+    Signs are propagated along the minimum spanning tree of the weights ``1 - |v_i . v_j|``: edges
+    are taken in the order of their weight, and a union-find that stores the sign of every element
+    relative to its root joins the trees, so that no graph is ever traversed.
+
+    Parameters
+    ----------
+    direction : (k, 2) or (k, 3) array
+        Unit vectors.
+    pairs : (e, 2) int array
+        Neighbouring elements.
+
+    Returns
+    -------
+    (k, 2) or (k, 3) array
+        `direction` or its opposite, element by element. Each connected component keeps the sign
+        of its first element.
+    """
+    product = np.einsum("ij,ij->i", direction[pairs[:, 0]], direction[pairs[:, 1]])
+    order = np.argsort(1.0 - np.abs(product), kind="stable")
+    return direction * _signs(len(direction), pairs[order], product[order] < 0.0)[:, None]
+
+
+@njit(cache=True)
+def _signs(count, pairs, opposite):  # type: ignore[no-untyped-def]
+    parent = np.arange(count)
+    parity = np.zeros(count, np.bool_)  # relative to the parent
+    root_of_pair = np.empty(2, np.int64)
+    odd = np.empty(2, np.bool_)
+    for e in range(len(pairs)):
+        for side in range(2):
+            element = pairs[e, side]
+            turned = False
+            while parent[element] != element:
+                above = parent[element]
+                parity[element] ^= parity[above] and parent[above] != above
+                parent[element] = parent[above]
+                turned ^= parity[element]
+                element = parent[element]
+            root_of_pair[side] = element
+            odd[side] = turned
+        a, b = root_of_pair
+        if a != b:
+            # The smaller index stays the root: the first element keeps its sign.
+            if b < a:
+                a, b = b, a
+            parent[b] = a
+            parity[b] = odd[0] ^ odd[1] ^ opposite[e]
+    sign = np.ones(count)
+    for start in range(count):
+        element = start
+        turned = False
+        while parent[element] != element:
+            turned ^= parity[element]
+            element = parent[element]
+        if turned:
+            sign[start] = -1.0
+    return sign

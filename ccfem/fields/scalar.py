@@ -1,0 +1,148 @@
+"""The scalar field whose isocurves are the paths [paper 000, section 4.2, Eq. 6]."""
+
+import numpy as np
+import scipy.sparse as sparse
+
+from ccfem.arrays import FloatArray
+from ccfem.errors import SolveError
+from ccfem.fields.surface import Surface, positive_definite
+
+__all__ = ["fit_constrained", "fit_literal", "fit_weighted"]
+
+_REGULARISATION = 1e-10
+
+
+def fit_literal(surface: Surface, vectors: FloatArray) -> FloatArray:
+    """Field whose gradient is nearest to the vectors turned by 90 degrees.
+
+    Minimises ``sum_f A_f |grad s - R90 u_f|^2``. The paper prints Eq. 6 without the turn, which
+    would put the isocurves across the stress.
+
+    Parameters
+    ----------
+    surface : Surface
+    vectors : (t, 2) array
+        u of Eq. 5, along the tension.
+
+    Returns
+    -------
+    (n,) array
+        At the points; its mean on every connected part is arbitrary.
+    """
+    turned = np.column_stack([-vectors[:, 1], vectors[:, 0]])
+    metric = surface.areas[:, None, None] * np.eye(2)
+    return _solve(surface, metric, surface.areas[:, None] * turned)
+
+
+def fit_weighted(
+    surface: Surface,
+    direction: FloatArray,
+    density: FloatArray,
+    weight: FloatArray,
+    spacing_weight: float = 0.1,
+) -> FloatArray:
+    """Field that runs along the tension first and keeps the wanted density second.
+
+    Minimises ``sum_f w_f A_f [(t . grad s)^2 + spacing_weight (n . grad s - m)^2]`` with t the
+    direction, n its normal and m the wanted density of isocurves.
+
+    Parameters
+    ----------
+    surface : Surface
+    direction : (t, 2) array
+        Oriented unit vectors.
+    density : (t,) array
+        m, in any unit: isocurves per mm up to a factor.
+    weight : (t,) array
+    spacing_weight : float, default 0.1
+        The smaller, the better the alignment and the less even the spacing.
+
+    Returns
+    -------
+    (n,) array
+    """
+    metric, flux = _weighted_form(surface, direction, density, weight, spacing_weight)
+    return _solve(surface, metric, flux)
+
+
+def fit_constrained(
+    surface: Surface,
+    direction: FloatArray,
+    density: FloatArray,
+    weight: FloatArray,
+    width: float,
+    spacing_weight: float = 0.1,
+) -> FloatArray:
+    """As `fit_weighted`, subject to ``|grad s| <= 1 / width`` on every triangle.
+
+    Isocurves at unit levels are then at least `width` apart wherever they run through the same
+    triangles, without any search for their number. A second-order cone programme, solved by
+    Clarabel through cvxpy.
+
+    Parameters
+    ----------
+    surface, direction, weight, spacing_weight
+        As in `fit_weighted`.
+    density : (t,) array, 1/mm
+        Wanted number of isocurves per mm; capped at ``1 / width``.
+    width : float, mm
+
+    Returns
+    -------
+    (n,) array
+
+    Raises
+    ------
+    SolveError
+        With the status of the solver when it did not find the optimum.
+    """
+    import cvxpy
+
+    count = len(surface.points)
+    density = np.minimum(density, 1.0 / width)
+    normal = np.column_stack([-direction[:, 1], direction[:, 0]])
+    rows = np.repeat(np.arange(len(surface.triangles)), 3)
+    shape = (len(surface.triangles), count)
+
+    def along(vectors: FloatArray) -> sparse.csr_array:
+        values = np.einsum("tid,td->ti", surface.gradients, vectors).ravel()
+        return sparse.csr_array((values, (rows, surface.triangles.ravel())), shape=shape)
+
+    root = np.sqrt(surface.areas * weight / (surface.areas * weight).mean())
+    field = cvxpy.Variable(count)
+    ones = np.ones((len(root), 1))
+    misaligned = cvxpy.multiply(root, along(direction) @ field)
+    uneven = cvxpy.multiply(np.sqrt(spacing_weight) * root, along(normal) @ field - density)
+    gradient = cvxpy.vstack(
+        [along(ones * np.array([1.0, 0.0])) @ field, along(ones * np.array([0.0, 1.0])) @ field]
+    )
+    usable = np.flatnonzero(np.abs(surface.gradients).max(axis=(1, 2)) > 0.0)
+    problem = cvxpy.Problem(
+        cvxpy.Minimize(cvxpy.sum_squares(misaligned) + cvxpy.sum_squares(uneven)),
+        [cvxpy.norm(gradient[:, usable], axis=0) <= 1.0 / width, field[0] == 0.0],
+    )
+    problem.solve(solver=cvxpy.CLARABEL)
+    if problem.status != cvxpy.OPTIMAL or field.value is None:
+        raise SolveError(f"the constrained scalar field ended as '{problem.status}' (Clarabel)")
+    return np.asarray(field.value)
+
+
+def _weighted_form(
+    surface: Surface,
+    direction: FloatArray,
+    density: FloatArray,
+    weight: FloatArray,
+    spacing_weight: float,
+) -> tuple[FloatArray, FloatArray]:
+    normal = np.column_stack([-direction[:, 1], direction[:, 0]])
+    w = surface.areas * weight
+    metric = direction[:, :, None] * direction[:, None, :]
+    metric = metric + spacing_weight * normal[:, :, None] * normal[:, None, :]
+    return w[:, None, None] * metric, (w * spacing_weight * density)[:, None] * normal
+
+
+def _solve(surface: Surface, metric: FloatArray, flux: FloatArray) -> FloatArray:
+    matrix = surface.energy(metric)
+    small = _REGULARISATION * float(np.median(matrix.diagonal()))
+    identity = sparse.eye_array(len(surface.points), format="csc")
+    return np.asarray(positive_definite(matrix + small * identity).solve(surface.source(flux)))

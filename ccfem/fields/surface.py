@@ -1,0 +1,109 @@
+"""Linear finite elements on the triangles of a layer: gradients, Laplacian, adjacency."""
+
+from dataclasses import dataclass
+from functools import cached_property
+from typing import Any
+
+import numpy as np
+import scipy.sparse as sparse
+from scipy.sparse.linalg import splu
+
+from ccfem.arrays import FloatArray, IntArray, read_only
+from ccfem.layers.layer import Layer
+
+__all__ = ["Surface", "positive_definite"]
+
+
+def positive_definite(matrix: Any) -> Any:
+    """Factor a sparse symmetric positive definite matrix; the result has ``solve``."""
+    options = {"SymmetricMode": True, "DiagPivotThresh": 0.0}
+    return splu(sparse.csc_array(matrix), permc_spec="MMD_AT_PLUS_A", options=options)
+
+
+_THIN = 1e-9
+"""Triangles with less than this share of the mean area have no usable gradient: they get none."""
+
+
+@dataclass(frozen=True)
+class Surface:
+    """Triangles in the plane, with the operators that the fields need.
+
+    Attributes
+    ----------
+    points : (n, 2) array, mm
+    triangles : (t, 3) int array
+    """
+
+    points: FloatArray
+    triangles: IntArray
+
+    @classmethod
+    def of(cls, layer: Layer) -> "Surface":
+        """Surface of a flat layer in its plane coordinates."""
+        return cls(layer.plane_points, layer.triangles)
+
+    @cached_property
+    def areas(self) -> FloatArray:
+        """Area of each triangle, (t,), mm^2."""
+        a, b, c = np.moveaxis(self.points[self.triangles], 1, 0)
+        u, v = b - a, c - a
+        return read_only(0.5 * (u[:, 0] * v[:, 1] - u[:, 1] * v[:, 0]))
+
+    @cached_property
+    def gradients(self) -> FloatArray:
+        """Gradients of the three shape functions on each triangle, (t, 3, 2), 1/mm."""
+        p = self.points[self.triangles]
+        opposite = p[:, [2, 0, 1]] - p[:, [1, 2, 0]]
+        turned = np.stack([-opposite[..., 1], opposite[..., 0]], axis=-1)
+        thick = self.areas > _THIN * self.areas.mean()
+        double = np.where(thick, 2.0 * self.areas, np.inf)
+        return read_only(turned / double[:, None, None])
+
+    def gradient(self, values: FloatArray) -> FloatArray:
+        """Gradient (t, 2) on each triangle of a field (n,) given at the points."""
+        return np.einsum("tk,tkd->td", values[self.triangles], self.gradients)
+
+    def mean(self, values: FloatArray) -> FloatArray:
+        """Mean on each triangle, (t, ...), of a field (n, ...) given at the points."""
+        return values[self.triangles].mean(axis=1)
+
+    def energy(self, metric: FloatArray) -> Any:
+        """Matrix (n, n) of the quadratic form ``sum_f grad s . metric_f grad s``.
+
+        Parameters
+        ----------
+        metric : (t, 2, 2) array
+            Symmetric, with the area of the triangle in it.
+        """
+        blocks = np.einsum(
+            "tid,tde,tje->tij", self.gradients, metric, self.gradients, optimize=True
+        )
+        rows = np.repeat(self.triangles, 3, axis=1).ravel()
+        columns = np.tile(self.triangles, (1, 3)).ravel()
+        n = len(self.points)
+        return sparse.coo_array((blocks.ravel(), (rows, columns)), shape=(n, n)).tocsc()
+
+    def source(self, flux: FloatArray) -> FloatArray:
+        """Vector (n,) of the linear form ``sum_f grad s . flux_f`` for (t, 2) fluxes."""
+        values = np.einsum("tid,td->ti", self.gradients, flux)
+        return self._at_points(values.ravel())
+
+    def lumped(self, weight: FloatArray) -> FloatArray:
+        """Lumped mass (n,) of a weight (t,) per triangle, mm^2 times its unit."""
+        share = np.repeat(self.areas * weight / 3.0, 3)
+        return self._at_points(share)
+
+    def _at_points(self, values: FloatArray) -> FloatArray:
+        total = np.bincount(self.triangles.ravel(), values, minlength=len(self.points))
+        return total.astype(np.float64)
+
+    @cached_property
+    def neighbours(self) -> IntArray:
+        """Pairs of triangles that share an edge, (e, 2)."""
+        n = len(self.points)
+        t = self.triangles
+        edges = np.concatenate([t[:, [0, 1]], t[:, [1, 2]], t[:, [2, 0]]])
+        key = edges.min(axis=1) * n + edges.max(axis=1)
+        order = np.argsort(key, kind="stable")
+        first = np.flatnonzero(key[order[1:]] == key[order[:-1]])
+        return read_only(np.stack([order[first], order[first + 1]], axis=1) % len(t), np.int64)
