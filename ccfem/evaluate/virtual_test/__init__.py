@@ -1,0 +1,1 @@
+"""The virtual test: the part re-solved with its fibres, before anything is printed."""
