@@ -1,1 +1,44 @@
 """Linear elasticity on tetrahedra: problem, assembly, solvers, recovery."""
+
+from ccfem.elasticity.assembly import add_blocks, assemble, cell_gradients, pattern
+from ccfem.elasticity.problem import (
+    Bearing,
+    Force,
+    Load,
+    PointForce,
+    Pressure,
+    Problem,
+    Support,
+    Traction,
+)
+from ccfem.elasticity.recovery import cell_stress, nodal_stress
+from ccfem.elasticity.solve import System, prepare, solve
+from ccfem.elasticity.solvers import BACKENDS, Solver, factorise, preconditioned_cg
+from ccfem.elasticity.stress_field import LayerStress, SolveRecord, StressField
+
+__all__ = [
+    "BACKENDS",
+    "Bearing",
+    "Force",
+    "LayerStress",
+    "Load",
+    "PointForce",
+    "Pressure",
+    "Problem",
+    "SolveRecord",
+    "Solver",
+    "StressField",
+    "Support",
+    "System",
+    "Traction",
+    "add_blocks",
+    "assemble",
+    "cell_gradients",
+    "cell_stress",
+    "factorise",
+    "nodal_stress",
+    "pattern",
+    "preconditioned_cg",
+    "prepare",
+    "solve",
+]

@@ -139,3 +139,11 @@ class Problem:
                 )
             if not np.isfinite(value).all():
                 raise InputError(f"problem.{name} must be finite; got NaN or infinity")
+
+    @property
+    def loaded_patches(self) -> tuple[str, ...]:
+        """Names of the patches that carry a support or a load, sorted."""
+        names = {support.patch for support in self.supports}
+        for case in self.loads.values():
+            names |= {load.patch for load in case if not isinstance(load, PointForce)}
+        return tuple(sorted(names))

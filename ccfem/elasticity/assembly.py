@@ -1,0 +1,271 @@
+"""Stiffness matrix of linear and quadratic tetrahedra, gathered row by row into 3x3 blocks.
+
+Each row of blocks is the sum over the cells round its node, so no element matrix is ever stored.
+Quadratic cells with straight sides are integrated exactly: their gradients are linear in the
+barycentric coordinates, so every block is a combination of the sixteen products of the four
+corner gradients.
+"""
+
+from dataclasses import dataclass
+
+import numpy as np
+import scipy.sparse as sp
+from numba import njit
+
+from ccfem.arrays import FloatArray, IntArray, read_only
+from ccfem.mesh import TetMesh
+
+__all__ = ["Pattern", "add_blocks", "assemble", "cell_gradients", "pattern"]
+
+
+@dataclass(frozen=True)
+class Pattern:
+    """Where the blocks of the stiffness matrix are; the same for every stiffness on a mesh.
+
+    Attributes
+    ----------
+    indptr : (n + 1,) int array
+        First block of each row.
+    indices : (b,) int array
+        Column (node) of each block, ascending within a row.
+    start : (n + 1,) int array
+        First entry of each node in `touching`.
+    touching : (m * q,) int array
+        ``q * cell + place`` of each cell that a node belongs to and its place there; q is the
+        number of nodes of a cell.
+    """
+
+    indptr: IntArray
+    indices: IntArray
+    start: IntArray
+    touching: IntArray
+
+    def __post_init__(self) -> None:
+        for name in ("indptr", "indices", "start", "touching"):
+            object.__setattr__(self, name, read_only(getattr(self, name), np.int32))
+
+
+@njit(cache=True)
+def _adjacency(cells, n):  # type: ignore[no-untyped-def]
+    m, q = cells.shape
+    start = np.zeros(n + 1, np.int32)
+    for cell in range(m):
+        for a in range(q):
+            start[cells[cell, a] + 1] += 1
+    for i in range(n):
+        start[i + 1] += start[i]
+    filled = start[:-1].copy()
+    touching = np.empty(m * q, np.int32)
+    for cell in range(m):
+        for a in range(q):
+            i = cells[cell, a]
+            touching[filled[i]] = cell * q + a
+            filled[i] += 1
+    seen = np.full(n, -1, np.int32)
+    indptr = np.zeros(n + 1, np.int32)
+    for i in range(n):
+        count = 0
+        for t in range(start[i], start[i + 1]):
+            for b in range(q):
+                j = cells[touching[t] // q, b]
+                if seen[j] != i:
+                    seen[j] = i
+                    count += 1
+        indptr[i + 1] = indptr[i] + count
+    # The pattern is symmetric: writing node i into the rows of its neighbours, with i ascending,
+    # leaves every row sorted.
+    indices = np.empty(indptr[n], np.int32)
+    filled[:] = indptr[:-1]
+    seen[:] = -1
+    for i in range(n):
+        for t in range(start[i], start[i + 1]):
+            for b in range(q):
+                j = cells[touching[t] // q, b]
+                if seen[j] != i:
+                    seen[j] = i
+                    indices[filled[j]] = i
+                    filled[j] += 1
+    return indptr, indices, start, touching
+
+
+def pattern(mesh: TetMesh) -> Pattern:
+    """Find the pattern of the stiffness matrix of a mesh."""
+    return Pattern(*_adjacency(mesh.cells, len(mesh.points)))
+
+
+def cell_gradients(mesh: TetMesh) -> FloatArray:
+    """Gradients of the four barycentric coordinates in each cell.
+
+    Returns
+    -------
+    (m, 4, 3) array, 1/mm
+        In a linear cell the displacement gradient is ``u.T @ gradients`` with the (4, 3)
+        displacement of its corners.
+    """
+    p = mesh.points[mesh.corners]
+    x, y, z = np.ascontiguousarray(np.moveaxis(p[:, 1:] - p[:, :1], 2, 0).transpose(0, 2, 1))
+    result = np.empty((len(p), 4, 3))
+    for a, (b, c) in enumerate(((1, 2), (2, 0), (0, 1)), start=1):
+        result[:, a, 0] = y[b] * z[c] - z[b] * y[c]
+        result[:, a, 1] = z[b] * x[c] - x[b] * z[c]
+        result[:, a, 2] = x[b] * y[c] - y[b] * x[c]
+    determinant = x[0] * result[:, 1, 0] + y[0] * result[:, 1, 1] + z[0] * result[:, 1, 2]
+    result[:, 1:] /= determinant[:, None, None]
+    result[:, 0] = -(result[:, 1] + result[:, 2] + result[:, 3])
+    return result
+
+
+@njit(cache=True)
+def _times_gradient(c, g, factor, t):  # type: ignore[no-untyped-def]
+    """Store ``factor * C B`` in t (6, 3), B the strain of displacements with gradient g."""
+    x, y, z = factor * g[0], factor * g[1], factor * g[2]
+    for k in range(6):
+        t[k, 0] = c[k, 0] * x + c[k, 4] * z + c[k, 5] * y
+        t[k, 1] = c[k, 1] * y + c[k, 3] * z + c[k, 5] * x
+        t[k, 2] = c[k, 2] * z + c[k, 3] * y + c[k, 4] * x
+
+
+@njit(cache=True)
+def _gather_linear(indptr, indices, start, touching, cells, gradients, scale, stiffness, data):  # type: ignore[no-untyped-def]
+    one = stiffness.shape[0] == 1
+    slot = np.empty(indptr.size - 1, np.int32)
+    t = np.empty((6, 3))
+    for i in range(indptr.size - 1):
+        for s in range(indptr[i], indptr[i + 1]):
+            slot[indices[s]] = s
+        for e in range(start[i], start[i + 1]):
+            cell, a = touching[e] // 4, touching[e] % 4
+            c = stiffness[0 if one else cell]
+            _times_gradient(c, gradients[cell, a], scale[cell], t)
+            for b in range(4):
+                x, y, z = gradients[cell, b, 0], gradients[cell, b, 1], gradients[cell, b, 2]
+                s = slot[cells[cell, b]]
+                for p in range(3):
+                    data[s, p, 0] += t[0, p] * x + t[4, p] * z + t[5, p] * y
+                    data[s, p, 1] += t[1, p] * y + t[3, p] * z + t[5, p] * x
+                    data[s, p, 2] += t[2, p] * z + t[3, p] * y + t[4, p] * x
+
+
+@njit(cache=True)
+def _gather_quadratic(  # type: ignore[no-untyped-def]
+    indptr, indices, start, touching, cells, gradients, scale, stiffness, first, second, data
+):
+    # Gradient of shape function a: sum of its terms phi_s g_s. A corner i has one term,
+    # (4 L_i - 1) g_i; the edge (i, j) has two, 4 L_j g_i and 4 L_i g_j. Written with the corner
+    # that the linear factor belongs to, any two terms integrate to 16 (1 + [same]) / 20, less 1
+    # where one of them is a corner's (twice less 1, plus 1, where both are).
+    one = stiffness.shape[0] == 1
+    slot = np.empty(indptr.size - 1, np.int32)
+    t = np.empty((6, 3))
+    block = np.empty((2, 4, 3, 3))
+    for i in range(indptr.size - 1):
+        for s in range(indptr[i], indptr[i + 1]):
+            slot[indices[s]] = s
+        for e in range(start[i], start[i + 1]):
+            cell, a = touching[e] // 10, touching[e] % 10
+            c = stiffness[0 if one else cell]
+            terms_a = 1 if a < 4 else 2
+            for k in range(terms_a):
+                corner = first[a] if k == 0 else second[a]
+                _times_gradient(c, gradients[cell, corner], scale[cell], t)
+                for b in range(4):
+                    x, y, z = gradients[cell, b, 0], gradients[cell, b, 1], gradients[cell, b, 2]
+                    for p in range(3):
+                        block[k, b, p, 0] = t[0, p] * x + t[4, p] * z + t[5, p] * y
+                        block[k, b, p, 1] = t[1, p] * y + t[3, p] * z + t[5, p] * x
+                        block[k, b, p, 2] = t[2, p] * z + t[3, p] * y + t[4, p] * x
+            for b in range(10):
+                s = slot[cells[cell, b]]
+                terms_b = 1 if b < 4 else 2
+                for k in range(terms_a):
+                    linear_a = second[a] if k == 0 else first[a]
+                    for h in range(terms_b):
+                        linear_b = second[b] if h == 0 else first[b]
+                        corner = first[b] if h == 0 else second[b]
+                        w = 1.6 if linear_a == linear_b else 0.8
+                        if a < 4 or b < 4:
+                            w -= 1.0
+                        for p in range(3):
+                            for r in range(3):
+                                data[s, p, r] += w * block[k, corner, p, r]
+
+
+_FIRST = np.concatenate([np.arange(4), TetMesh.edges[:, 0]])
+_SECOND = np.concatenate([np.arange(4), TetMesh.edges[:, 1]])
+
+
+def assemble(
+    mesh: TetMesh,
+    stiffness: FloatArray,
+    density: FloatArray | None = None,
+    where: Pattern | None = None,
+) -> sp.bsr_array:
+    """Stiffness matrix of a mesh.
+
+    Parameters
+    ----------
+    mesh : TetMesh
+        Linear, or quadratic with straight sides.
+    stiffness : (6, 6) or (m, 6, 6) array, MPa
+        In the global frame, for all cells or for each.
+    density : (m,) array, optional
+        Factor on the stiffness of each cell.
+    where : Pattern, optional
+        From `pattern`, when it is at hand already.
+
+    Returns
+    -------
+    bsr_array (3n, 3n) with 3x3 blocks, N/mm
+        Its columns are sorted and its ``indptr`` and ``indices`` are those of the pattern.
+    """
+    where = pattern(mesh) if where is None else where
+    scale = mesh.volumes if density is None else mesh.volumes * density
+    stiffness = np.ascontiguousarray(stiffness, dtype=np.float64).reshape(-1, 6, 6)
+    if len(stiffness) not in (1, len(mesh.cells)):
+        raise ValueError(
+            f"stiffness must have shape (6, 6) or ({len(mesh.cells)}, 6, 6); got "
+            f"{len(stiffness)} matrices: give one a cell"
+        )
+    data = np.zeros((len(where.indices), 3, 3))
+    arguments = (where.indptr, where.indices, where.start, where.touching, mesh.cells)
+    values = (cell_gradients(mesh), scale, stiffness)
+    if mesh.order == 1:
+        _gather_linear(*arguments, *values, data)
+    else:
+        _gather_quadratic(*arguments, *values, _FIRST, _SECOND, data)
+    n = 3 * len(mesh.points)
+    return sp.bsr_array((data, where.indices, where.indptr), shape=(n, n))
+
+
+@njit(cache=True)
+def _scatter(indptr, indices, nodes, blocks, data):  # type: ignore[no-untyped-def]
+    q = nodes.shape[1]
+    for e in range(nodes.shape[0]):
+        for a in range(q):
+            i = nodes[e, a]
+            for b in range(q):
+                low, high = indptr[i], indptr[i + 1] - 1
+                while low < high:
+                    middle = (low + high) // 2
+                    if indices[middle] < nodes[e, b]:
+                        low = middle + 1
+                    else:
+                        high = middle
+                for p in range(3):
+                    for r in range(3):
+                        data[low, p, r] += blocks[e, 3 * a + p, 3 * b + r]
+
+
+def add_blocks(matrix: sp.bsr_array, nodes: IntArray, blocks: FloatArray) -> None:
+    """Add element matrices to an assembled matrix, in place.
+
+    Parameters
+    ----------
+    matrix : bsr_array (3n, 3n)
+        From `assemble`. Every pair of nodes of an element must share a cell of its mesh.
+    nodes : (k, q) int array
+        Nodes of each element.
+    blocks : (k, 3q, 3q) array, N/mm
+        Element matrices, the components of a node together.
+    """
+    _scatter(matrix.indptr, matrix.indices, nodes, np.ascontiguousarray(blocks), matrix.data)

@@ -1,0 +1,194 @@
+"""Backends that solve the stiffness equations, and the choice among them."""
+
+from collections.abc import Callable
+from dataclasses import dataclass
+from importlib.util import find_spec
+from typing import NamedTuple
+
+import numpy as np
+import scipy.sparse as sp
+
+from ccfem.arrays import FloatArray, IntArray
+from ccfem.elasticity import direct, multigrid
+from ccfem.elasticity.conjugate_gradient import conjugate_gradient
+from ccfem.errors import InputError, SolveError
+
+__all__ = ["BACKENDS", "Solution", "Solver", "factorise", "preconditioned_cg"]
+
+BACKENDS = ("pypardiso", "cholmod", "superlu", "amg")
+
+_CURES = {
+    "pypardiso": 'pip install "ccfem[mkl]"',
+    "cholmod": 'pip install "scikit-sparse<0.5"',
+    "petsc": "install petsc4py",
+}
+_MODULES = {"pypardiso": "pypardiso", "cholmod": "sksparse", "petsc": "petsc4py"}
+
+_DIRECT_UNKNOWNS = 24_000
+"""Largest system that goes to SuperLU before AMG-CG is quicker."""
+
+_CHOLESKY_UNKNOWNS = 100_000
+"""Largest system that goes to a sparse Cholesky; about 150 000 linear cells."""
+
+
+class Solution(NamedTuple):
+    """What a solve found.
+
+    Attributes
+    ----------
+    values : (n,) array
+    iterations : int
+        0 for a direct solve.
+    residual : float
+        ``|rhs - matrix values| / |rhs|``, computed from the matrix.
+    """
+
+    values: FloatArray
+    iterations: int
+    residual: float
+
+
+@dataclass(frozen=True)
+class Solver:
+    """A factorisation or a preconditioner, ready for any number of right-hand sides.
+
+    Attributes
+    ----------
+    backend : str
+    matrix : bsr_array (n, n)
+    apply : callable
+        Solution of a right-hand side (n,): exact to rounding of a direct backend, else one
+        application of the preconditioner.
+    exact : bool
+    """
+
+    backend: str
+    matrix: sp.bsr_array
+    apply: Callable[[FloatArray], FloatArray]
+    exact: bool
+
+    def solve(
+        self, rhs: FloatArray, x0: FloatArray | None = None, tolerance: float = 1e-8
+    ) -> Solution:
+        """Solve for one right-hand side.
+
+        Parameters
+        ----------
+        rhs : (n,) array
+        x0 : (n,) array, optional
+            Where an iterative backend starts.
+        tolerance : float
+            Largest relative residual that is accepted.
+
+        Raises
+        ------
+        SolveError
+            When the relative residual stays above the tolerance.
+        """
+        if not self.exact:
+            return preconditioned_cg(self.matrix, rhs, self, x0, tolerance)
+        x = self.apply(rhs)
+        if _residual(self.matrix, x, rhs) > tolerance:
+            x = x + self.apply(rhs - self.matrix @ x)
+        return _checked(self.matrix, x, rhs, 0, tolerance, self.backend)
+
+
+def _residual(matrix: sp.bsr_array, x: FloatArray, rhs: FloatArray) -> float:
+    size = float(np.linalg.norm(rhs))
+    return float(np.linalg.norm(rhs - matrix @ x)) / (size or 1.0)
+
+
+def _checked(
+    matrix: sp.bsr_array,
+    x: FloatArray,
+    rhs: FloatArray,
+    iterations: int,
+    tolerance: float,
+    backend: str,
+) -> Solution:
+    residual = _residual(matrix, x, rhs)
+    if not residual <= tolerance:
+        raise SolveError(
+            f"{backend}: relative residual {residual:.1e} after {iterations} iterations, above "
+            f"the tolerance {tolerance:.1e}"
+        )
+    return Solution(x, iterations, residual)
+
+
+def preconditioned_cg(
+    matrix: sp.bsr_array,
+    rhs: FloatArray,
+    solver: Solver,
+    x0: FloatArray | None = None,
+    tolerance: float = 1e-8,
+) -> Solution:
+    """Solve by conjugate gradients with the solver of a similar matrix as preconditioner.
+
+    Parameters
+    ----------
+    matrix : bsr_array (n, n)
+    rhs : (n,) array
+    solver : Solver
+        Of this matrix or of one like it (another stiffness on the same mesh and supports).
+    x0 : (n,) array, optional
+    tolerance : float
+
+    Raises
+    ------
+    SolveError
+        When the relative residual stays above the tolerance.
+    """
+    # The recursive residual drifts from the true one: aim a little lower, and check the true one.
+    x, iterations = conjugate_gradient(matrix, rhs, solver.apply, x0, 0.5 * tolerance)
+    return _checked(matrix, x, rhs, iterations, tolerance, solver.backend)
+
+
+def choose(unknowns: int, order: int) -> str:
+    """Name the backend that suits a system of so many unknowns and order of displacement."""
+    if order == 2 and unknowns > _DIRECT_UNKNOWNS:
+        return "amg"
+    if unknowns <= _CHOLESKY_UNKNOWNS:
+        if direct.have_pardiso():
+            return "pypardiso"
+        if direct.have_cholmod():
+            return "cholmod"
+    return "superlu" if unknowns <= _DIRECT_UNKNOWNS else "amg"
+
+
+def factorise(
+    matrix: sp.bsr_array,
+    points: FloatArray,
+    backend: str = "auto",
+    parents: IntArray | None = None,
+) -> Solver:
+    """Factorise a stiffness matrix, or set up a preconditioner for it.
+
+    Parameters
+    ----------
+    matrix : bsr_array (3n, 3n) with 3x3 blocks
+        Symmetric positive definite; its first three blocks of columns sorted.
+    points : (n, 3) array, mm
+        Of the nodes that the rows stand for.
+    backend : str, default "auto"
+        One of `BACKENDS`; "auto" chooses by size and by what is installed.
+    parents : (n, 2) int array, optional
+        On quadratic meshes: the two rows of the corners whose middle each node is (twice its own
+        row for a corner, -1 for a corner without a row). "two-level" needs it.
+
+    Raises
+    ------
+    InputError
+        For an unknown backend and for one that is not installed, with the cure.
+    SolveError
+        When the factorisation fails.
+    """
+    if backend == "auto":
+        backend = choose(matrix.shape[0], 1 if parents is None else 2)
+    if backend not in BACKENDS:
+        raise InputError(f"no backend named '{backend}'; there are: auto, {', '.join(BACKENDS)}")
+    if backend in _MODULES and find_spec(_MODULES[backend]) is None:
+        raise InputError(f"backend '{backend}' is not installed: {_CURES[backend]}")
+    if backend == "amg":
+        return Solver(backend, matrix, multigrid.smoothed_aggregation(matrix, points), False)
+    makers = {"pypardiso": direct.pardiso, "cholmod": direct.cholmod, "superlu": direct.superlu}
+    return Solver(backend, matrix, makers[backend](matrix), True)

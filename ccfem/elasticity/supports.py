@@ -1,0 +1,262 @@
+"""Held components of the displacement, and whether they hold the part at all."""
+
+from collections.abc import Iterator
+from dataclasses import dataclass
+
+import numpy as np
+import scipy.sparse as sp
+from numba import njit
+from scipy.sparse.csgraph import connected_components
+
+from ccfem.arrays import BoolArray, FloatArray, IntArray, read_only
+from ccfem.elasticity.loads import facet_nodes
+from ccfem.elasticity.problem import Problem
+from ccfem.errors import InputError
+from ccfem.mesh import TetMesh
+
+__all__ = ["Held", "check_support", "held", "rigid_modes"]
+
+
+@njit(cache=True)
+def _reduce(indptr, indices, data, place, free, size, new_indptr, new_indices, new_data):  # type: ignore[no-untyped-def]
+    count = 0
+    for i in range(indptr.size - 1):
+        if place[i] < 0:
+            continue
+        for s in range(indptr[i], indptr[i + 1]):
+            j = indices[s]
+            if place[j] < 0:
+                continue
+            new_indices[count] = place[j]
+            for p in range(3):
+                for r in range(3):
+                    if free[i, p] and free[j, r]:
+                        new_data[count, p, r] = data[s, p, r]
+                    elif i == j and p == r:
+                        new_data[count, p, r] = size
+                    else:
+                        new_data[count, p, r] = 0.0
+            count += 1
+        new_indptr[place[i] + 1] = count
+    return count
+
+
+@dataclass(frozen=True)
+class Held:
+    """Which components are held, and where.
+
+    Attributes
+    ----------
+    free : (n, 3) bool array
+        Components that the solve finds.
+    value : (n, 3) array, mm
+        What held components are held at; zero elsewhere.
+    nodes : (k,) int array
+        Nodes with at least one free component: the rows of the reduced matrix.
+    """
+
+    free: BoolArray
+    value: FloatArray
+    nodes: IntArray
+
+    def reduce(self, matrix: sp.bsr_array) -> sp.bsr_array:
+        """Return the matrix (3k, 3k) of the nodes that can move.
+
+        Held components of such nodes keep a row with nothing but a diagonal entry, as large as
+        the mean one.
+        """
+        place = np.full(len(self.free), -1, dtype=np.int32)
+        place[self.nodes] = np.arange(len(self.nodes), dtype=np.int32)
+        indptr = np.zeros(len(self.nodes) + 1, np.int32)
+        indices = np.empty(len(matrix.indices), np.int32)
+        data = np.empty_like(matrix.data)
+        size = float(np.abs(matrix.diagonal()).mean())
+        count = _reduce(
+            matrix.indptr, matrix.indices, matrix.data, place, self.free, size,
+            indptr, indices, data,
+        )  # fmt: skip
+        n = 3 * len(self.nodes)
+        return sp.bsr_array((data[:count], indices[:count], indptr), shape=(n, n))
+
+    def right_hand_side(self, matrix: sp.bsr_array, forces: FloatArray) -> FloatArray:
+        """Right-hand side (3k,), N, of the reduced matrix, for nodal forces (n, 3)."""
+        rest = forces
+        if self.value.any():
+            rest = forces - (matrix @ self.value.reshape(-1)).reshape(-1, 3)
+        return np.where(self.free, rest, 0.0)[self.nodes].reshape(-1)
+
+    def expand(self, solution: FloatArray) -> FloatArray:
+        """Displacement (n, 3) of a solution (3k,) of the reduced system, mm."""
+        result = self.value.copy()
+        result[self.nodes] += np.where(self.free[self.nodes], solution.reshape(-1, 3), 0.0)
+        return result
+
+    def restrict(self, displacement: FloatArray) -> FloatArray:
+        """Solution (3k,) of the reduced system that stands for a displacement (n, 3)."""
+        return np.where(self.free, displacement, 0.0)[self.nodes].reshape(-1)
+
+
+def held(problem: Problem) -> Held:
+    """Collect the supports of a problem and check that they hold the part.
+
+    Nodes that belong to no cell are held at zero.
+
+    Raises
+    ------
+    InputError
+        For no support, an empty or unknown patch, values that contradict each other or are not
+        finite, and a part that is free to move; the message names the motion.
+    """
+    mesh = problem.mesh
+    if not problem.supports:
+        raise InputError("the part has no support: hold at least one patch")
+    free = np.ones((len(mesh.points), 3), dtype=bool)
+    value = np.zeros((len(mesh.points), 3))
+    for support in problem.supports:
+        if not np.isfinite(support.value).all():
+            raise InputError(f"a support must be held at finite values; got {support}")
+        facets = mesh.patch(support.patch)
+        if not len(facets):
+            raise InputError(f"patch '{support.patch}' is empty: no boundary facet meets its rule")
+        nodes = np.unique(facet_nodes(mesh, facets))
+        for component in sorted(set(support.components)):
+            k = "xyz".index(component)
+            before = nodes[~free[nodes, k]]
+            if (np.abs(value[before, k] - support.value[k]) > 1e-12).any():
+                raise InputError(
+                    f"supports contradict each other: nodes of patch '{support.patch}' are held "
+                    f"in {component} at {support.value[k]} mm and at another value"
+                )
+            free[nodes, k] = False
+            value[nodes, k] = support.value[k]
+    check_support(mesh, ~free)
+    unused = np.ones(len(mesh.points), dtype=bool)
+    unused[mesh.cells] = False
+    free[unused] = False
+    nodes = np.flatnonzero(free.any(axis=1))
+    return Held(read_only(free, np.bool_), read_only(value), read_only(nodes, np.int64))
+
+
+def rigid_modes(points: FloatArray) -> FloatArray:
+    """Displacements (3n, 6) of points (n, 3) in the three translations and three rotations."""
+    x, y, z = points.T
+    modes = np.zeros((len(points), 3, 6))
+    modes[:, [0, 1, 2], [0, 1, 2]] = 1.0
+    modes[:, 1, 3], modes[:, 2, 3] = -z, y
+    modes[:, 2, 4], modes[:, 0, 4] = -x, z
+    modes[:, 0, 5], modes[:, 1, 5] = -y, x
+    return modes.reshape(-1, 6)
+
+
+def check_support(mesh: TetMesh, fixed: BoolArray) -> None:
+    """Check that no piece of the part can move as a rigid body.
+
+    Bodies are cells joined through faces; bodies that share only an edge or a node are hinged
+    there. A piece is held when no rigid motion of its bodies respects the hinges and the supports.
+
+    Parameters
+    ----------
+    mesh : TetMesh
+    fixed : (n, 3) bool array
+
+    Raises
+    ------
+    InputError
+        Names the free motion.
+    """
+    pairs, m = mesh.neighbours, len(mesh.cells)
+    links = sp.coo_array((np.ones(len(pairs), dtype=bool), pairs.T), shape=(m, m))
+    count, body = connected_components(links, directed=False)
+    corner_body = np.repeat(body, 4)
+    members = np.unique(mesh.corners.reshape(-1) * count + corner_body)
+    node, owner = members // count, members % count
+    links = sp.coo_array(
+        (np.ones(len(node), dtype=bool), (owner, count + node)), shape=(2 * [count + len(fixed)])
+    )
+    pieces, piece = connected_components(links, directed=False)
+    for k in np.unique(piece[:count]):
+        chosen = piece[owner] == k
+        motion = _free_motions(mesh, fixed, node[chosen], owner[chosen])
+        if motion is not None:
+            which = f" (one of {pieces} separate pieces)" if np.ptp(piece[:count]) else ""
+            raise InputError(f"the part{which} is free to {motion}: add a support that holds it")
+
+
+def _free_motions(mesh: TetMesh, fixed: BoolArray, node: IntArray, owner: IntArray) -> str | None:
+    """Words for the rigid motions left to the bodies of one piece; None when it is held."""
+    bodies, owner = np.unique(owner, return_inverse=True)
+    points = mesh.points[node]
+    centre = points.mean(axis=0)
+    radius = float(np.linalg.norm(points - centre, axis=1).max())
+    modes = rigid_modes((points - centre) / radius).reshape(-1, 3, 6)
+    gram = np.zeros((len(bodies), 6, len(bodies), 6))
+    rows, sides = np.nonzero(fixed[node])
+    for body in range(len(bodies)):
+        own = modes[rows, sides][owner[rows] == body]
+        gram[body, :, body, :] += own.T @ own
+    for a, b in _hinges(node):
+        difference = np.zeros((3, len(bodies), 6))
+        difference[:, owner[a]], difference[:, owner[b]] = modes[a], -modes[b]
+        gram += np.einsum("kbi,kcj->bicj", difference, difference)
+    size = 6 * len(bodies)
+    values, vectors = np.linalg.eigh(gram.reshape(size, size))
+    null = vectors[:, values <= 1e-10 * max(1.0, values[-1])]
+    if not null.shape[1]:
+        return None
+    null = null.reshape(len(bodies), 6, -1)
+    worst = np.linalg.norm(null, axis=(1, 2)).argmax()
+    return " and to ".join(_words(null[worst], centre, radius))
+
+
+def _hinges(node: IntArray) -> Iterator[tuple[int, int]]:
+    """Pairs of entries that name the same node."""
+    order = np.argsort(node, kind="stable")
+    for k in np.flatnonzero(node[order[1:]] == node[order[:-1]]):
+        yield int(order[k]), int(order[k + 1])
+
+
+def _words(motions: FloatArray, centre: FloatArray, radius: float) -> list[str]:
+    """Words for the span of rigid motions (6, k): translation, then rotation over `radius`."""
+    values, combination = np.linalg.eigh(motions[3:].T @ motions[3:])
+    moving = values <= 1e-8
+    words = []
+    translations = np.linalg.qr(motions[:3] @ combination[:, moving])[0]
+    if translations.shape[1]:
+        words.append("move along " + " and ".join(_directions(translations)))
+    rotating = motions @ combination[:, ~moving]
+    # Translations that are free anyway say nothing about where an axis of rotation lies.
+    rotating[:3] -= translations @ (translations.T @ rotating[:3])
+    rotations = rotating[3:]
+    for direction in _axes(rotations):
+        weights = np.linalg.lstsq(rotations, direction, rcond=None)[0]
+        shift = rotating[:3] @ weights
+        through = centre + radius * np.cross(direction, shift)
+        pitch = float(direction @ shift)
+        point = ", ".join(f"{c:.4g}" for c in through + 0.0)
+        verb = "rotate" if abs(pitch) < 1e-6 else "screw"
+        words.append(f"{verb} about the axis through ({point}) along {_name(direction)}")
+    return words
+
+
+def _axes(span: FloatArray) -> list[FloatArray]:
+    """Basis of the column span (3, k), of coordinate axes where it can be."""
+    if not span.shape[1]:
+        return []
+    basis = np.linalg.svd(span, full_matrices=False)[0]
+    inside = [axis for axis in np.eye(3) if np.linalg.norm(basis.T @ axis) > 1.0 - 1e-6]
+    rest = basis - sum((np.outer(axis, axis @ basis) for axis in inside), np.zeros_like(basis))
+    more, size, _ = np.linalg.svd(rest, full_matrices=False)
+    return inside + [more[:, k] for k in np.flatnonzero(size > 1e-6)]
+
+
+def _directions(span: FloatArray) -> list[str]:
+    return [_name(direction) for direction in _axes(span)]
+
+
+def _name(direction: FloatArray) -> str:
+    """Name of a direction: a coordinate axis, or its components."""
+    k = int(np.abs(direction).argmax())
+    if abs(direction[k]) > 1.0 - 1e-6:
+        return "xyz"[k]
+    direction = direction * np.sign(direction[k])
+    return "(" + ", ".join(f"{c:.3g}" for c in direction) + ")"
