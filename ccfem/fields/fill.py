@@ -69,10 +69,10 @@ def fill_screened(
     Parameters
     ----------
     surface : Surface
-    direction : (n, 2) array
-        Unit vectors at the points, of any sign.
-    stress : (n,) array, MPa
-    confidence : (n,) array in [0, 1]
+    direction : (t, 2) array
+        Unit vectors on the triangles, of any sign.
+    stress : (t,) array, MPa
+    confidence : (t,) array in [0, 1]
     length : float, mm, default 3.0
 
     Returns
@@ -82,15 +82,13 @@ def fill_screened(
     stress : (t,) array, MPa
     """
     angle = np.arctan2(direction[:, 1], direction[:, 0])
-    double = np.column_stack([np.cos(2.0 * angle), np.sin(2.0 * angle)])
-    mass = surface.lumped(np.ones(len(surface.triangles)))
-    weighted = mass * confidence
-    metric = length**2 * surface.areas[:, None, None] * np.eye(2)
-    laplacian = surface.energy(metric)
+    mass = surface.lumped(np.ones(len(angle)))
     floor = 1e-9 * mass.mean() + 1e-6 * mass
-    lines = positive_definite(laplacian + sparse.diags_array(weighted + floor, format="csc"))
-    filled = np.column_stack([lines.solve(weighted * column) for column in double.T])
-    size = lines.solve((weighted + floor) * stress)
-    mean = surface.mean(filled)
-    angle = 0.5 * np.arctan2(mean[:, 1], mean[:, 0])
-    return np.column_stack([np.cos(angle), np.sin(angle)]), surface.mean(size)
+    metric = length**2 * surface.areas[:, None, None] * np.eye(2)
+    weighted = surface.lumped(confidence) + floor
+    matrix = surface.energy(metric) + sparse.diags_array(weighted, format="csc")
+    sources = [np.cos(2.0 * angle), np.sin(2.0 * angle), stress]
+    right = np.column_stack([surface.lumped(confidence * source) for source in sources])
+    cosine, sine, size = surface.mean(positive_definite(matrix).solve(right)).T
+    filled = 0.5 * np.arctan2(sine, cosine)
+    return np.column_stack([np.cos(filled), np.sin(filled)]), size

@@ -8,7 +8,9 @@ from ccfem.arrays import FloatArray, IntArray
 __all__ = ["orient"]
 
 
-def orient(direction: FloatArray, pairs: IntArray) -> FloatArray:
+def orient(
+    direction: FloatArray, pairs: IntArray, confidence: FloatArray | None = None
+) -> FloatArray:
     """Flip vectors so that neighbours point the same way wherever that is possible.
 
     Signs are propagated along the minimum spanning tree of the weights ``1 - |v_i . v_j|``: edges
@@ -21,6 +23,10 @@ def orient(direction: FloatArray, pairs: IntArray) -> FloatArray:
         Unit vectors.
     pairs : (e, 2) int array
         Neighbouring elements.
+    confidence : (k,) array in [0, 1], optional
+        Weights become ``1 - min(c_i, c_j) |v_i . v_j|``. Where a field of lines cannot be oriented
+        throughout, there is a cut across which it flips; in a smooth field nothing but the
+        confidence says where that cut does no harm.
 
     Returns
     -------
@@ -29,7 +35,12 @@ def orient(direction: FloatArray, pairs: IntArray) -> FloatArray:
         of its first element.
     """
     product = np.einsum("ij,ij->i", direction[pairs[:, 0]], direction[pairs[:, 1]])
-    order = np.argsort(1.0 - np.abs(product), kind="stable")
+    weight = 1.0 - np.abs(product)
+    if confidence is not None:
+        weight = 1.0 - np.minimum(confidence[pairs[:, 0]], confidence[pairs[:, 1]]) * np.abs(
+            product
+        )
+    order = np.argsort(weight, kind="stable")
     return direction * _signs(len(direction), pairs[order], product[order] < 0.0)[:, None]
 
 

@@ -63,22 +63,20 @@ def isocontours(
     start = np.concatenate([[0], np.cumsum(np.maximum(high - low + 1, 0))])
     crossings, level = _crossings(points, scaled, edges, low, start)
     line, offsets = _chain(of_triangle, low, high, start)
-    order = np.argsort(level[line[offsets[:-1]]], kind="stable") if len(offsets) > 1 else []
+    order = np.argsort(level[line[offsets[:-1]]], kind="stable")
     sizes = np.diff(offsets)[order]
-    taken = _gather(line, offsets, np.asarray(order, dtype=np.int64), sizes)
+    taken = _gather(line, offsets, order, sizes)
     new_offsets = np.concatenate([[0], np.cumsum(sizes)]).astype(np.int64)
     return Isocontours(crossings[taken], new_offsets, level[taken[new_offsets[:-1]]])
 
 
 def _gather(line: IntArray, offsets: IntArray, order: IntArray, sizes: IntArray) -> IntArray:
-    if not len(order):
-        return np.zeros(0, dtype=np.int64)
     shift = np.repeat(offsets[:-1][order] - (np.cumsum(sizes) - sizes), sizes)
     return line[np.arange(int(sizes.sum())) + shift]
 
 
 def _edges(triangles: IntArray, n: int) -> tuple[IntArray, IntArray]:
-    """Unique edges (e, 2) and the three edges of each triangle (t, 3), opposite to its corners."""
+    """Return unique edges (e, 2) and the edges (t, 3) opposite to the corners of each triangle."""
     pairs = np.concatenate([triangles[:, [1, 2]], triangles[:, [2, 0]], triangles[:, [0, 1]]])
     key = pairs.min(axis=1) * n + pairs.max(axis=1)
     unique, inverse = np.unique(key, return_inverse=True)

@@ -1,0 +1,100 @@
+"""How many isocurves fit: the search for their number [paper 000, section 4.3, Eq. 7]."""
+
+import numpy as np
+import scipy.sparse as sparse
+from scipy.sparse.csgraph import connected_components, dijkstra
+
+from ccfem.arrays import FloatArray
+from ccfem.fields.surface import Surface
+from ccfem.geometry.isocontours import (
+    Isocontours,
+    isocontours,
+    least_distance,
+    steepest_spacing,
+)
+
+__all__ = ["extract_levels", "levels_at", "start_count", "unit_levels"]
+
+
+def levels_at(surface: Surface, values: FloatArray, count: int) -> Isocontours:
+    """Isocurves at `count` levels, half a step from the extremes [paper 000, Eq. 7]."""
+    first, step = _levels(values, count)
+    return isocontours(surface.points, surface.triangles, values, first, step)
+
+
+def unit_levels(surface: Surface, values: FloatArray) -> Isocontours:
+    """Isocurves at whole steps of 1, the first half a step above the smallest value."""
+    first = float(values.min()) + 0.5
+    return isocontours(surface.points, surface.triangles, values, first, 1.0)
+
+
+def extract_levels(surface: Surface, values: FloatArray, width: float) -> Isocontours:
+    """Extract the largest number of isocurves whose neighbours are more than a width apart.
+
+    The number starts at `start_count`, grows while the smallest distance between neighbouring
+    isocurves exceeds the width, and then falls one by one until it does again. A number is first
+    tried on single triangles that two levels cross, and only when these allow it on all distances:
+    that changes the cost, not the result.
+
+    Parameters
+    ----------
+    surface : Surface
+    values : (n,) array
+        The scalar field.
+    width : float, mm
+        W.
+
+    Returns
+    -------
+    Isocontours
+        Empty where not even one isocurve fits. "Neighbours" are curves of levels i and i + 1;
+        branches of one level may come nearer to each other.
+    """
+    if not np.ptp(values) > 0.0:
+        return levels_at(surface, np.zeros(len(values)), 1)
+    gradient = surface.gradient(values)
+    count = start_count(surface, values, width)
+
+    def apart(count: int, enough: float) -> float:
+        first, step = _levels(values, count)
+        least = steepest_spacing(surface.areas, gradient, surface.triangles, values, first, step)
+        if least <= enough:
+            return float(least)
+        curves = isocontours(surface.points, surface.triangles, values, first, step)
+        return float(
+            least_distance(curves.points, curves.offsets, curves.level, 2.0 * width, enough)
+        )
+
+    distance = apart(count, width)
+    while distance > width:
+        count = int(np.ceil(count * distance / width))
+        distance = apart(count, width)
+    while count > 1 and not distance > width:
+        count -= 1
+        distance = apart(count, width)
+    return levels_at(surface, values, count)
+
+
+def start_count(surface: Surface, values: FloatArray, width: float) -> int:
+    """Distance along mesh edges from the smallest to the largest value, in widths.
+
+    For each connected part of the surface by Dijkstra; the largest counts.
+    """
+    t = surface.triangles
+    edges = np.concatenate([t[:, [0, 1]], t[:, [1, 2]], t[:, [2, 0]]])
+    length = np.linalg.norm(surface.points[edges[:, 0]] - surface.points[edges[:, 1]], axis=1)
+    n = len(surface.points)
+    graph = sparse.coo_array((length, (edges[:, 0], edges[:, 1])), shape=(n, n)).tocsr()
+    graph = graph.maximum(graph.T)
+    lowest = int(np.argmin(values))
+    distance = dijkstra(graph, directed=False, indices=lowest)
+    highest = distance[int(np.argmax(values))]
+    if not np.isfinite(highest):
+        _, part = connected_components(graph, directed=False)
+        highest = distance[(part == part[lowest]) & np.isfinite(distance)].max()
+    return max(int(np.ceil(highest / width)), 1)
+
+
+def _levels(values: FloatArray, count: int) -> tuple[float, float]:
+    low, step = float(values.min()), float(np.ptp(values)) / count
+    return low + 0.5 * step, step if step > 0.0 else 1.0

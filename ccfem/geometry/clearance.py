@@ -1,0 +1,130 @@
+"""Keeping strands apart: what lies nearer than a strand's width to a longer one is cut away."""
+
+from collections.abc import Sequence
+
+import numpy as np
+from numba import njit
+
+from ccfem.arrays import FloatArray
+
+__all__ = ["trim_to_clearance"]
+
+
+def trim_to_clearance(
+    lines: Sequence[FloatArray], clearance: float, least_length: float, first: int = 0
+) -> list[FloatArray]:
+    """Cut strands so that no two are nearer than a clearance, the longest first.
+
+    Strands are laid in the order of their length. Of each, only the stretches that keep the
+    clearance from those laid before, and from earlier parts of itself, remain; stretches shorter
+    than `least_length` are dropped.
+
+    Parameters
+    ----------
+    lines : sequence of (n_i, 2) arrays, mm
+        Their steps should not be much longer than half the clearance.
+    clearance : float, mm
+    least_length : float, mm
+    first : int, default 0
+        So many strands at the start of `lines` are laid before all others.
+
+    Returns
+    -------
+    list of (n, 2) arrays
+        From the longest strand to the shortest; an untouched closed strand stays closed.
+    """
+    if not lines:
+        return []
+    length = [float(np.linalg.norm(np.diff(line, axis=0), axis=1).sum()) for line in lines]
+    order = np.lexsort((-np.array(length), np.arange(len(lines)) >= first))
+    ordered = [lines[k] for k in order]
+    points = np.concatenate(ordered)
+    offsets = np.concatenate([[0], np.cumsum([len(line) for line in ordered])])
+    keep = _lay(points, offsets, clearance, least_length)
+    kept: list[FloatArray] = []
+    for k in range(len(ordered)):
+        mask = keep[offsets[k] : offsets[k + 1]]
+        line = ordered[k]
+        if mask.all():
+            kept.append(line)
+            continue
+        runs = np.flatnonzero(np.diff(np.concatenate([[False], mask, [False]]).astype(np.int8)))
+        pieces = [line[a:b] for a, b in zip(runs[::2], runs[1::2], strict=True) if b - a > 1]
+        closed = np.array_equal(line[0], line[-1])
+        if closed and len(pieces) > 1 and mask[0] and mask[-1]:
+            pieces = [np.concatenate([pieces[-1], pieces[0][1:]]), *pieces[1:-1]]
+        kept += pieces
+    sizes = [float(np.linalg.norm(np.diff(line, axis=0), axis=1).sum()) for line in kept]
+    return [line for line, size in zip(kept, sizes, strict=True) if size >= least_length]
+
+
+@njit(cache=True)
+def _lay(points, offsets, clearance, least_length):  # type: ignore[no-untyped-def]
+    count = len(points)
+    keep = np.ones(count, np.bool_)
+    x0, y0 = points[:, 0].min(), points[:, 1].min()
+    nx = int((points[:, 0].max() - x0) / clearance) + 1
+    ny = int((points[:, 1].max() - y0) / clearance) + 1
+    head = np.full(nx * ny, -1)
+    following = np.full(count, -1)
+    along = np.zeros(count)
+    line = np.zeros(count, np.int64)
+    for k in range(len(offsets) - 1):
+        first, last = offsets[k], offsets[k + 1]
+        for p in range(first, last):
+            line[p] = k
+            if p > first:
+                step = points[p] - points[p - 1]
+                along[p] = along[p - 1] + np.sqrt((step**2).sum())
+        closed = (points[first] == points[last - 1]).all()
+        whole = along[last - 1]
+        # Points are added to the grid only once the line has moved on by two clearances, so that
+        # a line is not in its own way.
+        waiting = first
+        for p in range(first, last):
+            i, j = int((points[p, 0] - x0) / clearance), int((points[p, 1] - y0) / clearance)
+            for cell in range(9):
+                a, b = i + cell // 3 - 1, j + cell % 3 - 1
+                if a < 0 or b < 0 or a >= nx or b >= ny:
+                    continue
+                q = head[a * ny + b]
+                while q >= 0 and keep[p]:
+                    apart = along[p] - along[q]
+                    if closed:
+                        apart = min(apart, whole - apart)
+                    own = line[q] == k
+                    if not (own and apart < 3.0 * clearance):
+                        dx, dy = points[p, 0] - points[q, 0], points[p, 1] - points[q, 1]
+                        if dx * dx + dy * dy < clearance * clearance:
+                            keep[p] = False
+                    q = following[q]
+            while waiting < p and along[waiting] < along[p] - 2.0 * clearance:
+                _add(points, keep, waiting, head, following, x0, y0, clearance, ny)
+                waiting += 1
+        # Stretches too short to print do not hold others off.
+        _drop_short(keep, along, first, last, least_length, closed)
+        for q in range(waiting, last):
+            _add(points, keep, q, head, following, x0, y0, clearance, ny)
+    return keep
+
+
+@njit(cache=True)
+def _add(points, keep, p, head, following, x0, y0, size, ny):  # type: ignore[no-untyped-def]
+    if keep[p]:
+        cell = int((points[p, 0] - x0) / size) * ny + int((points[p, 1] - y0) / size)
+        following[p] = head[cell]
+        head[cell] = p
+
+
+@njit(cache=True)
+def _drop_short(keep, along, first, last, least_length, closed):  # type: ignore[no-untyped-def]
+    start = -1
+    for p in range(first, last + 1):
+        if p < last and keep[p]:
+            if start < 0:
+                start = p
+        elif start >= 0:
+            joins_round = closed and (start == first or p == last)
+            if along[p - 1] - along[start] < least_length and not joins_round:
+                keep[start:p] = False
+            start = -1

@@ -1,0 +1,275 @@
+"""Joining polylines end to end into fewer, longer ones."""
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
+import shapely
+from scipy.spatial import cKDTree
+
+from ccfem.arrays import FloatArray
+
+__all__ = ["Joint", "join", "link_ends", "ring_arc"]
+
+
+@dataclass(frozen=True)
+class Joint:
+    """A connection of two ends of polylines.
+
+    Ends are numbered: polyline k starts with end 2 k and stops with end 2 k + 1.
+
+    Attributes
+    ----------
+    first, second : int
+        The ends.
+    between : (n, 2) array, mm
+        Points between them, from `first` to `second`, ends not included.
+    """
+
+    first: int
+    second: int
+    between: FloatArray
+
+
+def join(lines: Sequence[FloatArray], joints: Sequence[Joint]) -> list[FloatArray]:
+    """Join polylines at their ends.
+
+    Parameters
+    ----------
+    lines : sequence of (n_i, 2) arrays, mm
+        Open polylines; closed ones simply have no joint.
+    joints : sequence of Joint
+        Each end in at most one of them.
+
+    Returns
+    -------
+    list of (n, 2) arrays
+        A chain of joints that returns to its start gives a closed polyline, first point repeated.
+    """
+    partner: dict[int, tuple[int, FloatArray]] = {}
+    for joint in joints:
+        partner[joint.first] = (joint.second, joint.between)
+        partner[joint.second] = (joint.first, joint.between[::-1])
+    joined = []
+    done = np.zeros(len(lines), dtype=bool)
+    ends = [end for end in range(2 * len(lines)) if end not in partner]
+    for start in [*ends, *range(0, 2 * len(lines), 2)]:
+        if done[start // 2]:
+            continue
+        parts = []
+        end: int | None = start
+        while end is not None and not done[end // 2]:
+            done[end // 2] = True
+            parts.append(lines[end // 2] if end % 2 == 0 else lines[end // 2][::-1])
+            end, between = partner.get(end ^ 1, (None, np.zeros((0, 2))))
+            if end is not None:
+                parts.append(between)
+        if end is not None:  # back at the start
+            parts.append(parts[0][:1])
+        joined.append(np.concatenate(parts))
+    return joined
+
+
+_CLOSING_TURN = np.deg2rad(60.0)
+"""A link may close a path to a ring only where it turns less, both ends together: a path of two
+neighbouring strands that closes on itself can no longer join the next."""
+
+
+@dataclass(frozen=True)
+class _Link:
+    """A possible link of two ends; each line is cut back to where the link leaves it."""
+
+    cost: float
+    turn: float  # radians, both ends together
+    first: int
+    second: int
+    path: FloatArray  # from the cut end of `first` to that of `second`
+
+
+def link_ends(
+    lines: Sequence[FloatArray],
+    section: Any,
+    limit: float,
+    width: float,
+    turn_cost: float = 1.0,
+) -> list[FloatArray]:
+    """Join ends that lie near each other by links inside the section.
+
+    A link is straight, or it follows the boundary half a strand's width inside it, where two
+    neighbouring ends lie on that boundary. Links are taken in the order of their cost: their
+    length, and `turn_cost` mm for every right angle that the path turns at its ends. A link
+    crosses nothing and stays 0.9 widths away from all strands but the two that it joins.
+
+    Parameters
+    ----------
+    lines : sequence of (n_i, 2) arrays, mm
+    section : shapely (Multi)Polygon
+    limit : float, mm
+        Longest link.
+    width : float, mm
+        Of a strand.
+    turn_cost : float, mm, default 1.0
+
+    Returns
+    -------
+    list of (n, 2) arrays
+    """
+    opened = [k for k, line in enumerate(lines) if not np.array_equal(line[0], line[-1])]
+    if not opened or limit <= 0.0:
+        return list(lines)
+    ends = np.array([2 * k + side for k in opened for side in (0, 1)])
+    links = _straight_links(lines, ends, limit, turn_cost)
+    links += _boundary_links(lines, ends, section, 0.5 * width, limit, turn_cost)
+    links.sort(key=lambda link: (link.cost, link.first, link.second))
+    return _accept(list(lines), links, section, 0.9 * width)
+
+
+def _accept(
+    lines: list[FloatArray], links: list[_Link], section: Any, clearance: float
+) -> list[FloatArray]:
+    """Take links greedily, cheapest first, as long as they keep off everything else."""
+    paths = [shapely.linestrings(link.path) for link in links]
+    shapely.prepare(section)
+    inside = shapely.covers(section, paths) if links else []
+    strands = shapely.linestrings(np.concatenate(lines), indices=_rows(lines))
+    tree = shapely.STRtree(strands)
+    taken: set[int] = set()
+    accepted: list[Any] = []
+    joints = []
+    chain = np.arange(len(lines))
+    for link, path, within in zip(links, paths, inside, strict=True):
+        if not within or link.first in taken or link.second in taken:
+            continue
+        own = {link.first // 2, link.second // 2}
+        if chain[link.first // 2] == chain[link.second // 2] and link.turn > _CLOSING_TURN:
+            continue
+        near = set(tree.query(path, predicate="dwithin", distance=clearance).tolist()) - own
+        if near or any(shapely.dwithin(path, other, clearance) for other in accepted):
+            continue
+        cut = {k: _cut_back(lines[k], link, k) for k in own}
+        shortened = shapely.linestrings(_shorten(link.path))
+        if any(shapely.intersects(shortened, shapely.linestrings(line)) for line in cut.values()):
+            continue
+        for k, line in cut.items():
+            lines[k] = line
+        chain[chain == chain[link.second // 2]] = chain[link.first // 2]
+        taken |= {link.first, link.second}
+        accepted.append(path)
+        joints.append(Joint(link.first, link.second, link.path[1:-1]))
+    return join(lines, joints)
+
+
+def _cut_back(line: FloatArray, link: _Link, k: int) -> FloatArray:
+    """Line k, cut back at the ends that the link takes to where the link leaves it."""
+    if link.first == 2 * k or link.second == 2 * k:
+        line = _cut_start(line, link.path[0] if link.first == 2 * k else link.path[-1])
+    if link.first == 2 * k + 1 or link.second == 2 * k + 1:
+        point = link.path[0] if link.first == 2 * k + 1 else link.path[-1]
+        line = _cut_start(line[::-1], point)[::-1]
+    return line
+
+
+def _cut_start(line: FloatArray, point: FloatArray) -> FloatArray:
+    """Replace the start of a line, up to a point on it, by that point."""
+    if np.array_equal(line[0], point):
+        return line
+    step = np.diff(line, axis=0)
+    length = np.maximum((step**2).sum(axis=1), 1e-30)
+    share = np.clip(((point - line[:-1]) * step).sum(axis=1) / length, 0.0, 1.0)
+    gap = np.linalg.norm(line[:-1] + share[:, None] * step - point, axis=1)
+    piece = int(np.argmax(gap < 1e-9 + gap.min()))
+    rest = line[piece + 1 :]
+    return np.concatenate([[point], rest[1:] if np.allclose(rest[0], point) else rest])
+
+
+def _shorten(path: FloatArray, share: float = 1e-3) -> FloatArray:
+    shortened = path.copy()
+    shortened[0] += share * (path[1] - path[0])
+    shortened[-1] += share * (path[-2] - path[-1])
+    return shortened
+
+
+def _straight_links(
+    lines: Sequence[FloatArray], ends: Any, limit: float, turn_cost: float
+) -> list[_Link]:
+    points = np.array([lines[end // 2][-(end % 2)] for end in ends])
+    outward = np.array([_outward(lines[end // 2], end % 2) for end in ends])
+    links = []
+    for a, b in cKDTree(points).query_pairs(limit):
+        step = points[b] - points[a]
+        length = float(np.linalg.norm(step))
+        if length > 0.0:
+            turn = _angle(outward[a], step) + _angle(outward[b], -step)
+            cost = length + turn_cost * turn / (0.5 * np.pi)
+            path = np.stack([points[a], points[b]])
+            links.append(_Link(cost, turn, int(ends[a]), int(ends[b]), path))
+    return links
+
+
+def _boundary_links(
+    lines: Sequence[FloatArray],
+    ends: Any,
+    section: Any,
+    inset: float,
+    limit: float,
+    turn_cost: float,
+) -> list[_Link]:
+    """Links along the boundary, `inset` inside it, between neighbouring ends on it."""
+    links: list[_Link] = []
+    inner = shapely.buffer(section, -inset)
+    starts = shapely.points(np.array([lines[end // 2][-(end % 2)] for end in ends]))
+    for ring in shapely.get_rings(inner):
+        found = []
+        for end in ends[shapely.dwithin(ring, starts, 1.5 * inset)]:
+            line = lines[end // 2] if end % 2 == 0 else lines[end // 2][::-1]
+            head = shapely.linestrings(_head(line, limit))
+            meeting = shapely.get_coordinates(shapely.intersection(head, ring))
+            if len(meeting):
+                passed = shapely.line_locate_point(head, shapely.points(meeting))
+                point = meeting[np.argmin(passed)]
+                position = float(shapely.line_locate_point(ring, shapely.points(point)))
+                found.append((position, int(end), point, _outward(line, 0)))
+        found.sort(key=lambda entry: entry[:2])
+        for k, (position, end, point, out) in enumerate(found):
+            after, other, target, other_out = found[(k + 1) % len(found)]
+            gap = (after - position) % ring.length
+            if other == end or not 0.0 < gap <= limit:
+                continue
+            arc = ring_arc(ring, position, gap)
+            arc[0], arc[-1] = point, target
+            turn = _angle(out, arc[1] - arc[0]) + _angle(other_out, arc[-2] - arc[-1])
+            cost = gap + turn_cost * turn / (0.5 * np.pi)
+            links.append(_Link(cost, turn, end, other, arc))
+    return links
+
+
+def ring_arc(ring: Any, start: float, length: float) -> FloatArray:
+    """Points (n, 2) of a closed ring from the arc length `start` over `length`, both ends in."""
+    corners = shapely.get_coordinates(ring)
+    along = np.concatenate([[0.0], np.cumsum(np.linalg.norm(np.diff(corners, axis=0), axis=1))])
+    twice = np.concatenate([along[:-1], along + along[-1]])
+    inner = twice[(twice > start + 1e-9) & (twice < start + length - 1e-9)]
+    wanted = np.concatenate([[start], inner, [start + length]]) % along[-1]
+    return np.column_stack([np.interp(wanted, along, corners[:, axis]) for axis in (0, 1)])
+
+
+def _head(line: FloatArray, reach: float) -> FloatArray:
+    """Return the first `reach` mm of a line, at least its first piece."""
+    distance = np.cumsum(np.linalg.norm(np.diff(line, axis=0), axis=1))
+    return line[: int(np.searchsorted(distance, reach)) + 2]
+
+
+def _angle(a: FloatArray, b: FloatArray) -> float:
+    return abs(float(np.arctan2(a[0] * b[1] - a[1] * b[0], a @ b)))
+
+
+def _rows(lines: Sequence[FloatArray]) -> Any:
+    return np.repeat(np.arange(len(lines)), [len(line) for line in lines])
+
+
+def _outward(line: FloatArray, side: int, reach: float = 1.0) -> FloatArray:
+    """Unit vector along which the line leaves its first (side 0) or last (side 1) point."""
+    head = _head(line if side == 0 else line[::-1], reach)
+    step = head[0] - head[-1]
+    return step / max(float(np.linalg.norm(step)), 1e-12)

@@ -1,0 +1,259 @@
+"""Isocurves of a scalar field that follows the tension: the method of Chen et al. 2021.
+
+X. Chen, G. Fang, W.-H. Liao, C. C. L. Wang, Field-based toolpath generation for 3D printing
+continuous fibre reinforced thermoplastic composites, Additive Manufacturing 49 (2021) 102470
+(paper 000). `Isocurve.literal` is the algorithm as printed; the defaults are better by what
+``benchmarks/papers/chen_2021`` measures.
+"""
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+from typing import Any, ClassVar, Literal, get_args
+
+import numpy as np
+
+from ccfem.arrays import FloatArray
+from ccfem.elasticity.stress_field import LayerStress, StressField
+from ccfem.errors import InputError
+from ccfem.fields.compatibility import Incompatible
+from ccfem.fields.fill import fill_laplacian, fill_screened
+from ccfem.fields.layer_tension import MeshTension, SampledTension, layer_tension, mesh_tension
+from ccfem.fields.levels import extract_levels, unit_levels
+from ccfem.fields.orientation import orient
+from ccfem.fields.scalar import fit_constrained, fit_literal, fit_weighted
+from ccfem.fields.surface import Surface
+from ccfem.geometry.clearance import trim_to_clearance
+from ccfem.geometry.conformal import lead_into, parallel_curve
+from ccfem.geometry.joining import link_ends
+from ccfem.geometry.rings import close_short_ring, holes_on
+from ccfem.layers.layer import Layer
+from ccfem.machine import Machine
+from ccfem.strategies.strategy import Amount, LayerStrategy
+from ccfem.toolpaths import Toolpaths
+
+__all__ = ["Isocurve"]
+
+Field = Literal["layer", "mesh"]
+Source = Literal["nodal", "cell"]
+Sense = Literal["tensile", "absolute"]
+Fill = Literal["screened", "laplacian"]
+Fit = Literal["weighted", "literal"]
+Spacing = Literal["search", "constrained"]
+
+_LEAST_WEIGHT = 1e-3
+
+
+@dataclass(frozen=True)
+class Isocurve:
+    """Fibre along the tension, the denser the larger the tension.
+
+    Attributes
+    ----------
+    cap : float, default 82
+        Percentile (by area of the layer) of the stress above which the density grows no more.
+        The knob for how much fibre a layer gets: without it one hot spot sets the spacing of the
+        whole layer.
+    power : float, default 1
+        p of Eq. 5: density as stress to this power; 0 gives uniform density.
+    spacing_weight : float, default 0.1
+        Weight of even spacing against alignment in the fit (``fit="weighted"``).
+    fill_length : float, mm, default 3
+        Reach of the screened fill.
+    link_limit : float, default 7
+        Longest link between two ends, in strand widths; the paper says 2.
+    rings : tuple of float, default (1.5, 2.5)
+        Distances, in strand widths, of the curves round loaded and supported holes. The isocurves
+        are led into the last one.
+    conformal : tuple of str, optional
+        Patches whose holes get such curves; by default all that carry a load or a support.
+    stress : {"nodal", "cell"}
+        Recovered stress, or that of the tetrahedra (the paper).
+    field : {"layer", "mesh"}
+        Tension of the stress in the plane of the layer, oriented there; or that in space, oriented
+        and filtered on the tetrahedra and then projected (the paper).
+    sense : {"tensile", "absolute"}
+        Follow tension only, or the stress of the largest size whatever its sign.
+    compression_limit : float, default 3
+        mu of section 4.1: compression more than so many times larger rules tension out.
+    incompatible : {"any", "majority", "all", "none"}
+        Filter of Eq. 2, for ``field="mesh"``.
+    fill : {"screened", "laplacian"}
+        One screened Poisson problem, or 50 steps of averaging (the paper, Eq. 3-4).
+    fit : {"weighted", "literal"}
+        `fields.scalar.fit_weighted` or `fit_literal` (the paper, Eq. 6).
+    spacing : {"search", "constrained"}
+        Search for the number of isocurves (the paper, section 4.3), or a convex programme whose
+        unit levels keep the width by construction.
+    trim : bool, default True
+        Cut branches that come nearer than a strand's width to a longer one.
+    """
+
+    cap: float = 82.0
+    power: float = 1.0
+    spacing_weight: float = 0.1
+    fill_length: float = 3.0
+    link_limit: float = 7.0
+    rings: tuple[float, ...] = (1.5, 2.5)
+    conformal: tuple[str, ...] | None = None
+    stress: Source = "nodal"
+    field: Field = "layer"
+    sense: Sense = "tensile"
+    compression_limit: float = 3.0
+    incompatible: Incompatible = "none"
+    fill: Fill = "screened"
+    fit: Fit = "weighted"
+    spacing: Spacing = "search"
+    trim: bool = True
+
+    amount: ClassVar[Amount] = Amount("cap", most=40.0, least=100.0)
+
+    def __post_init__(self) -> None:
+        choices = {
+            "stress": Source,
+            "field": Field,
+            "sense": Sense,
+            "incompatible": Incompatible,
+            "fill": Fill,
+            "fit": Fit,
+            "spacing": Spacing,
+        }
+        for name, kind in choices.items():
+            if getattr(self, name) not in get_args(kind):
+                raise InputError(
+                    f"isocurve.{name} must be one of {', '.join(get_args(kind))}; got "
+                    f"{getattr(self, name)!r}"
+                )
+        if not 0.0 < self.cap <= 100.0:
+            raise InputError(f"isocurve.cap must be a percentile in (0, 100]; got {self.cap!r}")
+        for name in ("power", "spacing_weight", "fill_length", "link_limit"):
+            if not 0.0 <= getattr(self, name) < np.inf:
+                raise InputError(
+                    f"isocurve.{name} must be a finite number >= 0; got {getattr(self, name)!r}"
+                )
+
+    @classmethod
+    def literal(cls) -> "Isocurve":
+        """Return the algorithm as the paper prints it."""
+        return cls(
+            cap=100.0,
+            link_limit=2.0,
+            stress="cell",
+            field="mesh",
+            incompatible="any",
+            fill="laplacian",
+            fit="literal",
+            trim=False,
+        )
+
+    def for_part(
+        self, stress: StressField, layers: Sequence[Layer], machine: Machine
+    ) -> LayerStrategy:
+        """Orient the field of the whole part, and check that there is any tension.
+
+        Raises
+        ------
+        InputError
+            When no layer has a tensile direction.
+        """
+        part = None
+        if self.field == "mesh":
+            part = mesh_tension(
+                stress, self.stress, self.sense, self.compression_limit, self.incompatible
+            )
+        planner = _Planner(self, part)
+        if not any(planner.tension(layer, stress.on(layer)).defined.any() for layer in layers):
+            largest = float(np.linalg.eigvalsh(stress.stress).max())
+            raise InputError(
+                "expected tension along which to lay fibre; the largest tensile stress found is "
+                f"{largest:.3g} MPa, outweighed by compression: turn the load round, or plan with "
+                "sense = 'absolute'"
+            )
+        return planner
+
+    def __call__(self, layer: Layer, stress: LayerStress, machine: Machine) -> Toolpaths:
+        """Plan one layer by itself."""
+        return self.for_part(stress.part, [layer], machine)(layer, stress, machine)
+
+
+@dataclass(frozen=True)
+class _Planner:
+    """The strategy once it has seen the whole part."""
+
+    strategy: Isocurve
+    part: MeshTension | None
+
+    def tension(self, layer: Layer, stress: LayerStress) -> SampledTension:
+        s = self.strategy
+        if self.part is not None:
+            return self.part.on(layer)
+        return layer_tension(stress, s.stress, s.sense, s.compression_limit)
+
+    def __call__(self, layer: Layer, stress: LayerStress, machine: Machine) -> Toolpaths:
+        tension = self.tension(layer, stress)
+        if not tension.defined.any():
+            return Toolpaths.empty()
+        surface = Surface.of(layer)
+        lines = self.isocurves(surface, tension, machine.fibre_width)
+        lines = self.connected(lines, layer, stress.part, machine)
+        return Toolpaths.from_plane(lines, layer)
+
+    def isocurves(
+        self, surface: Surface, tension: SampledTension, width: float
+    ) -> list[FloatArray]:
+        """Isocurves of the field, at least a width apart."""
+        s = self.strategy
+        cap = max(_percentile(tension.stress, surface.areas, s.cap), 1e-300)
+        confidence = np.where(tension.defined, np.minimum(tension.stress / cap, 1.0), 0.0)
+        direction = tension.direction
+        if s.fill == "screened":
+            direction, size = fill_screened(
+                surface, direction, tension.stress, confidence, s.fill_length
+            )
+            direction = orient(direction, surface.neighbours, confidence)
+        else:
+            if not tension.oriented:
+                direction = orient(direction, surface.neighbours)
+            direction, size = fill_laplacian(surface, direction, tension.stress, tension.defined)
+        density = np.clip(size / cap, 1e-9, 1.0) ** s.power
+        weight = np.maximum(confidence, _LEAST_WEIGHT)
+        if s.spacing == "constrained":
+            values = fit_constrained(
+                surface, direction, density / width, weight, width, s.spacing_weight
+            )
+            return unit_levels(surface, values).lines()
+        if s.fit == "literal":
+            values = fit_literal(surface, density[:, None] * direction)
+        else:
+            values = fit_weighted(surface, direction, density, weight, s.spacing_weight)
+        return extract_levels(surface, values, width).lines()
+
+    def connected(
+        self, lines: list[FloatArray], layer: Layer, part: StressField, machine: Machine
+    ) -> list[FloatArray]:
+        """Curves round the chosen holes, isocurves led into them, ends linked, the rest dropped."""
+        s, width, section = self.strategy, machine.fibre_width, layer.polygon
+        rings: list[FloatArray] = []
+        names = part.problem.loaded_patches if s.conformal is None else s.conformal
+        for hole in holes_on(layer, names) if s.rings else []:
+            for distance in s.rings[:-1]:
+                rings += parallel_curve(hole, distance * width, section)
+            lines = lead_into(lines, hole, s.rings[-1] * width, section)
+        if s.trim:
+            lines = trim_to_clearance([*rings, *lines], width, 3.0 * width, first=len(rings))
+        else:
+            lines = [*rings, *lines]
+        lines = link_ends(lines, section, s.link_limit * width, width)
+        lines = [close_short_ring(line, machine.minimum_length) for line in lines]
+        return [line for line in lines if _length(line) >= machine.minimum_length]
+
+
+def _length(line: FloatArray) -> float:
+    return float(np.linalg.norm(np.diff(line, axis=0), axis=1).sum())
+
+
+def _percentile(values: FloatArray, weight: FloatArray, share: float) -> float:
+    """Value that `share` percent of the weight lies at or below."""
+    order = np.argsort(values, kind="stable")
+    below = np.cumsum(weight[order])
+    place: Any = np.searchsorted(below, share / 100.0 * below[-1] * (1.0 - 1e-12))
+    return float(values[order[min(int(place), len(order) - 1)]])
