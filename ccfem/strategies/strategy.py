@@ -81,20 +81,36 @@ def create(name: str, parameters: Mapping[str, Any] | None = None) -> Strategy:
     Raises
     ------
     InputError
-        For an unknown strategy or parameter; the known ones are listed.
+        For an unknown strategy or parameter, the known ones listed; for a value of a wrong type.
     """
     known = named()
     if name not in known:
         raise InputError(f"no strategy named '{name}'; there are: {', '.join(sorted(known))}")
     parameters = dict(parameters or {})
-    fields = {f.name for f in dataclasses.fields(known[name])}  # type: ignore[arg-type]
-    for parameter in parameters:
+    fields = {f.name: f.default for f in dataclasses.fields(known[name])}  # type: ignore[arg-type]
+    for parameter, value in parameters.items():
         if parameter not in fields:
             raise InputError(
                 f"strategy '{name}' has no parameter '{parameter}'; it has: "
                 f"{', '.join(sorted(fields))}"
             )
+        _check_type(f"{name}.{parameter}", value, fields[parameter])
     return known[name](**parameters)
+
+
+def _check_type(what: str, value: object, default: object) -> None:
+    """Refuse a value of another type than the default; a default of None takes any."""
+    for kind, allowed, word in (
+        (bool, bool, "true or false"),
+        (int, int, "a whole number"),
+        (float, (int, float), "a number"),
+        (str, str, "a string"),
+        (tuple, tuple, "a list"),
+    ):
+        if isinstance(default, kind):
+            if not isinstance(value, allowed) or isinstance(value, bool) != (kind is bool):
+                raise InputError(f"{what} must be {word}, as {default!r}; got {value!r}")
+            return
 
 
 def plan(
