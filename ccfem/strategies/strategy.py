@@ -86,7 +86,11 @@ def create(name: str, parameters: Mapping[str, Any] | None = None) -> Strategy:
     known = named()
     if name not in known:
         raise InputError(f"no strategy named '{name}'; there are: {', '.join(sorted(known))}")
-    parameters = dict(parameters or {})
+    # Lists are what part files and the command line have for tuples.
+    parameters = {
+        key: tuple(value) if isinstance(value, list) else value
+        for key, value in (parameters or {}).items()
+    }
     fields = {f.name: f.default for f in dataclasses.fields(known[name])}  # type: ignore[arg-type]
     for parameter, value in parameters.items():
         if parameter not in fields:
