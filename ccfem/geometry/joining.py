@@ -71,6 +71,10 @@ def join(lines: Sequence[FloatArray], joints: Sequence[Joint]) -> list[FloatArra
     return joined
 
 
+_CLEARANCE = 0.9
+"""Least distance of a link to other strands, in widths: ends on a slanted boundary stand a little
+nearer to each other than the strands do."""
+
 _CLOSING_TURN = np.deg2rad(60.0)
 """A link may close a path to a ring only where it turns less, both ends together: a path of two
 neighbouring strands that closes on itself can no longer join the next."""
@@ -93,6 +97,7 @@ def link_ends(
     limit: float,
     width: float,
     turn_cost: float = 1.0,
+    along_boundary: bool = True,
 ) -> list[FloatArray]:
     """Join ends that lie near each other by links inside the section.
 
@@ -110,6 +115,8 @@ def link_ends(
     width : float, mm
         Of a strand.
     turn_cost : float, mm, default 1.0
+    along_boundary : bool, default True
+        Whether links may follow the boundary; otherwise all are straight.
 
     Returns
     -------
@@ -119,45 +126,70 @@ def link_ends(
     if not opened or limit <= 0.0:
         return list(lines)
     ends = np.array([2 * k + side for k in opened for side in (0, 1)])
-    links = _straight_links(lines, ends, limit, turn_cost)
-    links += _boundary_links(lines, ends, section, 0.5 * width, limit, turn_cost)
+    points = np.array([lines[end // 2][-(end % 2)] for end in ends])
+    outward = np.array([_outward(lines[end // 2], end % 2) for end in ends])
+    links = _straight_links(points, outward, ends, limit, turn_cost)
+    if along_boundary:
+        links += _boundary_links(
+            lines, points, outward, ends, section, 0.5 * width, limit, turn_cost
+        )
     links.sort(key=lambda link: (link.cost, link.first, link.second))
-    return _accept(list(lines), links, section, 0.9 * width)
+    return _accept(list(lines), links, section, _CLEARANCE * width)
 
 
 def _accept(
     lines: list[FloatArray], links: list[_Link], section: Any, clearance: float
 ) -> list[FloatArray]:
     """Take links greedily, cheapest first, as long as they keep off everything else."""
-    paths = [shapely.linestrings(link.path) for link in links]
-    shapely.prepare(section)
-    inside = shapely.covers(section, paths) if links else []
-    strands = shapely.linestrings(np.concatenate(lines), indices=_rows(lines))
-    tree = shapely.STRtree(strands)
+    if not links:
+        return lines
+    paths = _strings([link.path for link in links])
+    owners = np.array([[link.first // 2, link.second // 2] for link in links])
+    free = _free_links(lines, paths, owners, section, clearance)
     taken: set[int] = set()
     accepted: list[Any] = []
     joints = []
     chain = np.arange(len(lines))
-    for link, path, within in zip(links, paths, inside, strict=True):
-        if not within or link.first in taken or link.second in taken:
+    for k in np.flatnonzero(free):
+        link, path = links[k], paths[k]
+        if link.first in taken or link.second in taken:
             continue
-        own = {link.first // 2, link.second // 2}
-        if chain[link.first // 2] == chain[link.second // 2] and link.turn > _CLOSING_TURN:
+        closes = chain[link.first // 2] == chain[link.second // 2]
+        if closes and link.turn > _CLOSING_TURN:
             continue
-        near = set(tree.query(path, predicate="dwithin", distance=clearance).tolist()) - own
-        if near or any(shapely.dwithin(path, other, clearance) for other in accepted):
+        if accepted and shapely.dwithin(path, np.array(accepted), clearance).any():
             continue
-        cut = {k: _cut_back(lines[k], link, k) for k in own}
+        cut = {owner: _cut_back(lines[owner], link, owner) for owner in owners[k].tolist()}
         shortened = shapely.linestrings(_shorten(link.path))
-        if any(shapely.intersects(shortened, shapely.linestrings(line)) for line in cut.values()):
+        if shapely.intersects(shortened, _strings(list(cut.values()))).any():
             continue
-        for k, line in cut.items():
-            lines[k] = line
+        for owner, line in cut.items():
+            lines[owner] = line
         chain[chain == chain[link.second // 2]] = chain[link.first // 2]
         taken |= {link.first, link.second}
         accepted.append(path)
         joints.append(Joint(link.first, link.second, link.path[1:-1]))
     return join(lines, joints)
+
+
+def _free_links(
+    lines: list[FloatArray], paths: Any, owners: Any, section: Any, clearance: float
+) -> Any:
+    """Mask (l,) of links inside the section and clear of all strands but their own."""
+    shapely.prepare(section)
+    free = shapely.covers(section, paths)
+    tree = shapely.STRtree(_strings(lines))
+    link, strand = tree.query(paths[free], predicate="dwithin", distance=clearance)
+    link = np.flatnonzero(free)[link]
+    free[link[(owners[link] != strand[:, None]).all(axis=1)]] = False
+    return free
+
+
+def _strings(lines: Sequence[FloatArray]) -> Any:
+    sizes = [len(line) for line in lines]
+    return shapely.linestrings(
+        np.concatenate(lines), indices=np.repeat(np.arange(len(lines)), sizes)
+    )
 
 
 def _cut_back(line: FloatArray, link: _Link, k: int) -> FloatArray:
@@ -191,24 +223,24 @@ def _shorten(path: FloatArray, share: float = 1e-3) -> FloatArray:
 
 
 def _straight_links(
-    lines: Sequence[FloatArray], ends: Any, limit: float, turn_cost: float
+    points: FloatArray, outward: FloatArray, ends: Any, limit: float, turn_cost: float
 ) -> list[_Link]:
-    points = np.array([lines[end // 2][-(end % 2)] for end in ends])
-    outward = np.array([_outward(lines[end // 2], end % 2) for end in ends])
-    links = []
-    for a, b in cKDTree(points).query_pairs(limit):
-        step = points[b] - points[a]
-        length = float(np.linalg.norm(step))
-        if length > 0.0:
-            turn = _angle(outward[a], step) + _angle(outward[b], -step)
-            cost = length + turn_cost * turn / (0.5 * np.pi)
-            path = np.stack([points[a], points[b]])
-            links.append(_Link(cost, turn, int(ends[a]), int(ends[b]), path))
-    return links
+    pairs = cKDTree(points).query_pairs(limit, output_type="ndarray")
+    a, b = pairs[:, 0], pairs[:, 1]
+    step = points[b] - points[a]
+    length = np.linalg.norm(step, axis=1)
+    turn = _angles(outward[a], step) + _angles(outward[b], -step)
+    cost = length + turn_cost * turn / (0.5 * np.pi)
+    return [
+        _Link(float(cost[k]), float(turn[k]), int(ends[a[k]]), int(ends[b[k]]), points[pairs[k]])
+        for k in np.flatnonzero(length > 0.0)
+    ]
 
 
 def _boundary_links(
     lines: Sequence[FloatArray],
+    points: FloatArray,
+    outward: FloatArray,
     ends: Any,
     section: Any,
     inset: float,
@@ -217,30 +249,33 @@ def _boundary_links(
 ) -> list[_Link]:
     """Links along the boundary, `inset` inside it, between neighbouring ends on it."""
     links: list[_Link] = []
-    inner = shapely.buffer(section, -inset)
-    starts = shapely.points(np.array([lines[end // 2][-(end % 2)] for end in ends]))
-    for ring in shapely.get_rings(inner):
-        found = []
-        for end in ends[shapely.dwithin(ring, starts, 1.5 * inset)]:
-            line = lines[end // 2] if end % 2 == 0 else lines[end // 2][::-1]
-            head = shapely.linestrings(_head(line, limit))
-            meeting = shapely.get_coordinates(shapely.intersection(head, ring))
-            if len(meeting):
-                passed = shapely.line_locate_point(head, shapely.points(meeting))
-                point = meeting[np.argmin(passed)]
-                position = float(shapely.line_locate_point(ring, shapely.points(point)))
-                found.append((position, int(end), point, _outward(line, 0)))
-        found.sort(key=lambda entry: entry[:2])
-        for k, (position, end, point, out) in enumerate(found):
-            after, other, target, other_out = found[(k + 1) % len(found)]
-            gap = (after - position) % ring.length
-            if other == end or not 0.0 < gap <= limit:
+    starts = shapely.points(points)
+    heads = _strings(
+        [_head(lines[e // 2] if e % 2 == 0 else lines[e // 2][::-1], limit) for e in ends]
+    )
+    for ring in shapely.get_rings(shapely.buffer(section, -inset)):
+        near = np.flatnonzero(shapely.dwithin(ring, starts, 1.5 * inset))
+        crossing = shapely.intersection(heads[near], ring)
+        crossed, index = shapely.get_coordinates(crossing, return_index=True)
+        if not len(crossed):
+            continue
+        # Where a head meets the ring more than once, the link leaves at the first meeting.
+        passed = shapely.line_locate_point(heads[near][index], shapely.points(crossed))
+        order = np.lexsort((passed, index))
+        _, first = np.unique(index[order], return_index=True)
+        meeting, end = crossed[order[first]], near[index[order[first]]]
+        position = shapely.line_locate_point(ring, shapely.points(meeting))
+        around = np.lexsort((end, position))
+        for k, after in zip(around, np.roll(around, -1), strict=True):
+            gap = float((position[after] - position[k]) % ring.length)
+            if not 0.0 < gap <= limit:
                 continue
-            arc = ring_arc(ring, position, gap)
-            arc[0], arc[-1] = point, target
-            turn = _angle(out, arc[1] - arc[0]) + _angle(other_out, arc[-2] - arc[-1])
+            arc = ring_arc(ring, float(position[k]), gap)
+            arc[0], arc[-1] = meeting[k], meeting[after]
+            leaving = np.stack([arc[1] - arc[0], arc[-2] - arc[-1]])
+            turn = float(_angles(outward[end[[k, after]]], leaving).sum())
             cost = gap + turn_cost * turn / (0.5 * np.pi)
-            links.append(_Link(cost, turn, end, other, arc))
+            links.append(_Link(cost, turn, int(ends[end[k]]), int(ends[end[after]]), arc))
     return links
 
 
@@ -260,16 +295,14 @@ def _head(line: FloatArray, reach: float) -> FloatArray:
     return line[: int(np.searchsorted(distance, reach)) + 2]
 
 
-def _angle(a: FloatArray, b: FloatArray) -> float:
-    return abs(float(np.arctan2(a[0] * b[1] - a[1] * b[0], a @ b)))
-
-
-def _rows(lines: Sequence[FloatArray]) -> Any:
-    return np.repeat(np.arange(len(lines)), [len(line) for line in lines])
+def _angles(a: FloatArray, b: FloatArray) -> FloatArray:
+    """Angle between vectors (k, 2), radians in [0, pi]."""
+    cross = a[:, 0] * b[:, 1] - a[:, 1] * b[:, 0]
+    return np.asarray(np.abs(np.arctan2(cross, (a * b).sum(axis=1))))
 
 
 def _outward(line: FloatArray, side: int, reach: float = 1.0) -> FloatArray:
-    """Unit vector along which the line leaves its first (side 0) or last (side 1) point."""
+    """Return the unit vector along which a line leaves its first or last (side 1) point."""
     head = _head(line if side == 0 else line[::-1], reach)
     step = head[0] - head[-1]
     return step / max(float(np.linalg.norm(step)), 1e-12)

@@ -84,6 +84,8 @@ class Isocurve:
     spacing : {"search", "constrained"}
         Search for the number of isocurves (the paper, section 4.3), or a convex programme whose
         unit levels keep the width by construction.
+    boundary_links : bool, default True
+        Links may follow the boundary; in the paper all are straight.
     trim : bool, default True
         Cut branches that come nearer than a strand's width to a longer one.
     """
@@ -103,6 +105,7 @@ class Isocurve:
     fill: Fill = "screened"
     fit: Fit = "weighted"
     spacing: Spacing = "search"
+    boundary_links: bool = True
     trim: bool = True
 
     amount: ClassVar[Amount] = Amount("cap", most=40.0, least=100.0)
@@ -142,6 +145,7 @@ class Isocurve:
             incompatible="any",
             fill="laplacian",
             fit="literal",
+            boundary_links=False,
             trim=False,
         )
 
@@ -242,7 +246,9 @@ class _Planner:
             lines = trim_to_clearance([*rings, *lines], width, 3.0 * width, first=len(rings))
         else:
             lines = [*rings, *lines]
-        lines = link_ends(lines, section, s.link_limit * width, width)
+        lines = link_ends(
+            lines, section, s.link_limit * width, width, along_boundary=s.boundary_links
+        )
         lines = [close_short_ring(line, machine.minimum_length) for line in lines]
         return [line for line in lines if _length(line) >= machine.minimum_length]
 
