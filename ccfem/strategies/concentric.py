@@ -1,0 +1,67 @@
+"""Baseline: rings parallel to the border, from the outside in."""
+
+from dataclasses import dataclass
+from typing import ClassVar
+
+import numpy as np
+
+from ccfem.elasticity.stress_field import LayerStress
+from ccfem.errors import InputError
+from ccfem.geometry.offsets import join_rings, offset_rings
+from ccfem.layers.layer import Layer
+from ccfem.machine import Machine
+from ccfem.strategies.strategy import Amount
+from ccfem.toolpaths import Toolpaths
+
+__all__ = ["Concentric"]
+
+
+@dataclass(frozen=True)
+class Concentric:
+    """Rings parallel to every border of the section, the stress unseen.
+
+    The first ring lies half a fibre width inside the border; opposite sides of a ring stay a fibre
+    width apart, which leaves a gap along the middle where no further ring fits. This is the fill
+    that slicers call concentric, and model C of paper 000, figure 3.
+
+    Attributes
+    ----------
+    spacing : float, default 1
+        Distance of neighbouring rings in fibre widths, at least 1.
+    rings : int, optional
+        Number of rings along each border; by default as many as fit.
+    joined : bool, default True
+        Whether nested rings are joined by short ramps into one strand, as printers that cut the
+        fibre do. Otherwise every ring is a closed path of its own.
+    start : tuple of 2 floats, mm, optional
+        Point in the plane of the layer that the outermost rings start next to; by default the
+        first point of the layer's border.
+    """
+
+    spacing: float = 1.0
+    rings: int | None = None
+    joined: bool = True
+    start: tuple[float, float] | None = None
+
+    amount: ClassVar[Amount] = Amount("spacing", most=1.0, least=20.0)
+
+    def __post_init__(self) -> None:
+        if not 1.0 <= self.spacing < float("inf"):
+            raise InputError(
+                f"concentric.spacing must be at least 1 fibre width; got {self.spacing}"
+            )
+        if self.rings is not None and self.rings < 1:
+            raise InputError(f"concentric.rings must be at least 1; got {self.rings}")
+
+    def __call__(self, layer: Layer, stress: LayerStress, machine: Machine) -> Toolpaths:
+        """Plan the paths of one layer; none where the section is thinner than a fibre."""
+        width = machine.fibre_width
+        spacing = self.spacing * width
+        levels = offset_rings(layer.polygon, 0.5 * width, spacing, width, self.rings)
+        lines = [ring for level in levels for ring in level]
+        if self.joined and levels:
+            first = layer.plane_points[layer.loops[0][0]]
+            start = first if self.start is None else np.asarray(self.start, dtype=np.float64)
+            lines = join_rings(levels, start, spacing, width)
+        paths = Toolpaths.from_plane(lines, layer)
+        return paths.select(paths.lengths >= machine.minimum_length)

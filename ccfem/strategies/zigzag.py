@@ -1,0 +1,59 @@
+"""Baseline: parallel lines across the section, linked at their ends."""
+
+from dataclasses import dataclass
+from typing import ClassVar
+
+import numpy as np
+
+from ccfem.elasticity.stress_field import LayerStress
+from ccfem.errors import InputError
+from ccfem.geometry.hatch import zigzag
+from ccfem.layers.layer import Layer
+from ccfem.machine import Machine
+from ccfem.strategies.strategy import Amount
+from ccfem.toolpaths import Toolpaths
+
+__all__ = ["Zigzag"]
+
+
+@dataclass(frozen=True)
+class Zigzag:
+    """Parallel lines at one angle a layer, linked into as few strands as possible.
+
+    What slicers call rectilinear or isotropic fibre fill, and model B of paper 000, figure 3. The
+    stress is unseen.
+
+    Attributes
+    ----------
+    spacing : float, default 1
+        Distance of the lines in fibre widths, at least 1.
+    angle : float, degrees, default 45
+        Direction of the lines on layer 0 to the first axis of the layer.
+    turn : float, degrees, default 90
+        Turn from each layer to the next; 90 alternates between two directions as the published
+        paths of paper 000 do, 45 goes round four.
+    """
+
+    spacing: float = 1.0
+    angle: float = 45.0
+    turn: float = 90.0
+
+    amount: ClassVar[Amount] = Amount("spacing", most=1.0, least=20.0)
+    direction: ClassVar[str] = "angle"
+
+    def __post_init__(self) -> None:
+        if not 1.0 <= self.spacing < float("inf"):
+            raise InputError(f"zigzag.spacing must be at least 1 fibre width; got {self.spacing}")
+        if not np.isfinite([self.angle, self.turn]).all():
+            raise InputError(
+                f"zigzag.angle and zigzag.turn must be finite degrees; got {self.angle} and "
+                f"{self.turn}"
+            )
+
+    def __call__(self, layer: Layer, stress: LayerStress, machine: Machine) -> Toolpaths:
+        """Plan the paths of one layer; none where the section is thinner than a fibre."""
+        width = machine.fibre_width
+        angle = np.radians(self.angle + self.turn * layer.index)
+        lines = zigzag(layer.polygon, 0.5 * width, width, self.spacing * width, angle)
+        paths = Toolpaths.from_plane(lines, layer)
+        return paths.select(paths.lengths >= machine.minimum_length)
