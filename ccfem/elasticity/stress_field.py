@@ -2,8 +2,12 @@
 
 from dataclasses import dataclass
 
+import numpy as np
+
 from ccfem.arrays import FloatArray, read_only
 from ccfem.elasticity.problem import Problem
+from ccfem.errors import InputError
+from ccfem.geometry.locate import locate_tets
 from ccfem.layers.layer import Layer
 from ccfem.mesh import TetMesh
 
@@ -71,6 +75,34 @@ class StressField:
     def mesh(self) -> TetMesh:
         """Mesh of the problem."""
         return self.problem.mesh
+
+    def at(self, points: FloatArray, tolerance: float = 1e-3) -> FloatArray:
+        """Recovered stress at any points of the part.
+
+        Parameters
+        ----------
+        points : (k, 3) array, mm
+        tolerance : float, mm
+            Points outside the mesh by no more than this take the stress of its surface.
+
+        Returns
+        -------
+        (k, 3, 3) array, MPa
+            Interpolated linearly between the corner nodes of the cell that holds each point.
+
+        Raises
+        ------
+        InputError
+            When a point lies further outside.
+        """
+        cell, weights = locate_tets(self.mesh.points, self.mesh.corners, points, tolerance)
+        if (cell < 0).any():
+            first = int(np.flatnonzero(cell < 0)[0])
+            raise InputError(
+                f"stress is known in the part only; {int((cell < 0).sum())} of {len(cell)} points "
+                f"lie outside, the first at {np.round(points[first], 6).tolist()}: check the frame"
+            )
+        return np.einsum("qk,qkij->qij", weights, self.nodal[self.mesh.corners[cell]])
 
     def on(self, layer: Layer) -> "LayerStress":
         """Stress on one layer of the part."""

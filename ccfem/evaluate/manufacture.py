@@ -1,0 +1,107 @@
+"""How much fibre there is, in how many pieces, and how long it takes to print."""
+
+from dataclasses import dataclass
+
+import numpy as np
+
+from ccfem.arrays import FloatArray
+from ccfem.evaluate.column import Column
+from ccfem.evaluate.plane_paths import PlanePaths
+from ccfem.machine import Machine
+from ccfem.toolpaths import TRAVEL, Toolpaths
+
+__all__ = ["COLUMNS", "ManufactureSamples", "manufacture_indices", "sample_manufacture"]
+
+_LENGTH = ">= 0; NaN without fibre"
+_SHARE = "0 to 1, 1 is best; NaN without fibre"
+
+COLUMNS = (
+    Column("fibre_length", "mm", "Sum of the lengths of the fibre paths.", ">= 0"),
+    Column("paths", "1", "Number of fibre paths that have a length.", ">= 0"),
+    Column("cuts", "1", "Number of cuts of the fibre: one at the end of every path.", ">= 0"),
+    Column("length_min", "mm", "Length of the shortest fibre path.", _LENGTH),
+    Column("length_median", "mm", "Median length of the fibre paths.", _LENGTH),
+    Column("length_max", "mm", "Length of the longest fibre path.", _LENGTH),
+    Column(
+        "long_enough_count",
+        "1",
+        "Share of the number of fibre paths that are at least as long as the machine's minimum.",
+        _SHARE,
+    ),
+    Column(
+        "long_enough_length",
+        "1",
+        "Share of the fibre's length that lies in paths at least as long as the machine's minimum.",
+        _SHARE,
+    ),
+    Column(
+        "print_time",
+        "s",
+        "Length of each path over the speed of its kind, plus the straight way from the end of "
+        "each path to the start of the next one of its layer over the travel speed. Cutting, "
+        "acceleration and what is not among the paths given (such as matrix) cost nothing.",
+        ">= 0",
+    ),
+)
+
+_ROUNDING = 1e-6
+"""A path short of the minimum length by no more than this share of it is long enough."""
+
+
+@dataclass(frozen=True)
+class ManufactureSamples:
+    """Lengths (k,), mm, of the fibre paths, and print time (1,), s, a layer."""
+
+    length: FloatArray
+    seconds: FloatArray
+
+
+def sample_manufacture(
+    paths: PlanePaths, toolpaths: Toolpaths, machine: Machine
+) -> ManufactureSamples:
+    """Lengths of the fibre paths of a layer, and the time that all its paths take.
+
+    Parameters
+    ----------
+    paths : PlanePaths
+    toolpaths : Toolpaths
+        Every path of the same layer, of all kinds, in the order of printing.
+    machine : Machine
+    """
+    speeds = np.array([machine.fibre_speed, *[machine.matrix_speed] * 2, machine.travel_speed])
+    drawn = toolpaths.select(toolpaths.kind != TRAVEL)
+    starts, ends = drawn.points[drawn.offsets[:-1]], drawn.points[drawn.offsets[1:] - 1]
+    ways = float(np.linalg.norm(starts[1:] - ends[:-1], axis=1).sum())
+    # Travel that the paths spell out replaces the straight ways.
+    travel = toolpaths.of_kind(TRAVEL)
+    ways = float(travel.lengths.sum()) if len(travel) else ways
+    seconds = _duration(drawn.lengths, speeds[drawn.kind]) + _duration(ways, speeds[TRAVEL])
+    return ManufactureSamples(paths.lengths, np.array([seconds]))
+
+
+def _duration(length: FloatArray | float, speed: FloatArray | float) -> float:
+    """Time, s; a speed of 0 takes forever unless there is nothing to draw."""
+    length, speed = np.broadcast_arrays(np.atleast_1d(length), np.atleast_1d(speed))
+    needed = length > 0.0
+    if (speed[needed] == 0.0).any():
+        return float("inf")
+    return float((length[needed] / speed[needed]).sum())
+
+
+def manufacture_indices(samples: ManufactureSamples, machine: Machine) -> dict[str, float]:
+    """Values of `COLUMNS`."""
+    length = samples.length
+    total = float(length.sum())
+    quantiles = np.quantile(length, [0.0, 0.5, 1.0]) if len(length) else np.full(3, np.nan)
+    enough = length >= machine.minimum_length * (1.0 - _ROUNDING)
+    return {
+        "fibre_length": total,
+        "paths": float(len(length)),
+        "cuts": float(len(length)),
+        "length_min": float(quantiles[0]),
+        "length_median": float(quantiles[1]),
+        "length_max": float(quantiles[2]),
+        "long_enough_count": float(enough.mean()) if len(length) else np.nan,
+        "long_enough_length": float(length[enough].sum()) / total if len(length) else np.nan,
+        "print_time": float(samples.seconds.sum()),
+    }

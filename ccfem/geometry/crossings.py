@@ -1,0 +1,123 @@
+"""Where polylines of the plane cross themselves and each other."""
+
+import numpy as np
+from numba import njit
+
+from ccfem.arrays import BoolArray, FloatArray, IntArray
+from ccfem.geometry.buckets import bucket
+from ccfem.geometry.polylines import lengths, subdivide
+
+__all__ = ["find_crossings"]
+
+_TOUCH = 1e-9
+"""Distance, mm, within which a point lies on a segment."""
+
+
+def find_crossings(points: FloatArray, offsets: IntArray, closed: BoolArray) -> IntArray:
+    """Pairs of segments at which polylines go from one side of a polyline to the other.
+
+    Counted are proper crossings of two segments, and crossings through points of the polylines: of
+    a segment through a point, or of two polylines through a common point. Ends that touch, corners
+    that touch without passing to the other side, and stretches that run on top of each other are
+    no crossings. Points within 1e-9 mm of a segment lie on it.
+
+    Parameters
+    ----------
+    points : (P, 2) array, mm
+        Without repeated neighbouring points.
+    offsets : (K + 1,) int array
+    closed : (K,) bool array
+
+    Returns
+    -------
+    (c, 2) int array
+        Index of the point that starts each of the two segments, the smaller one first, sorted. A
+        crossing through a point names the segments that end at it.
+    """
+    total = float(lengths(points, offsets).sum())
+    if total == 0.0:
+        return np.zeros((0, 2), dtype=np.int64)
+    extent = points.max(axis=0) - points.min(axis=0)
+    longest = max(2.0 * float(extent[0] * extent[1]) / total, 2.0 * total / len(points))
+    pieces, ends, segment = subdivide(points, offsets, longest)
+    start = np.ones(len(pieces), dtype=bool)
+    start[ends[1:] - 1] = False
+    first = np.flatnonzero(start)
+    a, b = pieces[first], pieces[first + 1]
+    grid = bucket(np.minimum(a, b) - _TOUCH, np.maximum(a, b) + _TOUCH, longest)
+    following = np.arange(len(points)) + 1
+    following[offsets[1:] - 1] = np.where(closed, offsets[:-1] + 1, -1)
+    pairs = np.unique(_near(grid.starts, grid.items, segment[first], points, _TOUCH), axis=0)
+    return pairs[_crosses(pairs[:, 0], pairs[:, 1], points, following)]
+
+
+@njit(cache=True)
+def _near(
+    starts: IntArray, items: IntArray, segment: IntArray, points: FloatArray, touch: float
+) -> IntArray:
+    """Pairs of segments of a cell, not neighbours in their polyline, that meet or nearly do.
+
+    Neither segment has both its ends clearly on one side of the other. A pair comes once for every
+    cell that it shares.
+    """
+    found = 0
+    pairs = np.empty((64, 2), np.int64)
+    side = np.empty(4)
+    for cell in range(len(starts) - 1):
+        for m in range(starts[cell], starts[cell + 1]):
+            for n in range(m + 1, starts[cell + 1]):
+                i, j = segment[items[m]], segment[items[n]]
+                if abs(i - j) < 2:
+                    continue
+                for k in range(4):
+                    a, p = (i, j + k) if k < 2 else (j, i + k - 2)
+                    dx, dy = points[a + 1, 0] - points[a, 0], points[a + 1, 1] - points[a, 1]
+                    across = dx * (points[p, 1] - points[a, 1]) - dy * (points[p, 0] - points[a, 0])
+                    limit = touch * (abs(dx) + abs(dy))
+                    side[k] = 0.0 if abs(across) <= limit else across
+                if side[0] * side[1] > 0.0 or side[2] * side[3] > 0.0:
+                    continue
+                if found == len(pairs):
+                    longer = np.empty((2 * found, 2), np.int64)
+                    for k in range(found):
+                        longer[k, 0], longer[k, 1] = pairs[k, 0], pairs[k, 1]
+                    pairs = longer
+                pairs[found, 0], pairs[found, 1] = min(i, j), max(i, j)
+                found += 1
+    return pairs[:found]
+
+
+def _crosses(i: IntArray, j: IntArray, points: FloatArray, following: IntArray) -> BoolArray:
+    """Whether the segments from points i and j cross, at their inside or at their last point."""
+    side = _Sides(points)
+    a, b, c, d = i, i + 1, j, j + 1
+    after_b, after_d = following[b], following[d]
+    goes_on_b, goes_on_d = after_b >= 0, after_d >= 0
+    side_a, side_b, side_c, side_d = side(c, d, a), side(c, d, b), side(a, b, c), side(a, b, d)
+    straddles_i, straddles_j = side_c * side_d < 0, side_a * side_b < 0
+    # Through the point b of the first polyline, at the inside of the second segment; and so on.
+    through_b = (side_b == 0) & straddles_i & goes_on_b & (side_a * side(c, d, after_b) < 0)
+    through_d = (side_d == 0) & straddles_j & goes_on_d & (side_c * side(a, b, after_d) < 0)
+    meet = np.hypot(*(points[b] - points[d]).T) <= _TOUCH
+    turns = side.of_bend(a, b, after_b, c) * side.of_bend(a, b, after_b, after_d) < 0
+    through_both = meet & goes_on_b & goes_on_d & turns
+    return (straddles_i & straddles_j) | (~meet & (through_b | through_d)) | through_both
+
+
+class _Sides:
+    """On which side of lines through given points other given points lie."""
+
+    def __init__(self, points: FloatArray) -> None:
+        self.points = points
+
+    def __call__(self, a: IntArray, b: IntArray, p: IntArray) -> IntArray:
+        """1 where point p lies left of the line from a to b, -1 right of it, 0 on it."""
+        x, y = (self.points[b] - self.points[a]).T
+        u, v = (self.points[p] - self.points[a]).T
+        across = x * v - y * u
+        return np.where(np.abs(across) <= _TOUCH * np.hypot(x, y), 0, np.sign(across)).astype(int)
+
+    def of_bend(self, a: IntArray, b: IntArray, c: IntArray, p: IntArray) -> IntArray:
+        """1 where point p lies left of the bend a-b-c (seen from b), -1 right of it, 0 on it."""
+        into, out = self(a, b, p), self(b, c, p)
+        return np.where(self(a, b, c) >= 0, np.minimum(into, out), np.maximum(into, out))

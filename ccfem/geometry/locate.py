@@ -1,0 +1,143 @@
+"""Find the triangle or tetrahedron that holds a point, with a uniform grid of buckets."""
+
+from functools import reduce
+
+import numpy as np
+from numba import njit
+
+from ccfem.arrays import FloatArray, IntArray
+from ccfem.geometry.buckets import bucket
+
+__all__ = ["locate", "locate_tets"]
+
+
+def locate(
+    points: FloatArray, triangles: IntArray, queries: FloatArray, reach: float = 0.0
+) -> tuple[IntArray, FloatArray]:
+    """Triangle of the plane that holds each query point.
+
+    Parameters
+    ----------
+    points : (n, 2) array, mm
+    triangles : (t, 3) int array
+        Of either orientation; flat ones are never found.
+    queries : (q, 2) array, mm
+    reach : float, mm, default 0
+        A query outside every triangle takes the triangle whose edges it oversteps least, if by no
+        more than this.
+
+    Returns
+    -------
+    triangle : (q,) int array
+        Index into `triangles`, or -1.
+    barycentric : (q, 3) array in [0, 1]
+        Weights of the corners, summing to 1; for a query outside, those of a point of the triangle
+        close to it; 0 where `triangle` is -1.
+    """
+    return _locate_simplices(points, triangles, queries, reach)
+
+
+def locate_tets(
+    points: FloatArray, tets: IntArray, queries: FloatArray, reach: float = 0.0
+) -> tuple[IntArray, FloatArray]:
+    """Tetrahedron that holds each query point: as `locate`, with (n, 3), (m, 4) and (q, 3)."""
+    return _locate_simplices(points, tets, queries, reach)
+
+
+def _locate_simplices(
+    points: FloatArray, simplices: IntArray, queries: FloatArray, reach: float
+) -> tuple[IntArray, FloatArray]:
+    queries = np.ascontiguousarray(queries, dtype=np.float64)
+    found = np.full(len(queries), -1, dtype=np.int64)
+    weights = np.zeros((len(queries), simplices.shape[1]))
+    if not len(queries) or not len(simplices):
+        return found, weights
+    corners = points[simplices]
+    origins, gradients, heights = _barycentric_maps(corners)
+    each = np.moveaxis(corners, 1, 0)
+    low, high = reduce(np.minimum, each), reduce(np.maximum, each)
+    # First without reach, which needs the fewest candidates; then only what was not found.
+    for margin in (0.0, reach) if reach > 0.0 else (0.0,):
+        left = np.flatnonzero(found < 0)
+        if not len(left):
+            break
+        slack = margin + 1e-9 * float(np.abs(corners).max())
+        grid = bucket(low - slack, high + slack)
+        index, weight = _search(*grid, origins, gradients, heights, queries[left], slack)
+        weight = np.maximum(weight, 0.0)
+        total = weight.sum(axis=1, keepdims=True)
+        found[left], weights[left] = index, weight / np.where(total > 0.0, total, 1.0)
+    return found, weights
+
+
+def _barycentric_maps(corners: FloatArray) -> tuple[FloatArray, FloatArray, FloatArray]:
+    """First corner, gradients of the barycentric coordinates and heights of each simplex.
+
+    Flat simplices get zero gradients and heights, so that no point is ever inside them.
+    """
+    edges = corners[:, 1:] - corners[:, :1]
+    size = np.abs(np.linalg.det(edges))
+    scale = np.einsum("tij,tij->t", edges, edges) ** (0.5 * edges.shape[1])
+    flat = size <= 1e-14 * scale
+    edges = np.where(flat[:, None, None], np.eye(edges.shape[1]), edges)
+    inverse = np.swapaxes(np.linalg.inv(edges), 1, 2)
+    gradients = np.concatenate([-inverse.sum(axis=1, keepdims=True), inverse], axis=1)
+    gradients[flat] = 0.0
+    norm = np.sqrt(np.einsum("tij,tij->ti", gradients, gradients))
+    heights = np.divide(1.0, norm, out=np.zeros_like(norm), where=norm > 0.0)
+    return np.ascontiguousarray(corners[:, 0]), gradients, heights
+
+
+@njit(cache=True)
+def _search(
+    origin: FloatArray,
+    cell: float,
+    shape: IntArray,
+    starts: IntArray,
+    items: IntArray,
+    origins: FloatArray,
+    gradients: FloatArray,
+    heights: FloatArray,
+    queries: FloatArray,
+    slack: float,
+) -> tuple[IntArray, FloatArray]:
+    """Simplex of each query: the first that holds it, else the least overstepped within slack."""
+    count, dimension = queries.shape
+    found = np.full(count, -1, np.int64)
+    weights = np.zeros((count, dimension + 1))
+    weight = np.empty(dimension + 1)
+    for q in range(count):
+        c = 0
+        outside = False
+        for d in range(3):
+            i = 0
+            if d < dimension:
+                i = int(np.floor((queries[q, d] - origin[d]) / cell))
+            outside = outside or i < 0 or i >= shape[d]
+            c = c * shape[d] + i
+        if outside:
+            continue
+        best = -slack
+        for item in range(starts[c], starts[c + 1]):
+            k = items[item]
+            if heights[k, 0] == 0.0:
+                continue
+            depth = np.inf
+            rest = 1.0
+            for corner in range(1, dimension + 1):
+                value = 0.0
+                for d in range(dimension):
+                    value += gradients[k, corner, d] * (queries[q, d] - origins[k, d])
+                weight[corner] = value
+                rest -= value
+                depth = min(depth, value * heights[k, corner])
+            weight[0] = rest
+            depth = min(depth, rest * heights[k, 0])
+            if depth >= best:
+                best = depth
+                found[q] = k
+                for corner in range(dimension + 1):
+                    weights[q, corner] = weight[corner]
+                if depth >= 0.0:
+                    break
+    return found, weights

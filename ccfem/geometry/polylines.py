@@ -1,0 +1,245 @@
+"""Polylines as arrays: arc length, resampling, turning, splitting.
+
+Many polylines at once are held as in CSR: ``points`` (P, d) with ``offsets`` (K + 1,), polyline k
+being ``points[offsets[k]:offsets[k + 1]]``, in d = 2 or 3 dimensions. A closed polyline repeats its
+first point at its end.
+"""
+
+from collections.abc import Iterable, Sequence
+from itertools import pairwise
+
+import numpy as np
+
+from ccfem.arrays import BoolArray, FloatArray, IntArray
+
+__all__ = [
+    "arc_lengths",
+    "between",
+    "lengths",
+    "merge_repeated",
+    "pack",
+    "point_at",
+    "resample",
+    "sample_at",
+    "sample_midpoints",
+    "split",
+    "subdivide",
+    "turning_angles",
+]
+
+
+def pack(lines: Sequence[FloatArray]) -> tuple[FloatArray, IntArray]:
+    """Points (P, d) and offsets (K + 1,) of a list of (n_i, d) polylines."""
+    sizes = [len(line) for line in lines]
+    offsets = np.concatenate([[0], np.cumsum(sizes, dtype=np.int64)]).astype(np.int64)
+    points = np.concatenate(lines) if len(lines) else np.zeros((0, 2))
+    return np.asarray(points, dtype=np.float64), offsets
+
+
+def _steps(points: FloatArray, offsets: IntArray) -> FloatArray:
+    """Distance of each point to the one before it, (P,); 0 at the start of a polyline."""
+    steps = np.zeros(len(points))
+    if len(points):
+        steps[1:] = np.sqrt(np.einsum("ij,ij->i", *[np.diff(points, axis=0)] * 2))
+        starts = offsets[:-1]
+        steps[starts[starts < len(points)]] = 0.0
+    return steps
+
+
+def arc_lengths(points: FloatArray, offsets: IntArray) -> FloatArray:
+    """Arc length from the start of its polyline to each point, (P,)."""
+    along = np.cumsum(_steps(points, offsets))
+    sizes = np.diff(offsets)
+    starts = offsets[:-1][sizes > 0]
+    return along - np.repeat(along[starts], sizes[sizes > 0])
+
+
+def lengths(points: FloatArray, offsets: IntArray) -> FloatArray:
+    """Length of each polyline, (K,)."""
+    along = np.concatenate([[0.0], np.cumsum(_steps(points, offsets))])
+    return along[offsets[1:]] - along[offsets[:-1]]
+
+
+def sample_at(
+    points: FloatArray, offsets: IntArray, line: IntArray, position: FloatArray
+) -> tuple[FloatArray, IntArray]:
+    """Points of polylines at given arc lengths.
+
+    Parameters
+    ----------
+    points, offsets
+        The polylines, each with at least one point.
+    line : (s,) int array
+        Polyline of each sample.
+    position : (s,) array
+        Arc length from the start of that polyline; clipped to it.
+
+    Returns
+    -------
+    points : (s, d) array
+    segment : (s,) int array
+        Index of the point that starts the segment on which each sample lies. Segments of no length
+        are never named, unless the whole polyline has none.
+    """
+    if not len(line):
+        return np.zeros((0, points.shape[1])), np.zeros(0, dtype=np.int64)
+    total = lengths(points, offsets)
+    # One axis for all polylines, with gaps of 1 so that they cannot meet.
+    base = np.cumsum(total + 1.0) - (total + 1.0)
+    axis = arc_lengths(points, offsets) + np.repeat(base, np.diff(offsets))
+    wanted = np.clip(position, 0.0, total[line]) + base[line]
+    segment = np.searchsorted(axis, wanted, side="right") - 1
+    # Polyline ends belong to the last segment that has a length.
+    last = np.searchsorted(axis, axis[offsets[1:] - 1], side="left") - 1
+    segment = np.clip(segment, offsets[line], np.maximum(last, offsets[:-1])[line])
+    following = np.minimum(segment + 1, offsets[line + 1] - 1)
+    size = axis[following] - axis[segment]
+    share = np.divide(wanted - axis[segment], size, out=np.zeros(len(wanted)), where=size > 0.0)
+    share = np.clip(share, 0.0, 1.0)[:, None]
+    return (1.0 - share) * points[segment] + share * points[following], segment
+
+
+def resample(points: FloatArray, offsets: IntArray, step: float) -> tuple[FloatArray, IntArray]:
+    """Resample polylines in equal steps of arc length.
+
+    Each polyline of length L is cut into ``max(1, round(L / step))`` equal parts, so that both ends
+    stay and a closed polyline stays closed.
+
+    Parameters
+    ----------
+    points, offsets
+        The polylines, each with at least one point.
+    step : float, mm
+        Wanted distance along the curve between neighbouring points.
+
+    Returns
+    -------
+    points, offsets
+        The resampled polylines; arc length is the one of the polylines given.
+    """
+    total = lengths(points, offsets)
+    parts = np.maximum(1, np.round(total / step).astype(np.int64))
+    ends = np.concatenate([[0], np.cumsum(parts + 1)])
+    line = np.repeat(np.arange(len(total)), parts + 1)
+    number = np.arange(ends[-1]) - ends[line]
+    found, _ = sample_at(points, offsets, line, number * (total / parts)[line])
+    if len(total):
+        found[ends[:-1]], found[ends[1:] - 1] = points[offsets[:-1]], points[offsets[1:] - 1]
+    return found, ends
+
+
+def sample_midpoints(
+    points: FloatArray, offsets: IntArray, step: float
+) -> tuple[FloatArray, FloatArray, FloatArray, IntArray]:
+    """Cut polylines into equal parts and sample the middle of each part.
+
+    Parts are those of `resample`. Polylines of no length give no sample.
+
+    Returns
+    -------
+    points : (s, d) array
+    tangents : (s, d) array
+        Unit vectors along the segment on which each sample lies.
+    weights : (s,) array
+        Length of the part; they sum to the length of the polylines.
+    line : (s,) int array
+        Polyline of each sample.
+    """
+    total = lengths(points, offsets)
+    parts = np.where(total > 0.0, np.maximum(1, np.round(total / step)), 0).astype(np.int64)
+    line = np.repeat(np.arange(len(total)), parts)
+    size = np.divide(total, parts, out=np.zeros(len(total)), where=parts > 0)[line]
+    number = np.arange(len(line)) - (np.cumsum(parts) - parts)[line]
+    found, segment = sample_at(points, offsets, line, (number + 0.5) * size)
+    tangent = points[np.minimum(segment + 1, len(points) - 1)] - points[segment]
+    norm = np.linalg.norm(tangent, axis=1)
+    return found, tangent / np.maximum(norm, 1e-300)[:, None], size, line
+
+
+def subdivide(
+    points: FloatArray, offsets: IntArray, longest: float
+) -> tuple[FloatArray, IntArray, IntArray]:
+    """Cut segments longer than `longest` into equal pieces; every given point stays.
+
+    Returns
+    -------
+    points, offsets
+        The subdivided polylines.
+    segment : (P',) int array
+        Index of the given point that starts the segment on which each new point lies.
+    """
+    steps = _steps(points, offsets)
+    # Pieces of the segment that each point starts; the last point of a polyline starts none.
+    pieces = np.ones(len(points), dtype=np.int64)
+    pieces[:-1] = np.maximum(1, np.ceil(steps[1:] / longest - 1e-9))
+    segment = np.repeat(np.arange(len(points)), pieces)
+    first = np.concatenate([[0], np.cumsum(pieces)])
+    share = ((np.arange(len(segment)) - first[segment]) / pieces[segment])[:, None]
+    following = np.minimum(segment + 1, len(points) - 1)
+    return (1.0 - share) * points[segment] + share * points[following], first[offsets], segment
+
+
+def merge_repeated(
+    points: FloatArray, offsets: IntArray, tolerance: float = 0.0
+) -> tuple[FloatArray, IntArray]:
+    """Drop every point that lies within `tolerance` of the one before it.
+
+    First points always stay, so a polyline of no length keeps one point.
+    """
+    keep = _steps(points, offsets) > tolerance
+    starts = offsets[:-1][np.diff(offsets) > 0]
+    keep[starts] = True
+    kept = np.concatenate([[0], np.cumsum(keep)])
+    return points[keep], kept[offsets]
+
+
+def turning_angles(points: FloatArray, offsets: IntArray, closed: BoolArray) -> FloatArray:
+    """Angle by which polylines turn at each point, (P,), radians in [0, pi].
+
+    Parameters
+    ----------
+    points, offsets
+        The polylines, without repeated neighbouring points (`merge_repeated`): a step of no length
+        turns by 0.
+    closed : (K,) bool array
+        Closed polylines also turn at their first point; the angle is given there, and the repeated
+        last point has 0. Ends of open polylines have 0.
+    """
+    count = len(points)
+    if count == 0:
+        return np.zeros(0)
+    index = np.arange(count)
+    before, after = index - 1, np.minimum(index + 1, count - 1)
+    sizes = np.diff(offsets)
+    starts, ends = offsets[:-1][sizes > 0], offsets[1:][sizes > 0] - 1
+    ring = np.asarray(closed, dtype=bool)[sizes > 0] & (ends > starts)
+    before[starts] = np.where(ring, ends - 1, starts)
+    after[ends] = ends
+    into, out = points - points[before], points[after] - points
+    along = np.einsum("ij,ij->i", into, out)
+    if points.shape[1] == 2:
+        across = np.abs(into[:, 0] * out[:, 1] - into[:, 1] * out[:, 0])
+    else:
+        across = np.linalg.norm(np.cross(into, out), axis=1)
+    return np.arctan2(across, along)
+
+
+def point_at(line: FloatArray, position: float) -> FloatArray:
+    """Point (d,) of one polyline (n, d) at an arc length from its start."""
+    offsets = np.array([0, len(line)])
+    found, _ = sample_at(line, offsets, np.zeros(1, dtype=np.int64), np.array([position]))
+    return found[0]
+
+
+def between(line: FloatArray, start: float, end: float) -> FloatArray:
+    """Part of one polyline (n, d) from arc length `start` to arc length `end` >= `start`."""
+    along = arc_lengths(line, np.array([0, len(line)]))
+    inside = (along > start) & (along < end)
+    return np.concatenate([[point_at(line, start)], line[inside], [point_at(line, end)]])
+
+
+def split(line: FloatArray, positions: Iterable[float]) -> list[FloatArray]:
+    """Cut one open polyline (n, d) at arc lengths strictly inside it; the pieces in order."""
+    total = float(lengths(line, np.array([0, len(line)]))[0])
+    cuts = [0.0, *sorted({float(p) for p in positions if 0.0 < p < total}), total]
+    return [between(line, a, b) for a, b in pairwise(cuts)]
