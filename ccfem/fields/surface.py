@@ -97,6 +97,10 @@ class Surface:
         total = np.bincount(self.triangles.ravel(), values, minlength=len(self.points))
         return total.astype(np.float64)
 
+    def to_points(self, values: FloatArray) -> FloatArray:
+        """Area-weighted mean at the points, (n,), of a field (t,) given on the triangles."""
+        return self.lumped(values) / np.maximum(self.lumped(np.ones(len(values))), 1e-300)
+
     @cached_property
     def neighbours(self) -> IntArray:
         """Pairs of triangles that share an edge, (e, 2)."""

@@ -21,11 +21,22 @@ class Isocontours:
         Curve k holds ``points[offsets[k]:offsets[k + 1]]``; a closed one repeats its first point.
     level : (K,) int array
         Number of the level that each curve lies on.
+    edges : (P, 2) int array
+        Ends of the triangle edge that each point lies on.
+    weights : (P,) array in [0, 1]
+        ``points = (1 - weights) * nodes[edges[:, 0]] + weights * nodes[edges[:, 1]]``.
     """
 
     points: FloatArray
     offsets: IntArray
     level: IntArray
+    edges: IntArray
+    weights: FloatArray
+
+    def interpolate(self, values: FloatArray) -> FloatArray:
+        """Values (P,) at the points of the curves of a field (n,) given at the nodes."""
+        a, b = self.edges.T
+        return (1.0 - self.weights) * values[a] + self.weights * values[b]
 
     def lines(self) -> list[FloatArray]:
         """Return the curves as (n_i, 2) arrays."""
@@ -61,13 +72,15 @@ def isocontours(
     low = np.ceil(np.minimum(scaled[edges[:, 0]], scaled[edges[:, 1]])).astype(np.int64)
     high = np.floor(np.maximum(scaled[edges[:, 0]], scaled[edges[:, 1]])).astype(np.int64)
     start = np.concatenate([[0], np.cumsum(np.maximum(high - low + 1, 0))])
-    crossings, level = _crossings(points, scaled, edges, low, start)
+    edge, level, weights = _crossings(scaled, edges, low, start)
     line, offsets = _chain(of_triangle, low, high, start)
     order = np.argsort(level[line[offsets[:-1]]], kind="stable")
     sizes = np.diff(offsets)[order]
     taken = _gather(line, offsets, order, sizes)
     new_offsets = np.concatenate([[0], np.cumsum(sizes)]).astype(np.int64)
-    return Isocontours(crossings[taken], new_offsets, level[taken[new_offsets[:-1]]])
+    ends, w = edges[edge[taken]], weights[taken]
+    curve = (1.0 - w)[:, None] * points[ends[:, 0]] + w[:, None] * points[ends[:, 1]]
+    return Isocontours(curve, new_offsets, level[taken[new_offsets[:-1]]], ends, w)
 
 
 def _gather(line: IntArray, offsets: IntArray, order: IntArray, sizes: IntArray) -> IntArray:
@@ -84,16 +97,17 @@ def _edges(triangles: IntArray, n: int) -> tuple[IntArray, IntArray]:
 
 
 @njit(cache=True)
-def _crossings(points, scaled, edges, low, start):  # type: ignore[no-untyped-def]
-    crossings = np.empty((start[-1], 2))
+def _crossings(scaled, edges, low, start):  # type: ignore[no-untyped-def]
+    edge = np.empty(start[-1], np.int64)
     level = np.empty(start[-1], np.int64)
+    weights = np.empty(start[-1])
     for e in range(len(edges)):
         a, b = edges[e]
         for k in range(start[e], start[e + 1]):
+            edge[k] = e
             level[k] = low[e] + k - start[e]
-            w = (level[k] - scaled[a]) / (scaled[b] - scaled[a])
-            crossings[k] = (1.0 - w) * points[a] + w * points[b]
-    return crossings, level
+            weights[k] = (level[k] - scaled[a]) / (scaled[b] - scaled[a])
+    return edge, level, weights
 
 
 @njit(cache=True)

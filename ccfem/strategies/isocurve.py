@@ -6,6 +6,7 @@ continuous fibre reinforced thermoplastic composites, Additive Manufacturing 49 
 ``benchmarks/papers/chen_2021`` measures.
 """
 
+import itertools
 from collections.abc import Sequence
 from dataclasses import dataclass
 from typing import Any, ClassVar, Literal, get_args
@@ -24,6 +25,7 @@ from ccfem.fields.scalar import fit_constrained, fit_literal, fit_weighted
 from ccfem.fields.surface import Surface
 from ccfem.geometry.clearance import trim_to_clearance
 from ccfem.geometry.conformal import lead_into, parallel_curve
+from ccfem.geometry.isocontours import Isocontours
 from ccfem.geometry.joining import link_ends
 from ccfem.geometry.rings import close_short_ring, holes_on
 from ccfem.layers.layer import Layer
@@ -53,6 +55,8 @@ class Isocurve:
         Percentile (by area of the layer) of the stress above which the density grows no more.
         The knob for how much fibre a layer gets: without it one hot spot sets the spacing of the
         whole layer.
+    floor : float, default 0.1
+        Ends of isocurves are cut back to where the stress is at least this share of the cap.
     power : float, default 1
         p of Eq. 5: density as stress to this power; 0 gives uniform density.
     spacing_weight : float, default 0.1
@@ -91,6 +95,7 @@ class Isocurve:
     """
 
     cap: float = 82.0
+    floor: float = 0.1
     power: float = 1.0
     spacing_weight: float = 0.1
     fill_length: float = 3.0
@@ -139,6 +144,7 @@ class Isocurve:
         """Return the algorithm as the paper prints it."""
         return cls(
             cap=100.0,
+            floor=0.0,
             link_limit=2.0,
             stress="cell",
             field="mesh",
@@ -224,12 +230,28 @@ class _Planner:
             values = fit_constrained(
                 surface, direction, density / width, weight, width, s.spacing_weight
             )
-            return unit_levels(surface, values).lines()
+            return self.worthwhile(unit_levels(surface, values), surface, confidence)
         if s.fit == "literal":
             values = fit_literal(surface, density[:, None] * direction)
         else:
             values = fit_weighted(surface, direction, density, weight, s.spacing_weight)
-        return extract_levels(surface, values, width).lines()
+        return self.worthwhile(extract_levels(surface, values, width), surface, confidence)
+
+    def worthwhile(
+        self, curves: Isocontours, surface: Surface, confidence: FloatArray
+    ) -> list[FloatArray]:
+        """Curves without the ends that lie where the stress is below the floor."""
+        if self.strategy.floor <= 0.0:
+            return curves.lines()
+        enough = curves.interpolate(surface.to_points(confidence)) >= self.strategy.floor
+        kept = []
+        for a, b in itertools.pairwise(curves.offsets):
+            inside = np.flatnonzero(enough[a:b])
+            if np.array_equal(curves.points[a], curves.points[b - 1]):
+                kept.append(curves.points[a:b])
+            elif len(inside) > 1:
+                kept.append(curves.points[a + inside[0] : a + inside[-1] + 1])
+        return kept
 
     def connected(
         self, lines: list[FloatArray], layer: Layer, part: StressField, machine: Machine
