@@ -1,0 +1,110 @@
+"""Meshes from and to files, by the file's suffix."""
+
+import os
+from collections.abc import Callable
+from pathlib import Path
+
+import numpy as np
+
+from ccfem.errors import InputError
+from ccfem.io.abaqus import read_inp
+from ccfem.io.gmsh import read_msh
+from ccfem.io.npz import read_npz, write_npz
+from ccfem.io.tet import read_tet, write_tet
+from ccfem.io.vtu import read_vtu, write_vtu
+from ccfem.io.whole import existing_file, whole_file
+from ccfem.mesh import TetMesh
+from ccfem.mesh_check import check_mesh
+
+__all__ = ["read_mesh", "write_mesh"]
+
+_READERS: dict[str, Callable[[Path], TetMesh]] = {
+    ".tet": read_tet,
+    ".msh": read_msh,
+    ".vtu": read_vtu,
+    ".inp": read_inp,
+    ".npz": read_npz,
+}
+_WRITERS: dict[str, Callable[[TetMesh, Path], None]] = {
+    ".vtu": write_vtu,
+    ".tet": write_tet,
+    ".npz": write_npz,
+}
+_SURFACES = (".stl", ".obj", ".ply")
+
+
+def read_mesh(path: str | os.PathLike[str], scale: float = 1.0, check: bool = True) -> TetMesh:
+    """Read a tetrahedral mesh with the patches that its file names.
+
+    Parameters
+    ----------
+    path : path
+        ``.tet`` (`ccfem.io.tet`), Gmsh ``.msh`` 2.2 or 4.1 (physical groups of triangles become
+        patches), ``.vtu``, Abaqus ``.inp`` (surfaces, node sets and sets of triangles become
+        patches) or ``.npz`` (`ccfem.io.npz`). Linear or quadratic.
+    scale : float, default 1
+        Factor on the coordinates, to make them mm: 1000 for a file in metres.
+    check : bool, default True
+        Normalise and mend the mesh with `ccfem.mesh_check.check_mesh`, which also says what it
+        did; without it the mesh comes as it stands in the file.
+
+    Returns
+    -------
+    TetMesh
+
+    Raises
+    ------
+    InputError
+        When the file is missing or no tetrahedral mesh, or nothing sensible can follow from it.
+    """
+    path = existing_file(path, "mesh file")
+    suffix = path.suffix.lower()
+    if suffix in _SURFACES:
+        raise InputError(
+            f"{path} is a surface, not a tetrahedral mesh: read it with read_surface and fill it "
+            "with tetrahedralise, or name it as surface in the part file"
+        )
+    if suffix not in _READERS:
+        raise InputError(
+            f"cannot tell the format of mesh file {path}: its name must end in "
+            f"{', '.join(sorted(_READERS))}"
+        )
+    if not 0.0 < scale < float("inf"):
+        raise InputError(f"mesh scale must be a finite number above 0; got {scale}: correct it")
+    try:
+        mesh = _READERS[suffix](path)
+        if scale != 1.0:
+            mesh = TetMesh(mesh.points * scale, mesh.cells, mesh.patches)
+        if not check:
+            return mesh
+        return check_mesh(mesh)[0]
+    except InputError as error:
+        message = str(error)
+        raise InputError(message if str(path) in message else f"{path}: {message}") from None
+
+
+def write_mesh(mesh: TetMesh, path: str | os.PathLike[str]) -> None:
+    """Write a mesh, whole or not at all.
+
+    Parameters
+    ----------
+    mesh : TetMesh
+    path : path
+        ``.vtu`` or ``.npz`` (patches kept) or ``.tet`` (linear meshes only, patches left out: the
+        format has no place for them).
+
+    Raises
+    ------
+    InputError
+        For another suffix, a mesh that the format cannot hold, or a file that cannot be written.
+    """
+    path = Path(path)
+    suffix = path.suffix.lower()
+    if suffix not in _WRITERS:
+        raise InputError(
+            f"cannot write a mesh to {path}: its name must end in {', '.join(sorted(_WRITERS))}"
+        )
+    if not np.isfinite(mesh.points).all():
+        raise InputError(f"cannot write {path}: the mesh has NaN or infinite coordinates")
+    with whole_file(path) as temporary:
+        _WRITERS[suffix](mesh, temporary)

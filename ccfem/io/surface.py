@@ -1,0 +1,140 @@
+"""Closed triangulated surfaces from STL, OBJ and PLY files."""
+
+import os
+from dataclasses import dataclass
+
+import numpy as np
+
+from ccfem.arrays import FloatArray, IntArray, read_only
+from ccfem.errors import InputError
+from ccfem.io.quiet import read_quietly
+from ccfem.io.whole import existing_file
+
+__all__ = ["Surface", "read_surface"]
+
+_SUFFIXES = (".obj", ".ply", ".stl")
+
+
+@dataclass(frozen=True)
+class Surface:
+    """A closed surface of triangles, outward.
+
+    Attributes
+    ----------
+    points : (n, 3) array, mm
+    triangles : (t, 3) int array
+
+    Raises
+    ------
+    InputError
+        When the surface has no triangle, a coordinate that is not finite, or is open.
+    """
+
+    points: FloatArray
+    triangles: IntArray
+
+    def __post_init__(self) -> None:
+        object.__setattr__(self, "points", read_only(self.points))
+        object.__setattr__(self, "triangles", read_only(self.triangles, np.int64))
+        if self.points.ndim != 2 or self.points.shape[1] != 3 or not len(self.triangles):
+            raise InputError(
+                f"a surface needs points (n, 3) and triangles (t, 3); got {self.points.shape} "
+                f"and {self.triangles.shape}: give a triangulated surface"
+            )
+        if not np.isfinite(self.points).all():
+            raise InputError("surface points must be finite; got NaN or infinity: repair the file")
+        _check_closed(self.points, self.triangles)
+        if self.volume < 0.0:
+            object.__setattr__(self, "triangles", read_only(self.triangles[:, ::-1], np.int64))
+
+    @property
+    def volume(self) -> float:
+        """Volume inside the surface, mm^3."""
+        a, b, c = np.moveaxis(self.points[self.triangles] - self.points.mean(axis=0), 1, 0)
+        return float(np.einsum("ij,ij->", np.cross(a, b), c)) / 6.0
+
+
+def read_surface(path: str | os.PathLike[str], scale: float = 1.0) -> Surface:
+    """Read a closed surface.
+
+    Parameters
+    ----------
+    path : path
+        STL, OBJ or PLY; polygons are cut into triangles, equal points merged.
+    scale : float, default 1
+        Factor on the coordinates, to make them mm.
+
+    Returns
+    -------
+    Surface
+
+    Raises
+    ------
+    InputError
+        When the file is missing, no surface, or the surface is open; the message says how many
+        edges are open and where.
+    """
+    path = existing_file(path, "surface file")
+    if path.suffix.lower() not in _SUFFIXES:
+        raise InputError(
+            f"cannot tell the format of surface file {path}: its name must end in "
+            f"{', '.join(_SUFFIXES)}"
+        )
+    if not 0.0 < scale < float("inf"):
+        raise InputError(f"surface scale must be a finite number above 0; got {scale}: correct it")
+    found = read_quietly(path)
+    faces = getattr(found, "triangulate", lambda: None)()
+    if faces is None or not getattr(faces, "n_cells", 0) or not hasattr(faces, "regular_faces"):
+        raise InputError(
+            f"{path} is not a surface that can be read: it holds no triangles: export it again as "
+            "binary STL"
+        )
+    try:
+        return Surface(*_merged(np.asarray(faces.points, dtype=float) * scale, faces.regular_faces))
+    except InputError as error:
+        raise InputError(f"{path}: {error}") from None
+
+
+def _merged(points: FloatArray, triangles: IntArray) -> tuple[FloatArray, IntArray]:
+    """Merge points that agree to 1e-6 of the size; drop triangles that lose a side by it."""
+    points, triangles = np.asarray(points), np.asarray(triangles, dtype=np.int64)
+    if not np.isfinite(points).all():
+        raise InputError("surface points must be finite; got NaN or infinity: repair the file")
+    size = float(np.linalg.norm(np.ptp(points, axis=0))) or 1.0
+    _, first, place = np.unique(
+        np.round(points / (1e-6 * size)).astype(np.int64),
+        axis=0,
+        return_index=True,
+        return_inverse=True,
+    )
+    triangles = place.reshape(-1)[triangles]
+    a, b, c = triangles.T
+    return points[first], triangles[(a != b) & (b != c) & (c != a)]
+
+
+def _check_closed(points: FloatArray, triangles: IntArray) -> None:
+    """Raise unless every edge joins triangles that run along it in opposite directions."""
+    directed = triangles[:, [[0, 1], [1, 2], [2, 0]]].reshape(-1, 2)
+    edges, place, counts = np.unique(
+        np.sort(directed, axis=1), axis=0, return_inverse=True, return_counts=True
+    )
+    odd = np.flatnonzero(counts % 2)
+    if len(odd):
+        middle = points[edges[odd]].mean(axis=1)
+        at = ", ".join(f"{x:.4g}" for x in middle[0])
+        low, high = middle.min(axis=0), middle.max(axis=0)
+        span = " to ".join(
+            "(" + ", ".join(f"{x:.4g}" for x in corner) + ")" for corner in (low, high)
+        )
+        raise InputError(
+            f"the surface is open: {len(odd)} edges belong to an odd number of triangles, the "
+            f"first at ({at}), all within {span} mm: close the holes in the program that made it"
+        )
+    forward = np.where(directed[:, 0] < directed[:, 1], 1, -1)
+    turned = np.flatnonzero(np.bincount(place.reshape(-1), weights=forward))
+    if len(turned):
+        at = ", ".join(f"{x:.4g}" for x in points[edges[turned[0]]].mean(axis=0))
+        raise InputError(
+            f"the surface's triangles are not all turned outward: {len(turned)} edges are run "
+            f"along twice in one direction, the first at ({at}) mm: unify the normals"
+        )

@@ -1,0 +1,73 @@
+"""Writing a file whole or not at all."""
+
+import os
+from collections.abc import Iterator
+from contextlib import contextmanager
+from pathlib import Path
+
+from ccfem.errors import InputError
+
+__all__ = ["existing_file", "whole_file"]
+
+
+@contextmanager
+def whole_file(path: str | os.PathLike[str]) -> Iterator[Path]:
+    """Write to a temporary file that takes the place of `path` when the block ends well.
+
+    Parameters
+    ----------
+    path : path
+        The file to write; its folder must exist.
+
+    Yields
+    ------
+    Path
+        Name of a file in the same folder, with the same suffix, to write to. When the block
+        raises, it is removed and `path` stays as it was.
+
+    Raises
+    ------
+    InputError
+        When the file cannot be written.
+
+    Examples
+    --------
+    >>> import tempfile
+    >>> folder = Path(tempfile.mkdtemp())
+    >>> with whole_file(folder / "note.txt") as temporary:
+    ...     _ = temporary.write_text("all of it")
+    >>> (folder / "note.txt").read_text()
+    'all of it'
+    """
+    path = Path(path)
+    if not path.parent.is_dir():
+        raise InputError(f"cannot write {path}: there is no folder {path.parent}: make it first")
+    temporary = path.with_name(f".{path.stem}.{os.getpid()}{path.suffix}")
+    try:
+        yield temporary
+        os.replace(temporary, path)
+    except OSError as error:
+        raise InputError(
+            f"cannot write {path}: {error.strerror or error}: choose a folder you may write to"
+        ) from error
+    finally:
+        if temporary.exists():
+            temporary.unlink()
+
+
+def existing_file(path: str | os.PathLike[str], what: str) -> Path:
+    """Return `path` when it is a file that can be read.
+
+    Raises
+    ------
+    InputError
+        When it is not; the message begins with `what`.
+    """
+    path = Path(path)
+    if path.is_dir():
+        raise InputError(f"{what} {path} is a folder: name the file in it")
+    if not path.exists():
+        raise InputError(f"{what} {path} does not exist: check its name and folder")
+    if not os.access(path, os.R_OK):
+        raise InputError(f"{what} {path} cannot be read: check its permissions")
+    return path

@@ -1,0 +1,7 @@
+"""Surfaces and planforms to tetrahedral meshes."""
+
+from ccfem.meshing.planform import triangulate
+from ccfem.meshing.prisms import extrude
+from ccfem.meshing.volume import tetrahedralise
+
+__all__ = ["extrude", "tetrahedralise", "triangulate"]

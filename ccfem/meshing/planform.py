@@ -1,0 +1,286 @@
+"""Triangulation of a planform: even triangles, shorter ones where the outline turns sharply.
+
+Boundary points are laid along the outline and stay there; inner points start on a hexagonal grid
+and move to the area-weighted mean of the triangles round them (Chen and Holst, Efficient mesh
+optimization schemes based on optimal Delaunay triangulations, 2011), with a Delaunay
+triangulation in every round.
+"""
+
+from collections.abc import Callable
+from itertools import pairwise
+from typing import Any
+
+import numpy as np
+import shapely
+from scipy.spatial import Delaunay, QhullError, cKDTree
+
+from ccfem.arrays import BoolArray, FloatArray, IntArray
+from ccfem.errors import InputError
+
+__all__ = ["triangulate"]
+
+_CORNER = np.radians(25.0)
+"""Turn of the outline above which a vertex is a corner, kept as a point of the mesh."""
+_PER_TURN = 24
+"""Segments of a full turn of the outline."""
+_FINEST = 0.25
+"""Shortest edge length aimed at, in edge lengths asked for."""
+_GRADING = 0.25
+"""Growth of the edge length with the distance from where the outline turns."""
+_ROUNDS = 30
+"""Rounds of smoothing."""
+_SPACING = 0.8
+"""Least distance of points at the start, in edge lengths."""
+_MOST = 2e6
+"""Triangles above which a wanted edge length counts as a slip of the unit."""
+
+Size = Callable[[FloatArray], FloatArray]
+
+
+def triangulate(polygon: Any, edge_length: float) -> tuple[FloatArray, IntArray]:
+    """Triangulate a planform.
+
+    Parameters
+    ----------
+    polygon : shapely Polygon, mm
+        Valid, with or without holes.
+    edge_length : float, mm
+        Edge length aimed at. A full turn of the outline (a hole) has at least 24 segments unless
+        that takes edges shorter than a quarter of this length; it grows from there inward.
+
+    Returns
+    -------
+    points : (n, 2) array, mm
+        Boundary points, exactly on the outline, first.
+    triangles : (t, 3) int array
+        Counter-clockwise.
+
+    Raises
+    ------
+    InputError
+        When the polygon is empty or not valid, or the edge length does not suit it.
+    """
+    _check(polygon, edge_length)
+    rings = [np.asarray(r.coords)[:-1, :2] for r in (polygon.exterior, *polygon.interiors)]
+    size = _size_function(rings, edge_length)
+    outline = [_along(ring, size) for ring in rings]
+    inner = _grid(polygon, edge_length, size, np.concatenate(outline))
+    outline, inner = _conforming(outline, inner)
+    fixed = sum(map(len, outline))
+    points = np.concatenate([*outline, inner])
+    domain = shapely.Polygon(outline[0], outline[1:])
+    if not domain.is_valid:
+        raise _not_followed()
+    for _ in range(_ROUNDS):
+        points = _smoothed(points, _inside(points, domain), fixed, size)
+    outline, inner = _conforming(outline, points[fixed:])
+    points = np.concatenate([*outline, inner])
+    triangles = _inside(points, domain)
+    used = np.unique(triangles)
+    number = np.full(len(points), -1)
+    number[used] = np.arange(len(used))
+    return points[used], number[triangles]
+
+
+def _check(polygon: Any, edge_length: float) -> None:
+    """Raise on a planform or edge length that cannot be meshed."""
+    if not isinstance(polygon, shapely.Polygon) or polygon.is_empty:
+        raise InputError(
+            "a planform must be one polygon with an area; got "
+            f"{getattr(polygon, 'geom_type', polygon)}: join its parts or mesh them one by one"
+        )
+    if not polygon.is_valid:
+        raise InputError(
+            f"the planform is not a valid polygon: {shapely.is_valid_reason(polygon)}: correct it"
+        )
+    if not 0.0 < edge_length < np.inf:
+        raise InputError(f"edge length must be above 0 mm; got {edge_length}: correct it")
+    expected = polygon.area / (0.433 * edge_length**2)
+    if expected > _MOST:
+        raise InputError(
+            f"an edge length of {edge_length:g} mm would make about {expected:.1g} triangles: "
+            "choose a longer one"
+        )
+
+
+def _turns(ring: FloatArray) -> tuple[FloatArray, FloatArray]:
+    """Turn at each vertex of a ring, (k,), radians, and length of its two sides' mean, mm."""
+    before, after = ring - np.roll(ring, 1, axis=0), np.roll(ring, -1, axis=0) - ring
+    cross = before[:, 0] * after[:, 1] - before[:, 1] * after[:, 0]
+    turn = np.abs(np.arctan2(cross, np.einsum("ij,ij->i", before, after)))
+    return turn, 0.5 * (np.linalg.norm(before, axis=1) + np.linalg.norm(after, axis=1))
+
+
+def _size_function(rings: list[FloatArray], edge_length: float) -> Size:
+    """Edge length aimed at as a function of points (n, 2)."""
+    places, sizes = [], []
+    for ring in rings:
+        turn, side = _turns(ring)
+        smooth = (turn > 1e-6) & (turn < _CORNER)
+        wanted = 2.0 * np.pi / _PER_TURN * side[smooth] / turn[smooth]
+        wanted = np.maximum(wanted, _FINEST * edge_length)
+        places.append(ring[smooth][wanted < edge_length])
+        sizes.append(wanted[wanted < edge_length])
+    source, least = np.concatenate(places), np.concatenate(sizes)
+    step = np.floor(np.log(np.maximum(least, 1e-300) / edge_length) / np.log(1.05)).astype(int)
+    trees = [(edge_length * 1.05 ** float(k), cKDTree(source[step == k])) for k in np.unique(step)]
+
+    def size(points: FloatArray) -> FloatArray:
+        result = np.full(len(points), edge_length)
+        for finest, tree in trees:
+            reach = (edge_length - finest) / _GRADING
+            gap, _ = tree.query(points, distance_upper_bound=max(reach, 1e-12))
+            result = np.minimum(result, finest + _GRADING * gap)
+        return result
+
+    return size
+
+
+def _along(ring: FloatArray, size: Size) -> FloatArray:
+    """Points (k, 2) along a ring at the wanted distances; its corners are among them."""
+    turn, _ = _turns(ring)
+    corners = np.flatnonzero(turn >= _CORNER)
+    if not len(corners):
+        corners = np.array([0])
+    ring = np.roll(ring, -corners[0], axis=0)
+    stops = np.append(corners - corners[0], len(ring))
+    ring = np.concatenate([ring, ring[:1]])
+    least = 12 if len(corners) == 1 else 1
+    found = []
+    for start, stop in pairwise(stops):
+        line = shapely.LineString(ring[start : stop + 1])
+        fine = np.linspace(0.0, line.length, max(64, 8 * (stop - start)) + 1)
+        place = shapely.get_coordinates(shapely.line_interpolate_point(line, fine))
+        steps = np.diff(fine) / size(0.5 * (place[1:] + place[:-1]))
+        passed = np.concatenate([[0.0], np.cumsum(steps)])
+        count = max(least, round(passed[-1]))
+        at = np.interp(np.linspace(0.0, passed[-1], count + 1)[:-1], passed, fine)
+        found.append(shapely.get_coordinates(shapely.line_interpolate_point(line, at)))
+    return np.concatenate(found)
+
+
+def _grid(polygon: Any, edge_length: float, size: Size, outline: FloatArray) -> FloatArray:
+    """Inner points (k, 2): a hexagonal grid, a thinned finer one where edges are shorter."""
+    coarse = _hexagons(polygon, edge_length)
+    coarse = coarse[size(coarse) > 0.999 * edge_length]
+    fine = _hexagons(polygon, _FINEST * edge_length)
+    fine = fine[size(fine) <= 0.999 * edge_length]
+    fine = fine[np.random.default_rng(0).permutation(len(fine))]
+    points = np.concatenate([outline, coarse, fine])
+    wanted = _SPACING * size(points)
+    first = np.arange(len(points)) < len(outline)
+    near = cKDTree(outline).query(points)[0] < wanted
+    kept = _thinned(points, wanted, first, near & ~first)
+    return points[kept & ~first]
+
+
+def _hexagons(polygon: Any, step: float) -> FloatArray:
+    """Points (k, 2) of a hexagonal grid inside a polygon."""
+    low, high = np.array(polygon.bounds[:2]), np.array(polygon.bounds[2:])
+    count = np.ceil((high - low) / (step * np.array([1.0, np.sqrt(0.75)]))).astype(int) + 2
+    i, j = np.meshgrid(np.arange(count[0]), np.arange(count[1]), indexing="ij")
+    x = low[0] + step * (i + 0.5 * (j % 2) - 0.5)
+    y = low[1] + step * np.sqrt(0.75) * (j - 0.5)
+    points = np.stack([x.ravel(), y.ravel()], axis=1)
+    return points[shapely.contains_xy(polygon, points)]
+
+
+def _thinned(points: FloatArray, wanted: FloatArray, kept: BoolArray, gone: BoolArray) -> BoolArray:
+    """Points that keep the wanted distance from each other, the earlier one before the later.
+
+    `kept` are in from the start, `gone` out.
+    """
+    pairs = cKDTree(points).query_pairs(wanted.max(), output_type="ndarray")
+    gap = np.linalg.norm(points[pairs[:, 0]] - points[pairs[:, 1]], axis=1)
+    close = gap < 0.999 * wanted[pairs].max(axis=1)
+    pairs = np.sort(pairs[close], axis=1)
+    kept, gone = kept.copy(), gone.copy()
+    while True:
+        early, late = pairs.T
+        gone[late[kept[early]]] = True
+        gone[early[kept[late] & ~kept[early]]] = True
+        open_ = ~kept & ~gone
+        pairs = pairs[open_[pairs].all(axis=1)]
+        blocked = np.zeros(len(points), dtype=bool)
+        blocked[pairs[:, 1]] = True
+        ready = open_ & ~blocked
+        if not ready.any():
+            return kept
+        kept |= ready
+
+
+def _conforming(
+    outline: list[FloatArray], inner: FloatArray
+) -> tuple[list[FloatArray], FloatArray]:
+    """Outline with a point more wherever the triangulation misses one of its sides."""
+    for _ in range(8):
+        points = np.concatenate([*outline, inner])
+        corners = _delaunay(points)
+        sides = np.sort(corners[:, [[0, 1], [1, 2], [2, 0]]].reshape(-1, 2), axis=1)
+        known = np.unique(sides[:, 0] * len(points) + sides[:, 1])
+        start, closer = 0, []
+        for ring in outline:
+            here = start + np.arange(len(ring))
+            there = np.roll(here, -1)
+            key = np.minimum(here, there) * len(points) + np.maximum(here, there)
+            lost = np.flatnonzero(~np.isin(key, known))
+            middle = 0.5 * (ring[lost] + np.roll(ring, -1, axis=0)[lost])
+            closer.append(np.insert(ring, lost + 1, middle, axis=0))
+            start += len(ring)
+        if sum(map(len, closer)) == start:
+            return outline, inner
+        outline = closer
+    raise _not_followed()
+
+
+def _not_followed() -> InputError:
+    return InputError(
+        "the outline of the planform cannot be followed at this edge length: choose a shorter one"
+    )
+
+
+def _delaunay(points: FloatArray) -> IntArray:
+    """Delaunay triangles (t, 3), counter-clockwise."""
+    try:
+        corners = np.asarray(Delaunay(points).simplices, dtype=np.int64)
+    except QhullError:
+        raise InputError(
+            "the planform has no area that could be triangulated: check its coordinates"
+        ) from None
+    clockwise = _areas(points, corners) < 0.0
+    corners[clockwise] = corners[clockwise][:, ::-1]
+    return corners
+
+
+def _areas(points: FloatArray, corners: IntArray) -> FloatArray:
+    """Signed area of each triangle, (t,), mm^2."""
+    a, b, c = np.moveaxis(points[corners], 1, 0)
+    u, v = b - a, c - a
+    return 0.5 * (u[:, 0] * v[:, 1] - u[:, 1] * v[:, 0])
+
+
+def _inside(points: FloatArray, domain: Any) -> IntArray:
+    """Delaunay triangles with their centre in the domain; those without area are left out."""
+    corners = _delaunay(points)
+    centre = points[corners].mean(axis=1)
+    area = _areas(points, corners)
+    sides = np.roll(points[corners], 1, axis=1) - points[corners]
+    longest = np.linalg.norm(sides, axis=2).max(axis=1)
+    shapely.prepare(domain)
+    return corners[(area > 1e-9 * longest**2) & shapely.contains_xy(domain, centre)]
+
+
+def _smoothed(points: FloatArray, corners: IntArray, fixed: int, size: Size) -> FloatArray:
+    """Points moved to the weighted mean of the centres of the triangles round them."""
+    centre = points[corners].mean(axis=1)
+    weight = _areas(points, corners) / size(centre) ** 2
+    total = np.zeros(len(points))
+    moment = np.zeros_like(points)
+    for column in corners.T:
+        np.add.at(total, column, weight)
+        np.add.at(moment, column, weight[:, None] * centre)
+    moved = points.copy()
+    free = total > 0.0
+    free[:fixed] = False
+    moved[free] = moment[free] / total[free, None]
+    return moved

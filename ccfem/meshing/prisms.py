@@ -1,0 +1,79 @@
+"""Prismatic parts: a triangulated planform, extruded and cut into tetrahedra."""
+
+from typing import Any
+
+import numpy as np
+from scipy.sparse import coo_array
+from scipy.sparse.csgraph import reverse_cuthill_mckee
+
+from ccfem.arrays import FloatArray, IntArray
+from ccfem.errors import InputError
+from ccfem.mesh import TetMesh
+from ccfem.meshing.planform import triangulate
+
+__all__ = ["extrude"]
+
+_SPLIT = np.array([[0, 1, 2, 5], [0, 1, 4, 5], [0, 3, 4, 5]])
+"""Tetrahedra of a prism (bottom 0 1 2, top 3 4 5): side diagonals rise with the order."""
+
+
+def extrude(polygon: Any, height: float, edge_length: float, layers: int | None = None) -> TetMesh:
+    """Mesh a prism on a planform in the x-y plane.
+
+    Parameters
+    ----------
+    polygon : shapely Polygon, mm
+        With or without holes.
+    height : float, mm
+        The part reaches from z = 0 to `height`.
+    edge_length : float, mm
+        Edge length aimed at; shorter where the outline turns sharply (`triangulate`).
+    layers : int, optional
+        Layers of prisms over the height; by default as many as make them `edge_length` high.
+
+    Returns
+    -------
+    TetMesh
+        Linear, without patches. Each prism is cut into three tetrahedra; the diagonals on its
+        sides follow a random order of the planform's points (of a fixed seed) that is turned
+        round in every other layer, so that they favour no direction.
+    """
+    if not 0.0 < height < np.inf:
+        raise InputError(f"height must be a finite number above 0 mm; got {height}: correct it")
+    if layers is not None and layers < 1:
+        raise InputError(f"layers of cells must be at least 1; got {layers}: correct it")
+    plane, triangles = triangulate(polygon, edge_length)
+    plane, triangles = _numbered_along(plane, triangles)
+    count = layers or max(1, round(height / edge_length))
+    levels = count + 1
+    points = np.empty((len(plane), levels, 3))
+    points[:, :, :2] = plane[:, None]
+    points[:, :, 2] = np.linspace(0.0, height, levels)
+    rank = np.random.default_rng(0).permutation(len(plane))
+    rising = np.take_along_axis(triangles, np.argsort(rank[triangles], axis=1), axis=1)
+    layer_cells = []
+    for level in range(count):
+        ordered = rising if level % 2 == 0 else rising[:, ::-1]
+        prisms = np.hstack([ordered * levels + level, ordered * levels + level + 1])
+        layer_cells.append(prisms[:, _SPLIT])
+    cells = np.stack(layer_cells, axis=1).reshape(-1, 4)
+    return TetMesh(points.reshape(-1, 3), _turned(points.reshape(-1, 3), cells))
+
+
+def _turned(points: FloatArray, cells: IntArray) -> IntArray:
+    """Cells with positive volume."""
+    inside_out = TetMesh(points, cells).volumes < 0.0
+    cells[inside_out] = cells[inside_out][:, [0, 2, 1, 3]]
+    return cells
+
+
+def _numbered_along(points: FloatArray, triangles: IntArray) -> tuple[FloatArray, IntArray]:
+    """Points numbered so that neighbours have close numbers, triangles by their points."""
+    n = len(points)
+    ends = triangles[:, [0, 1, 2]].ravel(), triangles[:, [1, 2, 0]].ravel()
+    graph = coo_array((np.ones(len(ends[0])), ends), shape=(n, n)).tocsr()
+    order = reverse_cuthill_mckee((graph + graph.T).tocsr(), symmetric_mode=True)
+    number = np.empty(n, dtype=np.int64)
+    number[order] = np.arange(n)
+    triangles = number[triangles]
+    return points[order], triangles[np.argsort(triangles.min(axis=1), kind="stable")]

@@ -1,0 +1,64 @@
+"""Closed surface to tetrahedra, with fTetWild."""
+
+import numpy as np
+
+from ccfem.errors import InputError
+from ccfem.io.surface import Surface
+from ccfem.mesh import TetMesh
+from ccfem.mesh_check import check_mesh
+
+__all__ = ["tetrahedralise"]
+
+_MOST = 2e7
+"""Cells above which a wanted edge length counts as a slip of the unit."""
+
+
+def tetrahedralise(surface: Surface, edge_length: float) -> TetMesh:
+    """Fill a closed surface with tetrahedra (Hu et al., Fast Tetrahedral Meshing in the Wild).
+
+    The boundary of the mesh stays within 1e-3 of the part's diagonal of the surface.
+
+    Parameters
+    ----------
+    surface : Surface
+    edge_length : float, mm
+        Edge length aimed at.
+
+    Returns
+    -------
+    TetMesh
+        Linear, checked, without patches.
+
+    Raises
+    ------
+    InputError
+        When the edge length does not suit the part, or nothing is left inside the surface.
+    """
+    size = float(np.linalg.norm(np.ptp(surface.points, axis=0)))
+    if not 0.0 < edge_length < size:
+        raise InputError(
+            f"edge length must lie between 0 and the part's diagonal, {size:.3g} mm; got "
+            f"{edge_length}: correct it"
+        )
+    expected = surface.volume / (edge_length**3 / (6.0 * np.sqrt(2.0)))
+    if expected > _MOST:
+        raise InputError(
+            f"an edge length of {edge_length:g} mm would make about {expected:.1g} cells of a "
+            f"part {size:.3g} mm across: choose a longer one"
+        )
+    import pytetwild
+
+    points, cells = pytetwild.tetrahedralize(
+        np.array(surface.points),
+        surface.triangles.astype(np.int32),
+        edge_length_abs=float(edge_length),
+        optimize=True,
+        vtk_ordering=True,
+        quiet=True,
+    )
+    if not len(cells):
+        raise InputError(
+            "meshing left no cells inside the surface: check that it is closed, does not cut "
+            "itself, and that the edge length suits its thickness"
+        )
+    return check_mesh(TetMesh(points, cells))[0]

@@ -1,0 +1,47 @@
+import numpy as np
+import pytest
+
+from ccfem.mesh import TetMesh
+
+CUBE = np.array(
+    [[0, 1, 3, 7], [0, 1, 7, 5], [0, 5, 7, 4], [0, 3, 2, 7], [0, 6, 4, 7], [0, 2, 6, 7]]
+)
+
+
+def make_box(counts=(3, 2, 2), lengths=(3.0, 2.0, 1.0)):
+    """Box cut into bricks and each brick into six tetrahedra (Kuhn), positively oriented."""
+    nx, ny, nz = counts
+    grid = np.stack(np.meshgrid(*[np.arange(n + 1) for n in counts], indexing="ij"), axis=-1)
+    points = grid.reshape(-1, 3) * np.array(lengths) / np.array(counts)
+    index = np.arange(len(points)).reshape(nx + 1, ny + 1, nz + 1)
+    corners = np.stack(
+        [
+            index[i : i + nx, j : j + ny, k : k + nz].ravel()
+            for k in (0, 1)
+            for j in (0, 1)
+            for i in (0, 1)
+        ],
+        axis=1,
+    )
+    cells = corners[:, CUBE].reshape(-1, 4)
+    a, b, c, d = np.moveaxis(points[cells], 1, 0)
+    volume = np.einsum("ij,ij->i", np.cross(b - a, c - a), d - a)
+    cells[volume < 0] = cells[volume < 0][:, [0, 2, 1, 3]]
+    mesh = TetMesh(points, cells)
+    x = points[mesh.boundary][:, :, 0]
+    return mesh.with_patches(
+        {
+            "left": mesh.boundary[(x < 1e-9).all(axis=1)],
+            "right": mesh.boundary[(x > lengths[0] - 1e-9).all(axis=1)],
+        }
+    )
+
+
+@pytest.fixture(scope="session")
+def box():
+    return make_box()
+
+
+@pytest.fixture(scope="session")
+def build_box():
+    return make_box
