@@ -45,52 +45,20 @@ class Pattern:
             object.__setattr__(self, name, read_only(getattr(self, name), np.int32))
 
 
-@njit(cache=True)
-def _adjacency(cells, n):  # type: ignore[no-untyped-def]
-    m, q = cells.shape
-    start = np.zeros(n + 1, np.int32)
-    for cell in range(m):
-        for a in range(q):
-            start[cells[cell, a] + 1] += 1
-    for i in range(n):
-        start[i + 1] += start[i]
-    filled = start[:-1].copy()
-    touching = np.empty(m * q, np.int32)
-    for cell in range(m):
-        for a in range(q):
-            i = cells[cell, a]
-            touching[filled[i]] = cell * q + a
-            filled[i] += 1
-    seen = np.full(n, -1, np.int32)
-    indptr = np.zeros(n + 1, np.int32)
-    for i in range(n):
-        count = 0
-        for t in range(start[i], start[i + 1]):
-            for b in range(q):
-                j = cells[touching[t] // q, b]
-                if seen[j] != i:
-                    seen[j] = i
-                    count += 1
-        indptr[i + 1] = indptr[i] + count
-    # The pattern is symmetric: writing node i into the rows of its neighbours, with i ascending,
-    # leaves every row sorted.
-    indices = np.empty(indptr[n], np.int32)
-    filled[:] = indptr[:-1]
-    seen[:] = -1
-    for i in range(n):
-        for t in range(start[i], start[i + 1]):
-            for b in range(q):
-                j = cells[touching[t] // q, b]
-                if seen[j] != i:
-                    seen[j] = i
-                    indices[filled[j]] = i
-                    filled[j] += 1
-    return indptr, indices, start, touching
-
-
 def pattern(mesh: TetMesh) -> Pattern:
     """Find the pattern of the stiffness matrix of a mesh."""
-    return Pattern(*_adjacency(mesh.cells, len(mesh.points)))
+    (m, q), n = mesh.cells.shape, len(mesh.points)
+    starts = np.arange(0, m * q + 1, q, dtype=np.int32)
+    nodes = mesh.cells.reshape(-1).astype(np.int32)
+    places = np.arange(m * q, dtype=np.int32)
+    cells_of_node = sp.csr_array((places, nodes, starts), shape=(m, n)).T.tocsr()
+    one = np.ones(m * q, dtype=np.bool_)
+    joined = sp.csr_array(
+        (one, cells_of_node.indices, cells_of_node.indptr), shape=(n, m)
+    ) @ sp.csr_array((one, nodes, starts), shape=(m, n))
+    # The pattern is symmetric, and transposing leaves the columns sorted.
+    joined = joined.T.tocsr()
+    return Pattern(joined.indptr, joined.indices, cells_of_node.indptr, cells_of_node.data)
 
 
 def cell_gradients(mesh: TetMesh) -> FloatArray:

@@ -115,14 +115,14 @@ def _bearing(mesh: TetMesh, load: Bearing) -> FloatArray:
     """
     facets, area, normal = _outward(mesh, load.patch)
     force = np.array(load.vector, dtype=np.float64)
-    a: FloatArray = force
-    touched = np.zeros(len(facets), dtype=bool)
+    touched = normal @ force < 0.0
     for _ in range(50):
-        before, touched = touched, -(normal @ a) > 1e-9 * np.linalg.norm(a)
-        if np.array_equal(before, touched):
-            break
         weighted = (area * touched)[:, None] * normal
         a = np.asarray(np.linalg.lstsq(weighted.T @ normal, force, rcond=1e-9)[0])
+        now = -(normal @ a) > 1e-9 * np.linalg.norm(a)
+        if np.array_equal(now, touched):
+            break
+        touched = now
     forces = weighted * (normal @ a)[:, None]
     if not np.linalg.norm(forces.sum(axis=0) - force) <= 1e-6 * np.linalg.norm(force):
         raise InputError(

@@ -4,12 +4,47 @@ from typing import Any
 
 import numpy as np
 import scipy.sparse as sp
+from scipy.sparse.linalg import splu
 
-from ccfem.arrays import FloatArray
+from ccfem.arrays import FloatArray, IntArray
 from ccfem.elasticity.direct import Apply
+from ccfem.elasticity.smoothing import GaussSeidel
 from ccfem.elasticity.supports import rigid_modes
 
-__all__ = ["smoothed_aggregation"]
+__all__ = ["smoothed_aggregation", "two_level"]
+
+_COARSEST = 300
+"""Size below which a level is solved directly."""
+
+
+def _finest(matrix: sp.bsr_array, prolong: Any, coarse: Apply) -> Apply:
+    """Sweep forward, correct in the coarse space, sweep backward: a symmetric cycle."""
+    smoother, restrict = GaussSeidel(matrix), prolong.T.tocsr()
+
+    def apply(rhs: FloatArray) -> FloatArray:
+        x, residual = smoother.forward(rhs)
+        x += prolong @ coarse(restrict @ residual)
+        return smoother.backward(rhs, x)
+
+    return apply
+
+
+def _coarser(levels: Any) -> Apply:
+    """V-cycle over the levels of a pyamg hierarchy, the last one solved directly."""
+    level = levels[0]
+    if len(levels) == 1:
+        factor = splu(sp.csc_array(level.A))
+        return lambda rhs: np.asarray(factor.solve(rhs))
+    below = _coarser(levels[1:])
+
+    def apply(rhs: FloatArray) -> FloatArray:
+        x = np.zeros_like(rhs)
+        level.presmoother(level.A, x, rhs)
+        x += level.P @ below(level.R @ (rhs - level.A @ x))
+        level.postsmoother(level.A, x, rhs)
+        return x
+
+    return apply
 
 
 def smoothed_aggregation(matrix: sp.bsr_array, points: FloatArray) -> Apply:
@@ -17,13 +52,21 @@ def smoothed_aggregation(matrix: sp.bsr_array, points: FloatArray) -> Apply:
 
     Vanek, Mandel and Brezina, Computing 56 (1996) 179-196; Olson, Schroder and Tuminaro, SIAM J.
     Sci. Comput. 33 (2011) 966-991.
+
+    Parameters
+    ----------
+    matrix : bsr_array (3n, 3n) with 3x3 blocks
+    points : (n, 3) array, mm
     """
     import pyamg
 
     size = float(np.ptp(points, axis=0).max())
     near_kernel = rigid_modes((points - points.mean(axis=0)) / size)
-    sweeps = {name: ("block_gauss_seidel", {"sweep": name}) for name in ("forward", "backward")}
-    levels: Any = pyamg.smoothed_aggregation_solver(
+    # The finest level has its own compiled sweeps.
+    sweeps = {
+        name: [None, ("block_gauss_seidel", {"sweep": name})] for name in ("forward", "backward")
+    }
+    levels = pyamg.smoothed_aggregation_solver(
         sp.bsr_matrix(matrix),
         B=near_kernel,
         strength=("symmetric", {"theta": 0.08}),
@@ -31,7 +74,41 @@ def smoothed_aggregation(matrix: sp.bsr_array, points: FloatArray) -> Apply:
         improve_candidates=None,
         presmoother=sweeps["forward"],
         postsmoother=sweeps["backward"],
-        max_coarse=300,
-        coarse_solver="splu",
+        max_coarse=_COARSEST,
+        coarse_solver=None,
+    ).levels
+    if len(levels) == 1:
+        return _coarser(levels)
+    return _finest(matrix, levels[0].P.tocsr(), _coarser(levels[1:]))
+
+
+def two_level(matrix: sp.bsr_array, points: FloatArray, parents: IntArray) -> Apply:
+    """One cycle over a quadratic mesh and the linear displacements on the same cells.
+
+    Block Gauss-Seidel on the quadratic displacement, and a V-cycle of smoothed aggregation on the
+    linear one, whose matrix is the Galerkin product.
+
+    Parameters
+    ----------
+    matrix : bsr_array (3n, 3n) with 3x3 blocks
+    points : (n, 3) array, mm
+    parents : (n, 2) int array
+        Rows of the two corners whose middle each node is (twice its own row for a corner), -1
+        for a corner without a row.
+    """
+    n = len(points)
+    corner = parents[:, 0] == np.arange(n)
+    place = np.cumsum(corner) - 1
+    rows, columns = np.repeat(np.arange(n), 2), parents.reshape(-1)
+    kept = columns >= 0
+    weights = sp.csr_array(
+        (np.full(int(kept.sum()), 0.5), (rows[kept], place[columns[kept]])),
+        shape=(n, int(corner.sum())),
     )
-    return levels.aspreconditioner(cycle="V").matvec
+    blocks = weights.data[:, None, None] * np.eye(3)
+    prolong = sp.bsr_array(
+        (blocks, weights.indices, weights.indptr), shape=3 * np.array(weights.shape)
+    )
+    coarse = (prolong.T.tobsr() @ (matrix @ prolong)).tobsr((3, 3))
+    coarse.sort_indices()
+    return _finest(matrix, prolong.tocsr(), smoothed_aggregation(coarse, points[corner]))

@@ -15,7 +15,7 @@ from ccfem.errors import InputError, SolveError
 
 __all__ = ["BACKENDS", "Solution", "Solver", "factorise", "preconditioned_cg"]
 
-BACKENDS = ("pypardiso", "cholmod", "superlu", "amg")
+BACKENDS = ("pypardiso", "cholmod", "superlu", "amg", "two-level")
 
 _CURES = {
     "pypardiso": 'pip install "ccfem[mkl]"',
@@ -146,7 +146,7 @@ def preconditioned_cg(
 def choose(unknowns: int, order: int) -> str:
     """Name the backend that suits a system of so many unknowns and order of displacement."""
     if order == 2 and unknowns > _DIRECT_UNKNOWNS:
-        return "amg"
+        return "two-level"
     if unknowns <= _CHOLESKY_UNKNOWNS:
         if direct.have_pardiso():
             return "pypardiso"
@@ -190,5 +190,9 @@ def factorise(
         raise InputError(f"backend '{backend}' is not installed: {_CURES[backend]}")
     if backend == "amg":
         return Solver(backend, matrix, multigrid.smoothed_aggregation(matrix, points), False)
+    if backend == "two-level":
+        if parents is None:
+            raise InputError("backend 'two-level' is for quadratic meshes: use mesh.quadratic()")
+        return Solver(backend, matrix, multigrid.two_level(matrix, points, parents), False)
     makers = {"pypardiso": direct.pardiso, "cholmod": direct.cholmod, "superlu": direct.superlu}
     return Solver(backend, matrix, makers[backend](matrix), True)

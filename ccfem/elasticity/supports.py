@@ -5,7 +5,6 @@ from dataclasses import dataclass
 
 import numpy as np
 import scipy.sparse as sp
-from numba import njit
 from scipy.sparse.csgraph import connected_components
 
 from ccfem.arrays import BoolArray, FloatArray, IntArray, read_only
@@ -15,30 +14,6 @@ from ccfem.errors import InputError
 from ccfem.mesh import TetMesh
 
 __all__ = ["Held", "check_support", "held", "rigid_modes"]
-
-
-@njit(cache=True)
-def _reduce(indptr, indices, data, place, free, size, new_indptr, new_indices, new_data):  # type: ignore[no-untyped-def]
-    count = 0
-    for i in range(indptr.size - 1):
-        if place[i] < 0:
-            continue
-        for s in range(indptr[i], indptr[i + 1]):
-            j = indices[s]
-            if place[j] < 0:
-                continue
-            new_indices[count] = place[j]
-            for p in range(3):
-                for r in range(3):
-                    if free[i, p] and free[j, r]:
-                        new_data[count, p, r] = data[s, p, r]
-                    elif i == j and p == r:
-                        new_data[count, p, r] = size
-                    else:
-                        new_data[count, p, r] = 0.0
-            count += 1
-        new_indptr[place[i] + 1] = count
-    return count
 
 
 @dataclass(frozen=True)
@@ -65,18 +40,23 @@ class Held:
         Held components of such nodes keep a row with nothing but a diagonal entry, as large as
         the mean one.
         """
-        place = np.full(len(self.free), -1, dtype=np.int32)
-        place[self.nodes] = np.arange(len(self.nodes), dtype=np.int32)
-        indptr = np.zeros(len(self.nodes) + 1, np.int32)
-        indices = np.empty(len(matrix.indices), np.int32)
-        data = np.empty_like(matrix.data)
-        size = float(np.abs(matrix.diagonal()).mean())
-        count = _reduce(
-            matrix.indptr, matrix.indices, matrix.data, place, self.free, size,
-            indptr, indices, data,
-        )  # fmt: skip
-        n = 3 * len(self.nodes)
-        return sp.bsr_array((data[:count], indices[:count], indptr), shape=(n, n))
+        n, k = len(self.free), len(self.nodes)
+        place = np.full(n, -1, dtype=np.int32)
+        place[self.nodes] = np.arange(k, dtype=np.int32)
+        row = np.repeat(place, np.diff(matrix.indptr))
+        column = place[matrix.indices]
+        kept = (row >= 0) & (column >= 0)
+        row, column, data = row[kept], column[kept], matrix.data[kept]
+        free = self.free[self.nodes]
+        partly = ~free.all(axis=1)
+        if partly.any():
+            cut = np.flatnonzero(partly[row] | partly[column])
+            data[cut] *= free[row[cut], :, None] & free[column[cut], None, :]
+            diagonal = cut[row[cut] == column[cut]]
+            size = float(np.abs(matrix.diagonal()).mean())
+            data[diagonal] += size * np.eye(3) * ~free[row[diagonal], :, None]
+        indptr = np.concatenate([[0], np.cumsum(np.bincount(row, minlength=k))]).astype(np.int32)
+        return sp.bsr_array((data, column, indptr), shape=(3 * k, 3 * k))
 
     def right_hand_side(self, matrix: sp.bsr_array, forces: FloatArray) -> FloatArray:
         """Right-hand side (3k,), N, of the reduced matrix, for nodal forces (n, 3)."""
