@@ -2,7 +2,6 @@
 
 import weakref
 from collections.abc import Callable
-from importlib.util import find_spec
 
 import numpy as np
 import scipy.sparse as sp
@@ -11,19 +10,9 @@ from scipy.sparse.linalg import splu
 from ccfem.arrays import FloatArray
 from ccfem.errors import SolveError
 
-__all__ = ["cholmod", "have_cholmod", "have_pardiso", "pardiso", "superlu"]
+__all__ = ["cholmod", "pardiso", "superlu"]
 
 Apply = Callable[[FloatArray], FloatArray]
-
-
-def have_pardiso() -> bool:
-    """Whether pypardiso is installed (extra ``mkl``)."""
-    return find_spec("pypardiso") is not None
-
-
-def have_cholmod() -> bool:
-    """Whether scikit-sparse is installed."""
-    return find_spec("sksparse") is not None
 
 
 def superlu(matrix: sp.bsr_array) -> Apply:

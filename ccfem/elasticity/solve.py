@@ -60,11 +60,19 @@ class System:
         chosen = self.stiffness if stiffness is None else stiffness
         return assemble(self.problem.mesh, chosen, self.problem.density, self.where)
 
-    def factorise(self, matrix: sp.bsr_array, backend: str = "auto") -> Solver:
-        """Factorise a stiffness matrix (3n, 3n) with the supports in place."""
+    def factorise(self, matrix: sp.bsr_array, backend: str = "auto", solves: int = 1) -> Solver:
+        """Factorise a stiffness matrix (3n, 3n) with the supports in place.
+
+        Parameters
+        ----------
+        matrix : bsr_array (3n, 3n), N/mm
+        backend : str, default "auto"
+        solves : int, default 1
+            Right-hand sides to expect.
+        """
         mesh, nodes = self.problem.mesh, self.held.nodes
         parents = _parents(mesh, nodes) if mesh.order == 2 else None
-        return factorise(self.held.reduce(matrix), mesh.points[nodes], backend, parents)
+        return factorise(self.held.reduce(matrix), mesh.points[nodes], backend, parents, solves)
 
     def field(
         self, case: str, displacement: FloatArray, matrix: sp.bsr_array, record: SolveRecord
@@ -146,7 +154,7 @@ def solve(
     system = prepare(problem)
     matrix = system.assemble()
     assembled = perf_counter()
-    solver = system.factorise(matrix, backend)
+    solver = system.factorise(matrix, backend, len(system.forces))
     record = SolveRecord(solver.backend, 0, 0.0, assembled - started, 0.0, 0)
     record = replace(record, unknowns=int(system.held.free.sum()))
     fields = {}

@@ -24,11 +24,14 @@ _CURES = {
 }
 _MODULES = {"pypardiso": "pypardiso", "cholmod": "sksparse", "petsc": "petsc4py"}
 
-_DIRECT_UNKNOWNS = 24_000
-"""Largest system that goes to SuperLU before AMG-CG is quicker."""
+_SMALL = 6_000
+"""Unknowns up to which SuperLU is quicker than setting up a multigrid (measured)."""
 
-_CHOLESKY_UNKNOWNS = 100_000
-"""Largest system that goes to a sparse Cholesky; about 150 000 linear cells."""
+_MANY = 4
+"""Right-hand sides from which a sparse Cholesky is quicker than a multigrid (measured)."""
+
+_CHOLESKY = 100_000
+"""Unknowns up to which that holds: about 200 000 linear cells of a thin part."""
 
 
 class Solution(NamedTuple):
@@ -143,16 +146,24 @@ def preconditioned_cg(
     return _checked(matrix, x, rhs, iterations, tolerance, solver.backend)
 
 
-def choose(unknowns: int, order: int) -> str:
-    """Name the backend that suits a system of so many unknowns and order of displacement."""
-    if order == 2 and unknowns > _DIRECT_UNKNOWNS:
-        return "two-level"
-    if unknowns <= _CHOLESKY_UNKNOWNS:
-        if direct.have_pardiso():
-            return "pypardiso"
-        if direct.have_cholmod():
-            return "cholmod"
-    return "superlu" if unknowns <= _DIRECT_UNKNOWNS else "amg"
+def choose(unknowns: int, order: int, solves: int = 1) -> str:
+    """Name the backend that suits a system and what is installed.
+
+    Parameters
+    ----------
+    unknowns : int
+    order : int
+        Of the displacement: 1 or 2.
+    solves : int
+        Right-hand sides to expect.
+    """
+    if unknowns <= _SMALL:
+        return "superlu"
+    if order == 1 and solves >= _MANY and unknowns <= _CHOLESKY:
+        for backend in ("pypardiso", "cholmod"):
+            if find_spec(_MODULES[backend]) is not None:
+                return backend
+    return "amg" if order == 1 else "two-level"
 
 
 def factorise(
@@ -160,13 +171,14 @@ def factorise(
     points: FloatArray,
     backend: str = "auto",
     parents: IntArray | None = None,
+    solves: int = 1,
 ) -> Solver:
     """Factorise a stiffness matrix, or set up a preconditioner for it.
 
     Parameters
     ----------
     matrix : bsr_array (3n, 3n) with 3x3 blocks
-        Symmetric positive definite; its first three blocks of columns sorted.
+        Symmetric positive definite, columns sorted.
     points : (n, 3) array, mm
         Of the nodes that the rows stand for.
     backend : str, default "auto"
@@ -174,6 +186,8 @@ def factorise(
     parents : (n, 2) int array, optional
         On quadratic meshes: the two rows of the corners whose middle each node is (twice its own
         row for a corner, -1 for a corner without a row). "two-level" needs it.
+    solves : int, default 1
+        Right-hand sides to expect: with many, "auto" prefers a direct backend.
 
     Raises
     ------
@@ -183,7 +197,7 @@ def factorise(
         When the factorisation fails.
     """
     if backend == "auto":
-        backend = choose(matrix.shape[0], 1 if parents is None else 2)
+        backend = choose(matrix.shape[0], 1 if parents is None else 2, solves)
     if backend not in BACKENDS:
         raise InputError(f"no backend named '{backend}'; there are: auto, {', '.join(BACKENDS)}")
     if backend in _MODULES and find_spec(_MODULES[backend]) is None:

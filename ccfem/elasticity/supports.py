@@ -48,13 +48,13 @@ class Held:
         kept = (row >= 0) & (column >= 0)
         row, column, data = row[kept], column[kept], matrix.data[kept]
         free = self.free[self.nodes]
-        partly = ~free.all(axis=1)
+        partly = np.logical_not(free.all(axis=1))
         if partly.any():
             cut = np.flatnonzero(partly[row] | partly[column])
             data[cut] *= free[row[cut], :, None] & free[column[cut], None, :]
             diagonal = cut[row[cut] == column[cut]]
             size = float(np.abs(matrix.diagonal()).mean())
-            data[diagonal] += size * np.eye(3) * ~free[row[diagonal], :, None]
+            data[diagonal] += size * np.eye(3) * np.logical_not(free[row[diagonal]])[:, :, None]
         indptr = np.concatenate([[0], np.cumsum(np.bincount(row, minlength=k))]).astype(np.int32)
         return sp.bsr_array((data, column, indptr), shape=(3 * k, 3 * k))
 
