@@ -12,6 +12,7 @@ from ccfem.elasticity.stress_field import LayerStress, StressField
 from ccfem.errors import InputError
 from ccfem.layers.layer import Layer
 from ccfem.machine import Machine
+from ccfem.parameters import check_type
 from ccfem.toolpaths import Toolpaths
 
 __all__ = ["Amount", "LayerStrategy", "Strategy", "create", "named", "plan"]
@@ -98,23 +99,8 @@ def create(name: str, parameters: Mapping[str, Any] | None = None) -> Strategy:
                 f"strategy '{name}' has no parameter '{parameter}'; it has: "
                 f"{', '.join(sorted(fields))}"
             )
-        _check_type(f"{name}.{parameter}", value, fields[parameter])
+        check_type(f"{name}.{parameter}", value, fields[parameter])
     return known[name](**parameters)
-
-
-def _check_type(what: str, value: object, default: object) -> None:
-    """Refuse a value of another type than the default; a default of None takes any."""
-    for kind, allowed, word in (
-        (bool, bool, "true or false"),
-        (int, int, "a whole number"),
-        (float, (int, float), "a number"),
-        (str, str, "a string"),
-        (tuple, tuple, "a list"),
-    ):
-        if isinstance(default, kind):
-            if not isinstance(value, allowed) or isinstance(value, bool) != (kind is bool):
-                raise InputError(f"{what} must be {word}, as {default!r}; got {value!r}")
-            return
 
 
 def plan(

@@ -1,0 +1,318 @@
+"""Comparison of strategies on one part: the same stress, layers, machine and length of fibre."""
+
+import time
+from collections.abc import Callable, Iterator, Mapping, Sequence
+from contextlib import contextmanager
+from dataclasses import replace
+from typing import Any
+
+from ccfem.cases.case import Case
+from ccfem.comparison import Comparison, Run, Tested
+from ccfem.elasticity.solve import solve
+from ccfem.elasticity.stress_field import StressField
+from ccfem.equal_fibre import Planned, length_per_layer, plan_to_length
+from ccfem.errors import InputError, SolveError
+from ccfem.evaluate import evaluate
+from ccfem.evaluate.virtual_test.equilibrium import BONDED, TENSION
+from ccfem.evaluate.virtual_test.specimen import Specimen
+from ccfem.evaluate.virtual_test.strand import Strand
+from ccfem.evaluate.virtual_test.strands import cut_strands
+from ccfem.evaluate.virtual_test.strength import first_failure
+from ccfem.evaluate.virtual_test.virtual_test import Bracket, virtual_test
+from ccfem.layers import Layer, slice_planar
+from ccfem.progress import Progress, silent
+from ccfem.strategies import Strategy, create, plan
+from ccfem.toolpaths import Toolpaths
+
+__all__ = ["STRATEGIES", "compare", "create_all", "solve_and_slice"]
+
+STRATEGIES = ("isocurve", "concentric", "zigzag", "contour_zigzag")
+"""The strategies that are compared when none are named."""
+
+DEFAULT_STRAND = Strand()
+
+
+def create_all(
+    case: Case,
+    names: Sequence[str] = STRATEGIES,
+    parameters: Mapping[str, Mapping[str, Any]] | None = None,
+) -> dict[str, Strategy]:
+    """Strategies by name, with the parameters of the case and, above these, those given.
+
+    Parameters
+    ----------
+    case : Case
+    names : sequence of str
+    parameters : mapping of strategy name to parameters, optional
+
+    Raises
+    ------
+    InputError
+        For an unknown strategy or parameter, or one named twice.
+    """
+    given = dict(parameters or {})
+    if not names:
+        raise InputError("name at least one strategy to compare; got none")
+    repeated = {name for name in names if list(names).count(name) > 1}
+    if repeated:
+        raise InputError(f"name each strategy once; got '{min(repeated)}' more than once")
+    for name in given:
+        if name not in names:
+            raise InputError(
+                f"parameters are given for '{name}', which is not among the strategies: "
+                f"{', '.join(names)}"
+            )
+    return {
+        name: create(name, {**case.parameters.get(name, {}), **given.get(name, {})})
+        for name in names
+    }
+
+
+def solve_and_slice(
+    case: Case, layers: int | None = None, load_case: str | None = None, backend: str = "auto"
+) -> tuple[StressField, tuple[Layer, ...], dict[str, float]]:
+    """Stress of one load case, the layers, and the seconds that each took.
+
+    Parameters
+    ----------
+    case : Case
+    layers : int, optional
+        Number of layers instead of the case's own.
+    load_case : str, optional
+        By default the first one.
+    backend : str, default "auto"
+        As in `solve`.
+
+    Raises
+    ------
+    InputError
+        For an unknown load case, or a problem that cannot be solved or sliced.
+    """
+    seconds: dict[str, float] = {}
+    name = _load_case(case, load_case)
+    with _timed(seconds, "solve"):
+        stress = solve(case.problem, backend=backend)[name]
+    with _timed(seconds, "slice"):
+        count = case.layers if layers is None else layers
+        stack = slice_planar(case.problem.mesh, case.build, count=count)
+    return stress, stack, seconds
+
+
+def compare(
+    case: Case,
+    strategies: Mapping[str, Strategy] | Sequence[str] = STRATEGIES,
+    layers: int | None = None,
+    fibre_per_layer: float | None = None,
+    natural: bool = False,
+    strand: Strand | None = DEFAULT_STRAND,
+    load_case: str | None = None,
+    backend: str = "auto",
+    progress: Progress = silent,
+) -> Comparison:
+    """Solve a case once, and plan and evaluate each strategy on it.
+
+    Strategies are compared at equal length of fibre: more fibre wins almost any comparison. When no
+    length is given, it is the smallest that any of them lays of its own accord, so that nobody has
+    to lay more than it would, and all others are thinned to it by the parameter that each names for
+    the purpose. A strategy that fails stays in the result, with the reason.
+
+    Parameters
+    ----------
+    case : Case
+    strategies : mapping of name to Strategy, or sequence of names
+        Named ones take the parameters of the case.
+    layers : int, optional
+        Number of layers instead of the case's own.
+    fibre_per_layer : float, mm, optional
+        Length that every strategy is held to, mean over the layers.
+    natural : bool, default False
+        Let every strategy lay its own amount instead.
+    strand : Strand or None
+        What a strand is worth in the virtual test; None leaves the test out.
+    load_case : str, optional
+        Load case to plan, evaluate and test for; by default the first one.
+    backend : str, default "auto"
+        As in `solve`.
+    progress : callable, optional
+        Told what is being done, and the share that is done.
+
+    Returns
+    -------
+    Comparison
+
+    Raises
+    ------
+    InputError
+        When the case, a strategy's name or its parameters make no sense.
+    SolveError
+        When the solve misses its tolerance.
+    """
+    if natural and fibre_per_layer is not None:
+        raise InputError("give either a fibre length per layer or the natural amount, not both")
+    if not isinstance(strategies, Mapping):
+        strategies = create_all(case, strategies)
+    progress(f"solving {case.name}", 0.0)
+    stress, stack, seconds = solve_and_slice(case, layers, load_case, backend)
+    spent: dict[str, dict[str, float]] = {name: {} for name in strategies}
+    done = _Steps(progress, 0.1, 4 * len(strategies))
+
+    found: dict[str, Planned | str] = {}
+    if fibre_per_layer is None:
+        for name, strategy in strategies.items():
+            done(f"planning {name}")
+            with _timed(spent[name], "plan"):
+                found[name] = _attempt(strategy, stack, stress, case)
+    wanted, setter = fibre_per_layer, ""
+    if fibre_per_layer is None and not natural:
+        wanted, setter = _smallest(found)
+    if wanted is not None:
+        for name, strategy in strategies.items():
+            if isinstance(found.get(name), str):
+                continue
+            done(f"fitting {name} to {wanted:.0f} mm a layer")
+            if name == setter:
+                continue
+            with _timed(spent[name], "plan"):
+                found[name] = _attempt(strategy, stack, stress, case, wanted)
+    runs = []
+    for name, strategy in strategies.items():
+        done(f"evaluating {name}")
+        note = "lays the least of its own accord: sets the length" if name == setter else ""
+        runs.append(_evaluated(name, strategy, found[name], stack, stress, case, spent[name], note))
+    if strand is not None:
+        runs = _all_tested(runs, stress, strand, backend, spent, done)
+    return Comparison(case, stress, stack, tuple(runs), wanted, seconds)
+
+
+def _attempt(
+    strategy: Strategy,
+    layers: Sequence[Layer],
+    stress: StressField,
+    case: Case,
+    wanted: float | None = None,
+) -> Planned | str:
+    """Plan, or the reason why that failed."""
+    try:
+        if wanted is not None:
+            return plan_to_length(strategy, layers, stress, case.machine, wanted)
+        toolpaths = plan(strategy, layers, stress, case.machine)
+    except (InputError, SolveError) as error:
+        return str(error)
+    return Planned(strategy, toolpaths, length_per_layer(toolpaths, layers))
+
+
+def _smallest(found: Mapping[str, Planned | str]) -> tuple[float | None, str]:
+    """Smallest length that a strategy lays, and its name; None and "" where none lays any."""
+    lengths = {
+        name: one.length_per_layer
+        for name, one in found.items()
+        if isinstance(one, Planned) and one.length_per_layer > 0.0
+    }
+    if not lengths:
+        return None, ""
+    name = min(lengths, key=lengths.__getitem__)
+    return lengths[name], name
+
+
+def _evaluated(
+    name: str,
+    strategy: Strategy,
+    planned: Planned | str,
+    layers: Sequence[Layer],
+    stress: StressField,
+    case: Case,
+    seconds: dict[str, float],
+    note: str,
+) -> Run:
+    if isinstance(planned, str):
+        return Run(name, strategy, Toolpaths.empty(), None, failure=planned, seconds=seconds)
+    if not len(planned.toolpaths):
+        failure = "laid no fibre: the layers are too thin, or the shortest strand is too long"
+        return Run(name, strategy, planned.toolpaths, None, failure=failure, seconds=seconds)
+    evaluation, failure = None, ""
+    try:
+        with _timed(seconds, "evaluate"):
+            evaluation = evaluate(planned.toolpaths, layers, stress, case.machine)
+    except (InputError, SolveError) as error:
+        failure = str(error)
+    return Run(
+        name,
+        planned.strategy,
+        planned.toolpaths,
+        evaluation,
+        length_per_layer=planned.length_per_layer,
+        note=planned.note or note,
+        failure=failure,
+        seconds=seconds,
+    )
+
+
+def _all_tested(
+    runs: Sequence[Run],
+    stress: StressField,
+    strand: Strand,
+    backend: str,
+    spent: Mapping[str, dict[str, float]],
+    done: Callable[[str], None],
+) -> list[Run]:
+    """Put every run that did not fail to the virtual test, all on one factorisation."""
+    try:
+        specimen = Specimen.of(stress, backend)
+    except InputError as error:
+        return [replace(run, untested=str(error)) for run in runs]
+    tested = []
+    for run in runs:
+        done(f"testing {run.name}")
+        if run.evaluation is None:
+            tested.append(run)
+            continue
+        try:
+            with _timed(spent[run.name], "virtual test"):
+                test = _tested(run, specimen, strand)
+            tested.append(replace(run, tested=test, seconds=spent[run.name]))
+        except (InputError, SolveError) as error:
+            tested.append(replace(run, untested=str(error), seconds=spent[run.name]))
+    return tested
+
+
+def _tested(run: Run, specimen: Specimen, strand: Strand) -> Tested:
+    strands = cut_strands(run.toolpaths, specimen.unreinforced.mesh)
+    tension = virtual_test(strands, specimen, strand, TENSION)
+    bracket = Bracket(tension, virtual_test(strands, specimen, strand, BONDED, span=()))
+    try:
+        return Tested(bracket, first_failure(tension, strand))
+    except InputError as error:
+        return Tested(bracket, None, str(error))
+
+
+def _load_case(case: Case, name: str | None) -> str:
+    known = list(case.problem.loads)
+    if not known:
+        raise InputError(f"case '{case.name}' has no load case; give it at least one load")
+    if name is None:
+        return known[0]
+    if name not in known:
+        raise InputError(f"no load case named '{name}'; the case has: {', '.join(known)}")
+    return name
+
+
+class _Steps:
+    """Counts steps of equal share for a progress bar."""
+
+    def __init__(self, progress: Progress, start: float, steps: int) -> None:
+        self._progress, self._start, self._steps, self._done = progress, start, steps, 0
+
+    def __call__(self, what: str) -> None:
+        """Tell what comes now."""
+        share = self._start + (1.0 - self._start) * self._done / self._steps
+        self._progress(what, min(share, 1.0))
+        self._done += 1
+
+
+@contextmanager
+def _timed(seconds: dict[str, float], stage: str) -> Iterator[None]:
+    start = time.perf_counter()
+    try:
+        yield
+    finally:
+        seconds[stage] = seconds.get(stage, 0.0) + time.perf_counter() - start

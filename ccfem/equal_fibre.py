@@ -1,0 +1,204 @@
+"""Planning to a wanted length of fibre, so that strategies are compared at equal cost.
+
+A strategy that lays more fibre wins almost any comparison. Every strategy therefore names the
+parameter that sets how much it lays (`Strategy.amount`), and `plan_to_length` searches its value.
+"""
+
+from collections.abc import Callable, Mapping, Sequence
+from dataclasses import dataclass, replace
+from typing import Any
+
+import numpy as np
+
+from ccfem.elasticity.stress_field import StressField
+from ccfem.errors import InputError
+from ccfem.layers.layer import Layer
+from ccfem.machine import Machine
+from ccfem.strategies.strategy import Amount, Strategy, plan
+from ccfem.toolpaths import FIBRE, Toolpaths
+
+__all__ = ["Planned", "length_per_layer", "plan_to_length"]
+
+_TOLERANCE = 0.01
+"""Share by which the length may fall short before the search stops."""
+_ROUNDS = 4
+"""Plans of the whole stack."""
+_STEPS = 9
+"""Plans of the few layers that stand for the stack, in each round."""
+_FINEST = 1e-4
+"""Share of the parameter's range below which a step in length is taken for what it is."""
+_FEW = 4
+"""Stacks of at most this many layers are searched as they are."""
+
+
+@dataclass(frozen=True)
+class Planned:
+    """Toolpaths of a part, and the strategy that made them.
+
+    Attributes
+    ----------
+    strategy : Strategy
+        With the value of its amount parameter that was found.
+    toolpaths : Toolpaths
+    length_per_layer : float, mm
+        Fibre length divided by the number of layers.
+    note : str
+        Empty, or one line that says why the wanted length was missed.
+    """
+
+    strategy: Strategy
+    toolpaths: Toolpaths
+    length_per_layer: float
+    note: str = ""
+
+
+def length_per_layer(toolpaths: Toolpaths, layers: Sequence[Layer]) -> float:
+    """Fibre length divided by the number of layers, mm."""
+    return float(toolpaths.of_kind(FIBRE).lengths.sum()) / max(len(layers), 1)
+
+
+def plan_to_length(
+    strategy: Strategy,
+    layers: Sequence[Layer],
+    stress: StressField,
+    machine: Machine,
+    wanted: float,
+    tolerance: float = _TOLERANCE,
+) -> Planned:
+    """Plan with the value of the amount parameter that lays at most the wanted fibre.
+
+    The value is searched on the bottom, middle and top layer, then checked on the whole stack; the
+    ratio of the two lengths corrects the next search. Of the values tried on the whole stack, the
+    one that lays most without laying too much is kept.
+
+    Parameters
+    ----------
+    strategy : Strategy
+        Its own value is where the search starts.
+    layers : sequence of Layer
+    stress : StressField
+    machine : Machine
+    wanted : float, mm
+        Fibre per layer: mean over the stack.
+    tolerance : float, default 0.01
+        The search stops within this share below `wanted`. A strategy whose length changes in steps
+        (one contour more or less) may miss it: `Planned.note` says so.
+
+    Returns
+    -------
+    Planned
+
+    Raises
+    ------
+    InputError
+        When `wanted` is not a positive number, or whatever the strategy raises.
+    """
+    if not (np.isfinite(wanted) and wanted > 0.0):
+        raise InputError(f"fibre per layer must be a length above 0 mm; got {wanted:g}: correct it")
+    few = layers if len(layers) <= _FEW else [layers[0], layers[len(layers) // 2], layers[-1]]
+    amount = strategy.amount
+    sampled: dict[float, float] = {}
+    tried: dict[float, Planned] = {}
+
+    def planned(value: float, on: Sequence[Layer]) -> Planned:
+        changed = _with_value(strategy, amount, value)
+        toolpaths = plan(changed, on, stress, machine)
+        return Planned(changed, toolpaths, length_per_layer(toolpaths, on))
+
+    def sample(value: float) -> float:
+        if value not in sampled:
+            result = planned(value, few)
+            if few is layers:
+                tried[value] = result
+            sampled[value] = result.length_per_layer
+        return sampled[value]
+
+    own = getattr(strategy, amount.parameter)
+    value, ratio = amount.most if own is None else float(own), 1.0
+    for _ in range(1 if few is layers else _ROUNDS):
+        target = wanted * (1.0 - 0.3 * tolerance) / ratio
+        value = _search(sample, sampled, value, amount, target, tolerance)
+        if value in tried:
+            break
+        tried[value] = planned(value, layers)
+        length = tried[value].length_per_layer
+        if (1.0 - tolerance) * wanted <= length <= wanted or not sampled[value] > 0.0:
+            break
+        ratio = length / sampled[value]
+    best = _best(list(tried.values()), wanted)
+    return replace(best, note=_note(best, amount, wanted, tolerance))
+
+
+def _with_value(strategy: Strategy, amount: Amount, value: float) -> Strategy:
+    changed: Any = replace(strategy, **{amount.parameter: value})  # type: ignore[type-var]
+    return changed
+
+
+def _best(tried: list[Planned], wanted: float) -> Planned:
+    """Return the longest plan that is not too long, or else the shortest."""
+    allowed = [one for one in tried if one.length_per_layer <= wanted * (1.0 + 1e-9)]
+    if allowed:
+        return max(allowed, key=lambda one: one.length_per_layer)
+    return min(tried, key=lambda one: one.length_per_layer)
+
+
+def _note(best: Planned, amount: Amount, wanted: float, tolerance: float) -> str:
+    length, value = best.length_per_layer, getattr(best.strategy, amount.parameter)
+    if (1.0 - tolerance) * wanted <= length <= wanted * (1.0 + 1e-9):
+        return ""
+    reached = f"lays {length:.0f} of {wanted:.0f} mm per layer"
+    if value == amount.most and length < wanted:
+        return f"{reached}: its most, at {amount.parameter} = {value:g}"
+    if value == amount.least and length > wanted:
+        return f"{reached}: its least, at {amount.parameter} = {value:g}"
+    return f"{reached}: the nearest that its steps allow"
+
+
+def _search(
+    length: Callable[[float], float],
+    known: Mapping[float, float],
+    start: float,
+    amount: Amount,
+    target: float,
+    tolerance: float,
+) -> float:
+    """Value whose length is at most the target and within the tolerance, or the nearest found.
+
+    `known` holds the lengths that `length` has been asked for. False position between the nearest
+    known length on either side; while one side is unknown, a guess by proportion.
+    """
+    ends = min(amount.least, amount.most), max(amount.least, amount.most)
+    enough = (1.0 - 0.5 * tolerance) * target
+    value = float(np.clip(start, *ends))
+    for step in range(_STEPS):
+        if value not in known and enough <= length(value) <= target:
+            return value
+        low = max((v for v in known if known[v] <= target), key=known.__getitem__, default=None)
+        high = min((v for v in known if known[v] > target), key=known.__getitem__, default=None)
+        if low is None or high is None:
+            value = _by_proportion(known, amount, target, ends)
+        elif known[low] >= enough or abs(high - low) <= _FINEST * (ends[1] - ends[0]):
+            return low
+        else:
+            share = (target - known[low]) / (known[high] - known[low])
+            # Every third step bisects, so that a curved relation cannot stall the search.
+            share = 0.5 if step % 3 == 2 else float(np.clip(share, 0.1, 0.9))
+            value = low + share * (high - low)
+        if value in known:
+            break
+    return low if low is not None else value
+
+
+def _by_proportion(
+    known: Mapping[float, float], amount: Amount, target: float, ends: tuple[float, float]
+) -> float:
+    """Guess while one side is unknown: the length goes as the parameter or as its inverse."""
+    nearest = min(known, key=lambda value: abs(known[value] - target))
+    unknown = amount.most if known[nearest] <= target else amount.least
+    if not (known[nearest] > 0.0 and ends[0] > 0.0):
+        return unknown
+    factor = target / known[nearest]
+    # A little beyond, so that the target comes to lie between two known lengths.
+    factor *= 1.05 if factor > 1.0 else 0.95
+    guess = nearest * factor if amount.most > amount.least else nearest / factor
+    return float(np.clip(guess, *ends))

@@ -1,0 +1,241 @@
+"""The headline of a comparison: the few indices that tables show first, order, and verdict."""
+
+from collections.abc import Mapping
+from dataclasses import dataclass
+
+import numpy as np
+
+from ccfem.comparison import Comparison, Run
+from ccfem.evaluate import Column
+
+__all__ = [
+    "HEADLINE",
+    "PROMISE",
+    "TEST_COLUMNS",
+    "Headline",
+    "best_values",
+    "headline_values",
+    "ranking",
+    "remarks",
+    "verdict",
+]
+
+PROMISE = (
+    "What the virtual test promises: the order of two designs, and their stiffness to each other "
+    "to about 10 %; the stiffness over that of the unreinforced part to 25 %, or 10 % once "
+    "calibrated on one print; the strength to 30 % after calibration. Delamination is not "
+    "predicted. Measured on three printed parts of Chen et al. 2021, one specimen mean each."
+)
+"""How far the virtual test can be trusted; shown next to its numbers."""
+
+_RATIO = "stiffness of the part with its fibres over that without"
+
+TEST_COLUMNS = (
+    Column(
+        "stiffness_ratio_tension",
+        "1",
+        f"The {_RATIO}, fibres in compression carrying nothing; default EA/E = 4 mm^2.",
+        ">= 1, higher is better; missing where there was no virtual test",
+    ),
+    Column(
+        "stiffness_ratio_low",
+        "1",
+        f"The {_RATIO}, tension only, at the lowest EA/E of the span (2 mm^2).",
+        "as stiffness_ratio_tension",
+    ),
+    Column(
+        "stiffness_ratio_high",
+        "1",
+        f"The {_RATIO}, tension only, at the highest EA/E of the span (6 mm^2).",
+        "as stiffness_ratio_tension",
+    ),
+    Column(
+        "stiffness_ratio_bonded",
+        "1",
+        f"The {_RATIO}, all fibres bonded and carrying tension and compression.",
+        "as stiffness_ratio_tension",
+    ),
+    Column(
+        "stiffness",
+        "N/mm",
+        "Size of the load squared over its work, fibres carrying tension only.",
+        "> 0, higher is better",
+    ),
+    Column(
+        "gain_per_metre",
+        "1/m",
+        "(stiffness_ratio_tension - 1) over the length of fibre inside the part.",
+        ">= 0, higher is better",
+    ),
+    Column(
+        "first_failure_load",
+        "N",
+        "Load at which the matrix (von Mises stress averaged over a 2 mm ball, away from loads and "
+        "supports) or the fibre (99th percentile of the axial force by length) first reaches its "
+        "strength, fibres carrying tension only.",
+        "> 0, higher is better; missing where a strength is unknown",
+    ),
+)
+"""Indices of the virtual test, described as those of the evaluator are."""
+
+
+@dataclass(frozen=True)
+class Headline:
+    """One column of the headline table.
+
+    Attributes
+    ----------
+    column : str
+        Name of the index.
+    title : str
+        What tables print above it.
+    better : str
+        "high", "low", or "" where neither is better.
+    pattern : str
+        How a value is printed, for `str.format`.
+    """
+
+    column: str
+    title: str
+    better: str
+    pattern: str
+
+
+HEADLINE = (
+    Headline("stiffness_ratio_tension", "stiffness ×, tension only", "high", "{:.2f}"),
+    Headline("stiffness_ratio_bonded", "stiffness ×, bonded", "high", "{:.2f}"),
+    Headline("first_failure_load", "first failure, N", "high", "{:.0f}"),
+    Headline("fibre_per_layer", "fibre, mm a layer", "", "{:.0f}"),
+    Headline("efficiency", "efficiency", "high", "{:.3f}"),
+    Headline("aligned_stress_10", "within 10°, by stress", "high", "{:.1%}"),
+    Headline("coverage_top_20", "coverage of top 20 % stress", "high", "{:.1%}"),
+    Headline("curvature_95", "curvature 95 %, 1/mm", "low", "{:.3f}"),
+    Headline("paths_per_layer", "paths a layer", "low", "{:.1f}"),
+    Headline("spacing_below", "nearer than W", "low", "{:.1%}"),
+    Headline("outside_length", "outside, mm", "low", "{:.2f}"),
+    Headline("all_crossings", "crossings", "low", "{:.0f}"),
+)
+"""The columns of the headline table; those that no run has are left out."""
+
+
+def headline_values(run: Run) -> Mapping[str, float]:
+    """Every total index of a run, with some per layer; empty where it failed."""
+    if run.evaluation is None:
+        return {}
+    total, layers = run.evaluation.total, max(len(run.evaluation.layers), 1)
+    return {
+        **_test_values(run),
+        **total,
+        "fibre_per_layer": total["fibre_length"] / layers,
+        "paths_per_layer": total["paths"] / layers,
+        "all_crossings": total["crossings"] + total["self_crossings"],
+    }
+
+
+def _test_values(run: Run) -> dict[str, float]:
+    if run.tested is None:
+        return {}
+    tension, bonded = run.tested.bracket.tension, run.tested.bracket.bonded
+    values = {
+        "stiffness_ratio_tension": tension.ratio,
+        "stiffness_ratio_bonded": bonded.ratio,
+        "stiffness": tension.stiffness,
+        "gain_per_metre": tension.gain_per_metre,
+    }
+    if tension.span:
+        ratios = [ratio for _, ratio in tension.span]
+        values["stiffness_ratio_low"] = min(ratios)
+        values["stiffness_ratio_high"] = max(ratios)
+    if run.tested.failure is not None:
+        values["first_failure_load"] = run.tested.failure.load
+    return values
+
+
+def best_values(comparison: Comparison) -> dict[str, float]:
+    """Best value of each headline column where the runs differ."""
+    best = {}
+    for head in HEADLINE:
+        values = [headline_values(run).get(head.column, np.nan) for run in comparison.succeeded]
+        known = [value for value in values if np.isfinite(value)]
+        if head.better and len(known) > 1 and min(known) < max(known):
+            best[head.column] = max(known) if head.better == "high" else min(known)
+    return best
+
+
+def ranking(comparison: Comparison) -> tuple[Run, ...]:
+    """Return the runs from the best to the worst, failed ones last.
+
+    By the predicted stiffness with fibres that carry tension only; those without a virtual test
+    come after, by efficiency.
+    """
+
+    def score(run: Run) -> tuple[bool, float, bool, float]:
+        ratio, efficiency = _ratio(run), headline_values(run).get("efficiency", np.nan)
+        return (
+            not np.isfinite(ratio),
+            -np.nan_to_num(ratio),
+            run.evaluation is None,
+            -np.nan_to_num(efficiency),
+        )
+
+    return tuple(sorted(comparison.runs, key=score))
+
+
+def remarks(run: Run, comparison: Comparison) -> list[str]:
+    """Say what has to stand next to the numbers of a run, a line each.
+
+    Two runs are undecided where tension-only and bonded fibres put them in different orders.
+    """
+    lines = [f"failed: {run.failure}"] if run.failure else []
+    unclear = [other.name for other in ranking(comparison) if _undecided(run, other)]
+    if unclear:
+        lines.append(
+            f"undecided against {', '.join(unclear)}: tension-only and bonded fibres give "
+            "different orders"
+        )
+    if run.untested:
+        lines.append(f"no virtual test: {run.untested}")
+    if run.tested is not None and run.tested.note:
+        lines.append(f"no first-failure load: {run.tested.note}")
+    if run.note:
+        lines.append(run.note)
+    return lines
+
+
+def verdict(comparison: Comparison) -> str:
+    """One sentence that says which strategy is best, by what, and at how much fibre."""
+    order = [run for run in ranking(comparison) if run.evaluation is not None]
+    if len(order) < 2:
+        return ""
+    first, second = order[0], order[1]
+    amount = (
+        "each with its own amount of fibre"
+        if comparison.fibre_per_layer is None
+        else f"at {comparison.fibre_per_layer:.0f} mm of fibre per layer"
+    )
+    if first.tested is None or second.tested is None:
+        best, following = (headline_values(run)["efficiency"] for run in (first, second))
+        return (
+            f"By efficiency alone (no virtual test): {first.name} with {best:.3f}, then "
+            f"{second.name} with {following:.3f}, {amount}."
+        )
+    if _undecided(first, second):
+        return (
+            f"Undecided between {first.name} and {second.name}, {amount}: fibres that carry "
+            f"tension only put the first ahead ({_ratio(first):.2f} to {_ratio(second):.2f} times "
+            "the unreinforced stiffness), bonded fibres the second."
+        )
+    return (
+        f"{first.name} makes the stiffest part, {amount}: {_ratio(first):.2f} times the "
+        f"unreinforced one, and {_ratio(first) / _ratio(second):.2f} times {second.name} "
+        "(predicted, fibres carrying tension only; bonded fibres agree on the order)."
+    )
+
+
+def _ratio(run: Run, mode: str = "tension") -> float:
+    return headline_values(run).get(f"stiffness_ratio_{mode}", np.nan)
+
+
+def _undecided(one: Run, other: Run) -> bool:
+    apart = _ratio(one) - _ratio(other), _ratio(one, "bonded") - _ratio(other, "bonded")
+    return apart[0] * apart[1] < 0.0
