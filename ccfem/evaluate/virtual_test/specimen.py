@@ -1,0 +1,109 @@
+"""The specimen of a virtual test: the part without fibres, clamped, loaded and factorised."""
+
+from dataclasses import dataclass
+from functools import cached_property
+
+import numpy as np
+import scipy.sparse as sp
+
+from ccfem.arrays import BoolArray, FloatArray
+from ccfem.elasticity.solve import System, prepare
+from ccfem.elasticity.solvers import Solver
+from ccfem.elasticity.stress_field import StressField
+from ccfem.errors import InputError
+
+__all__ = ["Specimen"]
+
+
+@dataclass(frozen=True)
+class Specimen:
+    """A part without fibres under one load case, kept for any number of virtual tests.
+
+    Attributes
+    ----------
+    unreinforced : StressField
+        Solution without fibres.
+    system : System
+        Equations of its problem.
+    matrix : bsr_array (3n, 3n), N/mm
+        Stiffness matrix without fibres.
+    backend : str
+        That factorises it, once, as the preconditioner of all tests.
+    """
+
+    unreinforced: StressField
+    system: System
+    matrix: sp.bsr_array
+    backend: str = "auto"
+
+    @classmethod
+    def of(cls, unreinforced: StressField, backend: str = "auto") -> "Specimen":
+        """Make the specimen of a solved problem.
+
+        Raises
+        ------
+        InputError
+            When forces act and supports move too: no single stiffness describes that.
+        """
+        system = prepare(unreinforced.problem)
+        if system.held.value.any() and system.forces[unreinforced.case].any():
+            raise InputError(
+                f"load case '{unreinforced.case}' has forces and moving supports; a virtual test "
+                "needs one or the other: split it"
+            )
+        return cls(unreinforced, system, system.assemble(), backend)
+
+    def under(self, unreinforced: StressField) -> "Specimen":
+        """Return the same part under another load case of its problem, factorisation shared."""
+        if unreinforced.problem is not self.unreinforced.problem:
+            raise InputError("expected a stress field of the same problem; got one of another")
+        other = Specimen(unreinforced, self.system, self.matrix, self.backend)
+        other.__dict__["solver"] = self.solver
+        return other
+
+    @cached_property
+    def solver(self) -> Solver:
+        """Factorisation, or preconditioner, of the part without fibres."""
+        return self.system.factorise(self.matrix, self.backend)
+
+    @property
+    def forces(self) -> FloatArray:
+        """Nodal forces (n, 3), N."""
+        return self.system.forces[self.unreinforced.case]
+
+    @property
+    def modulus(self) -> float:
+        """Young's modulus of the material along its first axis, MPa."""
+        compliance = np.linalg.inv(self.system.problem.material.stiffness)
+        return float(1.0 / compliance[0, 0])
+
+    def force(self, reactions: FloatArray) -> float:
+        """Size of the load, N, where the supports react with (n, 3), N.
+
+        The resultant of the forces, or of the reactions of the supports that move; where they
+        balance, half the sum of their sizes.
+        """
+        forces = self.forces
+        if self._moving.any():
+            forces = np.where(self._moving[:, None], reactions, 0.0)
+        resultant = float(np.linalg.norm(forces.sum(axis=0)))
+        sizes = float(np.linalg.norm(forces, axis=1).sum())
+        return resultant if resultant > 1e-6 * sizes else 0.5 * sizes
+
+    def stiffness(self, displacement: FloatArray, strain_energy: float) -> float:
+        """Stiffness of the part, N/mm.
+
+        ``F^2 / (f . u)`` under forces, with F their size (`force`), or ``2 U / d^2`` under moving
+        supports, with d the largest of their displacements.
+        """
+        if self._moving.any():
+            largest = float(np.linalg.norm(self.system.held.value, axis=1).max())
+            return 2.0 * strain_energy / largest**2
+        return self.force(np.zeros_like(displacement)) ** 2 / float(
+            np.vdot(self.forces, displacement)
+        )
+
+    @property
+    def _moving(self) -> BoolArray:
+        """Nodes (n,) that a support moves."""
+        return (self.system.held.value != 0.0).any(axis=1)
