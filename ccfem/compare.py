@@ -10,7 +10,7 @@ from ccfem.cases.case import Case
 from ccfem.comparison import Comparison, Run, Tested
 from ccfem.elasticity.solve import solve
 from ccfem.elasticity.stress_field import StressField
-from ccfem.equal_fibre import Planned, length_per_layer, plan_to_length
+from ccfem.equal_fibre import Planned, check_wanted, length_per_layer, plan_to_length
 from ccfem.errors import InputError, SolveError
 from ccfem.evaluate import evaluate
 from ccfem.evaluate.virtual_test.equilibrium import BONDED, TENSION
@@ -149,6 +149,8 @@ def compare(
     """
     if natural and fibre_per_layer is not None:
         raise InputError("give either a fibre length per layer or the natural amount, not both")
+    if fibre_per_layer is not None:
+        check_wanted(fibre_per_layer)
     if not isinstance(strategies, Mapping):
         strategies = create_all(case, strategies)
     progress(f"solving {case.name}", 0.0)

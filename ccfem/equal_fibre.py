@@ -17,7 +17,7 @@ from ccfem.machine import Machine
 from ccfem.strategies.strategy import Amount, Strategy, plan
 from ccfem.toolpaths import FIBRE, Toolpaths
 
-__all__ = ["Planned", "length_per_layer", "plan_to_length"]
+__all__ = ["Planned", "check_wanted", "length_per_layer", "plan_to_length"]
 
 _TOLERANCE = 0.01
 """Share by which the length may fall short before the search stops."""
@@ -25,7 +25,7 @@ _ROUNDS = 4
 """Plans of the whole stack."""
 _STEPS = 9
 """Plans of the few layers that stand for the stack, in each round."""
-_FINEST = 1e-4
+_FINEST = 1e-5
 """Share of the parameter's range below which a step in length is taken for what it is."""
 _FEW = 4
 """Stacks of at most this many layers are searched as they are."""
@@ -55,6 +55,12 @@ class Planned:
 def length_per_layer(toolpaths: Toolpaths, layers: Sequence[Layer]) -> float:
     """Fibre length divided by the number of layers, mm."""
     return float(toolpaths.of_kind(FIBRE).lengths.sum()) / max(len(layers), 1)
+
+
+def check_wanted(wanted: float) -> None:
+    """Refuse a wanted length per layer, mm, that is not a positive number."""
+    if not (np.isfinite(wanted) and wanted > 0.0):
+        raise InputError(f"fibre per layer must be a length above 0 mm; got {wanted:g}: correct it")
 
 
 def plan_to_length(
@@ -93,8 +99,7 @@ def plan_to_length(
     InputError
         When `wanted` is not a positive number, or whatever the strategy raises.
     """
-    if not (np.isfinite(wanted) and wanted > 0.0):
-        raise InputError(f"fibre per layer must be a length above 0 mm; got {wanted:g}: correct it")
+    check_wanted(wanted)
     few = layers if len(layers) <= _FEW else [layers[0], layers[len(layers) // 2], layers[-1]]
     amount = strategy.amount
     sampled: dict[float, float] = {}
@@ -114,9 +119,9 @@ def plan_to_length(
         return sampled[value]
 
     own = getattr(strategy, amount.parameter)
-    value, ratio = amount.most if own is None else float(own), 1.0
+    value, ratio, margin = amount.most if own is None else float(own), 1.0, 0.0
     for _ in range(1 if few is layers else _ROUNDS):
-        target = wanted * (1.0 - 0.3 * tolerance) / ratio
+        target = wanted * (1.0 - margin) / ratio
         value = _search(sample, sampled, value, amount, target, tolerance)
         if value in tried:
             break
@@ -124,7 +129,7 @@ def plan_to_length(
         length = tried[value].length_per_layer
         if (1.0 - tolerance) * wanted <= length <= wanted or not sampled[value] > 0.0:
             break
-        ratio = length / sampled[value]
+        ratio, margin = length / sampled[value], 0.3 * tolerance
     best = _best(list(tried.values()), wanted)
     return replace(best, note=_note(best, amount, wanted, tolerance))
 

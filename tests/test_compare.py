@@ -1,0 +1,137 @@
+"""Comparison: equal fibre, nobody dropped, and the order by the virtual test."""
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+
+from ccfem.cases.case import Case
+from ccfem.compare import compare, create_all
+from ccfem.elasticity.problem import Force, Problem, Support
+from ccfem.equal_fibre import length_per_layer
+from ccfem.errors import InputError
+from ccfem.headline import best_values, headline_values, ranking, remarks, verdict
+from ccfem.machine import Machine
+from ccfem.materials import isotropic
+from ccfem.strategies import create, plan
+from ccfem.structured import box_mesh
+
+SIZE = (60.0, 24.0, 4.0)
+
+
+def strip(force=1000.0):
+    """A strip along x that is free to contract: uniform stress."""
+    mesh = box_mesh(SIZE, (20, 8, 2))
+    supports = (Support("x_min", "x"), Support("y_min", "y"), Support("z_min", "z"))
+    problem = Problem(
+        mesh,
+        isotropic(3500.0, 0.35, tensile_strength=50.0),
+        supports,
+        {"pull": (Force("x_max", (force, 0.0, 0.0)),), "push": (Force("x_max", (-1.0, 0.0, 0.0)),)},
+    )
+    return Case("strip", "Strip", problem, layers=4, machine=Machine(minimum_length=20.0))
+
+
+@pytest.fixture(scope="module")
+def compared():
+    return compare(strip())
+
+
+def test_strategies_lay_the_same_length(compared):
+    natural = {
+        run.name: length_per_layer(
+            plan(create(run.name), compared.layers, compared.stress, compared.case.machine),
+            compared.layers,
+        )
+        for run in compared.runs
+    }
+    assert compared.fibre_per_layer == min(natural.values())
+    for run in compared.runs:
+        assert not run.failure
+        assert run.length_per_layer <= compared.fibre_per_layer * (1.0 + 1e-9)
+        assert run.length_per_layer >= 0.99 * compared.fibre_per_layer or "of" in run.note
+        assert set(run.seconds) == {"plan", "evaluate", "virtual test"}
+
+
+def test_natural_amounts_are_those_of_the_strategies():
+    strategies = {"zigzag": create("zigzag", {"spacing": 3.0}), "concentric": create("concentric")}
+    result = compare(strip(), strategies, natural=True, strand=None)
+    assert result.fibre_per_layer is None
+    for run in result.runs:
+        paths = plan(strategies[run.name], result.layers, result.stress, result.case.machine)
+        np.testing.assert_array_equal(run.toolpaths.points, paths.points)
+        assert run.strategy == strategies[run.name]
+        assert run.tested is None
+
+
+def test_fibre_along_the_pull_wins_by_the_rule_of_mixtures():
+    strategies = {
+        "across": create("zigzag", {"angle": 90.0, "turn": 0.0, "spacing": 2.0}),
+        "along": create("zigzag", {"angle": 0.0, "turn": 0.0, "spacing": 2.0}),
+    }
+    result = compare(strip(), strategies, fibre_per_layer=700.0)
+    assert [run.name for run in ranking(result)] == ["along", "across"]
+    along = headline_values(result.runs[1])
+    # EA of the strands over E of the matrix is 4 mm^2: n strands add 4 n to the area. The turns of
+    # the zigzag run across, and its strands end half a width inside the strip.
+    strands = along["fibre_length"] / SIZE[0]
+    mixtures = 1.0 + 4.0 * strands / (SIZE[1] * SIZE[2])
+    assert along["stiffness_ratio_tension"] == pytest.approx(mixtures, rel=0.1)
+    assert verdict(result).startswith("along makes the stiffest part, at 700 mm of fibre per layer")
+    best = best_values(result)
+    assert best["stiffness_ratio_tension"] == along["stiffness_ratio_tension"]
+    assert best["efficiency"] == along["efficiency"]
+
+
+def test_opposite_orders_are_undecided(compared):
+    first, second = ranking(compared)[:2]
+    bracket = second.tested.bracket
+    stiffer = replace(bracket.bonded, stiffness=10.0 * bracket.bonded.stiffness)
+    tested = replace(second.tested, bracket=replace(bracket, bonded=stiffer))
+    turned = replace(compared, runs=(first, replace(second, tested=tested)))
+    assert verdict(turned).startswith(f"Undecided between {first.name} and {second.name}")
+    assert any("undecided" in line for line in remarks(first, turned))
+    same = replace(compared, runs=(first, second))
+    assert verdict(same).startswith(f"{first.name} makes the stiffest part")
+
+
+def test_a_strategy_that_fails_stays_with_its_reason():
+    result = compare(strip(), ["isocurve", "zigzag"], load_case="push")
+    isocurve, zigzag = result.runs
+    assert "expected tension" in isocurve.failure
+    assert isocurve.evaluation is None
+    assert not zigzag.failure
+    assert ranking(result) == (zigzag, isocurve)
+    assert remarks(isocurve, result)[0].startswith("failed: expected tension")
+
+
+def test_thin_fibre_is_reported_not_dropped():
+    strategies = {"zigzag": create("zigzag", {"spacing": 20.0})}
+    case = replace(strip(), machine=Machine(minimum_length=5000.0))
+    (run,) = compare(case, strategies, natural=True).runs
+    assert run.failure.startswith("laid no fibre")
+
+
+@pytest.mark.parametrize(
+    ("arguments", "message"),
+    [
+        ({"strategies": ["isocurf"]}, "no strategy named 'isocurf'; there are: concentric,"),
+        ({"strategies": []}, "at least one strategy"),
+        ({"strategies": ["zigzag", "zigzag"]}, "'zigzag' more than once"),
+        ({"layers": 0}, "at least 1; got 0"),
+        ({"fibre_per_layer": -1.0}, "above 0 mm; got -1"),
+        ({"fibre_per_layer": 10.0, "natural": True}, "not both"),
+        ({"load_case": "twist"}, "no load case named 'twist'; the case has: pull, push"),
+    ],
+)
+def test_bad_input(arguments, message):
+    with pytest.raises(InputError, match=message):
+        compare(strip(), **arguments)
+
+
+def test_parameters_of_the_case_come_before_defaults_and_after_given_ones():
+    case = replace(strip(), parameters={"zigzag": {"angle": 10.0, "turn": 5.0}})
+    (zigzag,) = create_all(case, ["zigzag"], {"zigzag": {"turn": 7.0}}).values()
+    assert (zigzag.angle, zigzag.turn) == (10.0, 7.0)
+    with pytest.raises(InputError, match="'isocurve', which is not among"):
+        create_all(case, ["zigzag"], {"isocurve": {"cap": 80.0}})

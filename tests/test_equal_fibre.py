@@ -1,0 +1,92 @@
+"""Planning to a wanted length: never more, as near as the strategy's steps allow, and honest."""
+
+from dataclasses import dataclass
+from typing import ClassVar
+
+import numpy as np
+import pytest
+
+from ccfem.elasticity.problem import Force, Problem, Support
+from ccfem.elasticity.solve import solve
+from ccfem.equal_fibre import length_per_layer, plan_to_length
+from ccfem.errors import InputError
+from ccfem.layers import slice_planar
+from ccfem.machine import Machine
+from ccfem.materials import isotropic
+from ccfem.strategies import Amount, plan
+from ccfem.structured import box_mesh
+from ccfem.toolpaths import Toolpaths
+
+LENGTH, WIDTH = 60.0, 40.0
+MACHINE = Machine()
+
+
+@dataclass(frozen=True)
+class Lines:
+    """``int(WIDTH / spacing)`` lines along the plate: its length changes in steps of a line."""
+
+    spacing: float = 1.0
+    amount: ClassVar[Amount] = Amount("spacing", most=1.0, least=20.0)
+
+    def __call__(self, layer, stress, machine):
+        count = int(WIDTH / self.spacing + 1e-9)
+        ys = (np.arange(count) + 0.5) * self.spacing
+        return Toolpaths.from_plane([np.array([[0.0, y], [LENGTH, y]]) for y in ys], layer)
+
+
+@dataclass(frozen=True)
+class OneLine:
+    """One line whose length is a curved function of the parameter and of the layer."""
+
+    share: float = 50.0
+    amount: ClassVar[Amount] = Amount("share", most=0.0, least=100.0)
+
+    def __call__(self, layer, stress, machine):
+        x = LENGTH * np.sqrt(1.0 - self.share / 100.0) * (0.5 + 0.1 * (layer.index % 3)) + 1e-3
+        return Toolpaths.from_plane([np.array([[0.0, 1.0], [x, 1.0]])], layer)
+
+
+@pytest.fixture(scope="module")
+def plate():
+    mesh = box_mesh((LENGTH, WIDTH, 4.0), (6, 4, 2))
+    problem = Problem(
+        mesh, isotropic(3500.0, 0.35), (Support("x_min"),), {"pull": (Force("x_max", (1e3, 0, 0)),)}
+    )
+    return solve(problem)["pull"], slice_planar(mesh, count=8)
+
+
+@pytest.mark.parametrize("wanted", [2400.0, 1700.0, 1000.0, 600.0, 130.0])
+def test_steps_of_a_line(plate, wanted):
+    stress, layers = plate
+    planned = plan_to_length(Lines(), layers, stress, MACHINE, wanted)
+    lines = int(wanted / LENGTH)
+    assert planned.length_per_layer == pytest.approx(lines * LENGTH)
+    assert bool(planned.note) == (lines * LENGTH < 0.99 * wanted)
+
+
+@pytest.mark.parametrize("wanted", [30.0, 20.0, 10.0, 3.0, 1.0])
+def test_a_length_that_can_be_met_is_met(plate, wanted):
+    stress, layers = plate
+    planned = plan_to_length(OneLine(), layers, stress, MACHINE, wanted)
+    assert 0.99 * wanted <= planned.length_per_layer <= wanted
+    assert planned.note == ""
+    again = plan(planned.strategy, layers, stress, MACHINE)
+    np.testing.assert_array_equal(again.points, planned.toolpaths.points)
+    assert length_per_layer(again, layers) == planned.length_per_layer
+
+
+def test_more_than_the_most_and_less_than_the_least_are_said(plate):
+    stress, layers = plate
+    most = plan_to_length(Lines(), layers, stress, MACHINE, 9000.0)
+    assert most.length_per_layer == pytest.approx(40 * LENGTH)
+    assert "its most, at spacing = 1" in most.note
+    least = plan_to_length(Lines(), layers, stress, MACHINE, 60.0)
+    assert least.length_per_layer == pytest.approx(2 * LENGTH)
+    assert "its least, at spacing = 20" in least.note
+
+
+@pytest.mark.parametrize("wanted", [0.0, -5.0, float("nan"), float("inf")])
+def test_no_length_is_refused(plate, wanted):
+    stress, layers = plate
+    with pytest.raises(InputError, match="above 0 mm"):
+        plan_to_length(Lines(), layers, stress, MACHINE, wanted)
