@@ -11,7 +11,7 @@ from ccfem.elasticity.direct import Apply
 from ccfem.elasticity.smoothing import GaussSeidel
 from ccfem.elasticity.supports import rigid_modes
 
-__all__ = ["smoothed_aggregation", "two_level"]
+__all__ = ["petsc_gamg", "smoothed_aggregation", "two_level"]
 
 _COARSEST = 300
 """Size below which a level is solved directly."""
@@ -112,3 +112,31 @@ def two_level(matrix: sp.bsr_array, points: FloatArray, parents: IntArray) -> Ap
     coarse = (prolong.T.tobsr() @ (matrix @ prolong)).tobsr((3, 3))
     coarse.sort_indices()
     return _finest(matrix, prolong.tocsr(), smoothed_aggregation(coarse, points[corner]))
+
+
+def petsc_gamg(matrix: sp.bsr_array, points: FloatArray) -> Apply:
+    """One V-cycle of PETSc's smoothed aggregation (GAMG) with rigid-body modes.
+
+    Each process of an MPI run solves the whole problem.
+    """
+    from petsc4py import PETSc
+
+    rows = matrix.tocsr()
+    operator = PETSc.Mat().createAIJ(
+        size=rows.shape, bsize=3, csr=(rows.indptr, rows.indices, rows.data), comm=PETSc.COMM_SELF
+    )
+    operator.setOption(PETSc.Mat.Option.SPD, True)
+    place = PETSc.Vec().createWithArray(np.ascontiguousarray(points), bsize=3, comm=PETSc.COMM_SELF)
+    operator.setNearNullSpace(PETSc.NullSpace().createRigidBody(place))
+    preconditioner = PETSc.PC().create(comm=PETSc.COMM_SELF)
+    preconditioner.setOperators(operator)
+    preconditioner.setType("gamg")
+    preconditioner.setUp()
+    left, right = operator.createVecs()
+
+    def apply(rhs: FloatArray) -> FloatArray:
+        left.setArray(rhs)
+        preconditioner.apply(left, right)
+        return np.array(right.getArray())
+
+    return apply

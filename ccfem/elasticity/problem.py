@@ -139,6 +139,11 @@ class Problem:
                 )
             if not np.isfinite(value).all():
                 raise InputError(f"problem.{name} must be finite; got NaN or infinity")
+        if self.density is not None and not 0.0 < self.density.min() <= self.density.max() <= 1.0:
+            raise InputError(
+                f"problem.density must lie in (0, 1]; got {self.density.min()} to "
+                f"{self.density.max()}: give void cells a small positive density"
+            )
 
     @property
     def loaded_patches(self) -> tuple[str, ...]:

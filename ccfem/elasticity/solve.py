@@ -12,10 +12,10 @@ from ccfem.elasticity.assembly import Pattern, assemble, pattern
 from ccfem.elasticity.loads import load_case
 from ccfem.elasticity.problem import Problem
 from ccfem.elasticity.recovery import cell_stress, nodal_stress
-from ccfem.elasticity.solvers import Solver, factorise
+from ccfem.elasticity.solvers import LARGEST_DIRECT, Solver, direct_backend, factorise
 from ccfem.elasticity.stress_field import SolveRecord, StressField
 from ccfem.elasticity.supports import Held, held
-from ccfem.errors import InputError
+from ccfem.errors import InputError, SolveError
 from ccfem.mesh import TetMesh
 from ccfem.tensor import rotate_stiffness
 
@@ -134,7 +134,9 @@ def solve(
     ----------
     problem : Problem
     backend : str, default "auto"
-        One of `ccfem.elasticity.BACKENDS`; "auto" chooses by size and by what is installed.
+        One of `ccfem.elasticity.BACKENDS`; "auto" chooses by size and by what is installed, and
+        where an iterative backend misses the tolerance goes on with a direct one. The record
+        names the one that solved.
     tolerance : float, default 1e-8
         Largest relative residual that is accepted.
 
@@ -161,11 +163,18 @@ def solve(
     started = assembled
     for case, forces in system.forces.items():
         rhs = system.held.right_hand_side(matrix, forces)
-        solution = solver.solve(rhs, tolerance=tolerance)
+        try:
+            solution = solver.solve(rhs, tolerance=tolerance)
+        except SolveError:
+            if backend != "auto" or solver.exact or record.unknowns > LARGEST_DIRECT:
+                raise
+            solver = system.factorise(matrix, direct_backend())
+            solution = solver.solve(rhs, tolerance=tolerance)
         displacement = system.held.expand(solution.values)
         now = perf_counter()
         record = replace(
             record,
+            backend=solver.backend,
             iterations=solution.iterations,
             residual=solution.residual,
             solve_seconds=now - started,

@@ -15,7 +15,7 @@ from ccfem.errors import InputError, SolveError
 
 __all__ = ["BACKENDS", "Solution", "Solver", "factorise", "preconditioned_cg"]
 
-BACKENDS = ("pypardiso", "cholmod", "superlu", "amg", "two-level")
+BACKENDS = ("pypardiso", "cholmod", "superlu", "amg", "two-level", "petsc")
 
 _CURES = {
     "pypardiso": 'pip install "ccfem[mkl]"',
@@ -30,8 +30,8 @@ _SMALL = 6_000
 _MANY = 4
 """Right-hand sides from which a sparse Cholesky is quicker than a multigrid (measured)."""
 
-_CHOLESKY = 100_000
-"""Unknowns up to which that holds: about 200 000 linear cells of a thin part."""
+LARGEST_DIRECT = 100_000
+"""Unknowns up to which a direct backend is worth its memory."""
 
 
 class Solution(NamedTuple):
@@ -146,6 +146,14 @@ def preconditioned_cg(
     return _checked(matrix, x, rhs, iterations, tolerance, solver.backend)
 
 
+def direct_backend() -> str:
+    """Name the best direct backend that is installed."""
+    for backend in ("pypardiso", "cholmod"):
+        if find_spec(_MODULES[backend]) is not None:
+            return backend
+    return "superlu"
+
+
 def choose(unknowns: int, order: int, solves: int = 1) -> str:
     """Name the backend that suits a system and what is installed.
 
@@ -159,10 +167,10 @@ def choose(unknowns: int, order: int, solves: int = 1) -> str:
     """
     if unknowns <= _SMALL:
         return "superlu"
-    if order == 1 and solves >= _MANY and unknowns <= _CHOLESKY:
-        for backend in ("pypardiso", "cholmod"):
-            if find_spec(_MODULES[backend]) is not None:
-                return backend
+    if order == 1 and solves >= _MANY and unknowns <= LARGEST_DIRECT:
+        backend = direct_backend()
+        if backend != "superlu":
+            return backend
     return "amg" if order == 1 else "two-level"
 
 
@@ -208,5 +216,7 @@ def factorise(
         if parents is None:
             raise InputError("backend 'two-level' is for quadratic meshes: use mesh.quadratic()")
         return Solver(backend, matrix, multigrid.two_level(matrix, points, parents), False)
+    if backend == "petsc":
+        return Solver(backend, matrix, multigrid.petsc_gamg(matrix, points), False)
     makers = {"pypardiso": direct.pardiso, "cholmod": direct.cholmod, "superlu": direct.superlu}
     return Solver(backend, matrix, makers[backend](matrix), True)

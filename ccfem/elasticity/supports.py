@@ -148,17 +148,26 @@ def check_support(mesh: TetMesh, fixed: BoolArray) -> None:
     links = sp.coo_array((np.ones(len(pairs), dtype=bool), pairs.T), shape=(m, m))
     count, body = connected_components(links, directed=False)
     corner_body = np.repeat(body, 4)
+    if count == 1:
+        used = np.zeros(len(fixed), dtype=bool)
+        used[mesh.corners] = True
+        node = np.flatnonzero(used)
+        motion = _free_motions(mesh, fixed, node, np.zeros(len(node), dtype=np.int64))
+        if motion is not None:
+            raise InputError(f"the part is free to {motion}: add a support that holds it")
+        return
     members = np.unique(mesh.corners.reshape(-1) * count + corner_body)
     node, owner = members // count, members % count
     links = sp.coo_array(
         (np.ones(len(node), dtype=bool), (owner, count + node)), shape=(2 * [count + len(fixed)])
     )
-    pieces, piece = connected_components(links, directed=False)
-    for k in np.unique(piece[:count]):
+    _, piece = connected_components(links, directed=False)
+    named = np.unique(piece[:count])
+    for k in named:
         chosen = piece[owner] == k
         motion = _free_motions(mesh, fixed, node[chosen], owner[chosen])
         if motion is not None:
-            which = f" (one of {pieces} separate pieces)" if np.ptp(piece[:count]) else ""
+            which = f" (one of {len(named)} separate pieces)" if len(named) > 1 else ""
             raise InputError(f"the part{which} is free to {motion}: add a support that holds it")
 
 
