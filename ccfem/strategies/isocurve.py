@@ -7,11 +7,12 @@ continuous fibre reinforced thermoplastic composites, Additive Manufacturing 49 
 """
 
 import itertools
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 from typing import Any, ClassVar, Literal, get_args
 
 import numpy as np
+from scipy.spatial import cKDTree
 
 from ccfem.arrays import FloatArray
 from ccfem.elasticity.stress_field import LayerStress, StressField
@@ -28,6 +29,7 @@ from ccfem.geometry.conformal import lead_into, parallel_curve
 from ccfem.geometry.isocontours import Isocontours
 from ccfem.geometry.joining import link_ends
 from ccfem.geometry.rings import close_short_ring, holes_on
+from ccfem.geometry.spiral import spiral
 from ccfem.layers.layer import Layer
 from ccfem.machine import Machine
 from ccfem.strategies.strategy import Amount, LayerStrategy
@@ -43,6 +45,8 @@ Fit = Literal["weighted", "literal"]
 Spacing = Literal["search", "constrained"]
 
 _LEAST_WEIGHT = 1e-3
+_SPIRAL_LIMIT = 4.0
+"""Largest distance, in strand widths, of closed isocurves that are joined to a spiral."""
 
 
 @dataclass(frozen=True)
@@ -88,6 +92,8 @@ class Isocurve:
     spacing : {"search", "constrained"}
         Search for the number of isocurves (the paper, section 4.3), or a convex programme whose
         unit levels keep the width by construction.
+    spiral : bool, default True
+        Join nested closed isocurves where the stress is least; not in the paper.
     boundary_links : bool, default True
         Links may follow the boundary; in the paper all are straight.
     trim : bool, default True
@@ -110,6 +116,7 @@ class Isocurve:
     fill: Fill = "screened"
     fit: Fit = "weighted"
     spacing: Spacing = "search"
+    spiral: bool = True
     boundary_links: bool = True
     trim: bool = True
 
@@ -151,6 +158,7 @@ class Isocurve:
             incompatible="any",
             fill="laplacian",
             fit="literal",
+            spiral=False,
             boundary_links=False,
             trim=False,
         )
@@ -204,7 +212,7 @@ class _Planner:
             return Toolpaths.empty()
         surface = Surface.of(layer)
         lines = self.isocurves(surface, tension, machine.fibre_width)
-        lines = self.connected(lines, layer, stress.part, machine)
+        lines = self.connected(lines, layer, tension, stress.part, machine)
         return Toolpaths.from_plane(lines, layer)
 
     def isocurves(
@@ -254,7 +262,12 @@ class _Planner:
         return kept
 
     def connected(
-        self, lines: list[FloatArray], layer: Layer, part: StressField, machine: Machine
+        self,
+        lines: list[FloatArray],
+        layer: Layer,
+        tension: SampledTension,
+        part: StressField,
+        machine: Machine,
     ) -> list[FloatArray]:
         """Curves round the chosen holes, isocurves led into them, ends linked, the rest dropped."""
         s, width, section = self.strategy, machine.fibre_width, layer.polygon
@@ -268,11 +281,19 @@ class _Planner:
             lines = trim_to_clearance([*rings, *lines], width, 3.0 * width, first=len(rings))
         else:
             lines = [*rings, *lines]
+        if s.spiral:
+            lines = spiral(lines, _SPIRAL_LIMIT * width, _nearest(layer, tension.stress), section)
         lines = link_ends(
             lines, section, s.link_limit * width, width, along_boundary=s.boundary_links
         )
         lines = [close_short_ring(line, machine.minimum_length) for line in lines]
         return [line for line in lines if _length(line) >= machine.minimum_length]
+
+
+def _nearest(layer: Layer, values: FloatArray) -> Callable[[FloatArray], FloatArray]:
+    """Return a function that gives points (k, 2) the value of the nearest triangle."""
+    tree = cKDTree(layer.plane_points[layer.triangles].mean(axis=1))
+    return lambda points: values[tree.query(points)[1]]
 
 
 def _length(line: FloatArray) -> float:
