@@ -1,5 +1,6 @@
 """Materials: stiffness, strengths, and where the numbers come from."""
 
+from collections.abc import Callable
 from dataclasses import dataclass
 
 import numpy as np
@@ -7,7 +8,14 @@ import numpy as np
 from ccfem.arrays import FloatArray, read_only
 from ccfem.errors import InputError
 
-__all__ = ["Material", "isotropic", "transversely_isotropic"]
+__all__ = [
+    "Material",
+    "isotropic",
+    "material_names",
+    "named_material",
+    "plane_stress",
+    "transversely_isotropic",
+]
 
 
 @dataclass(frozen=True)
@@ -104,3 +112,110 @@ def transversely_isotropic(
     stiffness = np.linalg.inv(compliance)
     stiffness = 0.5 * (stiffness + stiffness.T)
     return Material(name, stiffness, tensile_strength, compressive_strength, source)
+
+
+def plane_stress(
+    modulus_fibre: float, modulus_transverse: float, poisson_fibre: float, shear_fibre: float
+) -> FloatArray:
+    """Reduced stiffness of a thin sheet with the fibre along axis 1.
+
+    Parameters
+    ----------
+    modulus_fibre, modulus_transverse, shear_fibre : float, MPa
+        E1, E2 and G12.
+    poisson_fibre : float
+        nu12, with ``|nu12| < sqrt(E1 / E2)``.
+
+    Returns
+    -------
+    (3, 3) array, MPa
+        Q with ``[s11, s22, s12] = Q @ [e11, e22, 2 e12]`` (Jones, Mechanics of Composite
+        Materials, 1999, eq. 2.66).
+    """
+    e1, e2, nu = modulus_fibre, modulus_transverse, poisson_fibre
+    if not (min(e1, e2, shear_fibre) > 0.0 and nu * nu < e1 / e2):
+        raise InputError(
+            f"plane stress: expected positive moduli and nu12^2 < E1/E2; got E1 {e1}, E2 {e2}, "
+            f"G12 {shear_fibre}, nu12 {nu}"
+        )
+    rest = 1.0 - nu * nu * e2 / e1
+    q12 = nu * e2 / rest
+    return np.array([[e1 / rest, q12, 0.0], [q12, e2 / rest, 0.0], [0.0, 0.0, shear_fibre]])
+
+
+_NEURAL_TOMO = "NeuralTOMO repository, materialsBase.py"
+_MARKFORGED = "Markforged composites data sheet, older edition (Onyx 1.4 GPa)"
+_BORROWED = "assumed: E2 4.1 GPa, nu12 0.33, G12 2.2 GPa as C-FRAM, nu23 0.45"
+_PLOCHER = "Plocher, table 5"
+
+
+def _printed_fibre(name: str, modulus: float, tensile: float, compressive: float) -> Material:
+    """Markforged fibre: the sheet gives the axial values only."""
+    source = f"{_MARKFORGED}; {_BORROWED}"
+    return transversely_isotropic(
+        modulus, 4100.0, 0.33, 2200.0, 0.45, name, tensile, compressive, source
+    )
+
+
+_TABLE: dict[str, Callable[[], Material]] = {
+    "pla": lambda: isotropic(
+        3000.0, 0.35, "pla", 52.0, 61.0, f"{_NEURAL_TOMO} (in-plane axis 1; transverse 32/-47)"
+    ),
+    "pla_plus": lambda: isotropic(
+        3000.0, 0.35, "pla_plus", 52.0, 61.0, f"{_NEURAL_TOMO} (elastic constants as PLA there)"
+    ),
+    "onyx": lambda: isotropic(
+        1400.0, 0.41, "onyx", 36.0, None, f"{_MARKFORGED}; strength at yield; assumed: nu 0.41"
+    ),
+    "nylon_w": lambda: isotropic(
+        1700.0, 0.39, "nylon_w", 51.0, None, f"{_MARKFORGED}; strength at yield; assumed: nu 0.39"
+    ),
+    "pa6": lambda: isotropic(
+        2600.0, 0.39, "pa6", 60.0, None, "typical dry PA6; all values assumed"
+    ),
+    "mf_carbon": lambda: _printed_fibre("mf_carbon", 60000.0, 800.0, 320.0),
+    "mf_kevlar": lambda: _printed_fibre("mf_kevlar", 27000.0, 610.0, 97.0),
+    "mf_fiberglass": lambda: _printed_fibre("mf_fiberglass", 21000.0, 590.0, 140.0),
+    "mf_hsht_fg": lambda: _printed_fibre("mf_hsht_fg", 21000.0, 600.0, 192.0),
+    "s_fram": lambda: transversely_isotropic(
+        1900.0, 1100.0, 0.41, 700.0, 0.45, "s_fram", source=f"{_PLOCHER}; assumed: nu23 0.45"
+    ),
+    "c_fram": lambda: transversely_isotropic(
+        73200.0,
+        4100.0,
+        0.33,
+        2200.0,
+        0.45,
+        "c_fram",
+        source=f"{_PLOCHER}, measured by Saeed 2021 (whose abstract reads 85 GPa); "
+        "assumed: nu23 0.45",
+    ),
+    "wang_laminate": lambda: transversely_isotropic(
+        18300.0,
+        19800.0,
+        0.17,
+        5150.0,
+        0.45,
+        "wang_laminate",
+        source="Wang 2021, from a woven laminate of Kenedi 2017, in the plane; assumed: the "
+        "direction through the thickness as axis 2, nu23 0.45",
+    ),
+}
+
+
+def material_names() -> tuple[str, ...]:
+    """Names of the materials of the table."""
+    return tuple(sorted(_TABLE))
+
+
+def named_material(name: str) -> Material:
+    """Material of the table; its `source` says which of its numbers are assumed.
+
+    Raises
+    ------
+    InputError
+        For an unknown name; the known ones are listed.
+    """
+    if name not in _TABLE:
+        raise InputError(f"no material named '{name}'; there are: {', '.join(material_names())}")
+    return _TABLE[name]()
