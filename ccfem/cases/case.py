@@ -30,6 +30,8 @@ class Case:
         Where a strategy should not use its defaults on this part.
     source : str
         Paper or person that the case comes from.
+    findings : tuple of str
+        What was found and mended in a mesh from a file, one line each.
     """
 
     name: str
@@ -40,6 +42,7 @@ class Case:
     machine: Machine = field(default_factory=Machine)
     parameters: Mapping[str, Mapping[str, Any]] = field(default_factory=dict)
     source: str = ""
+    findings: tuple[str, ...] = ()
 
     def __post_init__(self) -> None:
         parameters = {name: MappingProxyType(dict(p)) for name, p in self.parameters.items()}

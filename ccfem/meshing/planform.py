@@ -14,7 +14,7 @@ import numpy as np
 import shapely
 from scipy.spatial import Delaunay, QhullError, cKDTree
 
-from ccfem.arrays import BoolArray, FloatArray, IntArray
+from ccfem.arrays import FloatArray, IntArray
 from ccfem.errors import InputError
 
 __all__ = ["triangulate"]
@@ -137,15 +137,19 @@ def _size_function(rings: list[FloatArray], edge_length: float) -> Size:
 
 
 def _along(ring: FloatArray, size: Size) -> FloatArray:
-    """Points (k, 2) along a ring at the wanted distances; its corners are among them."""
+    """Points (k, 2) along a ring at the wanted distances.
+
+    Its corners are among them, or its outermost points in x and y where it has none.
+    """
     turn, _ = _turns(ring)
     corners = np.flatnonzero(turn >= _CORNER)
+    least = 1
     if not len(corners):
-        corners = np.array([0])
+        ends = [ring[:, 0].argmin(), ring[:, 0].argmax(), ring[:, 1].argmin(), ring[:, 1].argmax()]
+        corners, least = np.unique(ends), 3
     ring = np.roll(ring, -corners[0], axis=0)
     stops = np.append(corners - corners[0], len(ring))
     ring = np.concatenate([ring, ring[:1]])
-    least = 12 if len(corners) == 1 else 1
     found = []
     for start, stop in pairwise(stops):
         line = shapely.LineString(ring[start : stop + 1])
@@ -160,18 +164,16 @@ def _along(ring: FloatArray, size: Size) -> FloatArray:
 
 
 def _grid(polygon: Any, edge_length: float, size: Size, outline: FloatArray) -> FloatArray:
-    """Inner points (k, 2): a hexagonal grid, a thinned finer one where edges are shorter."""
+    """Inner points (k, 2): a hexagonal grid, and points of a finer one in the gaps it leaves."""
     coarse = _hexagons(polygon, edge_length)
-    coarse = coarse[size(coarse) > 0.999 * edge_length]
+    wanted = size(coarse)
+    clear = cKDTree(outline).query(coarse)[0] >= _SPACING * wanted
+    coarse = coarse[clear & (wanted > 0.999 * edge_length)]
     fine = _hexagons(polygon, _FINEST * edge_length)
-    fine = fine[size(fine) <= 0.999 * edge_length]
-    fine = fine[np.random.default_rng(0).permutation(len(fine))]
-    points = np.concatenate([outline, coarse, fine])
-    wanted = _SPACING * size(points)
-    first = np.arange(len(points)) < len(outline)
-    near = cKDTree(outline).query(points)[0] < wanted
-    kept = _thinned(points, wanted, first, near & ~first)
-    return points[kept & ~first]
+    wanted = _SPACING * size(fine)
+    open_ = cKDTree(np.concatenate([outline, coarse])).query(fine)[0] >= wanted
+    order = np.random.default_rng(0).permutation(np.flatnonzero(open_))
+    return np.concatenate([coarse, _thinned(fine[order], wanted[order])])
 
 
 def _hexagons(polygon: Any, step: float) -> FloatArray:
@@ -185,28 +187,22 @@ def _hexagons(polygon: Any, step: float) -> FloatArray:
     return points[shapely.contains_xy(polygon, points)]
 
 
-def _thinned(points: FloatArray, wanted: FloatArray, kept: BoolArray, gone: BoolArray) -> BoolArray:
-    """Points that keep the wanted distance from each other, the earlier one before the later.
-
-    `kept` are in from the start, `gone` out.
-    """
+def _thinned(points: FloatArray, wanted: FloatArray) -> FloatArray:
+    """Points that keep the wanted distance from each other, the earlier before the later."""
+    if not len(points):
+        return points
     pairs = cKDTree(points).query_pairs(wanted.max(), output_type="ndarray")
     gap = np.linalg.norm(points[pairs[:, 0]] - points[pairs[:, 1]], axis=1)
-    close = gap < 0.999 * wanted[pairs].max(axis=1)
-    pairs = np.sort(pairs[close], axis=1)
-    kept, gone = kept.copy(), gone.copy()
+    pairs = np.sort(pairs[gap < wanted[pairs].max(axis=1)], axis=1)
+    kept, gone = np.zeros((2, len(points)), dtype=bool)
     while True:
-        early, late = pairs.T
-        gone[late[kept[early]]] = True
-        gone[early[kept[late] & ~kept[early]]] = True
-        open_ = ~kept & ~gone
-        pairs = pairs[open_[pairs].all(axis=1)]
-        blocked = np.zeros(len(points), dtype=bool)
+        blocked = kept | gone
         blocked[pairs[:, 1]] = True
-        ready = open_ & ~blocked
-        if not ready.any():
-            return kept
-        kept |= ready
+        if blocked.all() and not len(pairs):
+            return points[kept]
+        kept |= ~blocked
+        gone[pairs[kept[pairs[:, 0]], 1]] = True
+        pairs = pairs[~(kept | gone)[pairs].any(axis=1)]
 
 
 def _conforming(

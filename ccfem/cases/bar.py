@@ -1,0 +1,84 @@
+"""A tensile bar: of the size of the bar of paper 000."""
+
+from typing import Any
+
+import shapely
+
+from ccfem.cases.case import Case
+from ccfem.cases.stored import mesh_of_case
+from ccfem.elasticity.problem import Force, Problem, Support
+from ccfem.materials import isotropic
+from ccfem.mesh import TetMesh
+from ccfem.meshing import extrude
+from ccfem.patches import Plane, patches_from_rules
+
+__all__ = ["bar", "bar_mesh", "bar_outline"]
+
+ELEMENT_SIZE = 1.5
+LENGTH = 125.0
+THICKNESS = 5.0
+
+
+def bar_outline(
+    width: float = 25.0,
+    gauge_length: float = 40.0,
+    gauge_width: float = 8.0,
+    shoulder: float = 8.0,
+) -> Any:
+    """Planform of the bar: 125 mm long, 25 mm wide, 8 mm wide in the gauge.
+
+    Parameters
+    ----------
+    width : float, mm
+        Of the grips.
+    gauge_length, gauge_width : float, mm
+        The parallel part.
+    shoulder : float, mm
+        Radius of the quarter circles from gauge to grips; at most half the step in width.
+
+    Returns
+    -------
+    shapely Polygon
+    """
+    end, half, slim = 0.5 * LENGTH, 0.5 * width, 0.5 * gauge_width
+    start = 0.5 * gauge_length + shoulder
+    grips = [shapely.box(-end, -half, -start, half), shapely.box(start, -half, end, half)]
+    body = shapely.union_all([shapely.box(-end, -slim, end, slim), *grips])
+    body = body.buffer(shoulder, join_style="mitre").buffer(-shoulder, quad_segs=32)
+    return shapely.remove_repeated_points(body, 1e-3)
+
+
+def bar_mesh(element_size: float) -> TetMesh:
+    """Mesh of the bar with patches support (the left end) and load (the right end)."""
+    rules = {"support": Plane("x", "min"), "load": Plane("x", "max")}
+    return patches_from_rules(extrude(bar_outline(), THICKNESS, element_size), rules)
+
+
+def bar(element_size: float = ELEMENT_SIZE, order: int = 1, force: float = 1000.0) -> Case:
+    """Tensile bar, 125 x 25 x 5 mm, held at its left end and pulled at its right end along x.
+
+    Parameters
+    ----------
+    element_size : float, mm
+        Edge length of the cells aimed at.
+    order : {1, 2}
+        Linear or quadratic cells.
+    force : float, N
+    """
+    material = isotropic(
+        3500.0, 0.35, name="PLA", source="modulus and Poisson's ratio assumed for printed PLA"
+    )
+    problem = Problem(
+        mesh_of_case("bar", element_size, order, bar_mesh),
+        material,
+        (Support("support"),),
+        {"pull": (Force("load", (force, 0.0, 0.0)),)},
+    )
+    return Case(
+        name="bar",
+        title="Tensile bar, 125 x 25 x 5 mm, pulled at its ends",
+        problem=problem,
+        layers=10,
+        source="size of the tensile bar of Chen et al. 2021 (Additive Manufacturing 49, 102470); "
+        "own outline of lines and quarter circles",
+    )

@@ -1,0 +1,114 @@
+"""A ring with two lugs, pulled at the holes: of the size of the Loop of paper 000."""
+
+from typing import Any
+
+import numpy as np
+import shapely
+
+from ccfem.arrays import FloatArray
+from ccfem.cases.case import Case
+from ccfem.cases.stored import mesh_of_case
+from ccfem.elasticity.problem import Force, Problem, Support
+from ccfem.materials import isotropic
+from ccfem.mesh import TetMesh
+from ccfem.meshing import extrude
+from ccfem.patches import Cylinder, patches_from_rules
+
+__all__ = ["loop", "loop_mesh", "loop_outline"]
+
+ELEMENT_SIZE = 2.4
+HOLE = 50.0
+"""Distance of the holes' centres from the middle of the ring, mm."""
+HOLE_RADIUS = 5.0
+THICKNESS = 10.0
+
+
+def loop_outline(
+    ring_radius: float = 50.0,
+    ring_width: float = 20.0,
+    lug_radius: float = 20.0,
+    fillet: float = 10.0,
+) -> Any:
+    """Planform of the loop: 100 mm wide and 140 mm long with the defaults.
+
+    Parameters
+    ----------
+    ring_radius, ring_width : float, mm
+        Outer radius of the ring, and its width.
+    lug_radius : float, mm
+        Of the lugs round the holes, which lie at (0, 50) and (0, -50).
+    fillet : float, mm
+        Radius where a lug meets the ring.
+
+    Returns
+    -------
+    shapely Polygon
+    """
+    # The fillet's circle touches the ring's and the lug's from outside.
+    y = ((ring_radius + fillet) ** 2 - (lug_radius + fillet) ** 2 + HOLE**2) / (2.0 * HOLE)
+    x = np.sqrt((ring_radius + fillet) ** 2 - y**2)
+    low, high = np.arctan2(y, x), np.arctan2(HOLE - y, x)
+    quarter = np.concatenate(
+        [
+            _arc(0.0, 0.0, ring_radius, 0.0, low),
+            _arc(x, y, fillet, low + np.pi, np.pi - high)[1:],
+            _arc(0.0, HOLE, lug_radius, -high, 0.5 * np.pi)[1:],
+        ]
+    )
+    half = np.concatenate([quarter, quarter[-2::-1] * [-1.0, 1.0]])
+    outline = np.concatenate([half, half[-2:0:-1] * [1.0, -1.0]])
+    openings = [shapely.Point(0.0, 0.0).buffer(ring_radius - ring_width, quad_segs=32)]
+    openings += [shapely.Point(0.0, y).buffer(HOLE_RADIUS, quad_segs=32) for y in (-HOLE, HOLE)]
+    return shapely.Polygon(outline, [ring.exterior.coords for ring in openings])
+
+
+def _arc(x: float, y: float, radius: float, start: float, stop: float) -> FloatArray:
+    """Points (k, 2) on an arc round (x, y), no more than 3 degrees apart."""
+    angle = np.linspace(start, stop, 2 + int(abs(stop - start) / np.radians(3.0)))
+    return np.stack([x + radius * np.cos(angle), y + radius * np.sin(angle)], axis=1)
+
+
+def loop_mesh(element_size: float) -> TetMesh:
+    """Mesh of the loop with patches support, load, hole_bottom and hole_top."""
+    bottom, top = (0.0, -HOLE, 0.0), (0.0, HOLE, 0.0)
+    rules = {
+        "support": Cylinder(bottom, "z", HOLE_RADIUS, half="-y"),
+        "load": Cylinder(top, "z", HOLE_RADIUS, half="y"),
+        "hole_bottom": Cylinder(bottom, "z", HOLE_RADIUS),
+        "hole_top": Cylinder(top, "z", HOLE_RADIUS),
+    }
+    return patches_from_rules(extrude(loop_outline(), THICKNESS, element_size), rules)
+
+
+def loop(element_size: float = ELEMENT_SIZE, order: int = 1, force: float = 1000.0) -> Case:
+    """Ring with two lugs, 140 x 100 x 10 mm, pulled apart at the two holes.
+
+    The outer half of the bottom hole is fixed, the outer half of the top hole pulled along y.
+
+    Parameters
+    ----------
+    element_size : float, mm
+        Edge length of the cells aimed at.
+    order : {1, 2}
+        Linear or quadratic cells.
+    force : float, N
+    """
+    material = isotropic(
+        3500.0,
+        0.35,
+        name="PLA+",
+        source="modulus and Poisson's ratio assumed for eSUN PLA+ (the filament of paper 000)",
+    )
+    problem = Problem(
+        mesh_of_case("loop", element_size, order, loop_mesh),
+        material,
+        (Support("support"),),
+        {"pull": (Force("load", (0.0, force, 0.0)),)},
+    )
+    return Case(
+        name="loop",
+        title="Ring with two lugs, 140 x 100 x 10 mm, pulled at its two holes",
+        problem=problem,
+        source="size and loading of the Loop of Chen et al. 2021 (Additive Manufacturing 49, "
+        "102470); own outline of circles",
+    )

@@ -1,0 +1,53 @@
+"""How cases are found by name."""
+
+import importlib
+import inspect
+import pkgutil
+from collections.abc import Callable, Mapping
+from importlib.metadata import entry_points
+from typing import Any
+
+from ccfem.cases.case import Case
+from ccfem.errors import InputError
+
+__all__ = ["create_case", "named_cases"]
+
+
+def named_cases() -> Mapping[str, Callable[..., Case]]:
+    """Every case by name: the modules of this package, and entry points ``ccfem.cases``.
+
+    A module that holds a function of its own name is a case; its parameters have defaults.
+    """
+    import ccfem.cases as package
+
+    found: dict[str, Callable[..., Case]] = {}
+    for info in pkgutil.iter_modules(package.__path__):
+        module = importlib.import_module(f"{package.__name__}.{info.name}")
+        if callable(getattr(module, info.name, None)):
+            found[info.name] = getattr(module, info.name)
+    for entry in entry_points(group="ccfem.cases"):
+        found[entry.name] = entry.load()
+    return found
+
+
+def create_case(name: str, **parameters: Any) -> Case:
+    """Make a case from its name and parameters.
+
+    Raises
+    ------
+    InputError
+        For an unknown case or parameter; the known ones are listed.
+    """
+    known = named_cases()
+    if name not in known:
+        raise InputError(
+            f"no case named '{name}'; there are: {', '.join(sorted(known))}: name one of them or "
+            "a part file (.toml)"
+        )
+    fields = inspect.signature(known[name]).parameters
+    for parameter in parameters:
+        if parameter not in fields:
+            raise InputError(
+                f"case '{name}' has no parameter '{parameter}'; it has: {', '.join(fields)}"
+            )
+    return known[name](**parameters)
