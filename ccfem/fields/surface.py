@@ -59,6 +59,15 @@ class Surface:
         double = np.where(thick, 2.0 * self.areas, np.inf)
         return read_only(turned / double[:, None, None])
 
+    @cached_property
+    def gradient_matrix(self) -> Any:
+        """Matrix (2 t, n) that takes values at the points to x and y gradients, alternating."""
+        values = np.swapaxes(self.gradients, 1, 2).ravel()
+        columns = np.repeat(self.triangles, 2, axis=0).ravel()
+        rows = np.arange(0, len(values) + 1, 3)
+        shape = (2 * len(self.triangles), len(self.points))
+        return sparse.csr_array((values, columns, rows), shape=shape)
+
     def gradient(self, values: FloatArray) -> FloatArray:
         """Gradient (t, 2) on each triangle of a field (n,) given at the points."""
         return np.einsum("tk,tkd->td", values[self.triangles], self.gradients)

@@ -22,7 +22,7 @@ from ccfem.fields.fill import fill_laplacian, fill_screened
 from ccfem.fields.layer_tension import MeshTension, SampledTension, layer_tension, mesh_tension
 from ccfem.fields.levels import extract_levels, unit_levels
 from ccfem.fields.orientation import orient
-from ccfem.fields.scalar import fit_constrained, fit_literal, fit_weighted
+from ccfem.fields.scalar import fit_cone, fit_constrained, fit_literal, fit_weighted
 from ccfem.fields.surface import Surface
 from ccfem.geometry.clearance import trim_to_clearance
 from ccfem.geometry.conformal import lead_into, parallel_curve
@@ -42,9 +42,12 @@ Source = Literal["nodal", "cell"]
 Sense = Literal["tensile", "absolute"]
 Fill = Literal["screened", "laplacian"]
 Fit = Literal["weighted", "literal"]
-Spacing = Literal["search", "constrained"]
+Spacing = Literal["constrained", "search", "cone"]
 
 _LEAST_WEIGHT = 1e-3
+_ROOM = 1.03
+"""Bound on the distance of isocurves, in strand widths: strands that stood just at the width would
+be trimmed wherever the numbers fall short of it."""
 _SPIRAL_LIMIT = 4.0
 """Largest distance, in strand widths, of closed isocurves that are joined to a spiral."""
 
@@ -59,13 +62,13 @@ class Isocurve:
         Percentile (by area of the layer) of the stress above which the density grows no more.
         The knob for how much fibre a layer gets: without it one hot spot sets the spacing of the
         whole layer.
-    floor : float, default 0.1
+    floor : float, default 0.4
         Ends of isocurves are cut back to where the stress is at least this share of the cap.
     power : float, default 1
         p of Eq. 5: density as stress to this power; 0 gives uniform density.
     spacing_weight : float, default 0.1
         Weight of even spacing against alignment in the fit (``fit="weighted"``).
-    fill_length : float, mm, default 3
+    fill_length : float, mm, default 1.5
         Reach of the screened fill.
     link_limit : float, default 7
         Longest link between two ends, in strand widths; the paper says 2.
@@ -89,9 +92,9 @@ class Isocurve:
         One screened Poisson problem, or 50 steps of averaging (the paper, Eq. 3-4).
     fit : {"weighted", "literal"}
         `fields.scalar.fit_weighted` or `fit_literal` (the paper, Eq. 6).
-    spacing : {"search", "constrained"}
-        Search for the number of isocurves (the paper, section 4.3), or a convex programme whose
-        unit levels keep the width by construction.
+    spacing : {"constrained", "search", "cone"}
+        Bound the gradient in the fit, so that unit levels keep the width; or search for the number
+        of isocurves (the paper, section 4.3); or the bound once more, by an exact and slow solver.
     spiral : bool, default True
         Join nested closed isocurves where the stress is least; not in the paper.
     boundary_links : bool, default True
@@ -101,10 +104,10 @@ class Isocurve:
     """
 
     cap: float = 82.0
-    floor: float = 0.1
+    floor: float = 0.4
     power: float = 1.0
     spacing_weight: float = 0.1
-    fill_length: float = 3.0
+    fill_length: float = 1.5
     link_limit: float = 7.0
     rings: tuple[float, ...] = (1.5, 2.5)
     conformal: tuple[str, ...] | None = None
@@ -115,7 +118,7 @@ class Isocurve:
     incompatible: Incompatible = "none"
     fill: Fill = "screened"
     fit: Fit = "weighted"
-    spacing: Spacing = "search"
+    spacing: Spacing = "constrained"
     spiral: bool = True
     boundary_links: bool = True
     trim: bool = True
@@ -158,6 +161,7 @@ class Isocurve:
             incompatible="any",
             fill="laplacian",
             fit="literal",
+            spacing="search",
             spiral=False,
             boundary_links=False,
             trim=False,
@@ -234,10 +238,10 @@ class _Planner:
             direction, size = fill_laplacian(surface, direction, tension.stress, tension.defined)
         density = np.clip(size / cap, 1e-9, 1.0) ** s.power
         weight = np.maximum(confidence, _LEAST_WEIGHT)
-        if s.spacing == "constrained":
-            values = fit_constrained(
-                surface, direction, density / width, weight, width, s.spacing_weight
-            )
+        if s.spacing != "search":
+            fit = fit_constrained if s.spacing == "constrained" else fit_cone
+            room = _ROOM * width
+            values = fit(surface, direction, density / room, weight, room, s.spacing_weight)
             return self.worthwhile(unit_levels(surface, values), surface, confidence)
         if s.fit == "literal":
             values = fit_literal(surface, density[:, None] * direction)
