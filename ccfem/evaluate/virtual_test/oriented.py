@@ -23,7 +23,7 @@ from ccfem.evaluate.virtual_test.strands import Strands
 from ccfem.materials import Material
 from ccfem.tensor import from_voigt, strain_from_voigt, to_voigt
 
-__all__ = ["fibre_share", "mix", "oriented_problem", "oriented_stiffness", "plane_stress"]
+__all__ = ["fibre_share", "mix", "oriented_problem", "oriented_stiffness", "to_plane_stress"]
 
 
 def fibre_share(strands: Strands, volumes: FloatArray, area: float) -> FloatArray:
@@ -108,7 +108,7 @@ def mix(directions: FloatArray, share: FloatArray, fibre: Material, matrix: Mate
     return matrix.stiffness + share[..., None, None] * (smeared - matrix.stiffness)
 
 
-def plane_stress(stiffness: FloatArray) -> FloatArray:
+def to_plane_stress(stiffness: FloatArray) -> FloatArray:
     """Condense stiffness (..., 6, 6) to plane stress (..., 3, 3) in 11, 22, 12, MPa."""
     kept, free = np.array([0, 1, 5]), np.array([2, 3, 4])
     inner = stiffness[..., free[:, None], free]

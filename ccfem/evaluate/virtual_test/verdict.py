@@ -12,8 +12,9 @@ HONEST_PROMISE = (
     "Virtual test: the order of two designs holds and the ratio of their stiffnesses is right to "
     "about 10 %, or the verdict is 'undecided'; reinforced over unreinforced stiffness is right to "
     "25 %, to 10 % after calibration with one reinforced print; first-failure load to 30 % after "
-    "calibration, the size of its gain is not reliable. Measured on three published parts with one specimen each: an indication, not a "
-    "validation. Linear elastic, fibres as bars; delamination is not predicted."
+    "calibration, while the size of its gain is not reliable. Measured on three published parts "
+    "with one specimen each: an indication, not a validation. Linear elastic, fibres as bars; "
+    "delamination is not predicted."
 )
 """What may be expected of the numbers; to be shown wherever they are."""
 

@@ -11,7 +11,7 @@ from ccfem.evaluate.virtual_test.oriented import (
     mix,
     oriented_problem,
     oriented_stiffness,
-    plane_stress,
+    to_plane_stress,
 )
 from ccfem.evaluate.virtual_test.strands import cut_strands
 from ccfem.materials import Material, isotropic, transversely_isotropic
@@ -66,14 +66,14 @@ def test_shares_mix_by_volume():
         mix(directions, np.array([0.5, 0.25, 1.5]), CARBON, PLA)
 
 
-def test_plane_stress_is_the_textbook_stiffness():
+def test_to_plane_stress_is_the_textbook_stiffness():
     e1, e2, nu12, g12 = 73200.0, 4100.0, 0.33, 2200.0
     nu21 = nu12 * e2 / e1
     d = 1.0 - nu12 * nu21
     expected = np.array([[e1 / d, nu12 * e2 / d, 0], [nu12 * e2 / d, e2 / d, 0], [0, 0, g12]])
-    np.testing.assert_allclose(plane_stress(CARBON.stiffness), expected, rtol=1e-9, atol=1e-6)
+    np.testing.assert_allclose(to_plane_stress(CARBON.stiffness), expected, rtol=1e-9, atol=1e-6)
     pixels = mix(np.array([[[1.0, 0, 0], [0, 1.0, 0]]]), np.ones((1, 2)), CARBON, PLA)
-    found = plane_stress(pixels)
+    found = to_plane_stress(pixels)
     assert found.shape == (1, 2, 3, 3)
     np.testing.assert_allclose(found[0, 1, 0, 0], e2 / d, rtol=1e-9)
 
