@@ -35,7 +35,7 @@ class Concentric:
         fibre do. Otherwise every ring is a closed path of its own.
     start : tuple of 2 floats, mm, optional
         Point in the plane of the layer that the outermost rings start next to; by default the
-        first point of the layer's border.
+        middle of the first edge of the layer's border.
     """
 
     spacing: float = 1.0
@@ -60,7 +60,7 @@ class Concentric:
         levels = offset_rings(layer.polygon, 0.5 * width, spacing, width, self.rings)
         lines = [ring for level in levels for ring in level]
         if self.joined and levels:
-            first = layer.plane_points[layer.loops[0][0]]
+            first = layer.plane_points[layer.loops[0][:2]].mean(axis=0)
             start = first if self.start is None else np.asarray(self.start, dtype=np.float64)
             lines = join_rings(levels, start, spacing, width)
         paths = Toolpaths.from_plane(lines, layer)

@@ -1,0 +1,107 @@
+"""Toolpaths as a VTK PolyData file (.vtp), for ParaView and PyVista."""
+
+import base64
+from collections.abc import Iterator, Mapping
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from ccfem.arrays import FloatArray
+from ccfem.errors import InputError
+from ccfem.io.whole import whole_file
+from ccfem.toolpaths import Toolpaths
+
+__all__ = ["write_paths"]
+
+_TYPES = {"f8": "Float64", "i8": "Int64", "u1": "UInt8"}
+
+
+def write_paths(
+    toolpaths: Toolpaths,
+    path: str | Path,
+    point_data: Mapping[str, FloatArray] | None = None,
+    path_data: Mapping[str, FloatArray] | None = None,
+) -> None:
+    """Write toolpaths to a ``.vtp`` file, whole or not at all.
+
+    Every path is one polyline, in the frame of the mesh, mm. The file holds the normals and, for
+    each path, ``layer``, ``kind`` (index into `toolpaths.KINDS`), ``closed`` and ``length``.
+
+    Parameters
+    ----------
+    toolpaths : Toolpaths
+    path : str or Path
+    point_data : mapping of name to (P,) or (P, 3) array, optional
+        More values at the points.
+    path_data : mapping of name to (K,) array, optional
+        More values of the paths.
+
+    Raises
+    ------
+    InputError
+        When the file cannot be written, or an array has the wrong length.
+    """
+    points: dict[str, NDArray[Any]] = {"normals": toolpaths.normals, **(point_data or {})}
+    paths: dict[str, NDArray[Any]] = {
+        "layer": toolpaths.layer,
+        "kind": toolpaths.kind,
+        "closed": toolpaths.closed.astype(np.uint8),
+        "length": toolpaths.lengths,
+        **(path_data or {}),
+    }
+    for arrays, size, what in (
+        (points, len(toolpaths.points), "point"),
+        (paths, len(toolpaths), "path"),
+    ):
+        for name, values in arrays.items():
+            if len(values) != size:
+                raise InputError(
+                    f"'{name}' must have one value a {what}, {size} in all; got {len(values)}"
+                )
+    with whole_file(path) as temporary, open(temporary, "w", encoding="ascii") as file:
+        file.writelines(_lines(toolpaths, points, paths))
+
+
+def _lines(
+    toolpaths: Toolpaths, points: Mapping[str, NDArray[Any]], paths: Mapping[str, NDArray[Any]]
+) -> Iterator[str]:
+    """Lines of the XML file (VTK file formats, "PolyData")."""
+    yield '<?xml version="1.0"?>\n'
+    yield (
+        '<VTKFile type="PolyData" version="1.0" byte_order="LittleEndian" header_type="UInt64">\n'
+    )
+    yield (
+        f'<PolyData><Piece NumberOfPoints="{len(toolpaths.points)}" NumberOfVerts="0" '
+        f'NumberOfLines="{len(toolpaths)}" NumberOfStrips="0" NumberOfPolys="0">\n'
+    )
+    yield '<PointData Normals="normals">\n'
+    yield from (_array(name, values) for name, values in points.items())
+    yield '</PointData>\n<CellData Scalars="layer">\n'
+    yield from (_array(name, values) for name, values in paths.items())
+    yield "</CellData>\n<Points>\n" + _array("Points", toolpaths.points) + "</Points>\n<Lines>\n"
+    yield _array("connectivity", np.arange(len(toolpaths.points)))
+    yield _array("offsets", toolpaths.offsets[1:])
+    yield "</Lines>\n</Piece></PolyData>\n</VTKFile>\n"
+
+
+def _array(name: str, values: NDArray[Any]) -> str:
+    """One DataArray, inline in base64 with its size in bytes before it."""
+    values = np.asarray(values)
+    if values.dtype == np.bool_:
+        values = values.astype(np.uint8)
+    kind = "u1" if values.dtype == np.uint8 else "f8" if values.dtype.kind == "f" else "i8"
+    data = np.ascontiguousarray(values, dtype=f"<{kind}").tobytes()
+    text = base64.b64encode(len(data).to_bytes(8, "little") + data).decode("ascii")
+    components = values.shape[1] if values.ndim == 2 else 1
+    return (
+        f'<DataArray type="{_TYPES[kind]}" Name="{_escaped(name)}" '
+        f'NumberOfComponents="{components}" format="binary">{text}</DataArray>\n'
+    )
+
+
+def _escaped(name: str) -> str:
+    from xml.sax.saxutils import escape
+
+    return escape(name, {'"': "&quot;"})

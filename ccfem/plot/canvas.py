@@ -1,0 +1,220 @@
+"""Figures of sections: size, scale bar, colour bar, and files. No state of pyplot is touched."""
+
+import io
+from collections.abc import Sequence
+from pathlib import Path
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+
+from ccfem.arrays import FloatArray
+from ccfem.errors import InputError
+from ccfem.io.whole import whole_file
+from ccfem.plot.colours import INK, OUTLINE
+
+if TYPE_CHECKING:
+    from matplotlib.axes import Axes
+    from matplotlib.figure import Figure
+
+__all__ = [
+    "colour_bar",
+    "extents_of",
+    "inches_per_mm",
+    "new_figure",
+    "png",
+    "save",
+    "scale_bar",
+    "title",
+]
+
+_HEAD, _FOOT = 0.50, 0.34
+"""Space for title and scale bar, inches."""
+_MARGIN = 0.03
+"""Free space round the section over its larger extent."""
+_DPI = 150.0
+_COLOURS = 128
+_FORMATS = (".png", ".pdf", ".svg")
+_FONT: dict[str, Any] = {"family": ["DejaVu Sans"], "color": INK}
+
+
+def new_figure(
+    extents: Sequence[float], columns: int = 1, width: float = 4.0
+) -> tuple["Figure", list["Axes"]]:
+    """Figure with one picture of a section, or several side by side.
+
+    Parameters
+    ----------
+    extents : 4 floats, mm
+        x and y of the lower left, then of the upper right corner of what is drawn.
+    columns : int, default 1
+    width : float, inches, default 4
+        Of each picture; its height follows the section's shape, up to one and a half times as
+        much.
+
+    Returns
+    -------
+    figure, list of axes
+        Axes without frame and ticks, in mm, both directions to one scale.
+    """
+    from matplotlib.backends.backend_agg import FigureCanvasAgg
+    from matplotlib.figure import Figure
+
+    left, bottom, right, top = extents
+    margin = _MARGIN * max(right - left, top - bottom)
+    wide, high = right - left + 2.0 * margin, top - bottom + 2.0 * margin
+    height = width * min(max(high / wide, 0.2), 1.5)
+    total = height + _HEAD + _FOOT
+    figure = Figure(figsize=(columns * width, total), dpi=_DPI, facecolor="white")
+    FigureCanvasAgg(figure)
+    axes = []
+    for k in range(columns):
+        one = figure.add_axes((k / columns, _FOOT / total, 1.0 / columns, height / total))
+        one.set_axis_off()
+        one.set_xlim(left - margin, right + margin)
+        one.set_ylim(bottom - margin, top + margin)
+        one.set_aspect("equal")
+        axes.append(one)
+    return figure, axes
+
+
+def title(axes: "Axes", heading: str, caption: str = "", colour: str | None = None) -> None:
+    """Write a heading and one line of key numbers above a picture.
+
+    Parameters
+    ----------
+    axes : Axes
+        From `new_figure`.
+    heading, caption : str
+    colour : str, optional
+        Colour of a mark before the heading: that of the strategy.
+    """
+    figure = _figure(axes)
+    box = axes.get_position()
+    inch = 1.0 / figure.get_figheight()
+    x = box.x0 + 0.12 / figure.get_figwidth()
+    if colour is not None:
+        from matplotlib.patches import Rectangle
+
+        mark = (0.10 / figure.get_figwidth(), 0.13 * inch)
+        figure.add_artist(
+            Rectangle((x, box.y1 + 0.275 * inch), *mark, color=colour, transform=figure.transFigure)
+        )
+        x += 0.17 / figure.get_figwidth()
+    figure.text(x, box.y1 + 0.27 * inch, heading, size=10, weight="bold", **_FONT)
+    figure.text(
+        box.x0 + 0.12 / figure.get_figwidth(), box.y1 + 0.08 * inch, caption, size=7.5, **_FONT
+    )
+
+
+def _figure(axes: "Axes") -> Any:
+    return axes.figure
+
+
+def scale_bar(axes: "Axes") -> None:
+    """Draw a bar of a round length below a picture."""
+    figure = _figure(axes)
+    box = axes.get_position()
+    left, right = axes.get_xlim()
+    per_mm = inches_per_mm(axes) / figure.get_figwidth()
+    length = _round_length(0.25 * (right - left))
+    x = box.x0 + 0.12 / figure.get_figwidth()
+    y = box.y0 - 0.12 / figure.get_figheight()
+    from matplotlib.lines import Line2D
+
+    figure.add_artist(
+        Line2D([x, x + length * per_mm], [y, y], color=INK, lw=1.6, solid_capstyle="butt")
+    )
+    place = x + length * per_mm + 0.05 / figure.get_figwidth()
+    figure.text(place, y, f"{length:g} mm", size=7.5, va="center", **_FONT)
+
+
+def inches_per_mm(axes: "Axes") -> float:
+    """Scale of a picture: the axes may be larger than the picture, which keeps its shape."""
+    box = axes.get_position()
+    size = _figure(axes).get_size_inches() * [box.width, box.height]
+    left, right = axes.get_xlim()
+    bottom, top = axes.get_ylim()
+    return float(min(size[0] / (right - left), size[1] / (top - bottom)))
+
+
+def _round_length(most: float) -> float:
+    """Largest of 1, 2, 5 times a power of ten that is at most `most`."""
+    power = 10.0 ** np.floor(np.log10(most))
+    return float(max(step * power for step in (1.0, 2.0, 5.0) if step * power <= most))
+
+
+def colour_bar(axes: "Axes", colours: Any, limits: tuple[float, float], label: str) -> None:
+    """Draw the scale of a colour map below a picture, at its right.
+
+    Parameters
+    ----------
+    axes : Axes
+    colours : Colormap
+    limits : tuple of 2 floats
+        Values at the ends of the map.
+    label : str
+        Quantity and unit.
+    """
+    figure = _figure(axes)
+    box = axes.get_position()
+    wide, high = figure.get_figwidth(), figure.get_figheight()
+    y = box.y0 - 0.12 / high
+    right = box.x1 - 0.12 / wide
+    upper = figure.text(
+        right, y, f"{limits[1]:.3g} {label}", size=7.5, ha="right", va="center", **_FONT
+    )
+    extent = upper.get_window_extent(figure.canvas.get_renderer())
+    end = right - 1.03 * extent.width / figure.dpi / wide - 0.08 / wide
+    bar = figure.add_axes((end - 0.6 / wide, y - 0.05 / high, 0.6 / wide, 0.1 / high))
+    bar.imshow(np.linspace(0.0, 1.0, 64)[None], aspect="auto", cmap=colours)
+    bar.set_xticks([])
+    bar.set_yticks([])
+    for side in bar.spines.values():
+        side.set(color=OUTLINE, linewidth=0.5)
+    start = end - 0.68 / wide
+    figure.text(start, y, f"{limits[0]:.3g}", size=7.5, ha="right", va="center", **_FONT)
+
+
+def png(figure: "Figure", dpi: float = _DPI) -> bytes:
+    """Return a figure as the bytes of a PNG file.
+
+    The colours are reduced to 128, which makes reports with many pictures several times smaller.
+    """
+    from PIL import Image
+
+    figure.set_dpi(dpi)
+    figure.canvas.draw()
+    image = Image.fromarray(np.asarray(figure.canvas.buffer_rgba())[..., :3])  # type: ignore[attr-defined]
+    reduced = image.quantize(_COLOURS, method=Image.Quantize.FASTOCTREE, dither=Image.Dither.NONE)
+    background: Any = reduced.getpixel((0, 0))
+    colours: Any = reduced.getpalette()
+    colours[3 * background : 3 * background + 3] = [255, 255, 255]
+    reduced.putpalette(colours)
+    target = io.BytesIO()
+    reduced.save(target, "png", dpi=(dpi, dpi))
+    return target.getvalue()
+
+
+def save(figure: "Figure", path: str | Path, dpi: float = _DPI) -> None:
+    """Write a figure to a file, whole or not at all; the suffix (.png, .pdf, .svg) says the format.
+
+    Raises
+    ------
+    InputError
+        When the file cannot be written, or the format is another one.
+    """
+    path = Path(path)
+    if path.suffix.lower() not in _FORMATS:
+        raise InputError(
+            f"a picture is written as {', '.join(_FORMATS)}; got '{path.name}': change its suffix"
+        )
+    with whole_file(path) as temporary:
+        if path.suffix.lower() == ".png":
+            temporary.write_bytes(png(figure, dpi))
+        else:
+            figure.savefig(temporary, dpi=dpi)
+
+
+def extents_of(points: FloatArray) -> tuple[float, float, float, float]:
+    """Extents (left, bottom, right, top) of points (n, 2), mm."""
+    return (*points.min(axis=0).tolist(), *points.max(axis=0).tolist())

@@ -1,0 +1,285 @@
+"""Pictures of one layer: its section, the tension in it, and the fibre paths."""
+
+from collections.abc import Mapping
+from dataclasses import dataclass
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+
+from ccfem.arrays import FloatArray
+from ccfem.elasticity.stress_field import LayerStress
+from ccfem.layers.layer import Layer
+from ccfem.plot.canvas import colour_bar, extents_of, inches_per_mm, new_figure, scale_bar, title
+from ccfem.plot.colours import INK, OUTLINE, SECTION, palette, scale
+from ccfem.tensor import in_plane, largest_in_plane
+from ccfem.toolpaths import FIBRE, Toolpaths
+
+if TYPE_CHECKING:
+    from matplotlib.axes import Axes
+    from matplotlib.figure import Figure
+
+__all__ = [
+    "Coloured",
+    "compare_layer",
+    "draw_paths",
+    "draw_section",
+    "draw_segments",
+    "draw_stress",
+    "layer_picture",
+    "mark_failure",
+    "tension_limit",
+]
+
+_LINE = 0.45
+"""Width of a drawn strand over the fibre width, so that neighbours stay apart in the picture."""
+_NO_VALUE = "#b5bac1"
+
+
+@dataclass(frozen=True)
+class Coloured:
+    """Straight pieces of fibre with a value each, to colour the paths by.
+
+    Attributes
+    ----------
+    segments : (s, 2, 2) array, mm
+        Both ends of each piece in the plane of the layer.
+    values : (s,) array
+        NaN is drawn grey.
+    label : str
+        Unit, and quantity if wanted, for the colour bar.
+    limits : tuple of 2 floats
+        Values at the ends of the colour scale.
+    signed : bool, default False
+        Whether the scale has its middle at zero; `limits` should then be symmetric.
+    """
+
+    segments: FloatArray
+    values: FloatArray
+    label: str
+    limits: tuple[float, float]
+    signed: bool = False
+
+
+def tension_limit(stress: LayerStress, share: float = 0.98) -> float:
+    """Tension, MPa, that this share of the layer's area stays below: the end of a colour scale.
+
+    At least a tiny positive number, so that a layer without tension has a scale too.
+    """
+    values = _tension(stress)[stress.layer.triangles].mean(axis=1)
+    order = np.argsort(values)
+    below = np.cumsum(stress.layer.areas[order])
+    if not len(order):
+        return 1e-12
+    place = min(int(np.searchsorted(below, share * below[-1])), len(order) - 1)
+    return max(float(values[order[place]]), 1e-12)
+
+
+def _tension(stress: LayerStress) -> FloatArray:
+    """Larger principal stress in the plane at the layer's points, (n,), MPa, 0 where negative."""
+    largest, _, _ = largest_in_plane(in_plane(stress.nodal, stress.layer.frame))
+    return np.maximum(largest, 0.0)
+
+
+def draw_section(axes: "Axes", layer: Layer, filled: bool = True) -> None:
+    """Draw the border of a layer's section, and the section in grey."""
+    from matplotlib.collections import PathCollection
+    from matplotlib.path import Path
+
+    corners = [layer.plane_points[np.append(loop, loop[:1])] for loop in layer.loops]
+    if not corners:
+        return
+    outline = Path.make_compound_path(*[Path(ring, closed=True) for ring in corners])
+    face = SECTION if filled else "none"
+    axes.add_collection(
+        PathCollection([outline], facecolor=face, edgecolor=OUTLINE, linewidth=0.7, zorder=1.5),
+        autolim=False,
+    )
+
+
+def draw_stress(axes: "Axes", stress: LayerStress, limit: float) -> Any:
+    """Colour a layer by its tension, from none to `limit`, MPa; returns the colour map."""
+    layer, colours = stress.layer, scale("stress")
+    axes.tripcolor(
+        *layer.plane_points.T,
+        layer.triangles,
+        _tension(stress),
+        shading="gouraud",
+        cmap=colours,
+        vmin=0.0,
+        vmax=limit,
+        rasterized=True,
+        zorder=1.0,
+    )
+    return colours
+
+
+def draw_paths(
+    axes: "Axes", layer: Layer, paths: Toolpaths, width: float, colour: str = INK
+) -> None:
+    """Draw the fibre paths of a layer in one colour.
+
+    Parameters
+    ----------
+    axes : Axes
+    layer : Layer
+    paths : Toolpaths
+        Of the whole part, or of this layer.
+    width : float, mm
+        Of a strand.
+    colour : str
+    """
+    from matplotlib.collections import LineCollection
+
+    wanted = paths.select((paths.layer == layer.index) & (paths.kind == FIBRE))
+    lines = [layer.to_plane(path) for path in wanted]
+    axes.add_collection(
+        LineCollection(
+            lines,
+            colors=colour,
+            linewidths=_points(axes, _LINE * width),
+            capstyle="round",
+            joinstyle="round",
+            zorder=2.0,
+        ),
+        autolim=False,
+    )
+
+
+def draw_segments(axes: "Axes", coloured: Coloured, width: float) -> Any:
+    """Draw pieces of fibre coloured by their values; returns the colour map."""
+    from matplotlib.collections import LineCollection
+
+    colours = scale("sign" if coloured.signed else "size").with_extremes(bad=_NO_VALUE)
+    pieces = LineCollection(
+        list(coloured.segments),
+        cmap=colours,
+        linewidths=_points(axes, _LINE * width),
+        capstyle="round",
+        zorder=2.0,
+    )
+    pieces.set_array(np.ma.masked_invalid(coloured.values))
+    pieces.set_clim(*coloured.limits)
+    axes.add_collection(pieces, autolim=False)
+    return colours
+
+
+def mark_failure(axes: "Axes", point: FloatArray, label: str = "") -> None:
+    """Mark the spot (2,), mm, where a part fails first."""
+    axes.plot(*point, "o", ms=11, mfc="none", mec="white", mew=3.5, zorder=3.0)
+    axes.plot(*point, "o", ms=11, mfc="none", mec="#a51f2d", mew=1.8, zorder=3.1)
+    if label:
+        axes.annotate(
+            label,
+            (float(point[0]), float(point[1])),
+            xytext=(9, 9),
+            textcoords="offset points",
+            size=8,
+            weight="bold",
+            color="#a51f2d",
+            bbox={"boxstyle": "round,pad=0.2", "fc": "white", "ec": "none", "alpha": 0.85},
+            zorder=3.2,
+        )
+
+
+def _points(axes: "Axes", length: float) -> float:
+    """Size in points of a length, mm, on the axes, at least a hair."""
+    return max(72.0 * inches_per_mm(axes) * length, 0.3)
+
+
+def layer_picture(
+    layer: Layer,
+    stress: LayerStress | None,
+    paths: Toolpaths,
+    width: float,
+    heading: str = "",
+    caption: str = "",
+    limit: float | None = None,
+    coloured: Coloured | None = None,
+    colour: str | None = None,
+) -> "Figure":
+    """Picture of the paths of one layer.
+
+    Parameters
+    ----------
+    layer : Layer
+    stress : LayerStress or None
+        Its tension colours the section, unless the paths have colours of their own.
+    paths : Toolpaths
+        Of the whole part, or of this layer.
+    width : float, mm
+        Of a strand (`Machine.fibre_width`).
+    heading, caption : str
+        Title, and a line with key numbers.
+    limit : float, MPa, optional
+        End of the colour scale of the tension; default `tension_limit` of the layer. Give the same
+        for pictures that are compared.
+    coloured : Coloured, optional
+        Pieces drawn instead of the paths in one colour.
+    colour : str, optional
+        Of the mark before the heading: that of the strategy.
+
+    Returns
+    -------
+    Figure
+        For `plot.canvas.png` or `plot.canvas.save`.
+    """
+    figure, (axes,) = new_figure(extents_of(layer.plane_points))
+    _draw(axes, layer, stress, paths, width, limit, coloured)
+    title(axes, heading, caption, colour)
+    return figure
+
+
+def compare_layer(
+    layer: Layer,
+    stress: LayerStress | None,
+    paths: Mapping[str, Toolpaths],
+    width: float,
+    captions: Mapping[str, str] | None = None,
+    limit: float | None = None,
+    coloured: Mapping[str, Coloured] | None = None,
+) -> "Figure":
+    """Picture of one layer with the paths of several strategies side by side.
+
+    Parameters
+    ----------
+    layer, stress, width, limit
+        As in `layer_picture`.
+    paths : mapping of strategy name to Toolpaths
+    captions : mapping of strategy name to str, optional
+        Lines with key numbers.
+    coloured : mapping of strategy name to Coloured, optional
+
+    Returns
+    -------
+    Figure
+    """
+    figure, columns = new_figure(extents_of(layer.plane_points), columns=len(paths))
+    colours = palette(paths)
+    for axes, (name, lines) in zip(columns, paths.items(), strict=True):
+        own = (coloured or {}).get(name)
+        _draw(axes, layer, stress, lines, width, limit, own)
+        title(axes, name, (captions or {}).get(name, ""), colours[name])
+    return figure
+
+
+def _draw(
+    axes: "Axes",
+    layer: Layer,
+    stress: LayerStress | None,
+    paths: Toolpaths,
+    width: float,
+    limit: float | None,
+    coloured: Coloured | None,
+) -> None:
+    """One picture without its title."""
+    draw_section(axes, layer, filled=stress is None or coloured is not None)
+    if coloured is not None:
+        colours = draw_segments(axes, coloured, width)
+        colour_bar(axes, colours, coloured.limits, coloured.label)
+    else:
+        if stress is not None:
+            end = tension_limit(stress) if limit is None else limit
+            colours = draw_stress(axes, stress, end)
+            colour_bar(axes, colours, (0.0, end), "MPa tension")
+        draw_paths(axes, layer, paths, width)
+    scale_bar(axes)
