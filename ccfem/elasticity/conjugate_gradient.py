@@ -59,7 +59,10 @@ def conjugate_gradient(
         beta = (new - _dot(previous, z)) / old if iteration else 0.0
         direction = z + beta * direction
         image = matrix @ direction
-        step = new / _dot(direction, image)
+        curvature = _dot(direction, image)
+        if not curvature > 0.0:  # not positive definite, or no direction left
+            return x, iteration
+        step = new / curvature
         x += step * direction
         previous, old = residual, new
         residual = residual - step * image

@@ -4,7 +4,6 @@ from typing import Any
 
 import numpy as np
 import scipy.sparse as sp
-from scipy.sparse.linalg import splu
 
 from ccfem.arrays import FloatArray, IntArray
 from ccfem.elasticity.direct import Apply
@@ -13,8 +12,8 @@ from ccfem.elasticity.supports import rigid_modes
 
 __all__ = ["petsc_gamg", "smoothed_aggregation", "two_level"]
 
-_COARSEST = 300
-"""Size below which a level is solved directly."""
+_COARSEST = 50
+"""Aggregates below which a level is inverted."""
 
 
 def _finest(matrix: sp.bsr_array, prolong: Any, coarse: Apply) -> Apply:
@@ -30,11 +29,12 @@ def _finest(matrix: sp.bsr_array, prolong: Any, coarse: Apply) -> Apply:
 
 
 def _coarser(levels: Any) -> Apply:
-    """V-cycle over the levels of a pyamg hierarchy, the last one solved directly."""
+    """V-cycle over the levels of a pyamg hierarchy, the last one inverted."""
     level = levels[0]
     if len(levels) == 1:
-        factor = splu(sp.csc_array(level.A))
-        return lambda rhs: np.asarray(factor.solve(rhs))
+        # Singular where an aggregate is too small, or too straight, for six rigid modes.
+        inverse = np.linalg.pinv(level.A.toarray(), rcond=1e-12, hermitian=True)
+        return lambda rhs: np.einsum("ij,j->i", inverse, rhs)
     below = _coarser(levels[1:])
 
     def apply(rhs: FloatArray) -> FloatArray:

@@ -1,0 +1,166 @@
+import importlib.util
+
+import numpy as np
+import pytest
+import scipy.sparse as sp
+
+from ccfem.elasticity import solvers
+from ccfem.elasticity.assembly import assemble
+from ccfem.elasticity.problem import Force, Problem, Support
+from ccfem.elasticity.solve import prepare, solve
+from ccfem.elasticity.solvers import BACKENDS, choose, factorise, preconditioned_cg
+from ccfem.errors import InputError, SolveError
+from ccfem.materials import isotropic, transversely_isotropic
+from ccfem.structured import box_mesh
+
+MODULES = {"pypardiso": "pypardiso", "cholmod": "sksparse", "petsc": "petsc4py"}
+
+
+def installed(backend):
+    return backend not in MODULES or importlib.util.find_spec(MODULES[backend]) is not None
+
+
+def system(order=1, divisions=(8, 4, 3), material=None):
+    mesh = box_mesh((8.0, 3.0, 2.0), divisions)
+    mesh = mesh if order == 1 else mesh.quadratic()
+    supports = (Support("x_min"), Support("y_min", "y"))
+    loads = {
+        "down": (Force("x_max", (0.0, 0.0, -1.0)),),
+        "pull": (Force("x_max", (1.0, 0.5, 0.0)),),
+    }
+    return prepare(Problem(mesh, material or isotropic(100.0, 0.3), supports, loads))
+
+
+def equations(prepared):
+    """Return the reduced matrix, the right-hand side of "down", points and parents of the rows."""
+    matrix = prepared.assemble()
+    reduced = prepared.held.reduce(matrix)
+    rhs = prepared.held.right_hand_side(matrix, prepared.forces["down"])
+    return reduced, rhs, prepared.problem.mesh.points[prepared.held.nodes]
+
+
+@pytest.mark.parametrize("order", [1, 2])
+@pytest.mark.parametrize("backend", BACKENDS)
+def test_backends_agree_with_a_dense_solve(backend, order):
+    if not installed(backend):
+        pytest.skip(f"{backend} is not installed")
+    if backend == "two-level" and order == 1:
+        pytest.skip("two levels need a quadratic mesh")
+    prepared = system(order, (4, 2, 2))
+    matrix, rhs, _ = equations(prepared)
+    solver = prepared.factorise(prepared.assemble(), backend)
+    assert solver.backend == backend
+    solution = solver.solve(rhs, tolerance=1e-10)
+    exact = np.linalg.solve(matrix.toarray(), rhs)
+    np.testing.assert_allclose(solution.values, exact, atol=1e-8 * np.abs(exact).max())
+    assert solution.residual <= 1e-10
+    assert solution.residual == pytest.approx(
+        np.linalg.norm(rhs - matrix @ solution.values) / np.linalg.norm(rhs)
+    )
+    assert (solution.iterations == 0) == solver.exact
+
+
+@pytest.mark.parametrize("backend", ["amg", "two-level"])
+def test_multigrid_needs_few_iterations_whatever_the_size(backend):
+    counts = []
+    for divisions in ((8, 6, 4), (20, 12, 8)):
+        prepared = system(1 if backend == "amg" else 2, divisions)
+        _, rhs, _ = equations(prepared)
+        solver = prepared.factorise(prepared.assemble(), backend)
+        counts.append(solver.solve(rhs).iterations)
+    assert max(counts) <= 40
+    assert counts[1] <= 1.6 * counts[0]
+
+
+def test_amg_copes_with_fibres_that_are_stiff_one_way():
+    material = transversely_isotropic(73200.0, 4100.0, 0.33, 2200.0)
+    prepared = system(1, (16, 6, 4), material)
+    matrix, rhs, points = equations(prepared)
+    solution = factorise(matrix, points, "amg").solve(rhs)
+    assert solution.iterations < 100
+
+
+def test_a_good_start_saves_iterations():
+    prepared = system(1, (12, 6, 4))
+    matrix, rhs, points = equations(prepared)
+    solver = factorise(matrix, points, "amg")
+    cold = solver.solve(rhs)
+    assert solver.solve(rhs, cold.values).iterations == 0
+    assert 0 < solver.solve(rhs, 0.999 * cold.values).iterations < cold.iterations
+
+
+@pytest.mark.parametrize("backend", ["superlu", "amg"])
+def test_a_kept_factorisation_preconditions_a_changed_matrix(backend):
+    prepared = system(1, (8, 6, 4))
+    matrix, rhs, points = equations(prepared)
+    solver = factorise(matrix, points, backend)
+    mesh = prepared.problem.mesh
+    factor = np.random.default_rng(0).uniform(0.5, 2.0, len(mesh.cells))
+    stiffness = factor[:, None, None] * isotropic(100.0, 0.3).stiffness
+    changed = prepared.held.reduce(assemble(mesh, stiffness))
+    solution = preconditioned_cg(changed, rhs, solver, tolerance=1e-10)
+    exact = np.linalg.solve(changed.toarray(), rhs)
+    np.testing.assert_allclose(solution.values, exact, atol=1e-8 * np.abs(exact).max())
+    assert 0 < solution.iterations < 60
+
+
+def test_unknown_backend_lists_the_known():
+    matrix, _, points = equations(system())
+    with pytest.raises(InputError, match="no backend named 'mumps'; there are: auto, pypardiso"):
+        factorise(matrix, points, "mumps")
+
+
+@pytest.mark.parametrize("backend", sorted(MODULES))
+def test_a_missing_backend_names_its_cure(backend, monkeypatch):
+    monkeypatch.setattr(solvers, "find_spec", lambda name: None)
+    matrix, _, points = equations(system())
+    with pytest.raises(InputError, match=rf"backend '{backend}' is not installed: .*install"):
+        factorise(matrix, points, backend)
+
+
+def test_two_levels_need_a_quadratic_mesh():
+    matrix, _, points = equations(system())
+    with pytest.raises(InputError, match="quadratic"):
+        factorise(matrix, points, "two-level")
+
+
+def test_the_choice_follows_size_order_and_what_is_installed(monkeypatch):
+    monkeypatch.setattr(solvers, "find_spec", lambda name: None)
+    assert choose(1_000, 1) == choose(1_000, 2) == "superlu"
+    assert choose(20_000, 1) == choose(20_000, 1, solves=10) == "amg"
+    assert choose(20_000, 2) == "two-level"
+    monkeypatch.setattr(solvers, "find_spec", lambda name: name == "sksparse" or None)
+    assert choose(20_000, 1) == "amg"
+    assert choose(20_000, 1, solves=10) == "cholmod"
+    monkeypatch.setattr(solvers, "find_spec", lambda name: True)
+    assert choose(20_000, 1, solves=10) == "pypardiso"
+    assert choose(500_000, 1, solves=10) == "amg"
+
+
+@pytest.mark.parametrize("backend", ["superlu", "amg"])
+def test_a_missed_tolerance_is_an_error_with_the_residual(backend):
+    matrix, rhs, points = equations(system())
+    with pytest.raises(SolveError, match=rf"{backend}: relative residual \d\.\de-\d+ after"):
+        factorise(matrix, points, backend).solve(rhs, tolerance=1e-25)
+
+
+@pytest.mark.parametrize("backend", [b for b in ("superlu", "pypardiso") if installed(b)])
+def test_a_singular_matrix_is_an_error(backend):
+    points = np.eye(3)
+    blocks = sp.bsr_array(np.kron(np.eye(3), np.ones((3, 3))), blocksize=(3, 3))
+    with pytest.raises(SolveError, match=f"{backend}: "):
+        factorise(blocks, points, backend).solve(np.arange(9.0))
+
+
+def test_automatic_choice_goes_on_with_a_direct_backend(monkeypatch):
+    monkeypatch.setattr(solvers, "_SMALL", 0)
+    monkeypatch.setattr(solvers, "find_spec", lambda name: None)
+    monkeypatch.setattr(
+        "ccfem.elasticity.multigrid.smoothed_aggregation",
+        lambda matrix, points: lambda rhs: 0 * rhs,
+    )
+    problem = system().problem
+    fields = solve(problem)
+    assert {field.record.backend for field in fields.values()} == {"superlu"}
+    with pytest.raises(SolveError, match="amg"):
+        solve(problem, "amg")
