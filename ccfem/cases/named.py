@@ -9,6 +9,7 @@ from typing import Any
 
 from ccfem.cases.case import Case
 from ccfem.errors import InputError
+from ccfem.tables import from_table
 
 __all__ = ["create_case", "named_cases"]
 
@@ -36,7 +37,7 @@ def create_case(name: str, **parameters: Any) -> Case:
     Raises
     ------
     InputError
-        For an unknown case or parameter; the known ones are listed.
+        For an unknown case or parameter, the known ones listed; for a value of a wrong type.
     """
     known = named_cases()
     if name not in known:
@@ -50,4 +51,4 @@ def create_case(name: str, **parameters: Any) -> Case:
             raise InputError(
                 f"case '{name}' has no parameter '{parameter}'; it has: {', '.join(fields)}"
             )
-    return known[name](**parameters)
+    return from_table(known[name], parameters, f"case {name}")

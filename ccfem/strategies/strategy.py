@@ -12,7 +12,7 @@ from ccfem.elasticity.stress_field import LayerStress, StressField
 from ccfem.errors import InputError
 from ccfem.layers.layer import Layer
 from ccfem.machine import Machine
-from ccfem.parameters import check_type
+from ccfem.tables import from_table
 from ccfem.toolpaths import Toolpaths
 
 __all__ = ["Amount", "LayerStrategy", "Strategy", "create", "named", "plan"]
@@ -87,20 +87,18 @@ def create(name: str, parameters: Mapping[str, Any] | None = None) -> Strategy:
     known = named()
     if name not in known:
         raise InputError(f"no strategy named '{name}'; there are: {', '.join(sorted(known))}")
-    # Lists are what part files and the command line have for tuples.
-    parameters = {
-        key: tuple(value) if isinstance(value, list) else value
-        for key, value in (parameters or {}).items()
-    }
-    fields = {f.name: f.default for f in dataclasses.fields(known[name])}  # type: ignore[arg-type]
-    for parameter, value in parameters.items():
+    fields = {f.name for f in dataclasses.fields(known[name])}  # type: ignore[arg-type]
+    for parameter in parameters or {}:
         if parameter not in fields:
             raise InputError(
                 f"strategy '{name}' has no parameter '{parameter}'; it has: "
                 f"{', '.join(sorted(fields))}"
             )
-        check_type(f"{name}.{parameter}", value, fields[parameter])
-    return known[name](**parameters)
+    table = {
+        key: list(value) if isinstance(value, tuple) else value
+        for key, value in (parameters or {}).items()
+    }
+    return from_table(known[name], table, f"strategies.{name}")
 
 
 def plan(

@@ -1,0 +1,127 @@
+"""Tables of a TOML file to values: keys by name, types by annotation, nothing else accepted."""
+
+import inspect
+import math
+import types
+import typing
+from collections.abc import Callable, Mapping
+from typing import Any, Literal, TypeVar, Union, get_args, get_origin
+
+from ccfem.errors import InputError
+
+__all__ = ["from_table"]
+
+T = TypeVar("T")
+
+_WORDS: dict[Any, str] = {
+    float: "a number",
+    int: "a whole number",
+    bool: "true or false",
+    str: "a string",
+    type(None): "left out",
+}
+
+
+def from_table(make: Callable[..., T], table: object, where: str, infinite: bool = False) -> T:
+    """Call `make` with the entries of a table as keyword arguments.
+
+    Parameters
+    ----------
+    make : dataclass or function
+        Its parameters name the keys, their annotations the types: numbers, strings, booleans,
+        literals, tuples (written as lists), dictionaries (written as tables) and unions of these.
+    table : object
+        What stands in the file.
+    where : str
+        Place in the file, for the messages.
+    infinite : bool, default False
+        Whether numbers may be infinite.
+
+    Raises
+    ------
+    InputError
+        For something that is no table, an unknown or a missing key (the known ones are listed), a
+        value of another type, or whatever `make` refuses.
+    """
+    if not isinstance(table, Mapping):
+        raise InputError(f"{where} must be a table; got {table!r}: write [{where}] and its keys")
+    parameters = inspect.signature(make).parameters
+    hints = typing.get_type_hints(make)
+    for key in table:
+        if key not in parameters:
+            raise InputError(f"{where} has no key '{key}'; it has: {', '.join(parameters)}")
+    values = {}
+    for name, parameter in parameters.items():
+        if name in table:
+            values[name] = _converted(table[name], hints[name], f"{where}.{name}", infinite)
+        elif parameter.default is inspect.Parameter.empty:
+            raise InputError(
+                f"{where} needs the key '{name}'; its keys are: {', '.join(parameters)}"
+            )
+    try:
+        return make(**values)
+    except InputError as error:
+        raise InputError(f"{where}: {error}") from None
+
+
+def _converted(value: object, hint: Any, where: str, infinite: bool) -> Any:
+    """Value as the annotation wants it, or an error that says what it wants."""
+    found = _fitted(value, hint, infinite)
+    if found is _UNFIT:
+        raise InputError(f"{where} must be {_described(hint)}; got {value!r}: correct it")
+    return found
+
+
+_UNFIT = object()
+
+
+def _fitted(value: Any, hint: Any, infinite: bool) -> Any:
+    """Value as the annotation wants it, or `_UNFIT`."""
+    origin, arguments = get_origin(hint), get_args(hint)
+    if origin in (Union, types.UnionType):
+        fits = (_fitted(value, option, infinite) for option in arguments)
+        return next((fit for fit in fits if fit is not _UNFIT), _UNFIT)
+    if origin is Literal:
+        same = any(value == option and type(value) is type(option) for option in arguments)
+        return value if same else _UNFIT
+    if origin is tuple:
+        if not isinstance(value, list):
+            return _UNFIT
+        options = arguments[:1] * len(value) if arguments[-1] is Ellipsis else arguments
+        if len(options) != len(value):
+            return _UNFIT
+        parts = [_fitted(v, option, infinite) for v, option in zip(value, options, strict=True)]
+        return _UNFIT if any(part is _UNFIT for part in parts) else tuple(parts)
+    if origin is dict:
+        return dict(value) if isinstance(value, Mapping) else _UNFIT
+    if hint in (int, float, bool, str):
+        return _plain(value, hint, infinite)
+    return _UNFIT
+
+
+def _plain(value: Any, hint: Any, infinite: bool) -> Any:
+    """Take a number, string or boolean of the wanted type, or `_UNFIT`."""
+    if isinstance(value, bool) or hint is bool:
+        return value if hint is bool and isinstance(value, bool) else _UNFIT
+    if hint in (str, int):
+        return value if isinstance(value, hint) else _UNFIT
+    if not isinstance(value, int | float) or math.isnan(value):
+        return _UNFIT
+    return float(value) if infinite or math.isfinite(value) else _UNFIT
+
+
+def _described(hint: Any) -> str:
+    """Words for an annotation."""
+    origin, arguments = get_origin(hint), get_args(hint)
+    if origin in (Union, types.UnionType):
+        wanted = [option for option in arguments if option is not type(None)]
+        return " or ".join(_described(option) for option in wanted)
+    if origin is Literal:
+        return "one of " + ", ".join(repr(option) for option in arguments)
+    if origin is tuple and arguments[-1] is Ellipsis:
+        return f"a list, each item {_described(arguments[0])}"
+    if origin is tuple:
+        return f"a list of {len(arguments)}, each {_described(arguments[0])}"
+    if origin is dict:
+        return "a table"
+    return _WORDS.get(hint, str(hint))
