@@ -58,11 +58,11 @@ class Isocurve:
 
     Attributes
     ----------
-    cap : float, default 82
+    cap : float, default 84
         Percentile (by area of the layer) of the stress above which the density grows no more.
         The knob for how much fibre a layer gets: without it one hot spot sets the spacing of the
         whole layer.
-    floor : float, default 0.4
+    floor : float, default 0.6
         Ends of isocurves are cut back to where the stress is at least this share of the cap.
     power : float, default 1
         p of Eq. 5: density as stress to this power; 0 gives uniform density.
@@ -75,8 +75,9 @@ class Isocurve:
     rings : tuple of float, default (1.5, 2.5)
         Distances, in strand widths, of the curves round loaded and supported holes. The isocurves
         are led into the last one.
-    conformal : tuple of str, optional
-        Patches whose holes get such curves; by default all that carry a load or a support.
+    conformal : tuple of str or "loaded", default ()
+        Patches whose holes get such curves; "loaded" takes all that carry a load or a support. The
+        paper leaves the choice to the user; by the virtual test they cost stiffness.
     stress : {"nodal", "cell"}
         Recovered stress, or that of the tetrahedra (the paper).
     field : {"layer", "mesh"}
@@ -103,14 +104,14 @@ class Isocurve:
         Cut branches that come nearer than a strand's width to a longer one.
     """
 
-    cap: float = 82.0
-    floor: float = 0.4
+    cap: float = 84.0
+    floor: float = 0.6
     power: float = 1.0
     spacing_weight: float = 0.1
     fill_length: float = 1.5
     link_limit: float = 7.0
     rings: tuple[float, ...] = (1.5, 2.5)
-    conformal: tuple[str, ...] | None = None
+    conformal: tuple[str, ...] | Literal["loaded"] = ()
     stress: Source = "nodal"
     field: Field = "layer"
     sense: Sense = "tensile"
@@ -141,6 +142,11 @@ class Isocurve:
                     f"isocurve.{name} must be one of {', '.join(get_args(kind))}; got "
                     f"{getattr(self, name)!r}"
                 )
+        if isinstance(self.conformal, str) and self.conformal != "loaded":
+            raise InputError(
+                "isocurve.conformal must be 'loaded' or a list of patch names; got "
+                f"{self.conformal!r}"
+            )
         if not 0.0 < self.cap <= 100.0:
             raise InputError(f"isocurve.cap must be a percentile in (0, 100]; got {self.cap!r}")
         for name in ("power", "spacing_weight", "fill_length", "link_limit"):
@@ -156,6 +162,7 @@ class Isocurve:
             cap=100.0,
             floor=0.0,
             link_limit=2.0,
+            conformal="loaded",
             stress="cell",
             field="mesh",
             incompatible="any",
@@ -276,7 +283,7 @@ class _Planner:
         """Curves round the chosen holes, isocurves led into them, ends linked, the rest dropped."""
         s, width, section = self.strategy, machine.fibre_width, layer.polygon
         rings: list[FloatArray] = []
-        names = part.problem.loaded_patches if s.conformal is None else s.conformal
+        names = part.problem.loaded_patches if s.conformal == "loaded" else s.conformal
         for hole in holes_on(layer, names) if s.rings else []:
             for distance in s.rings[:-1]:
                 rings += parallel_curve(hole, distance * width, section)
