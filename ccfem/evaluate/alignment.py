@@ -73,6 +73,10 @@ _ISOTROPIC = 1e-6
 """Principal values that differ by no more than this share of the larger one count as equal."""
 
 
+_ROUNDING = 1e-3
+"""Samples no further than this, mm, outside the section take the stress of its edge."""
+
+
 @dataclass(frozen=True)
 class AlignmentSamples:
     """Samples along the fibre inside the part, (s,) each.
@@ -94,9 +98,7 @@ class AlignmentSamples:
     along: FloatArray
 
 
-def sample_alignment(
-    paths: PlanePaths, stress: LayerStress, step: float, reach: float
-) -> AlignmentSamples:
+def sample_alignment(paths: PlanePaths, stress: LayerStress, step: float) -> AlignmentSamples:
     """Stress along the paths of a layer.
 
     Parameters
@@ -106,14 +108,12 @@ def sample_alignment(
         Stress on the same layer; its nodal values are used.
     step : float, mm
         A path of length L is cut into ``max(1, round(L / step))`` equal parts and sampled in the
-        middle of each.
-    reach : float, mm
-        Samples further outside the section than this have no stress and are left out; nearer ones
-        take the stress of the section's edge.
+        middle of each. Samples outside the section (by more than 0.001 mm, the rounding of path
+        files) meet no stress and are left out.
     """
     layer = paths.layer
     points, tangents, length, _ = sample_midpoints(paths.points, paths.offsets, step)
-    triangle, weights = locate(layer.plane_points, layer.triangles, points, reach)
+    triangle, weights = locate(layer.plane_points, layer.triangles, points, _ROUNDING)
     inside = triangle >= 0
     corners = in_plane(stress.nodal, layer.frame)[layer.triangles[triangle[inside]]]
     s = np.einsum("qk,qkc->qc", weights[inside], corners)

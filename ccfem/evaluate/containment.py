@@ -49,36 +49,55 @@ def sample_containment(paths: PlanePaths) -> ContainmentSamples:
     shapely.prepare(grown)
     index = np.repeat(np.arange(len(paths)), np.diff(paths.offsets))
     lines = shapely.linestrings(paths.points, indices=index)
-    outside = shapely.difference(lines[~shapely.covers(grown, lines)], grown)
+    # Segment by segment, since the difference of a whole path would merge what lies on itself.
+    segments = np.stack(_segments(lines[~shapely.covers(grown, lines)]), axis=1)
+    pieces = shapely.linestrings(segments) if len(segments) else np.zeros(0, dtype=object)
+    outside = shapely.difference(pieces[~shapely.covers(grown, pieces)], grown)
     length = float(shapely.length(outside).sum())
     return ContainmentSamples(np.array([length]), np.array([_depth(outside, section)]))
 
 
 def _depth(lines: Any, section: Any) -> float:
-    """Largest distance of lines from a polygon, by bisection.
+    """Largest distance of lines outside a polygon from it, by bisection.
 
-    The distance from the polygon changes along a line by no more than the way gone, so a piece
-    whose middle is at d reaches at most d + half its length; pieces that cannot beat the largest
-    distance found are dropped, the others halved.
+    The distance from one edge of the polygon is convex along a line, so no point of a piece is
+    further from the polygon than the further end of the piece is from any chosen edge: the one
+    nearest to its middle. Pieces that cannot beat the largest distance found are dropped, the
+    others halved.
     """
-    points, index = shapely.get_coordinates(shapely.get_parts(lines), return_index=True)
-    same = index[1:] == index[:-1]
-    a, b = points[:-1][same], points[1:][same]
+    a, b = _segments(lines)
     if not len(a):
         return 0.0
-    shapely.prepare(section)
-    best = float(shapely.distance(section, shapely.points(points)).max())
+    start, end = _segments(shapely.boundary(section))
+    tree = shapely.STRtree(shapely.linestrings(np.stack([start, end], axis=1)))
+    best = 0.0
     while len(a):
         middle = 0.5 * (a + b)
-        distance = shapely.distance(section, shapely.points(middle))
-        best = max(best, float(distance.max()))
-        half = 0.5 * np.hypot(*(b - a).T)
-        left = distance + half > best + _TOLERANCE
+        edge = tree.nearest(shapely.points(middle))
+        near, far = start[edge], end[edge]
+        best = max(best, float(_to_edges(middle, near, far).max()))
+        bound = np.maximum(_to_edges(a, near, far), _to_edges(b, near, far))
+        left = bound > best + _TOLERANCE
         a, b = (
             np.concatenate([a[left], middle[left]]),
             np.concatenate([middle[left], b[left]]),
         )
     return best
+
+
+def _segments(lines: Any) -> tuple[FloatArray, FloatArray]:
+    """First and last points, (s, 2) each, of all segments of lines."""
+    points, index = shapely.get_coordinates(shapely.get_parts(lines), return_index=True)
+    same = index[1:] == index[:-1]
+    return points[:-1][same], points[1:][same]
+
+
+def _to_edges(points: FloatArray, start: FloatArray, end: FloatArray) -> FloatArray:
+    """Distance of each point (s, 2) from its own edge."""
+    along, to = end - start, points - start
+    square = np.maximum(np.einsum("ij,ij->i", along, along), 1e-300)
+    share = np.einsum("ij,ij->i", to, along) / square
+    return np.hypot(*(to - np.clip(share, 0.0, 1.0)[:, None] * along).T)
 
 
 def containment_indices(samples: ContainmentSamples) -> dict[str, float]:

@@ -90,7 +90,8 @@ def curvature_indices(samples: CurvatureSamples, machine: Machine) -> dict[str, 
     """Values of `COLUMNS`."""
     curvature, metres = samples.curvature, float(samples.length.sum()) / 1000.0
     none = not len(curvature)
-    quantiles = np.full(4, np.nan) if none else np.quantile(curvature, [0.5, 0.8, 0.95, 1.0])
+    shares = [0.5, 0.8, 0.95, 1.0]
+    quantiles = [np.nan] * 4 if none else np.quantile(curvature, shares, method="inverted_cdf")
     ok = np.nan if none else float((curvature * machine.minimum_radius < 1.0).mean())
     values = {
         f"curvature_{name}": float(value)

@@ -163,7 +163,7 @@ def _sample(toolpaths: Toolpaths, layer: Layer, stress: StressField, machine: Ma
     return [
         manufacture.sample_manufacture(paths, toolpaths, machine),
         curvature.sample_curvature(paths, width),
-        alignment.sample_alignment(paths, on_layer, width, width),
+        alignment.sample_alignment(paths, on_layer, width),
         spacing.sample_spacing(paths, width),
         coverage.sample_coverage(paths, on_layer, width),
         containment.sample_containment(paths),

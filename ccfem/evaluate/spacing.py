@@ -144,7 +144,7 @@ def spacing_indices(samples: SpacingSamples, machine: Machine) -> dict[str, floa
     distance = samples.distance
     if not len(distance):
         return {column.name: float("nan") for column in COLUMNS}
-    quantiles = np.quantile(distance, [0.01, 0.05, 0.5])
+    quantiles = np.quantile(distance, [0.01, 0.05, 0.5], method="inverted_cdf")
     near = distance < machine.fibre_width * (1.0 - _ROUNDING)
     return {
         "spacing_1": float(quantiles[0]),

@@ -5,7 +5,6 @@ in-plane axes of a layer's frame, Z along the build direction. (For the authors'
 y, the tool's X, Y, Z are x, -z, y of the mesh.)
 """
 
-import os
 from collections.abc import Sequence
 from pathlib import Path
 
@@ -14,6 +13,7 @@ import numpy as np
 from ccfem.arrays import FloatArray
 from ccfem.errors import InputError
 from ccfem.geometry.polylines import pack
+from ccfem.io.whole import existing_file, whole_file
 from ccfem.layers.layer import Layer
 from ccfem.toolpaths import FIBRE, Toolpaths
 
@@ -45,12 +45,11 @@ def read_waypoints(path: str | Path, frame: FloatArray) -> Toolpaths:
     InputError
         When the file cannot be read, or a line is not what the format says.
     """
+    file = existing_file(path, "waypoint file")
     try:
-        text = Path(path).read_text()
-    except (OSError, UnicodeDecodeError) as error:
-        raise InputError(
-            f"expected a waypoint file at {path}; it cannot be read: {error}"
-        ) from None
+        text = file.read_text(encoding="utf-8")
+    except UnicodeDecodeError:
+        raise InputError(f"{path} is no waypoint file: it holds no text: check its name") from None
     lines, layers = _parse(text, str(path))
     if not lines:
         return Toolpaths.empty()
@@ -141,11 +140,5 @@ def write_waypoints(path: str | Path, toolpaths: Toolpaths, layers: Sequence[Lay
         for line in fibre.on_layer(layer.index):
             rows = (line @ layer.frame.T).round(4) + 0.0
             out += ["S", *(f"X{x:.10g} Y{y:.10g} Z{z:.10g}" for x, y, z in rows.tolist()), "E"]
-    target = Path(path)
-    part = target.with_name(target.name + ".part")
-    try:
-        part.write_text("\n".join(out) + "\n")
-        os.replace(part, target)
-    except OSError as error:
-        part.unlink(missing_ok=True)
-        raise InputError(f"cannot write the waypoint file {path}: {error}") from None
+    with whole_file(path) as temporary:
+        temporary.write_text("\n".join(out) + "\n", encoding="utf-8")
