@@ -1,5 +1,8 @@
 """Closed surface to tetrahedra, with fTetWild."""
 
+from contextlib import chdir
+from tempfile import TemporaryDirectory
+
 import numpy as np
 
 from ccfem.errors import InputError
@@ -48,14 +51,16 @@ def tetrahedralise(surface: Surface, edge_length: float) -> TetMesh:
         )
     import pytetwild
 
-    points, cells = pytetwild.tetrahedralize(
-        np.array(surface.points),
-        surface.triangles.astype(np.int32),
-        edge_length_abs=float(edge_length),
-        optimize=True,
-        vtk_ordering=True,
-        quiet=True,
-    )
+    # fTetWild leaves a file in the working folder: let it be one that goes away.
+    with TemporaryDirectory() as folder, chdir(folder):
+        points, cells = pytetwild.tetrahedralize(
+            np.array(surface.points),
+            surface.triangles.astype(np.int32),
+            edge_length_abs=float(edge_length),
+            optimize=True,
+            vtk_ordering=True,
+            quiet=True,
+        )
     if not len(cells):
         raise InputError(
             "meshing left no cells inside the surface: check that it is closed, does not cut "

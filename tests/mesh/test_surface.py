@@ -92,7 +92,8 @@ def test_missing_surface(tmp_path):
         read_surface(tmp_path / "a.stl")
 
 
-def test_a_closed_surface_is_filled(box, capfd):
+def test_a_closed_surface_is_filled(box, capfd, tmp_path, monkeypatch):
+    monkeypatch.chdir(tmp_path)
     points, triangles = box_surface(box)
     mesh = tetrahedralise(Surface(points, triangles), 0.5)
     assert mesh.volumes.min() > 0.0
@@ -105,6 +106,7 @@ def test_a_closed_surface_is_filled(box, capfd):
     assert 0.25 < np.median(lengths) < 0.75
     assert check_mesh(mesh)[1].findings == ()
     assert capfd.readouterr().out == ""
+    assert list(tmp_path.iterdir()) == []
 
 
 @pytest.mark.parametrize("edge_length", [0.0, -1.0, 100.0, float("nan"), 1e-4])
