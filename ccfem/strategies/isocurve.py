@@ -48,6 +48,9 @@ _LEAST_WEIGHT = 1e-3
 _ROOM = 1.03
 """Bound on the distance of isocurves, in strand widths: strands that stood just at the width would
 be trimmed wherever the numbers fall short of it."""
+_TRIM = 0.98
+"""What is nearer than this to a longer strand, in strand widths, is cut: curves that are led along
+each other at one width differ by their chords."""
 _SPIRAL_LIMIT = 4.0
 """Largest distance, in strand widths, of closed isocurves that are joined to a spiral."""
 
@@ -289,7 +292,9 @@ class _Planner:
                 rings += parallel_curve(hole, distance * width, section)
             lines = lead_into(lines, hole, s.rings[-1] * width, section)
         if s.trim:
-            lines = trim_to_clearance([*rings, *lines], width, 3.0 * width, first=len(rings))
+            lines = trim_to_clearance(
+                [*rings, *lines], _TRIM * width, 3.0 * width, first=len(rings)
+            )
         else:
             lines = [*rings, *lines]
         if s.spiral:

@@ -1,0 +1,214 @@
+"""The isocurve strategy on fields whose paths are known, and on the authors' part."""
+
+import dataclasses
+import os
+import sys
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from ccfem.elasticity import solve
+from ccfem.elasticity.problem import Problem, Support, Traction
+from ccfem.elasticity.stress_field import SolveRecord, StressField
+from ccfem.errors import InputError
+from ccfem.evaluate import evaluate
+from ccfem.layers import slice_planar
+from ccfem.machine import Machine
+from ccfem.materials import isotropic
+from ccfem.mesh import TetMesh
+from ccfem.strategies import create, plan
+from ccfem.strategies.isocurve import Isocurve
+from ccfem.structured import box_mesh
+from ccfem.toolpaths import Toolpaths
+
+MACHINE = Machine()
+
+
+def field_of(mesh: TetMesh, stress_at) -> StressField:
+    """Stress field given by a function of points (k, 3)."""
+    patch = mesh.boundary[:1]
+    mesh = mesh.with_patches({"support": patch})
+    problem = Problem(mesh, isotropic(3500.0, 0.35), (Support("support"),))
+    zeros = np.zeros_like(mesh.points)
+    record = SolveRecord("given", 0, 0.0, 0.0, 0.0, 0)
+    cell = stress_at(mesh.points[mesh.cells].mean(axis=1))
+    return StressField(problem, "given", zeros, cell, stress_at(mesh.points), zeros, 0.0, record)
+
+
+def uniform(angle: float, size: float = 10.0):
+    t = np.array([np.cos(angle), np.sin(angle), 0.0])
+
+    def stress(points: np.ndarray) -> np.ndarray:
+        return np.broadcast_to(size * np.outer(t, t), (len(points), 3, 3))
+
+    return stress
+
+
+def ring_mesh(inner: float, outer: float) -> TetMesh:
+    box = box_mesh((1.0, 1.0, 1.0), (14, 120, 1))
+    s, turn, z = box.points.T
+    radius, angle = inner + (outer - inner) * s, 2.0 * np.pi * turn
+    points = np.column_stack([radius * np.cos(angle), radius * np.sin(angle), z])
+    joined, inverse = np.unique(np.round(points, 9), axis=0, return_inverse=True)
+    cells = inverse.reshape(-1)[box.cells]
+    mesh = TetMesh(joined, cells)
+    return mesh if mesh.volumes.min() > 0 else TetMesh(joined, cells[:, [0, 1, 3, 2]])
+
+
+def planned(strategy: Isocurve, field: StressField, count: int = 1) -> tuple:
+    layers = slice_planar(field.mesh, count=count)
+    return plan(strategy, layers, field, MACHINE), layers
+
+
+@pytest.mark.parametrize("angle", [0.0, 0.4, 1.3])
+@pytest.mark.parametrize(
+    "strategy",
+    [Isocurve(), Isocurve(spacing="search"), Isocurve.literal(), Isocurve(spacing="cone")],
+)
+def test_uniform_tension_gives_straight_equidistant_paths(strategy: Isocurve, angle: float) -> None:
+    field = field_of(box_mesh((60.0, 60.0, 2.0), (20, 20, 1)), uniform(angle))
+    unlinked = dataclasses.replace(strategy, link_limit=0.0)
+    paths, layers = planned(unlinked, field)
+    total = evaluate(paths, layers, field, MACHINE).total
+    assert total["aligned_10"] == pytest.approx(1.0)
+    assert total["angle_mean"] < 0.1
+    normal = np.array([-np.sin(angle), np.cos(angle), 0.0])
+    places = np.sort([line[0] @ normal for line in paths])
+    spread = np.concatenate([line @ normal - line[0] @ normal for line in paths])
+    assert np.abs(spread).max() < 0.02
+    gaps = np.diff(places)
+    assert gaps.min() >= 1.0 - 1e-6
+    assert gaps.max() < 1.12
+    np.testing.assert_allclose(gaps, gaps.mean(), atol=0.02)
+
+
+def test_hoop_tension_gives_concentric_circles() -> None:
+    def hoop(points: np.ndarray) -> np.ndarray:
+        radius = np.hypot(points[:, 0], points[:, 1])
+        t = np.column_stack([-points[:, 1], points[:, 0], np.zeros(len(points))]) / radius[:, None]
+        return 10.0 * t[:, :, None] * t[:, None, :]
+
+    field = field_of(ring_mesh(10.0, 24.0), hoop)
+    paths, layers = planned(Isocurve(spiral=False), field)
+    assert len(paths) >= 12
+    for line in paths:
+        radius = np.hypot(line[:, 0], line[:, 1])
+        np.testing.assert_allclose(radius, radius.mean(), atol=0.12)
+    wound, _ = planned(Isocurve(), field)
+    assert len(wound) <= 2
+    total = evaluate(wound, layers, field, MACHINE).total
+    assert total["crossings"] == total["self_crossings"] == 0
+
+
+def test_adaptive_density_follows_the_stress() -> None:
+    def bending(points: np.ndarray) -> np.ndarray:
+        stress = np.zeros((len(points), 3, 3))
+        stress[:, 0, 0] = points[:, 1]  # 0 to 60 MPa across the width
+        return stress
+
+    field = field_of(box_mesh((60.0, 60.0, 2.0), (15, 30, 1)), bending)
+    adaptive = Isocurve(cap=100.0, floor=0.0, link_limit=0.0, trim=False)
+    paths, _ = planned(adaptive, field)
+    places = np.sort([line[0, 1] for line in paths])
+    # one strand a width at the largest stress, and their number up to y as the stress's integral
+    expected = places**2 / (2.0 * 60.0 * 1.03)
+    np.testing.assert_allclose(np.arange(len(places)) + 0.5, expected, atol=1.0)
+    even, _ = planned(dataclasses.replace(adaptive, power=0.0), field)
+    places = np.sort([line[0, 1] for line in even])
+    gaps = np.diff(places[places > 3.0])  # next to the edge there is no stress to follow
+    np.testing.assert_allclose(gaps, gaps.mean(), rtol=0.05)
+
+
+def test_half_the_width_gives_twice_the_length() -> None:
+    field = field_of(box_mesh((60.0, 30.0, 2.0), (20, 10, 1)), uniform(0.3))
+    layers = slice_planar(field.mesh, count=1)
+    lengths = [
+        plan(Isocurve(), layers, field, Machine(fibre_width=width)).lengths.sum()
+        for width in (1.0, 0.5)
+    ]
+    assert lengths[1] / lengths[0] == pytest.approx(2.0, rel=0.05)
+
+
+def test_conformal_curves_follow_the_named_hole() -> None:
+    mesh = ring_mesh(8.0, 40.0)
+    radius = np.hypot(*np.moveaxis(mesh.points[mesh.boundary][:, :, :2], -1, 0))
+    hole = mesh.boundary[(radius < 8.001).all(axis=1)]
+    field = field_of(mesh.with_patches({"hole": hole}), uniform(0.0))
+    paths, _ = planned(Isocurve(conformal=("hole",), spiral=False, link_limit=0.0), field)
+    reach = [np.hypot(line[:, 0], line[:, 1]) for line in paths]
+    assert min(r.min() for r in reach) == pytest.approx(9.5, abs=0.05)
+    rings = [r for r in reach if np.ptp(r) < 0.05]
+    assert [r.mean() for r in rings] == pytest.approx([9.5], abs=0.05)
+    rest = [r.min() for r in reach if np.ptp(r) >= 0.05]
+    assert min(rest) == pytest.approx(10.5, abs=0.05)
+
+
+def test_no_tension_names_the_largest_stress_and_the_option() -> None:
+    field = field_of(box_mesh((60.0, 30.0, 2.0), (10, 5, 1)), uniform(0.0, -10.0))
+    with pytest.raises(InputError, match=r"largest tensile stress.*sense = 'absolute'"):
+        planned(Isocurve(), field)
+    paths, _ = planned(Isocurve(sense="absolute", link_limit=0.0), field)
+    assert paths.lengths.sum() > 0.9 * 60.0 * 30.0 / 1.1
+    for line in paths:
+        np.testing.assert_allclose(line[:, 1], line[0, 1], atol=0.02)
+
+
+def test_a_layer_without_tension_gets_no_path() -> None:
+    def bending(points: np.ndarray) -> np.ndarray:
+        stress = np.zeros((len(points), 3, 3))
+        stress[:, 0, 0] = points[:, 2] - 4.0
+        return stress
+
+    field = field_of(box_mesh((60.0, 30.0, 8.0), (10, 5, 4)), bending)
+    paths, _ = planned(Isocurve(), field, count=4)
+    assert set(paths.layer.tolist()) == {2, 3}
+
+
+@pytest.mark.parametrize(
+    "wrong", [{"cap": 0.0}, {"cap": 101.0}, {"fill": "heat"}, {"power": -1.0}, {"conformal": "all"}]
+)
+def test_wrong_parameters_are_refused(wrong: dict) -> None:
+    with pytest.raises(InputError, match=f"isocurve.{next(iter(wrong))}"):
+        create("isocurve", wrong)
+
+
+def test_solved_bar_is_filled_with_straight_strands() -> None:
+    mesh = box_mesh((80.0, 12.0, 4.0), (40, 6, 2))
+    problem = Problem(
+        mesh,
+        isotropic(3500.0, 0.35),
+        (Support("x_min"),),
+        {"pull": (Traction("x_max", (10.0, 0.0, 0.0)),)},
+    )
+    field = solve(problem)["pull"]
+    paths, layers = planned(Isocurve(), field, count=3)
+    total = evaluate(paths, layers, field, MACHINE).total
+    assert total["aligned_stress_10"] > 0.95
+    assert total["coverage"] > 0.85
+
+
+needs_authors_data = pytest.mark.skipif(
+    "CCFEM_CHEN2021" not in os.environ, reason="needs the authors' data: set CCFEM_CHEN2021"
+)
+
+
+@needs_authors_data
+def test_figures_on_the_authors_loop() -> None:
+    """The promises on the authors' Loop, at no more fibre than theirs (34.658 m)."""
+    sys.path.insert(0, str(Path(__file__).parents[2] / "benchmarks" / "papers" / "chen_2021"))
+    from loop import authors_loop
+
+    case = authors_loop()
+    field = next(iter(solve(case.problem).values()))
+    layers = slice_planar(field.mesh, case.build, count=12)
+    paths: Toolpaths = plan(Isocurve(), layers, field, MACHINE)
+    total = evaluate(paths, layers, field, MACHINE).total
+    assert total["fibre_length"] <= 34658.0
+    assert total["aligned_10"] >= 0.93
+    assert total["aligned_stress_10"] >= 0.95
+    assert total["coverage_top_20"] >= 0.72
+    assert total["curvature_95"] <= 0.12
+    assert total["outside_depth"] <= 0.02
+    assert total["crossings"] == total["self_crossings"] == 0
+    assert np.bincount(paths.layer).max() <= 16
