@@ -7,26 +7,21 @@ import numpy as np
 
 from ccfem.comparison import Comparison, Run
 from ccfem.evaluate import Column
+from ccfem.evaluate.virtual_test.verdict import UNDECIDED
+from ccfem.evaluate.virtual_test.verdict import verdict as verdict_of_pair
 
 __all__ = [
     "HEADLINE",
-    "PROMISE",
     "TEST_COLUMNS",
     "Headline",
     "best_values",
+    "cell_text",
     "headline_values",
     "ranking",
     "remarks",
+    "stiffness_ratios",
     "verdict",
 ]
-
-PROMISE = (
-    "What the virtual test promises: the order of two designs, and their stiffness to each other "
-    "to about 10 %; the stiffness over that of the unreinforced part to 25 %, or 10 % once "
-    "calibrated on one print; the strength to 30 % after calibration. Delamination is not "
-    "predicted. Measured on three printed parts of Chen et al. 2021, one specimen mean each."
-)
-"""How far the virtual test can be trusted; shown next to its numbers."""
 
 _RATIO = "stiffness of the part with its fibres over that without"
 
@@ -66,6 +61,12 @@ TEST_COLUMNS = (
         "1/m",
         "(stiffness_ratio_tension - 1) over the length of fibre inside the part.",
         ">= 0, higher is better",
+    ),
+    Column(
+        "strain_energy",
+        "N mm",
+        "Strain energy of matrix and fibres under the load, fibres carrying tension only.",
+        "> 0, lower is better under forces",
     ),
     Column(
         "first_failure_load",
@@ -141,6 +142,7 @@ def _test_values(run: Run) -> dict[str, float]:
         "stiffness_ratio_bonded": bonded.ratio,
         "stiffness": tension.stiffness,
         "gain_per_metre": tension.gain_per_metre,
+        "strain_energy": tension.solution.strain_energy,
     }
     if tension.span:
         ratios = [ratio for _, ratio in tension.span]
@@ -149,6 +151,19 @@ def _test_values(run: Run) -> dict[str, float]:
     if run.tested.failure is not None:
         values["first_failure_load"] = run.tested.failure.load
     return values
+
+
+def cell_text(run: Run, head: Headline) -> tuple[str, str]:
+    """Text of a cell of the headline table, and what to add to it in smaller letters."""
+    values = headline_values(run)
+    value, extra = values.get(head.column, np.nan), ""
+    if not np.isfinite(value):
+        return "–", ""
+    if head.column == "stiffness_ratio_tension" and "stiffness_ratio_low" in values:
+        extra = f"{values['stiffness_ratio_low']:.2f}–{values['stiffness_ratio_high']:.2f}"
+    if head.column == "first_failure_load" and run.tested is not None and run.tested.failure:
+        extra = run.tested.failure.what
+    return head.pattern.format(value), extra
 
 
 def best_values(comparison: Comparison) -> dict[str, float]:
@@ -181,25 +196,37 @@ def ranking(comparison: Comparison) -> tuple[Run, ...]:
     return tuple(sorted(comparison.runs, key=score))
 
 
-def remarks(run: Run, comparison: Comparison) -> list[str]:
-    """Say what has to stand next to the numbers of a run, a line each.
+def remarks(comparison: Comparison) -> list[str]:
+    """Say what has to stand next to the numbers, a line each."""
+    lines: dict[str, list[str]] = {}
+    for run in ranking(comparison):
+        about = [f"failed: {run.failure}"] if run.failure else []
+        if run.untested:
+            about.append(f"no virtual test: {run.untested}")
+        if run.tested is not None and run.tested.note:
+            about.append(f"no first-failure load: {run.tested.note}")
+        if run.note:
+            about.append(run.note)
+        for line in about:
+            lines.setdefault(line, []).append(run.name)
+    found = [f"{', '.join(names)}: {line}" for line, names in lines.items()]
+    tested = [run for run in ranking(comparison) if run.tested is not None]
+    for k, run in enumerate(tested):
+        unclear = [other.name for other in tested[k + 1 :] if _undecided(run, other)]
+        if unclear:
+            found.append(
+                f"{run.name}: undecided against {', '.join(unclear)}, for tension-only and bonded "
+                "fibres do not agree on an order"
+            )
+    return found
 
-    Two runs are undecided where tension-only and bonded fibres put them in different orders.
-    """
-    lines = [f"failed: {run.failure}"] if run.failure else []
-    unclear = [other.name for other in ranking(comparison) if _undecided(run, other)]
-    if unclear:
-        lines.append(
-            f"undecided against {', '.join(unclear)}: tension-only and bonded fibres give "
-            "different orders"
-        )
-    if run.untested:
-        lines.append(f"no virtual test: {run.untested}")
-    if run.tested is not None and run.tested.note:
-        lines.append(f"no first-failure load: {run.tested.note}")
-    if run.note:
-        lines.append(run.note)
-    return lines
+
+def stiffness_ratios(one: Run, other: Run) -> tuple[float, float]:
+    """Stiffness of one run over that of another, tension only and bonded; NaN where untested."""
+    return (
+        _ratio(one) / _ratio(other),
+        _ratio(one, "bonded") / _ratio(other, "bonded"),
+    )
 
 
 def verdict(comparison: Comparison) -> str:
@@ -221,9 +248,10 @@ def verdict(comparison: Comparison) -> str:
         )
     if _undecided(first, second):
         return (
-            f"Undecided between {first.name} and {second.name}, {amount}: fibres that carry "
-            f"tension only put the first ahead ({_ratio(first):.2f} to {_ratio(second):.2f} times "
-            "the unreinforced stiffness), bonded fibres the second."
+            f"Undecided between {first.name} and {second.name}, {amount}: "
+            f"{_ratio(first):.2f} and {_ratio(second):.2f} times the unreinforced stiffness where "
+            f"fibres carry tension only, {_ratio(first, 'bonded'):.2f} and "
+            f"{_ratio(second, 'bonded'):.2f} where they are bonded."
         )
     return (
         f"{first.name} makes the stiffest part, {amount}: {_ratio(first):.2f} times the "
@@ -237,5 +265,6 @@ def _ratio(run: Run, mode: str = "tension") -> float:
 
 
 def _undecided(one: Run, other: Run) -> bool:
-    apart = _ratio(one) - _ratio(other), _ratio(one, "bonded") - _ratio(other, "bonded")
-    return apart[0] * apart[1] < 0.0
+    if one.tested is None or other.tested is None:
+        return False
+    return verdict_of_pair(one.tested.bracket, other.tested.bracket) == UNDECIDED

@@ -1,0 +1,292 @@
+"""The command line: ``ccfem cases``, ``strategies``, ``compare``, ``plan``.
+
+Only this module turns strings into objects. Everything heavy is imported by the command that needs
+it, so that ``ccfem --help`` answers at once.
+"""
+
+import shlex
+import sys
+import time
+from collections.abc import Iterator
+from contextlib import contextmanager
+from pathlib import Path
+from typing import TYPE_CHECKING, Annotated, Any
+
+import typer
+
+from ccfem import __version__
+from ccfem.errors import InputError, SolveError
+
+if TYPE_CHECKING:
+    from ccfem.cases.case import Case
+    from ccfem.progress import Progress
+
+__all__ = ["app", "main"]
+
+_STARTED = time.perf_counter()
+
+app = typer.Typer(
+    name="ccfem",
+    help="Finite elements and stress-driven toolpaths for printing continuous fibre. "
+    "Units: mm, N, MPa.",
+    add_completion=False,
+    context_settings={"help_option_names": ["-h", "--help"]},
+    pretty_exceptions_enable=False,
+    rich_markup_mode=None,
+)
+
+_CasePath = Annotated[
+    str, typer.Argument(metavar="CASE_OR_PART.toml", help="Name of a case, or a part file.")
+]
+_Out = Annotated[Path | None, typer.Option("--out", metavar="DIR", help="Folder for the results.")]
+_SetCase = Annotated[
+    list[str] | None,
+    typer.Option(
+        "--set-case",
+        metavar="NAME=VALUE",
+        help="Set a parameter of the case, as element_size=3; repeatable.",
+    ),
+]
+_Layers = Annotated[
+    int | None,
+    typer.Option("--layers", metavar="N", help="Fibre layers instead of the part's own."),
+]
+_Fibre = Annotated[
+    float | None,
+    typer.Option(
+        "--fibre-per-layer",
+        metavar="MM",
+        help="Fibre length that each strategy is held to, mean over the layers. By default the "
+        "smallest that any of them lays of its own accord.",
+    ),
+]
+_VirtualTest = Annotated[
+    bool,
+    typer.Option(
+        "--virtual-test/--no-virtual-test",
+        help="Re-solve the part with the fibres of each strategy in it.",
+    ),
+]
+_LoadCase = Annotated[
+    str | None,
+    typer.Option("--load-case", metavar="NAME", help="Load case to plan for; default the first."),
+]
+_Backend = Annotated[
+    str, typer.Option("--backend", metavar="NAME", help="Linear solver; default by size.")
+]
+
+
+@app.callback(invoke_without_command=True)
+def _top(
+    context: typer.Context,
+    version: Annotated[bool, typer.Option("--version", help="Print the version.")] = False,
+) -> None:
+    if version:
+        print(f"ccfem {__version__}")
+        raise typer.Exit
+    if context.invoked_subcommand is None:
+        print(context.get_help())
+
+
+@app.command()
+def cases() -> None:
+    """List the cases that come with ccfem."""
+    from ccfem.screen import print_cases
+
+    print_cases()
+
+
+@app.command()
+def strategies() -> None:
+    """List the strategies with their parameters and defaults."""
+    from ccfem.screen import print_strategies
+
+    print_strategies()
+
+
+@app.command()
+def compare(
+    case: _CasePath,
+    strategies: Annotated[
+        str | None,
+        typer.Option(metavar="A,B,..", help="Strategies; default the four of ccfem."),
+    ] = None,
+    set_case: _SetCase = None,
+    layers: _Layers = None,
+    fibre_per_layer: _Fibre = None,
+    natural: Annotated[
+        bool, typer.Option("--natural", help="Let each strategy lay its own amount of fibre.")
+    ] = False,
+    set_: Annotated[
+        list[str] | None,
+        typer.Option("--set", metavar="STRATEGY.NAME=VALUE", help="Set a parameter; repeatable."),
+    ] = None,
+    virtual_test: _VirtualTest = True,
+    load_case: _LoadCase = None,
+    backend: _Backend = "auto",
+    out: _Out = None,
+) -> None:
+    """Plan a part by several strategies and show which is best, with numbers and pictures."""
+    from ccfem.compare import STRATEGIES
+
+    names = STRATEGIES if strategies is None else _names(strategies)
+    parameters: dict[str, dict[str, Any]] = {}
+    for text in set_ or ():
+        path, value = _assignment(text)
+        strategy, dot, name = path.partition(".")
+        if not dot:
+            raise InputError(f"--set expects STRATEGY.NAME=VALUE; got '{text}'")
+        parameters.setdefault(strategy, {})[name] = value
+    options = _options(layers, fibre_per_layer, virtual_test, load_case, backend)
+    _run(case, "", set_case, names, parameters, out, {**options, "natural": natural})
+
+
+@app.command()
+def plan(
+    case: _CasePath,
+    strategy: Annotated[str, typer.Option(metavar="S", help="See ccfem strategies.")],
+    set_: Annotated[
+        list[str] | None,
+        typer.Option("--set", metavar="NAME=VALUE", help="Set a parameter; repeatable."),
+    ] = None,
+    set_case: _SetCase = None,
+    layers: _Layers = None,
+    fibre_per_layer: _Fibre = None,
+    virtual_test: _VirtualTest = True,
+    load_case: _LoadCase = None,
+    backend: _Backend = "auto",
+    out: _Out = None,
+) -> None:
+    """Plan a part by one strategy, by default with as much fibre as it lays of its own accord."""
+    parameters = {strategy: dict(_assignment(text) for text in set_ or ())}
+    options = _options(layers, fibre_per_layer, virtual_test, load_case, backend)
+    options["natural"] = fibre_per_layer is None
+    _run(case, f"-{strategy}", set_case, (strategy,), parameters, out, options)
+
+
+def _options(
+    layers: int | None,
+    fibre_per_layer: float | None,
+    virtual_test: bool,
+    load_case: str | None,
+    backend: str,
+) -> dict[str, Any]:
+    """Keyword arguments of `ccfem.compare.compare`."""
+    from ccfem.compare import DEFAULT_STRAND
+
+    return {
+        "layers": layers,
+        "fibre_per_layer": fibre_per_layer,
+        "strand": DEFAULT_STRAND if virtual_test else None,
+        "load_case": load_case,
+        "backend": backend,
+    }
+
+
+def _run(
+    case_name: str,
+    suffix: str,
+    set_case: list[str] | None,
+    names: tuple[str, ...],
+    parameters: dict[str, dict[str, Any]],
+    out: Path | None,
+    options: dict[str, Any],
+) -> None:
+    """Compare and write; a failure leaves nothing behind."""
+    from ccfem.compare import compare as run_comparison
+    from ccfem.compare import create_all
+    from ccfem.results import staged, write_results
+    from ccfem.screen import print_comparison
+
+    imported = time.perf_counter()
+    case = _load(case_name, set_case)
+    seconds = {"start": imported - _STARTED, "mesh": time.perf_counter() - imported}
+    chosen = create_all(case, names, parameters)
+    where = out if out is not None else Path("results") / f"{case.name}{suffix}"
+    with staged(where) as folder, _bar() as progress:
+        comparison = run_comparison(case, chosen, progress=_part(progress, 0.0, 0.75), **options)
+        if not comparison.succeeded:
+            reasons = "; ".join(f"{run.name}: {run.failure}" for run in comparison.runs)
+            raise InputError(f"no strategy could plan '{case.name}': {reasons}")
+        command = shlex.join(["ccfem", *sys.argv[1:]])
+        write_results(comparison, folder, command, seconds, _part(progress, 0.75, 1.0))
+    print_comparison(comparison, where, time.perf_counter() - _STARTED)
+
+
+def _part(progress: "Progress", first: float, last: float) -> "Progress":
+    """Progress of a piece of work that takes the bar from `first` to `last`."""
+    return lambda what, share: progress(what, first + (last - first) * share)
+
+
+def _load(name: str, set_case: list[str] | None) -> "Case":
+    """Read a part file, or make a case from its name and parameters."""
+    from ccfem.cases.named import create_case
+
+    parameters = dict(_assignment(text) for text in set_case or ())
+    if not (name.endswith(".toml") or "/" in name or "\\" in name):
+        return create_case(name, **parameters)
+    if parameters:
+        raise InputError(
+            f"--set-case is for cases by name; '{name}' is a part file: change the file"
+        )
+    from ccfem.part_file import read_part
+
+    return read_part(Path(name))
+
+
+def _assignment(text: str) -> tuple[str, Any]:
+    """Split ``name=value``; the value is read as TOML, or else as a plain string."""
+    import tomllib
+
+    name, equals, value = (part.strip() for part in text.partition("="))
+    if not equals or not name:
+        raise InputError(f"expected NAME=VALUE; got '{text}': write for example cap=90")
+    try:
+        return name, tomllib.loads(f"value = {value}")["value"]
+    except tomllib.TOMLDecodeError:
+        return name, value
+
+
+def _names(text: str) -> tuple[str, ...]:
+    return tuple(name.strip() for name in text.split(",") if name.strip())
+
+
+@contextmanager
+def _bar() -> Iterator["Progress"]:
+    """Progress bar on stderr, or silence where nobody watches."""
+    from ccfem.progress import silent
+
+    if not sys.stderr.isatty():
+        yield silent
+        return
+    from rich.console import Console
+    from rich.progress import BarColumn, Progress, TextColumn, TimeElapsedColumn
+
+    columns = (BarColumn(), TimeElapsedColumn(), TextColumn("{task.description}"))
+    with Progress(*columns, console=Console(stderr=True), transient=True) as bar:
+        task = bar.add_task("", total=1.0)
+
+        def tell(what: str, share: float) -> None:
+            bar.update(task, description=what, completed=share)
+
+        yield tell
+
+
+def main() -> None:
+    """Run the command line; bad input and failed solves end in one line and exit code 2."""
+    # The base class of a wrong option or argument, wherever typer keeps it.
+    usage_error: Any = typer.BadParameter.__mro__[1]
+    try:
+        code = typer.main.get_command(app)(standalone_mode=False)
+    except (InputError, SolveError) as error:
+        code = _complain(str(error))
+    except usage_error as error:
+        code = _complain(error.format_message())
+    except (typer.Abort, KeyboardInterrupt):
+        code = 130
+    sys.exit(code if isinstance(code, int) else 0)
+
+
+def _complain(message: str) -> int:
+    print("ccfem: error:", " ".join(message.split()), file=sys.stderr)
+    return 2

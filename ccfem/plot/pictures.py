@@ -1,0 +1,129 @@
+"""All pictures of a comparison: every layer of every strategy, and the fibre forces."""
+
+from collections.abc import Sequence
+from dataclasses import dataclass, replace
+
+import numpy as np
+
+from ccfem.comparison import Comparison, Run
+from ccfem.layers import Layer
+from ccfem.plot.canvas import png
+from ccfem.plot.colours import palette
+from ccfem.plot.fields import tension_picture
+from ccfem.plot.on_paths import force_on_paths
+from ccfem.plot.paths import Coloured, compare_layer, layer_picture, mark_failure, tension_limit
+from ccfem.progress import Progress, silent
+
+__all__ = ["Pictures", "draw_pictures"]
+
+
+@dataclass(frozen=True)
+class Pictures:
+    """PNG files of a comparison.
+
+    Attributes
+    ----------
+    paths : dict of (strategy, layer index) to bytes
+    forces : dict of strategy to bytes
+        Force in the fibres of the middle layer, where there was a virtual test.
+    tension : bytes
+        Tension in the middle layer.
+    overview : bytes
+        All strategies side by side on the middle layer.
+    middle : int
+        Index of the middle layer.
+    """
+
+    paths: dict[tuple[str, int], bytes]
+    forces: dict[str, bytes]
+    tension: bytes
+    overview: bytes
+    middle: int
+
+
+def draw_pictures(comparison: Comparison, progress: Progress = silent) -> Pictures:
+    """Draw every layer of every strategy that did not fail, all on one colour scale."""
+    layers, runs, stress = comparison.layers, comparison.succeeded, comparison.stress
+    width = comparison.case.machine.fibre_width
+    limit = max(tension_limit(stress.on(layer)) for layer in layers)
+    colours = palette(run.name for run in comparison.runs)
+    paths = {}
+    for k, layer in enumerate(layers):
+        progress("drawing pictures", k / len(layers))
+        for run in runs:
+            figure = layer_picture(
+                layer,
+                stress.on(layer),
+                run.toolpaths,
+                width,
+                f"{run.name}, layer {layer.index}",
+                caption(run, layer),
+                limit,
+                colour=colours[run.name],
+            )
+            paths[run.name, layer.index] = png(figure)
+    middle = layers[len(layers) // 2]
+    overview = compare_layer(
+        middle,
+        stress.on(middle),
+        {run.name: run.toolpaths for run in runs},
+        width,
+        {run.name: caption(run, middle) for run in runs},
+        limit,
+    )
+    heading = f"tension in layer {middle.index}, load case {stress.case}"
+    return Pictures(
+        paths,
+        _forces(runs, middle, width, colours),
+        png(tension_picture(stress.on(middle), heading, "size and direction", limit)),
+        png(overview),
+        middle.index,
+    )
+
+
+def caption(run: Run, layer: Layer) -> str:
+    """Key numbers of a run on one layer."""
+    if run.evaluation is None:
+        return ""
+    values = run.evaluation.of_layer(layer.index)
+    return (
+        f"{values['fibre_length']:.0f} mm in {values['paths']:.0f} paths, "
+        f"efficiency {values['efficiency']:.2f}"
+    )
+
+
+def _forces(
+    runs: Sequence[Run], layer: Layer, width: float, colours: dict[str, str]
+) -> dict[str, bytes]:
+    """Pictures of the axial force in the fibres of a layer, all on one scale."""
+    coloured: dict[str, Coloured] = {}
+    for run in runs:
+        if run.tested is not None:
+            test = run.tested.bracket.tension
+            s = test.strands
+            coloured[run.name] = force_on_paths(
+                s.middle, s.tangent, s.length, test.axial_force, layer
+            )
+    if not coloured:
+        return {}
+    end = max(one.limits[1] for one in coloured.values())
+    drawn = {}
+    for run in runs:
+        if run.tested is None:
+            continue
+        failure = run.tested.failure
+        about = "" if failure is None else f"first failure at {failure.load:.0f} N: {failure.what}"
+        figure = layer_picture(
+            layer,
+            None,
+            run.toolpaths,
+            width,
+            f"{run.name}, force in the fibres",
+            about,
+            coloured=replace(coloured[run.name], limits=(0.0, end), signed=False),
+            colour=colours[run.name],
+        )
+        if failure is not None:
+            mark_failure(figure.axes[0], layer.to_plane(np.asarray(failure.where)), failure.what)
+        drawn[run.name] = png(figure)
+    return drawn

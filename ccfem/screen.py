@@ -1,0 +1,88 @@
+"""What the command line prints: lists of cases and strategies, and the table of a comparison."""
+
+import dataclasses
+import inspect
+from pathlib import Path
+
+import numpy as np
+from rich import box
+from rich.console import Console
+from rich.table import Table
+
+from ccfem.comparison import Comparison
+from ccfem.evaluate.virtual_test.verdict import HONEST_PROMISE
+from ccfem.headline import (
+    HEADLINE,
+    best_values,
+    cell_text,
+    headline_values,
+    ranking,
+    remarks,
+    verdict,
+)
+
+__all__ = ["print_cases", "print_comparison", "print_strategies"]
+
+
+def print_cases() -> None:
+    """Print the name and title of every case."""
+    from ccfem.cases import named_cases
+
+    table = Table("case", "what it is", box=None, header_style="bold")
+    for name, about in sorted(named_cases().items()):
+        table.add_row(name, _first_line(about))
+    Console().print(table)
+
+
+def print_strategies() -> None:
+    """Print the strategies with their parameters and defaults; that of the amount is marked."""
+    from ccfem.strategies import named
+
+    console = Console(highlight=False)
+    for name, strategy in sorted(named().items()):
+        console.print(f"[bold]{name}[/bold]  {_first_line(strategy)}")
+        table = Table(box=None, show_header=False, padding=(0, 2, 0, 4))
+        for field in dataclasses.fields(strategy):  # type: ignore[arg-type]
+            note = ""
+            if field.name == strategy.amount.parameter:
+                amount = strategy.amount
+                note = f"sets the amount of fibre: {amount.most:g} most, {amount.least:g} least"
+            table.add_row(field.name, repr(field.default), note)
+        console.print(table)
+
+
+def _first_line(what: object) -> str:
+    return (inspect.getdoc(what) or "").split("\n")[0]
+
+
+def print_comparison(comparison: Comparison, where: Path, seconds: float) -> None:
+    """Print the headline table, the best of each row in bold, and where the results are."""
+    console = Console(highlight=False)
+    best = best_values(comparison)
+    runs = [run for run in ranking(comparison) if run.evaluation is not None]
+    values = [headline_values(run) for run in runs]
+    table = Table(
+        title=comparison.case.title, title_justify="left", header_style="bold", box=box.SIMPLE_HEAD
+    )
+    table.add_column("")
+    for run in runs:
+        table.add_column(run.name, justify="right")
+    for head in HEADLINE:
+        if not any(head.column in found for found in values):
+            continue
+        cells = []
+        for run, found in zip(runs, values, strict=True):
+            text, extra = cell_text(run, head)
+            if found.get(head.column) == best.get(head.column, np.nan):
+                text = f"[bold green]{text}[/]"
+            cells.append(f"{text} [dim]({extra})[/]" if extra else text)
+        table.add_row(head.title, *cells)
+    console.print(table)
+    for line in remarks(comparison):
+        console.print(line, style="dim", markup=False)
+    said = verdict(comparison)
+    if said:
+        console.print(said, style="bold", markup=False)
+    if any(run.tested is not None for run in runs):
+        console.print(HONEST_PROMISE, style="dim", markup=False)
+    console.print(f"{where / 'report.html'}  ({seconds:.1f} s)", markup=False, soft_wrap=True)
