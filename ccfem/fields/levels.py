@@ -23,8 +23,13 @@ def levels_at(surface: Surface, values: FloatArray, count: int) -> Isocontours:
 
 
 def unit_levels(surface: Surface, values: FloatArray) -> Isocontours:
-    """Isocurves at whole steps of 1, the first half a step above the smallest value."""
-    first = float(values.min()) + 0.5
+    """Isocurves at whole steps of 1, as many as fit, the lowest and the highest equally far in.
+
+    The curves are therefore the same for a field and for its negative.
+    """
+    low, high = float(values.min()), float(values.max())
+    count = int(np.floor(high - low + 0.5))
+    first = 0.5 * (low + high) - 0.5 * (count - 1)
     return isocontours(surface.points, surface.triangles, values, first, 1.0)
 
 

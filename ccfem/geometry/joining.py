@@ -79,6 +79,9 @@ _CLOSING_TURN = np.deg2rad(60.0)
 """A link may close a path to a ring only where it turns less, both ends together: a path of two
 neighbouring strands that closes on itself can no longer join the next."""
 
+_ON_BORDER = 1e-6
+"""Links that leave the section by no more than this, mm, are inside."""
+
 
 @dataclass(frozen=True)
 class _Link:
@@ -176,8 +179,10 @@ def _free_links(
     lines: list[FloatArray], paths: Any, owners: Any, section: Any, clearance: float
 ) -> Any:
     """Mask (l,) of links inside the section and clear of all strands but their own."""
-    shapely.prepare(section)
-    free = shapely.covers(section, paths)
+    # The link of two ends on one edge of the border lies on it: that must not be up to rounding.
+    grown = shapely.buffer(section, _ON_BORDER)
+    shapely.prepare(grown)
+    free = shapely.covers(grown, paths)
     tree = shapely.STRtree(_strings(lines))
     link, strand = tree.query(paths[free], predicate="dwithin", distance=clearance)
     link = np.flatnonzero(free)[link]

@@ -1,0 +1,169 @@
+"""Laws that every strategy has to obey; a new module in ccfem/strategies is tested by itself."""
+
+from dataclasses import replace
+from functools import cache
+
+import numpy as np
+import pytest
+import shapely
+
+from ccfem.elasticity.problem import Force, Problem, Support
+from ccfem.elasticity.solve import solve
+from ccfem.evaluate import evaluate
+from ccfem.layers.planar import slice_planar
+from ccfem.machine import Machine
+from ccfem.materials import isotropic
+from ccfem.mesh import TetMesh
+from ccfem.strategies import create, named, plan
+from ccfem.structured import box_mesh
+
+MACHINE = Machine()
+NAMES = sorted(named())
+
+
+def plate_with_hole():
+    """An elliptic plate, 76 x 56 x 4 mm, with an eccentric round hole; no symmetry in its plane."""
+    around, across = 60, 10
+    box = box_mesh((1.0, 1.0, 4.0), (around, across, 2))
+    share, depth, z = box.points.T
+    angle = 2.0 * np.pi * share
+    hole = np.stack([5.0 + 7.0 * np.cos(angle), -3.0 + 7.0 * np.sin(angle)])
+    rim = np.stack([38.0 * np.cos(angle), 28.0 * np.sin(angle)])
+    plane = hole + (rim - hole) * depth
+    # The seam: nodes at the full turn are those at its start, one row of the grid earlier.
+    column = np.arange(len(z)) % (around + 1)
+    node = np.where(column == around, np.arange(len(z)) - around, np.arange(len(z)))
+    kept, number = np.unique(node, return_inverse=True)
+    points = np.column_stack([*plane, z])[kept]
+    cells = number[box.cells]
+    a, b, c, d = np.moveaxis(points[cells], 1, 0)
+    inverted = np.einsum("ij,ij->i", np.cross(b - a, c - a), d - a) < 0.0
+    cells[inverted] = cells[inverted][:, [0, 2, 1, 3]]
+    rim_facets = number[box.patches["y_max"]]
+    x = points[rim_facets, 0].mean(axis=1)
+    return TetMesh(points, cells, {"left": rim_facets[x < -30.0], "right": rim_facets[x > 30.0]})
+
+
+@cache
+def planned_on(load=1.0, degrees=0.0):
+    """Stress and layers of the plate under a pull, the whole turned about z."""
+    c, s = np.cos(np.radians(degrees)), np.sin(np.radians(degrees))
+    rotation = np.array([[c, -s, 0.0], [s, c, 0.0], [0.0, 0.0, 1.0]])
+    mesh = plate_with_hole()
+    mesh = replace(mesh, points=mesh.points @ rotation.T)
+    force = tuple(load * (rotation @ [500.0, 120.0, 0.0]))
+    problem = Problem(
+        mesh, isotropic(3500.0, 0.35), (Support("left"),), {"pull": (Force("right", force),)}
+    )
+    return solve(problem, tolerance=1e-10)["pull"], slice_planar(mesh, count=2)
+
+
+@cache
+def default_paths(name):
+    stress, layers = planned_on()
+    return plan(create(name), layers, stress, MACHINE)
+
+
+def curves(paths):
+    return shapely.multilinestrings([shapely.linestrings(path[:, :2]) for path in paths])
+
+
+def apart(one, other):
+    """Largest distance of any point of either set of curves to the other set, mm."""
+    return max(
+        shapely.distance(
+            shapely.points(shapely.get_coordinates(shapely.segmentize(a, 0.1))), b
+        ).max()
+        for a, b in ((one, other), (other, one))
+    )
+
+
+@pytest.mark.parametrize("name", NAMES)
+def test_lays_fibre_on_every_layer(name):
+    paths = default_paths(name)
+    assert np.isfinite(paths.points).all()
+    assert set(paths.layer) == {0, 1}
+    heights = [layer.height for layer in planned_on()[1]]
+    for path, layer in zip(paths, paths.layer, strict=True):
+        np.testing.assert_allclose(path[:, 2], heights[layer], atol=1e-9)
+    np.testing.assert_array_equal(np.unique(paths.normals, axis=0), [[0.0, 0.0, 1.0]])
+
+
+@pytest.mark.parametrize("name", NAMES)
+def test_same_input_gives_the_same_paths(name):
+    stress, layers = planned_on()
+    again = plan(create(name), layers, stress, MACHINE)
+    np.testing.assert_array_equal(again.points, default_paths(name).points)
+    np.testing.assert_array_equal(again.offsets, default_paths(name).offsets)
+
+
+@pytest.mark.parametrize("factor", [1e3, 1e-3])
+@pytest.mark.parametrize("name", NAMES)
+def test_size_of_the_load_does_not_matter(name, factor):
+    stress, layers = planned_on(load=factor)
+    scaled = plan(create(name), layers, stress, MACHINE)
+    np.testing.assert_array_equal(scaled.offsets, default_paths(name).offsets)
+    np.testing.assert_allclose(scaled.points, default_paths(name).points, atol=1e-3)
+
+
+@pytest.mark.parametrize("turn", [33.0, 90.0])
+@pytest.mark.parametrize("name", NAMES)
+def test_paths_turn_with_the_part(name, turn):
+    """A strategy with a direction of its own names its parameter, in degrees, in `direction`."""
+    stress, layers = planned_on(degrees=turn)
+    strategy = create(name)
+    direction = getattr(strategy, "direction", None)
+    if direction is not None:
+        strategy = replace(strategy, **{direction: getattr(strategy, direction) + turn})
+    turned = plan(strategy, layers, stress, MACHINE)
+    paths = default_paths(name)
+    assert len(turned) == len(paths)
+    assert turned.lengths.sum() == pytest.approx(paths.lengths.sum(), rel=1e-3)
+    for k in range(len(layers)):
+        expected = shapely.affinity.rotate(curves(paths.on_layer(k)), turn, origin=(0, 0))
+        found = curves(turned.on_layer(k))
+        assert apart(found, expected) < 0.02
+
+
+@pytest.mark.parametrize("name", NAMES)
+def test_paths_stay_inside_the_layer(name):
+    for layer in planned_on()[1]:
+        allowed = shapely.buffer(layer.polygon, 0.02)
+        assert allowed.covers(curves(default_paths(name).on_layer(layer.index)))
+
+
+@pytest.mark.parametrize("name", NAMES)
+def test_no_path_is_too_short_for_the_cutter(name):
+    assert default_paths(name).lengths.min() >= MACHINE.minimum_length
+
+
+@pytest.mark.parametrize("name", NAMES)
+def test_paths_cross_neither_each_other_nor_themselves(name):
+    for k in (0, 1):
+        paths = default_paths(name).on_layer(k)
+        ends = np.concatenate([np.stack([p[:-1, :2], p[1:, :2]], axis=1) for p in paths])
+        segments = shapely.linestrings(ends)
+        crossing = shapely.STRtree(segments).query(segments, predicate="crosses")
+        assert crossing.shape[1] == 0
+
+
+@pytest.mark.parametrize("name", NAMES)
+def test_evaluator_accepts_the_paths(name):
+    stress, layers = planned_on()
+    paths = default_paths(name)
+    total = evaluate(paths, layers, stress, MACHINE).total
+    assert total["fibre_length"] == pytest.approx(paths.lengths.sum())
+    assert total["paths"] == len(paths)
+
+
+@pytest.mark.parametrize("name", NAMES)
+def test_amount_sets_how_much_fibre_is_laid(name):
+    stress, layers = planned_on()
+    amount = named()[name].amount
+    most, least = (
+        plan(create(name, {amount.parameter: value}), layers, stress, MACHINE).lengths.sum()
+        for value in (amount.most, amount.least)
+    )
+    assert most > 1.2 * least
+    default = default_paths(name).lengths.sum()
+    assert least <= default <= most
