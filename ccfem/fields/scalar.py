@@ -77,7 +77,7 @@ def fit_constrained(
     weight: FloatArray,
     width: float,
     spacing_weight: float = 0.1,
-    iterations: int = 30,
+    iterations: int = 20,
 ) -> FloatArray:
     """As `fit_weighted`, subject to ``|grad s| <= 1 / width`` on every triangle.
 
@@ -85,7 +85,7 @@ def fit_constrained(
     without any search for their number, and no hot spot sets the spacing of the whole layer. The
     convex problem is solved by the alternating direction method of multipliers (Boyd et al.,
     Foundations and Trends in Machine Learning 3 (2011) 1, section 3): one factorisation, and a
-    back-substitution and a projection an iteration. After 30 iterations the objective is within
+    back-substitution and a projection an iteration. After 20 iterations the objective is within
     1 % of the optimum and single triangles exceed the bound by some per cent, so that strands are
     still to be trimmed.
 
@@ -96,7 +96,7 @@ def fit_constrained(
     density : (t,) array, 1/mm
         Wanted number of isocurves per mm; capped at ``1 / width``.
     width : float, mm
-    iterations : int, default 30
+    iterations : int, default 20
 
     Returns
     -------

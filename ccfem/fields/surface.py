@@ -84,9 +84,10 @@ class Surface:
         metric : (t, 2, 2) array
             Symmetric, with the area of the triangle in it.
         """
-        blocks = np.einsum(
-            "tid,tde,tje->tij", self.gradients, metric, self.gradients, optimize=True
-        )
+        gx, gy = self.gradients[:, :, 0], self.gradients[:, :, 1]
+        fx = metric[:, 0, 0, None] * gx + metric[:, 0, 1, None] * gy
+        fy = metric[:, 1, 0, None] * gx + metric[:, 1, 1, None] * gy
+        blocks = gx[:, :, None] * fx[:, None, :] + gy[:, :, None] * fy[:, None, :]
         rows = np.repeat(self.triangles, 3, axis=1).ravel()
         columns = np.tile(self.triangles, (1, 3)).ravel()
         n = len(self.points)

@@ -11,6 +11,9 @@ from ccfem.geometry.joining import ring_arc
 
 __all__ = ["spiral"]
 
+_STRIDE = 4
+"""Every so many points of a ring are tried as the place of the seam."""
+
 
 def spiral(
     lines: Sequence[FloatArray],
@@ -64,13 +67,14 @@ def _counter_clockwise(ring: FloatArray) -> FloatArray:
 def _nested_chains(rings: list[FloatArray], limit: float) -> list[list[int]]:
     """Chains of rings, each inside the one before and near to it, from the outside in."""
     areas = [shapely.Polygon(ring) for ring in rings]
+    shapely.prepare(areas)
     chains: list[list[int]] = []
     for k in sorted(range(len(rings)), key=lambda k: -areas[k].area):
         around = [
             chain
             for chain in chains
             if shapely.contains(areas[chain[-1]], areas[k])
-            and shapely.distance(areas[chain[-1]].exterior, areas[k].exterior) <= limit
+            and shapely.dwithin(areas[chain[-1]].exterior, areas[k].exterior, limit)
         ]
         if around:
             min(around, key=lambda chain: areas[chain[-1]].area).append(k)
@@ -86,11 +90,11 @@ def _wind(
     if len(rings) < 2:
         return None
     strings = [shapely.LinearRing(ring) for ring in rings]
-    apart = shapely.distance(strings[1], shapely.points(rings[0]))
-    near = np.flatnonzero(apart <= limit)
-    if not len(near):
+    places = rings[0][::_STRIDE]
+    near = shapely.dwithin(strings[1], shapely.points(places), limit)
+    if not near.any():
         return None
-    seam = shapely.points(rings[0][near[np.argmin(cost(rings[0][near]))]])
+    seam = shapely.points(places[near][np.argmin(cost(places[near]))])
     pieces = []
     for k, string in enumerate(strings):
         neighbour = strings[k + 1] if k + 1 < len(strings) else strings[k - 1]
