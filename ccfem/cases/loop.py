@@ -7,9 +7,9 @@ import shapely
 
 from ccfem.arrays import FloatArray
 from ccfem.cases.case import Case
+from ccfem.cases.filament import printed_pla
 from ccfem.cases.stored import mesh_of_case
 from ccfem.elasticity.problem import Force, Problem, Support
-from ccfem.materials import isotropic
 from ccfem.mesh import TetMesh
 from ccfem.meshing import extrude
 from ccfem.patches import Cylinder, patches_from_rules
@@ -93,15 +93,9 @@ def loop(element_size: float = ELEMENT_SIZE, order: int = 1, force: float = 1000
         Linear or quadratic cells.
     force : float, N
     """
-    material = isotropic(
-        3500.0,
-        0.35,
-        name="PLA+",
-        source="modulus and Poisson's ratio assumed for eSUN PLA+ (the filament of paper 000)",
-    )
     problem = Problem(
         mesh_of_case("loop", element_size, order, loop_mesh),
-        material,
+        printed_pla(),
         (Support("support"),),
         {"pull": (Force("load", (0.0, force, 0.0)),)},
     )

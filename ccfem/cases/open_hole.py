@@ -5,9 +5,9 @@ from typing import Any
 import shapely
 
 from ccfem.cases.case import Case
+from ccfem.cases.filament import printed_pla
 from ccfem.cases.stored import mesh_of_case
 from ccfem.elasticity.problem import Force, Problem, Support
-from ccfem.materials import isotropic
 from ccfem.mesh import TetMesh
 from ccfem.meshing import extrude
 from ccfem.patches import Cylinder, PatchRule, Plane, patches_from_rules
@@ -46,12 +46,9 @@ def open_hole(element_size: float = ELEMENT_SIZE, order: int = 1, force: float =
         Linear or quadratic cells.
     force : float, N
     """
-    material = isotropic(
-        3500.0, 0.35, name="PLA", source="modulus and Poisson's ratio assumed for printed PLA"
-    )
     problem = Problem(
         mesh_of_case("open_hole", element_size, order, open_hole_mesh),
-        material,
+        printed_pla(),
         (Support("support"),),
         {"pull": (Force("load", (force, 0.0, 0.0)),)},
     )

@@ -36,6 +36,15 @@ def mean_on(mesh, facets, nodal):
     return np.einsum("i,i...->...", area, nodal[facets].mean(axis=1)) / area.sum()
 
 
+def smallest_angle(corners):
+    """Smallest angle of any triangle (t, 3, 3), degrees."""
+    before = np.roll(corners, 1, axis=1) - corners
+    after = np.roll(corners, -1, axis=1) - corners
+    cosine = np.einsum("ijk,ijk->ij", before, after)
+    cosine /= np.linalg.norm(before, axis=2) * np.linalg.norm(after, axis=2)
+    return np.degrees(np.arccos(cosine.max()))
+
+
 def test_names():
     assert set(NAMES) <= set(named_cases())
     with pytest.raises(InputError, match="no case named 'lop'; there are: bar, loop, open_hole"):
@@ -57,6 +66,8 @@ def test_case_is_as_described(case):
     outline = PLANFORMS[case.name]()
     thickness = SIZES[case.name][2]
     assert mesh.volumes.sum() == pytest.approx(outline.area * thickness, rel=2e-3)
+    floor = mesh.boundary[(mesh.points[mesh.boundary][..., 2] == 0.0).all(axis=1)]
+    assert smallest_angle(mesh.points[floor]) > 25.0
     assert len(case.title) < 80
     assert case.source
     assert case.problem.material.source
