@@ -8,13 +8,12 @@ folder that holds them (with ``Loop`` and ``bar`` in it) is named by the environ
 import os
 from pathlib import Path
 
-import numpy as np
-
 from ccfem.cases.case import Case
 from ccfem.elasticity.problem import Force, Problem, Support
 from ccfem.errors import InputError
+from ccfem.io import read_mesh
 from ccfem.materials import isotropic
-from ccfem.mesh import TetMesh
+from ccfem.patches import Cylinder, patches_from_rules
 
 __all__ = ["FOLDER", "LAYERS_PUBLISHED", "LAYERS_TABLE_2", "authors_folder", "authors_loop"]
 
@@ -27,8 +26,11 @@ LAYERS_PUBLISHED = 20
 LAYERS_TABLE_2 = 12
 """Layers that the paper's Table 2 counts: the first ones of the files."""
 
-_HOLES = {"support": (-50.0, -1.0), "load": (50.0, 1.0)}
-"""Height of each hole's axis along the mesh's z, and the sign of its outer half."""
+_HOLES = {
+    "support": Cylinder((-0.2, 5.0, -50.0), "y", radius=5.0, tolerance=0.45, half="-z"),
+    "load": Cylinder((-0.2, 5.0, 50.0), "y", radius=5.0, tolerance=0.45, half="z"),
+}
+"""Outer half of the wall of each hole; the walls' nodes lie up to 5.02 mm from the axes."""
 
 
 def authors_folder() -> Path:
@@ -59,8 +61,7 @@ def authors_loop(layers: int = LAYERS_TABLE_2) -> Case:
     layers : int, default 12
         Layers spread evenly over the height of 10 mm; 20 gives the heights of the authors' files.
     """
-    mesh = read_tet(authors_folder() / "Loop" / "Loop.tet")
-    mesh = mesh.with_patches({name: _outer_half(mesh, *hole) for name, hole in _HOLES.items()})
+    mesh = patches_from_rules(read_mesh(authors_folder() / "Loop" / "Loop.tet"), _HOLES)
     problem = Problem(
         mesh=mesh,
         material=isotropic(3500.0, 0.35, name="PLA of the Loop benchmark"),
@@ -75,24 +76,3 @@ def authors_loop(layers: int = LAYERS_TABLE_2) -> Case:
         layers=layers,
         source="Chen, Fang, Liao, Wang, Additive Manufacturing 49 (2021) 102470",
     )
-
-
-def read_tet(path: Path) -> TetMesh:
-    """Read a ``.tet`` file: counts of vertices and cells, coordinates, ``4 a b c d`` lines."""
-    lines = path.read_text().splitlines()
-    vertices, cells = int(lines[0].split()[0]), int(lines[1].split()[0])
-    points = np.array([line.split() for line in lines[2 : 2 + vertices]], dtype=np.float64)
-    table = lines[2 + vertices : 2 + vertices + cells]
-    corners = np.array([line.split()[1:5] for line in table], dtype=np.int64)
-    inverted = TetMesh(points, corners).volumes < 0.0
-    corners[inverted] = corners[inverted][:, [0, 2, 1, 3]]
-    return TetMesh(points, corners)
-
-
-def _outer_half(mesh: TetMesh, z: float, sign: float) -> np.ndarray:
-    """Facets of one hole's wall whose centroid lies beyond the axis of the hole."""
-    corners = mesh.points[mesh.boundary]
-    radius = np.hypot(corners[..., 0] + 0.2, corners[..., 2] - z)
-    flat = (corners[..., 1] < 0.05).all(axis=1) | (corners[..., 1] > 9.95).all(axis=1)
-    outer = sign * (corners[..., 2].mean(axis=1) - z) > 0.0
-    return mesh.boundary[(radius < 5.45).all(axis=1) & ~flat & outer]
