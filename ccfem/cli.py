@@ -51,6 +51,14 @@ _Layers = Annotated[
     int | None,
     typer.Option("--layers", metavar="N", help="Fibre layers instead of the part's own."),
 ]
+_Heights = Annotated[
+    str | None,
+    typer.Option(
+        "--heights",
+        metavar="MM,MM,..",
+        help="Heights of the layers along the build direction, instead of --layers.",
+    ),
+]
 _Fibre = Annotated[
     float | None,
     typer.Option(
@@ -113,6 +121,7 @@ def compare(
     ] = None,
     set_case: _SetCase = None,
     layers: _Layers = None,
+    heights: _Heights = None,
     fibre_per_layer: _Fibre = None,
     natural: Annotated[
         bool, typer.Option("--natural", help="Let each strategy lay its own amount of fibre.")
@@ -137,7 +146,7 @@ def compare(
         if not dot:
             raise InputError(f"--set expects STRATEGY.NAME=VALUE; got '{text}'")
         parameters.setdefault(strategy, {})[name] = value
-    options = _options(layers, fibre_per_layer, virtual_test, load_case, backend)
+    options = _options(layers, heights, fibre_per_layer, virtual_test, load_case, backend)
     _run(case, "", set_case, names, parameters, out, {**options, "natural": natural})
 
 
@@ -151,6 +160,7 @@ def plan(
     ] = None,
     set_case: _SetCase = None,
     layers: _Layers = None,
+    heights: _Heights = None,
     fibre_per_layer: _Fibre = None,
     virtual_test: _VirtualTest = True,
     load_case: _LoadCase = None,
@@ -159,13 +169,14 @@ def plan(
 ) -> None:
     """Plan a part by one strategy, by default with as much fibre as it lays of its own accord."""
     parameters = {strategy: dict(_assignment(text) for text in set_ or ())}
-    options = _options(layers, fibre_per_layer, virtual_test, load_case, backend)
+    options = _options(layers, heights, fibre_per_layer, virtual_test, load_case, backend)
     options["natural"] = fibre_per_layer is None
     _run(case, f"-{strategy}", set_case, (strategy,), parameters, out, options)
 
 
 def _options(
     layers: int | None,
+    heights: str | None,
     fibre_per_layer: float | None,
     virtual_test: bool,
     load_case: str | None,
@@ -174,8 +185,10 @@ def _options(
     """Keyword arguments of `ccfem.compare.compare`."""
     from ccfem.compare import DEFAULT_STRAND
 
+    if layers is not None and heights is not None:
+        raise InputError("give either --layers or --heights, not both")
     return {
-        "layers": layers,
+        "layers": layers if heights is None else _numbers(heights),
         "fibre_per_layer": fibre_per_layer,
         "strand": DEFAULT_STRAND if virtual_test else None,
         "load_case": load_case,
@@ -232,6 +245,13 @@ def _load(name: str, set_case: list[str] | None) -> "Case":
     from ccfem.part_file import read_part
 
     return read_part(Path(name))
+
+
+def _numbers(text: str) -> tuple[float, ...]:
+    try:
+        return tuple(float(number) for number in _names(text))
+    except ValueError:
+        raise InputError(f"expected numbers with commas between; got '{text}'") from None
 
 
 def _assignment(text: str) -> tuple[str, Any]:

@@ -69,15 +69,18 @@ def create_all(
 
 
 def solve_and_slice(
-    case: Case, layers: int | None = None, load_case: str | None = None, backend: str = "auto"
+    case: Case,
+    layers: int | Sequence[float] | None = None,
+    load_case: str | None = None,
+    backend: str = "auto",
 ) -> tuple[StressField, tuple[Layer, ...], dict[str, float]]:
     """Stress of one load case, the layers, and the seconds that each took.
 
     Parameters
     ----------
     case : Case
-    layers : int, optional
-        Number of layers instead of the case's own.
+    layers : int or sequence of float, optional
+        Number of layers instead of the case's own, or their heights along the build direction, mm.
     load_case : str, optional
         By default the first one.
     backend : str, default "auto"
@@ -93,15 +96,16 @@ def solve_and_slice(
     with _timed(seconds, "solve"):
         stress = solve(case.problem, backend=backend)[name]
     with _timed(seconds, "slice"):
-        count = case.layers if layers is None else layers
-        stack = slice_planar(case.problem.mesh, case.build, count=count)
+        chosen = case.layers if layers is None else layers
+        count, heights = (chosen, None) if isinstance(chosen, int) else (None, chosen)
+        stack = slice_planar(case.problem.mesh, case.build, count=count, heights=heights)
     return stress, stack, seconds
 
 
 def compare(
     case: Case,
     strategies: Mapping[str, Strategy] | Sequence[str] = STRATEGIES,
-    layers: int | None = None,
+    layers: int | Sequence[float] | None = None,
     fibre_per_layer: float | None = None,
     natural: bool = False,
     strand: Strand | None = DEFAULT_STRAND,
@@ -121,8 +125,8 @@ def compare(
     case : Case
     strategies : mapping of name to Strategy, or sequence of names
         Named ones take the parameters of the case.
-    layers : int, optional
-        Number of layers instead of the case's own.
+    layers : int or sequence of float, optional
+        Number of layers instead of the case's own, or their heights along the build direction, mm.
     fibre_per_layer : float, mm, optional
         Length that every strategy is held to, mean over the layers.
     natural : bool, default False

@@ -1,0 +1,255 @@
+"""The command line: what it prints and writes, and one line for everything that is wrong."""
+
+import csv
+import json
+import re
+import subprocess
+import sys
+
+import numpy as np
+import pytest
+
+from ccfem import __version__
+from ccfem.cli import main
+from ccfem.io import write_mesh
+from ccfem.structured import box_mesh
+
+PART = """
+mesh = "body.npz"
+layers = 3
+[material]
+modulus = 3500.0
+poisson = 0.35
+tensile_strength = 33.0
+[machine]
+minimum_length = 20.0
+[[supports]]
+patch = "x_min"
+[[loads.pull]]
+kind = "force"
+patch = "x_max"
+vector = [1000, 0, 0]
+"""
+
+PICTURES = {
+    *(f"{name}_layer_{k:02d}.png" for name in ("isocurve", "zigzag") for k in range(3)),
+    *(f"{name}_force.png" for name in ("isocurve", "zigzag")),
+    "tension.png",
+    "overview.png",
+}
+
+CUBE = "v 0 0 0\nv 9 0 0\nv 9 9 0\nv 0 9 0\nv 0 0 9\nv 9 0 9\nv 9 9 9\nv 0 9 9\n" + "".join(
+    f"f {face}\n"
+    for face in ("1 4 3 2", "1 2 6 5", "2 3 7 6", "3 4 8 7", "4 1 5 8")  # the top is missing
+)
+
+
+@pytest.fixture(scope="module")
+def folder(tmp_path_factory):
+    """Folder with a strip, and with files that are wrong in one way each."""
+    folder = tmp_path_factory.mktemp("cli")
+    mesh = box_mesh((60.0, 24.0, 4.0), (20, 8, 2))
+    write_mesh(mesh, folder / "body.npz")
+    tetrahedron = "0 0 0\n9 0 0\n0 nan 0\n0 0 9\n4 0 1 2 3\n"
+    (folder / "nan.tet").write_text(f"4 vertices\n1 tets\n{tetrahedron}")
+    (folder / "part.toml").write_text(PART)
+    (folder / "junk.msh").write_text("this is no mesh\n")
+    (folder / "open.obj").write_text(CUBE)
+    return folder
+
+
+@pytest.fixture
+def ccfem(monkeypatch, capsys, folder):
+    """Call the command line in the folder: exit code, lines of stdout, lines of stderr."""
+
+    def call(*arguments):
+        monkeypatch.chdir(folder)
+        monkeypatch.setattr(sys, "argv", ["ccfem", *map(str, arguments)])
+        with pytest.raises(SystemExit) as ended:
+            main()
+        said = capsys.readouterr()
+        return ended.value.code, said.out, said.err
+
+    return call
+
+
+def test_compare_writes_everything(ccfem, folder):
+    code, out, err = ccfem(
+        "compare", "part.toml", "--strategies", "isocurve,zigzag", "--out", "results/new"
+    )
+    assert (code, err) == (0, "")
+    assert "isocurve" in out
+    where = folder / "results" / "new"
+    written = {path.name for path in where.iterdir()}
+    assert written == PICTURES | {"results.csv", "results.json", "paths.vtp", "report.html"}
+    assert [p.name for p in folder.rglob(".ccfem*")] == []
+
+    about = json.loads((where / "results.json").read_text())
+    assert about["ccfem"] == __version__
+    assert about["command"].startswith("ccfem compare part.toml")
+    assert about["case"]["layers"] == 3
+    assert about["solver"]["residual"] < 1e-8
+    assert about["versions"]["numpy"] == np.__version__
+    assert {"start", "mesh", "solve", "slice", "pictures"} <= set(about["seconds"])
+    runs = {run["name"]: run for run in about["strategies"]}
+    for run in runs.values():
+        assert set(run["seconds"]) == {"plan", "evaluate", "virtual test"}
+        assert run["total"]["stiffness_ratio_tension"] > 1.0
+        assert run["length_per_layer"] <= about["fibre_per_layer"] * (1.0 + 1e-9)
+
+    with (where / "results.csv").open() as file:
+        rows = list(csv.DictReader(file))
+    assert [(row["strategy"], row["layer"]) for row in rows] == [
+        (name, layer) for name in ("isocurve", "zigzag") for layer in ("0", "1", "2", "total")
+    ]
+    for row in rows:
+        if row["layer"] == "total":
+            total = runs[row["strategy"]]["total"]
+            for column in ("fibre_length", "efficiency", "stiffness_ratio_bonded"):
+                assert float(row[column]) == pytest.approx(total[column], rel=1e-12)
+
+    import pyvista
+
+    paths = pyvista.read(where / "paths.vtp")
+    for number, name in enumerate(runs):
+        length = paths.cell_data["length"][paths.cell_data["strategy"] == number].sum()
+        assert length == pytest.approx(runs[name]["total"]["fibre_length"], rel=1e-9)
+
+
+def test_the_report_needs_no_other_file(ccfem, folder):
+    ccfem("plan", "part.toml", "--strategy", "zigzag", "--set", "angle=0", "--layers", 1,
+          "--no-virtual-test", "--out", "one")  # fmt: skip
+    page = (folder / "one" / "report.html").read_text()
+    assert "http" not in page
+    assert "src=" in page
+    assert page.count("src=") == page.count('src="data:image/png;base64,')
+    assert "angle = 0" in page
+    assert "ccfem plan part.toml --strategy zigzag --set angle=0" in page
+    assert {p.name for p in (folder / "one").glob("*layer*")} == {"zigzag_layer_00.png"}
+
+
+def test_a_failed_strategy_is_shown(ccfem, folder):
+    (folder / "push.toml").write_text(PUSH)
+    code, out, _ = ccfem("compare", "push.toml", "--strategies", "isocurve,zigzag", "--layers", 1)
+    assert code == 0
+    assert "isocurve: failed: expected tension" in " ".join(out.split())
+    page = (folder / "results" / "push" / "report.html").read_text()
+    assert "failed: expected tension" in page
+    rows = list(csv.DictReader((folder / "results" / "push" / "results.csv").open()))
+    assert rows[0]["strategy"] == "isocurve"
+    assert rows[0]["failure"].startswith("expected tension")
+    assert rows[0]["fibre_length"] == ""
+
+
+def test_lists(ccfem):
+    code, out, _ = ccfem("cases")
+    assert code == 0
+    for name in ("loop", "bar", "open_hole"):
+        assert name in out
+    code, out, _ = ccfem("strategies")
+    assert code == 0
+    for name in ("isocurve", "concentric", "zigzag", "contour_zigzag", "spacing", "cap"):
+        assert name in out
+    code, out, _ = ccfem()
+    assert code == 0
+    assert "compare" in out
+
+
+def test_it_is_a_module_too():
+    done = subprocess.run(
+        [sys.executable, "-m", "ccfem", "--version"], capture_output=True, text=True, check=True
+    )
+    assert done.stdout == f"ccfem {__version__}\n"
+
+
+ROLLERS = """
+[[supports]]
+patch = "x_min"
+components = "x"
+[[supports]]
+patch = "y_min"
+components = "y"
+[[supports]]
+patch = "z_min"
+components = "z"
+"""
+SUPPORT = '[[supports]]\npatch = "x_min"\n'
+PUSH = PART.replace(SUPPORT, ROLLERS).replace("[1000, 0, 0]", "[-1000, 0, 0]")
+HOLE = '[patches.pin]\nrule = "cylinder"\npoint = [30, 12, 0]\naxis = "z"\nradius = 3.0\n'
+
+
+@pytest.mark.parametrize(
+    ("text", "message"),
+    [
+        (PART.replace("body.npz", "gone.npz"), "gone.npz does not exist: check its name"),
+        (PART.replace("body.npz", "junk.msh"), "junk.msh is not a Gmsh mesh"),
+        (
+            PART.replace("body.npz", "part.toml"),
+            "cannot tell the format of mesh file part.toml: its name must end in",
+        ),
+        (
+            PART.replace('mesh = "body.npz"', 'surface = "open.obj"\nedge_length = 3'),
+            "open.obj: the surface is open: .*close the holes",
+        ),
+        (PART.replace(SUPPORT, ""), "support"),
+        (PART.replace('patch = "x_min"', 'patch = "x_min"\ncomponents = "x"'), "free"),
+        (PART + HOLE, "nearest"),
+        (PART.replace('"x_max"', '"end"'), "no patch named 'end'; the mesh has: x_max, x_min"),
+        (PART.replace("body.npz", "nan.tet"), "NaN"),
+        (PART.replace("[1000,", "[nan,"), "nan"),
+        (PART.replace("[1000,", "[0,"), "zero"),
+        (PUSH, "expected tension.*the largest tensile stress found is"),
+        (PART + "[strategies.isocurf]\na = 1\n", "no strategy named 'isocurf'; there are: "),
+        (PART + "[strategies.isocurve]\nkap = 1\n", "no parameter 'kap'; it has: .*cap"),
+        (PART.replace("layers = 3", "layers = 0"), "layers must be at least 1; got 0"),
+        (PART.replace("poisson = 0.35", "poisson = 0.5"), "poisson"),
+        ("mesh = ", "is not a TOML file"),
+    ],
+)
+def test_bad_parts_end_in_one_line(ccfem, folder, text, message):
+    (folder / "bad.toml").write_text(text)
+    refused(ccfem, folder, message, "plan", "bad.toml", "--strategy", "isocurve", "--out", "bad")
+
+
+@pytest.mark.parametrize(
+    ("arguments", "message"),
+    [
+        (["gone.toml"], "part file gone.toml does not exist: check its name and folder"),
+        (["lop"], "no case named 'lop'; there are: bar, loop, open_hole"),
+        (["part.toml", "--strategies", "zigzag,spiral"], "no strategy named 'spiral'; there are:"),
+        (["part.toml", "--strategies", ","], "at least one strategy"),
+        (["part.toml", "--set", "zigzag.pitch=2"], "'zigzag' has no parameter 'pitch'; it has:"),
+        (["part.toml", "--set", "zigzag.spacing=wide"], "must be a number; got 'wide'"),
+        (["part.toml", "--set", "zigzag.spacing=0.5"], "at least 1 fibre width; got 0.5"),
+        (["part.toml", "--set", "spacing=2"], "expects STRATEGY.NAME=VALUE; got 'spacing=2'"),
+        (["part.toml", "--set", "zigzag.spacing"], "expected NAME=VALUE"),
+        (["part.toml", "--set-case", "force=1"], "'part.toml' is a part file"),
+        (["bar", "--set-case", "length=1"], "case 'bar' has no parameter 'length'; it has:"),
+        (["part.toml", "--layers", "0"], "number of layers must be at least 1; got 0"),
+        (["part.toml", "--layers", "many"], "--layers"),
+        (["part.toml", "--heights", "1,2,9"], "height 9 mm lies outside the part.* from 0 to 4 mm"),
+        (["part.toml", "--heights", "1,x"], "expected numbers"),
+        (["part.toml", "--layers", "2", "--heights", "1"], "not both"),
+        (["part.toml", "--fibre-per-layer", "-3"], "above 0 mm; got -3"),
+        (["part.toml", "--fibre-per-layer", "9", "--natural"], "not both"),
+        (["part.toml", "--load-case", "twist"], "no load case named 'twist'; the case has: pull"),
+        (["part.toml", "--backend", "magic"], "magic"),
+        (["part.toml", "--out", "part.toml/results"], "cannot write results to part.toml/results"),
+        (["part.toml", "--ouput", "x"], "No such option"),
+        ([], "Missing argument"),
+    ],
+)
+def test_bad_arguments_end_in_one_line(ccfem, folder, arguments, message):
+    refused(ccfem, folder, message, "compare", *arguments)
+
+
+def refused(ccfem, folder, message, *arguments):
+    before = {path: path.stat().st_mtime_ns for path in folder.rglob("*") if path.is_file()}
+    code, out, err = ccfem(*arguments)
+    assert (code, out) == (2, "")
+    assert err.startswith("ccfem: error: ")
+    assert err.count("\n") == 1
+    assert re.search(message, err), err
+    after = {path: path.stat().st_mtime_ns for path in folder.rglob("*") if path.is_file()}
+    assert after == before
+    assert not list(folder.rglob(".ccfem*"))
