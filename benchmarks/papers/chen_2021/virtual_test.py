@@ -15,6 +15,7 @@ from loop import LAYERS_TABLE_2, authors_folder, authors_loop
 
 from ccfem.elasticity.problem import Bearing
 from ccfem.elasticity.solve import solve
+from ccfem.evaluate.virtual_test.oriented import oriented_ratio
 from ccfem.evaluate.virtual_test.specimen import Specimen
 from ccfem.evaluate.virtual_test.strand import Strand
 from ccfem.evaluate.virtual_test.strands import Strands, cut_strands
@@ -22,6 +23,7 @@ from ccfem.evaluate.virtual_test.strength import first_failure, matrix_peak
 from ccfem.evaluate.virtual_test.verdict import HONEST_PROMISE, verdict
 from ccfem.evaluate.virtual_test.virtual_test import virtual_bracket, virtual_test
 from ccfem.export.waypoints import read_waypoints
+from ccfem.materials import named_material
 from ccfem.toolpaths import Toolpaths
 
 __all__ = ["MATRIX_STRENGTH", "PHYSICAL", "authors_paths", "ratios"]
@@ -71,10 +73,16 @@ def main() -> None:
     print("Loop, stiffness:             zigzag/none  ours/none  ours/zigzag")
     print("physical, one specimen each       {:6.2f}     {:6.2f}       {:6.2f}".format(*PHYSICAL))
     for mode in ("bonded", "tension"):
-        for rho in (2.15, 4.0, 4.25):
+        for rho in (2.15, 2.25, 4.0, 4.25):
             found = ratios(specimen, strands, rho, mode)
             text = "{:6.3f}     {:6.3f}       {:6.3f}".format(*found)
             print(f"{mode:8} rho {rho:4.2f} mm^2          {text}")
+
+    carbon, area = named_material("c_fram"), case.machine.filament_area
+    smeared = [oriented_ratio(strands[name], field, carbon, area)[0] for name in strands]
+    text = "{:6.3f}     {:6.3f}       {:6.3f}".format(*smeared, smeared[1] / smeared[0])
+    rho = Strand.of(carbon, case.machine).stiffness(specimen.modulus) / specimen.modulus
+    print(f"smeared  rho {rho:4.2f} mm^2          {text}")
 
     print(
         "\nfirst failure, kN (tension only, rho 4, one matrix strength): predicted, measured peak"

@@ -16,14 +16,23 @@ import numpy as np
 
 from ccfem.arrays import FloatArray
 from ccfem.elasticity.problem import Problem
-from ccfem.elasticity.solve import cell_stiffness
+from ccfem.elasticity.solve import cell_stiffness, solve
+from ccfem.elasticity.stress_field import StressField
 from ccfem.errors import InputError
 from ccfem.evaluate.virtual_test.bars import bar_stiffness
+from ccfem.evaluate.virtual_test.specimen import Specimen
 from ccfem.evaluate.virtual_test.strands import Strands
 from ccfem.materials import Material
 from ccfem.tensor import from_voigt, strain_from_voigt, to_voigt
 
-__all__ = ["fibre_share", "mix", "oriented_problem", "oriented_stiffness", "to_plane_stress"]
+__all__ = [
+    "fibre_share",
+    "mix",
+    "oriented_problem",
+    "oriented_ratio",
+    "oriented_stiffness",
+    "to_plane_stress",
+]
 
 
 def fibre_share(strands: Strands, volumes: FloatArray, area: float) -> FloatArray:
@@ -145,3 +154,29 @@ def oriented_problem(problem: Problem, strands: Strands, fibre: Material, area: 
     smeared = oriented_stiffness(fourth[held] / length[held, None, None], fibre)
     stiffness[held] += share[held, None, None] * (smeared - stiffness[held])
     return replace(problem, stiffness=stiffness)
+
+
+def oriented_ratio(
+    strands: Strands, part: StressField, fibre: Material, area: float, backend: str = "auto"
+) -> tuple[float, StressField]:
+    """Stiffness with smeared fibres over that of the part without, and the solution.
+
+    The smeared counterpart of the bonded virtual test; its stress is the mean of fibre and matrix.
+
+    Parameters
+    ----------
+    strands : Strands
+    part : StressField
+        The part without fibres.
+    fibre : Material
+    area : float, mm^2
+        Cross-section of a strand.
+    backend : str
+        Solver.
+    """
+    smeared = oriented_problem(part.problem, strands, fibre, area)
+    smeared = replace(smeared, loads={part.case: smeared.loads[part.case]})
+    after = solve(smeared, backend)[part.case]
+    specimen = Specimen.of(part, backend)
+    before = specimen.stiffness(part.displacement, part.strain_energy)
+    return specimen.stiffness(after.displacement, after.strain_energy) / before, after

@@ -93,15 +93,15 @@ class Specimen:
     def stiffness(self, displacement: FloatArray, strain_energy: float) -> float:
         """Stiffness of the part, N/mm.
 
-        ``F^2 / (f . u)`` under forces, with F their size (`force`), or ``2 U / d^2`` under moving
-        supports, with d the largest of their displacements.
+        Under forces ``F^2 / W`` with F their size (`force`) and W the work ``f . u``, taken as
+        ``2 f . u - 2 U``: that is right to the square of the displacement's error. Under moving
+        supports ``2 U / d^2`` with d the largest of their displacements.
         """
         if self._moving.any():
             largest = float(np.linalg.norm(self.system.held.value, axis=1).max())
             return 2.0 * strain_energy / largest**2
-        return self.force(np.zeros_like(displacement)) ** 2 / float(
-            np.vdot(self.forces, displacement)
-        )
+        work = 2.0 * float(np.vdot(self.forces, displacement)) - 2.0 * strain_energy
+        return self.force(np.zeros_like(displacement)) ** 2 / work
 
     @property
     def _moving(self) -> BoolArray:

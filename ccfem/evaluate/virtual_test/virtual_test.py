@@ -17,7 +17,7 @@ from ccfem.toolpaths import Toolpaths
 
 __all__ = ["Bracket", "VirtualTest", "virtual_bracket", "virtual_brackets", "virtual_test"]
 
-_SPAN_TOLERANCE = 1e-5
+_SPAN_TOLERANCE = 1e-3
 """Relative residual of the solves for the span; the ratio's error is of its square."""
 
 

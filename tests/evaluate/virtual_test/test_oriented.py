@@ -10,6 +10,7 @@ from ccfem.evaluate.virtual_test.oriented import (
     fibre_share,
     mix,
     oriented_problem,
+    oriented_ratio,
     oriented_stiffness,
     to_plane_stress,
 )
@@ -118,6 +119,9 @@ def test_an_evenly_filled_bar_follows_the_rule_of_mixtures():
     np.testing.assert_allclose(
         u[problem.mesh.patch("x_max"), 0], 100.0 * 8.0 / (4.0 * 73200.0), rtol=1e-7
     )
+    ratio, field = oriented_ratio(strands, solve(problem)["pull"], CARBON, 1.0)
+    assert ratio == pytest.approx(73200.0 / 3000.0, rel=1e-7)
+    np.testing.assert_allclose(field.displacement, u, atol=1e-10)
     partly = oriented_problem(problem, strands, CARBON, 0.01)
     share = fibre_share(strands, problem.mesh.volumes, 0.01)
     expected = PLA.stiffness + share[:, None, None] * (CARBON.stiffness - PLA.stiffness)
