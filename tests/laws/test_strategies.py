@@ -1,6 +1,6 @@
 """Laws that every strategy has to obey; a new module in ccfem/strategies is tested by itself."""
 
-from dataclasses import replace
+from dataclasses import FrozenInstanceError, fields, replace
 from functools import cache
 
 import numpy as np
@@ -83,6 +83,19 @@ def coincide(one, other, tolerance):
         if len(np.unique(near)) < len(points):
             return False
     return True
+
+
+@pytest.mark.parametrize("name", NAMES)
+def test_strategy_is_a_value_with_defaults(name):
+    strategy, kind = create(name), named()[name]
+    assert strategy == create(name)
+    assert hash(strategy) == hash(create(name))
+    names = {field.name for field in fields(strategy)}
+    assert kind.amount.parameter in names
+    assert kind.amount.most != kind.amount.least
+    assert getattr(kind, "direction", kind.amount.parameter) in names
+    with pytest.raises(FrozenInstanceError):
+        setattr(strategy, kind.amount.parameter, kind.amount.most)
 
 
 @pytest.mark.parametrize("name", NAMES)

@@ -1,0 +1,67 @@
+"""The contour_zigzag baseline beside the zigzag-contour paths published with paper 000."""
+
+import os
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from ccfem.elasticity.problem import Force, Problem, Support
+from ccfem.elasticity.solve import solve
+from ccfem.evaluate import evaluate
+from ccfem.export.waypoints import read_waypoints
+from ccfem.io import read_mesh
+from ccfem.layers.planar import slice_planar
+from ccfem.machine import Machine
+from ccfem.materials import isotropic
+from ccfem.patches import Cylinder, patches_from_rules
+from ccfem.strategies import create, plan
+
+FOLDER = "CCFEM_CHEN2021"
+MACHINE = Machine()
+
+pytestmark = pytest.mark.skipif(FOLDER not in os.environ, reason="the authors' data is not here")
+
+
+@pytest.fixture(scope="module")
+def loop():
+    """Stress, the first 12 layers, and the published paths on them."""
+    folder = Path(os.environ[FOLDER]) / "Loop"
+    mesh = patches_from_rules(
+        read_mesh(folder / "Loop.tet"),
+        {
+            "support": Cylinder((-0.2, 5, -50), "y", radius=5.0, tolerance=0.45, half="-z"),
+            "load": Cylinder((-0.2, 5, 50), "y", radius=5.0, tolerance=0.45, half="z"),
+        },
+    )
+    force = Force("load", (0.0, 0.0, 1000.0))
+    problem = Problem(mesh, isotropic(3500.0, 0.35), (Support("support"),), {"pull": (force,)})
+    layers = slice_planar(mesh, (0, 1, 0), heights=0.25 + 0.5 * np.arange(12))
+    paths = read_waypoints(folder / "GcodeGenerater_Zigzag_Contour_raw.txt", layers[0].frame)
+    return solve(problem)["pull"], layers, paths.select(paths.layer < 12)
+
+
+def test_contour_zigzag_is_like_the_published_paths(loop):
+    """The same kind of paths at the same length of fibre, only without their crossings."""
+    stress, layers, published = loop
+    theirs = evaluate(published, layers, stress, MACHINE).total
+    assert theirs["fibre_length"] == pytest.approx(35895.0, rel=0.02)  # paper 000, table 2
+    paths = plan(create("contour_zigzag", {"spacing": 3.25}), layers, stress, MACHINE)
+    ours = evaluate(paths, layers, stress, MACHINE).total
+    assert ours["fibre_length"] == pytest.approx(theirs["fibre_length"], rel=0.05)
+    assert ours["paths"] <= theirs["paths"]
+    assert ours["angle_mean"] == pytest.approx(theirs["angle_mean"], abs=2.0)
+    assert ours["efficiency"] == pytest.approx(theirs["efficiency"], abs=0.03)
+    assert ours["coverage"] == pytest.approx(theirs["coverage"], abs=0.03)
+    assert ours["crossings"] == 0
+    assert ours["self_crossings"] == 0
+    assert ours["spacing_below"] < 0.25 * theirs["spacing_below"]
+
+
+@pytest.mark.parametrize("name", ["concentric", "zigzag", "contour_zigzag"])
+def test_full_fill_keeps_strands_apart(loop, name):
+    stress, layers, _ = loop
+    total = evaluate(plan(create(name), layers[:2], stress, MACHINE), layers[:2], stress, MACHINE)
+    assert total.total["spacing_below"] < 0.01
+    assert total.total["spacing_1"] > 0.98
+    assert total.total["outside_length"] == 0.0
