@@ -75,9 +75,8 @@ def sample_coverage(paths: PlanePaths, stress: LayerStress, width: float) -> Cov
     stress : LayerStress
         Stress on the same layer; its nodal values are used, interpolated in the triangles.
     width : float, mm
-        Fibre width W: the band that a path covers. Grid points lie 0.2 W apart, so that the
-        area of a straight strand along an axis is exact, and an area of A mm^2 with a boundary of
-        B mm is exact to about 0.05 W B^(1/2).
+        Fibre width W: the band that a path covers. Grid points lie 0.2 W apart, so that a
+        straight strand along an axis of the layer counts with its exact width.
     """
     layer = paths.layer
     step = 0.2 * width

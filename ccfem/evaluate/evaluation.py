@@ -41,6 +41,9 @@ COLUMNS: tuple[Column, ...] = (
 )
 """Every index in the order of the tables."""
 
+_ROUNDING = 1e-3
+"""Rounding, mm, of coordinates in path files."""
+
 
 @dataclass(frozen=True)
 class Evaluation:
@@ -148,7 +151,7 @@ def _check_layers(toolpaths: Toolpaths, layers: Sequence[Layer]) -> None:
             )
         layer = known[index]
         apart = np.abs(toolpaths.on_layer(index).points @ layer.frame[2] - layer.height).max()
-        if apart > 0.5 * layer.thickness:
+        if apart > 0.5 * layer.thickness + _ROUNDING:
             raise InputError(
                 f"a path of layer {index} lies {apart:.3g} mm above or below it: give the layers "
                 "that the paths were planned on"
