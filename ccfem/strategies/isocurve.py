@@ -14,7 +14,7 @@ from typing import Any, ClassVar, Literal, get_args
 import numpy as np
 from scipy.spatial import cKDTree
 
-from ccfem.arrays import FloatArray
+from ccfem.arrays import BoolArray, FloatArray
 from ccfem.elasticity.stress_field import LayerStress, StressField
 from ccfem.errors import InputError
 from ccfem.fields.compatibility import Incompatible
@@ -268,11 +268,15 @@ class _Planner:
         enough = curves.interpolate(surface.to_points(confidence)) >= self.strategy.floor
         kept = []
         for a, b in itertools.pairwise(curves.offsets):
-            inside = np.flatnonzero(enough[a:b])
-            if np.array_equal(curves.points[a], curves.points[b - 1]):
-                kept.append(curves.points[a:b])
-            elif len(inside) > 1:
-                kept.append(curves.points[a + inside[0] : a + inside[-1] + 1])
+            line, worth = curves.points[a:b], enough[a:b]
+            if np.array_equal(line[0], line[-1]) and not worth.all():
+                # A closed curve is opened in the middle of its longest stretch of low stress.
+                middle = _longest_run(~worth[:-1])
+                line = np.roll(line[:-1], -middle, axis=0)
+                worth = np.roll(worth[:-1], -middle)
+            inside = np.flatnonzero(worth)
+            if len(inside) > 1:
+                kept.append(line[inside[0] : inside[-1] + 1])
         return kept
 
     def connected(
@@ -310,6 +314,15 @@ def _nearest(layer: Layer, values: FloatArray) -> Callable[[FloatArray], FloatAr
     """Return a function that gives points (k, 2) the value of the nearest triangle."""
     tree = cKDTree(layer.plane_points[layer.triangles].mean(axis=1))
     return lambda points: values[tree.query(points)[1]]
+
+
+def _longest_run(mask: BoolArray) -> int:
+    """Index of the middle of the longest run of true values on a ring of values."""
+    twice = np.concatenate([[False], mask, mask, [False]]).astype(np.int8)
+    edges = np.flatnonzero(np.diff(twice))
+    starts, ends = edges[::2], edges[1::2]
+    longest = int(np.argmax(ends - starts))
+    return int(starts[longest] + ends[longest]) // 2 % len(mask)
 
 
 def _length(line: FloatArray) -> float:
