@@ -16,6 +16,10 @@ from ccfem.tensor import in_plane
 __all__ = ["MeshTension", "SampledTension", "layer_tension", "mesh_tension"]
 
 
+_ANY_COMPRESSION = 1e12
+"""Limit of compression over tension that rules nothing out."""
+
+
 @dataclass(frozen=True)
 class SampledTension:
     """Tension on the t triangles of a layer.
@@ -65,8 +69,8 @@ def layer_tension(
 
 def _absolute(tension: Tension, plane: FloatArray) -> Tension:
     """Direction and size of the principal stress of the largest size, whatever its sign."""
-    pulled = plane_tension(plane, np.inf)
-    pushed = plane_tension(-plane, np.inf)
+    pulled = plane_tension(plane, _ANY_COMPRESSION)
+    pushed = plane_tension(-plane, _ANY_COMPRESSION)
     push = pushed.stress > pulled.stress
     return Tension(
         np.where(push[:, None], pushed.direction, pulled.direction),
@@ -117,7 +121,7 @@ def mesh_tension(
     tensors = stress.stress if source == "cell" else stress.nodal[cells].mean(axis=1)
     tension = spatial_tension(tensors, compression_limit)
     if sense == "absolute":
-        pushed = spatial_tension(-tensors, np.inf)
+        pushed = spatial_tension(-tensors, _ANY_COMPRESSION)
         push = pushed.stress > np.where(tension.defined, tension.stress, UNDEFINED)
         tension = Tension(
             np.where(push[:, None], pushed.direction, tension.direction),

@@ -269,8 +269,12 @@ class _Planner:
         kept = []
         for a, b in itertools.pairwise(curves.offsets):
             line, worth = curves.points[a:b], enough[a:b]
-            if np.array_equal(line[0], line[-1]) and not worth.all():
-                # A closed curve is opened in the middle of its longest stretch of low stress.
+            if np.array_equal(line[0], line[-1]):
+                # A closed curve that mostly is worth its fibre stays whole: opened, it would lose
+                # the hold of its return. Any other is opened amid its longest low stretch.
+                if worth.mean() >= 0.5:
+                    kept.append(line)
+                    continue
                 middle = _longest_run(~worth[:-1])
                 line = np.roll(line[:-1], -middle, axis=0)
                 worth = np.roll(worth[:-1], -middle)
