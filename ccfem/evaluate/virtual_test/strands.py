@@ -147,7 +147,9 @@ def _grid(mesh: TetMesh) -> tuple[FloatArray, float, IntArray, IntArray, IntArra
     """Boxes of a regular grid with the cells that may touch each: corner, spacing, shape, CSR."""
     corners = mesh.points[mesh.corners]
     low, high = corners.min(axis=1), corners.max(axis=1)
-    spacing = float(np.mean(high - low))
+    extent = np.prod(mesh.bounds[1] - mesh.bounds[0])
+    # The second keeps the number of boxes near that of the cells in parts that are mostly empty.
+    spacing = max(float(np.mean(high - low)), float(np.cbrt(extent / (4 * len(low)))))
     margin = 1e-6 * spacing
     first = mesh.bounds[0] - 2.0 * margin
     shape = np.floor((mesh.bounds[1] + 2.0 * margin - first) / spacing).astype(np.int64) + 1

@@ -165,6 +165,18 @@ def test_a_gap_in_the_part_is_outside():
     assert strands.outside == pytest.approx(1.0)
 
 
+def test_a_small_part_far_from_another_needs_no_large_grid():
+    near = kuhn(shape=(3, 2, 2), size=(0.03, 0.02, 0.02))
+    far = near.points + 500.0
+    mesh = TetMesh(
+        np.concatenate([near.points, far]),
+        np.concatenate([near.cells, near.cells + len(near.points)]),
+    )
+    line = np.array([[0.001, 0.01, 0.011], [0.029, 0.012, 0.011]])
+    strands = cut_strands(toolpaths(line, line + 500.0), mesh)
+    assert strands.total == pytest.approx(2 * np.hypot(0.028, 0.002), rel=1e-9)
+
+
 @pytest.mark.parametrize(
     "paths",
     [
