@@ -3,14 +3,20 @@
 import time
 from collections.abc import Callable, Iterator, Mapping, Sequence
 from contextlib import contextmanager
-from dataclasses import replace
+from dataclasses import dataclass, field, replace
 from typing import Any
 
 from ccfem.cases.case import Case
 from ccfem.comparison import Comparison, Run, Tested
 from ccfem.elasticity.solve import solve
 from ccfem.elasticity.stress_field import StressField
-from ccfem.equal_fibre import Planned, check_wanted, length_per_layer, plan_to_length
+from ccfem.equal_fibre import (
+    TOLERANCE,
+    Planned,
+    check_wanted,
+    length_per_layer,
+    plan_to_length,
+)
 from ccfem.errors import InputError, SolveError
 from ccfem.evaluate import evaluate
 from ccfem.evaluate.virtual_test.equilibrium import BONDED, TENSION
@@ -118,7 +124,8 @@ def compare(
     Strategies are compared at equal length of fibre: more fibre wins almost any comparison. When no
     length is given, it is the smallest that any of them lays of its own accord, so that nobody has
     to lay more than it would, and all others are thinned to it by the parameter that each names for
-    the purpose. A strategy that fails stays in the result, with the reason.
+    the purpose. Where one cannot be thinned so far, its least is the length for all. A strategy
+    that fails stays in the result, with the reason.
 
     Parameters
     ----------
@@ -161,93 +168,112 @@ def compare(
     stress, stack, seconds = solve_and_slice(case, layers, load_case, backend)
     spent: dict[str, dict[str, float]] = {name: {} for name in strategies}
     done = _Steps(progress, 0.1, 4 * len(strategies))
-
-    found: dict[str, Planned | str] = {}
-    if fibre_per_layer is None:
-        for name, strategy in strategies.items():
-            done(f"planning {name}")
-            with _timed(spent[name], "plan"):
-                found[name] = _attempt(strategy, stack, stress, case)
-    wanted, setter = fibre_per_layer, ""
-    if fibre_per_layer is None and not natural:
-        wanted, setter = _smallest(found)
-    if wanted is not None:
-        for name, strategy in strategies.items():
-            if isinstance(found.get(name), str):
-                continue
-            done(f"fitting {name} to {wanted:.0f} mm a layer")
-            if name == setter:
-                continue
-            with _timed(spent[name], "plan"):
-                found[name] = _attempt(strategy, stack, stress, case, wanted)
+    planner = _Planner(stress, stack, case, spent, done, dict(strategies))
+    if fibre_per_layer is not None:
+        planner.plan_each(fibre_per_layer)
+        wanted: float | None = fibre_per_layer
+    else:
+        planner.plan_each(None)
+        wanted = None if natural else planner.level()
     runs = []
-    for name, strategy in strategies.items():
+    for name in strategies:
         done(f"evaluating {name}")
-        note = "lays the least of its own accord: sets the length" if name == setter else ""
-        runs.append(_evaluated(name, strategy, found[name], stack, stress, case, spent[name], note))
+        runs.append(_evaluated(name, planner, spent[name]))
     if strand is not None:
         runs = _all_tested(runs, stress, strand, backend, spent, done)
     return Comparison(case, stress, stack, tuple(runs), wanted, seconds)
 
 
-def _attempt(
-    strategy: Strategy,
-    layers: Sequence[Layer],
-    stress: StressField,
-    case: Case,
-    wanted: float | None = None,
-) -> Planned | str:
-    """Plan, or the reason why that failed."""
-    try:
+@dataclass
+class _Planner:
+    """Plans of several strategies on one part, brought to the same length."""
+
+    stress: StressField
+    layers: tuple[Layer, ...]
+    case: Case
+    spent: Mapping[str, dict[str, float]]
+    done: Callable[[str], None]
+    strategies: dict[str, Strategy]
+    found: dict[str, Planned] = field(default_factory=dict)
+    failures: dict[str, str] = field(default_factory=dict)
+
+    def plan_each(self, wanted: float | None, but: str = "") -> None:
+        """Plan every strategy that has not failed, to a length per layer or of its own accord."""
+        for name, strategy in self.strategies.items():
+            if name in self.failures or name == but:
+                continue
+            amount = "" if wanted is None else f" to {wanted:.0f} mm a layer"
+            self.done(f"planning {name}{amount}")
+            try:
+                with _timed(self.spent[name], "plan"):
+                    self.found[name] = self.planned(strategy, wanted)
+            except (InputError, SolveError) as error:
+                self.failures[name] = str(error)
+
+    def planned(self, strategy: Strategy, wanted: float | None) -> Planned:
+        """Plan one strategy."""
+        machine = self.case.machine
         if wanted is not None:
-            return plan_to_length(strategy, layers, stress, case.machine, wanted)
-        toolpaths = plan(strategy, layers, stress, case.machine)
-    except (InputError, SolveError) as error:
-        return str(error)
-    return Planned(strategy, toolpaths, length_per_layer(toolpaths, layers))
+            return plan_to_length(strategy, self.layers, self.stress, machine, wanted)
+        toolpaths = plan(strategy, self.layers, self.stress, machine)
+        return Planned(strategy, toolpaths, length_per_layer(toolpaths, self.layers))
+
+    def level(self) -> float | None:
+        """Bring all plans to the smallest natural length, or the smallest that all can go down to.
+
+        Returns
+        -------
+        float, mm, or None
+            The length; None where nobody lays fibre.
+        """
+        lengths = {n: one.length_per_layer for n, one in self.found.items() if len(one.toolpaths)}
+        if not lengths:
+            return None
+        setter = min(lengths, key=lengths.__getitem__)
+        wanted, note = lengths[setter], "lays the least of its own accord: sets the length"
+        self.plan_each(wanted, but=setter)
+        lengths = {name: one.length_per_layer for name, one in self.found.items()}
+        longest = max(lengths, key=lengths.__getitem__)
+        if lengths[longest] > (1.0 + TOLERANCE) * wanted:
+            setter, wanted = longest, lengths[longest]
+            note = (
+                f"cannot lay less, at {_amount_text(self.found[setter].strategy)}: sets the length"
+            )
+            self.plan_each(wanted, but=setter)
+        self.found[setter] = replace(self.found[setter], note=note)
+        return wanted
 
 
-def _smallest(found: Mapping[str, Planned | str]) -> tuple[float | None, str]:
-    """Smallest length that a strategy lays, and its name; None and "" where none lays any."""
-    lengths = {
-        name: one.length_per_layer
-        for name, one in found.items()
-        if isinstance(one, Planned) and one.length_per_layer > 0.0
-    }
-    if not lengths:
-        return None, ""
-    name = min(lengths, key=lengths.__getitem__)
-    return lengths[name], name
+def _amount_text(strategy: Strategy) -> str:
+    parameter = strategy.amount.parameter
+    return f"{parameter} = {getattr(strategy, parameter):g}"
 
 
-def _evaluated(
-    name: str,
-    strategy: Strategy,
-    planned: Planned | str,
-    layers: Sequence[Layer],
-    stress: StressField,
-    case: Case,
-    seconds: dict[str, float],
-    note: str,
-) -> Run:
-    if isinstance(planned, str):
-        return Run(name, strategy, Toolpaths.empty(), None, failure=planned, seconds=seconds)
+def _evaluated(name: str, planner: _Planner, seconds: dict[str, float]) -> Run:
+    """Evaluate what was planned, or say why there is nothing to evaluate."""
+    if name in planner.failures:
+        failure = planner.failures[name]
+        strategy = planner.strategies[name]
+        return Run(name, strategy, Toolpaths.empty(), None, failure=failure, seconds=seconds)
+    planned = planner.found[name]
+    evaluation, failure = None, ""
     if not len(planned.toolpaths):
         failure = "laid no fibre: the layers are too thin, or the shortest strand is too long"
-        return Run(name, strategy, planned.toolpaths, None, failure=failure, seconds=seconds)
-    evaluation, failure = None, ""
-    try:
-        with _timed(seconds, "evaluate"):
-            evaluation = evaluate(planned.toolpaths, layers, stress, case.machine)
-    except (InputError, SolveError) as error:
-        failure = str(error)
+    else:
+        try:
+            with _timed(seconds, "evaluate"):
+                evaluation = evaluate(
+                    planned.toolpaths, planner.layers, planner.stress, planner.case.machine
+                )
+        except (InputError, SolveError) as error:
+            failure = str(error)
     return Run(
         name,
         planned.strategy,
         planned.toolpaths,
         evaluation,
         length_per_layer=planned.length_per_layer,
-        note=planned.note or note,
+        note=planned.note,
         failure=failure,
         seconds=seconds,
     )

@@ -17,9 +17,9 @@ from ccfem.machine import Machine
 from ccfem.strategies.strategy import Amount, Strategy, plan
 from ccfem.toolpaths import FIBRE, Toolpaths
 
-__all__ = ["Planned", "check_wanted", "length_per_layer", "plan_to_length"]
+__all__ = ["TOLERANCE", "Planned", "check_wanted", "length_per_layer", "plan_to_length"]
 
-_TOLERANCE = 0.01
+TOLERANCE = 0.01
 """Share by which the length may fall short before the search stops."""
 _ROUNDS = 4
 """Plans of the whole stack."""
@@ -69,7 +69,7 @@ def plan_to_length(
     stress: StressField,
     machine: Machine,
     wanted: float,
-    tolerance: float = _TOLERANCE,
+    tolerance: float = TOLERANCE,
 ) -> Planned:
     """Plan with the value of the amount parameter that lays at most the wanted fibre.
 

@@ -6,6 +6,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from ccfem.comparison import Comparison, Run
+from ccfem.equal_fibre import TOLERANCE
 from ccfem.evaluate import Column
 from ccfem.evaluate.virtual_test.verdict import UNDECIDED
 from ccfem.evaluate.virtual_test.verdict import verdict as verdict_of_pair
@@ -167,10 +168,11 @@ def cell_text(run: Run, head: Headline) -> tuple[str, str]:
 
 
 def best_values(comparison: Comparison) -> dict[str, float]:
-    """Best value of each headline column where the runs differ."""
+    """Best value of each headline column where the runs differ; too much fibre does not count."""
     best = {}
+    equal = [run for run in comparison.succeeded if not _too_long(run, comparison)]
     for head in HEADLINE:
-        values = [headline_values(run).get(head.column, np.nan) for run in comparison.succeeded]
+        values = [headline_values(run).get(head.column, np.nan) for run in equal]
         known = [value for value in values if np.isfinite(value)]
         if head.better and len(known) > 1 and min(known) < max(known):
             best[head.column] = max(known) if head.better == "high" else min(known)
@@ -181,12 +183,14 @@ def ranking(comparison: Comparison) -> tuple[Run, ...]:
     """Return the runs from the best to the worst, failed ones last.
 
     By the predicted stiffness with fibres that carry tension only; those without a virtual test
-    come after, by efficiency.
+    come after, by efficiency. A run that lays more than the wanted fibre comes after all that do
+    not.
     """
 
-    def score(run: Run) -> tuple[bool, float, bool, float]:
+    def score(run: Run) -> tuple[bool, bool, float, bool, float]:
         ratio, efficiency = _ratio(run), headline_values(run).get("efficiency", np.nan)
         return (
+            _too_long(run, comparison),
             not np.isfinite(ratio),
             -np.nan_to_num(ratio),
             run.evaluation is None,
@@ -206,7 +210,8 @@ def remarks(comparison: Comparison) -> list[str]:
         if run.tested is not None and run.tested.note:
             about.append(f"no first-failure load: {run.tested.note}")
         if run.note:
-            about.append(run.note)
+            placed = ", so it is placed last" if _too_long(run, comparison) else ""
+            about.append(f"{run.note}{placed}")
         for line in about:
             lines.setdefault(line, []).append(run.name)
     found = [f"{', '.join(names)}: {line}" for line, names in lines.items()]
@@ -258,6 +263,11 @@ def verdict(comparison: Comparison) -> str:
         f"unreinforced one, and {_ratio(first) / _ratio(second):.2f} times {second.name} "
         "(predicted, fibres carrying tension only; bonded fibres agree on the order)."
     )
+
+
+def _too_long(run: Run, comparison: Comparison) -> bool:
+    wanted = comparison.fibre_per_layer
+    return wanted is not None and run.length_per_layer > (1.0 + TOLERANCE) * wanted
 
 
 def _ratio(run: Run, mode: str = "tension") -> float:

@@ -96,6 +96,31 @@ def test_opposite_orders_are_undecided(compared):
     assert verdict(same).startswith(f"{first.name} makes the stiffest part")
 
 
+def test_the_least_that_all_can_go_down_to_sets_the_length():
+    rings = create("contour_zigzag", {"contours": 4})
+    strategies = {"rings": rings, "zigzag": create("zigzag", {"spacing": 12.0})}
+    result = compare(strip(), strategies, strand=None)
+    least = plan(replace(rings, spacing=20.0), result.layers, result.stress, result.case.machine)
+    assert result.fibre_per_layer == length_per_layer(least, result.layers)
+    set_by, other = result.runs
+    assert set_by.note == "cannot lay less, at spacing = 20: sets the length"
+    assert 0.95 * result.fibre_per_layer <= other.length_per_layer <= result.fibre_per_layer
+
+
+def test_more_fibre_than_wanted_comes_last():
+    strategies = {
+        "rings": create("contour_zigzag", {"contours": 4}),
+        "zigzag": create("zigzag", {"turn": 0.0}),
+    }
+    result = compare(strip(), strategies, fibre_per_layer=300.0)
+    rings, zigzag = result.runs
+    assert rings.length_per_layer > 330.0
+    assert rings.tested.bracket.tension.ratio > zigzag.tested.bracket.tension.ratio
+    assert ranking(result) == (zigzag, rings)
+    assert any("rings: lays" in line and "placed last" in line for line in remarks(result))
+    assert "stiffness_ratio_tension" not in best_values(result)
+
+
 def test_a_strategy_that_fails_stays_with_its_reason():
     result = compare(strip(), ["isocurve", "zigzag"], load_case="push")
     isocurve, zigzag = result.runs
