@@ -62,11 +62,14 @@ class Isocurve:
     Attributes
     ----------
     cap : float, default 84
-        Percentile (by area of the layer) of the stress above which the density grows no more.
-        The knob for how much fibre a layer gets: without it one hot spot sets the spacing of the
-        whole layer.
+        Percentile (by area of the layer) of the stress above which the density grows no more:
+        without it one hot spot sets the spacing of the whole layer.
     floor : float, default 0.6
         Ends of isocurves are cut back to where the stress is at least this share of the cap.
+    density : float > 0, default 1
+        The knob for how much fibre a layer gets: strands lie as densely as they can where the
+        stress is above ``cap / density``, and in proportion to the stress elsewhere. With
+        ``spacing="search"`` the number of isocurves is scaled instead.
     power : float, default 1
         p of Eq. 5: density as stress to this power; 0 gives uniform density.
     spacing_weight : float, default 0.1
@@ -109,6 +112,7 @@ class Isocurve:
 
     cap: float = 84.0
     floor: float = 0.6
+    density: float = 1.0
     power: float = 1.0
     spacing_weight: float = 0.1
     fill_length: float = 1.5
@@ -127,7 +131,7 @@ class Isocurve:
     boundary_links: bool = True
     trim: bool = True
 
-    amount: ClassVar[Amount] = Amount("cap", most=40.0, least=100.0)
+    amount: ClassVar[Amount] = Amount("density", most=4.0, least=0.05)
 
     def __post_init__(self) -> None:
         choices = {
@@ -152,6 +156,8 @@ class Isocurve:
             )
         if not 0.0 < self.cap <= 100.0:
             raise InputError(f"isocurve.cap must be a percentile in (0, 100]; got {self.cap!r}")
+        if not 0.0 < self.density < np.inf:
+            raise InputError(f"isocurve.density must be a finite number > 0; got {self.density!r}")
         for name in ("power", "spacing_weight", "fill_length", "link_limit"):
             if not 0.0 <= getattr(self, name) < np.inf:
                 raise InputError(
@@ -246,7 +252,7 @@ class _Planner:
             if not tension.oriented:
                 direction = orient(direction, surface.neighbours)
             direction, size = fill_laplacian(surface, direction, tension.stress, tension.defined)
-        density = np.clip(size / cap, 1e-9, 1.0) ** s.power
+        density = np.clip(s.density * size / cap, 1e-9, 1.0) ** s.power
         weight = np.maximum(confidence, _LEAST_WEIGHT)
         if s.spacing != "search":
             fit = fit_constrained if s.spacing == "constrained" else fit_cone
@@ -257,7 +263,9 @@ class _Planner:
             values = fit_literal(surface, density[:, None] * direction)
         else:
             values = fit_weighted(surface, direction, density, weight, s.spacing_weight)
-        return self.worthwhile(extract_levels(surface, values, width), surface, confidence)
+        return self.worthwhile(
+            extract_levels(surface, values, width / min(s.density, 1.0)), surface, confidence
+        )
 
     def worthwhile(
         self, curves: Isocontours, surface: Surface, confidence: FloatArray
