@@ -2,8 +2,6 @@
 
 import dataclasses
 import os
-import sys
-from pathlib import Path
 
 import numpy as np
 import pytest
@@ -196,8 +194,7 @@ needs_authors_data = pytest.mark.skipif(
 @needs_authors_data
 def test_figures_on_the_authors_loop() -> None:
     """The promises on the authors' Loop, at no more fibre than theirs (34.658 m)."""
-    sys.path.insert(0, str(Path(__file__).parents[2] / "benchmarks" / "papers" / "chen_2021"))
-    from loop import authors_loop
+    from benchmarks.papers.chen_2021.loop import authors_loop
 
     case = authors_loop()
     field = next(iter(solve(case.problem).values()))

@@ -1,6 +1,6 @@
 """Virtual tests of the authors' own paths for the Loop, beside their physical tests.
 
-    CCFEM_CHEN2021=folder python benchmarks/papers/chen_2021/virtual_test.py
+    CCFEM_CHEN2021=folder python -m benchmarks.papers.chen_2021.virtual_test
 
 The authors printed and pulled one Loop without fibre, one with zigzag-contour paths and one with
 their own. Stiffness ratios of the physical tests are slopes read from their force-displacement
@@ -11,8 +11,8 @@ spread evenly over the height of 10 mm.
 from dataclasses import replace
 
 import numpy as np
-from loop import LAYERS_TABLE_2, authors_folder, authors_loop
 
+from benchmarks.papers.chen_2021.loop import LAYERS_TABLE_2, authors_folder, authors_loop
 from ccfem.elasticity.problem import Bearing
 from ccfem.elasticity.solve import solve
 from ccfem.evaluate.virtual_test.oriented import oriented_ratio

@@ -1,8 +1,6 @@
 """The authors' own paths on their own mesh: ratios that another program found for them."""
 
 import os
-import sys
-from pathlib import Path
 
 import pytest
 
@@ -17,18 +15,12 @@ pytestmark = pytest.mark.skipif(
     "CCFEM_CHEN2021" not in os.environ, reason="the authors' data is not here"
 )
 
-FOLDER = Path(__file__).parents[3] / "benchmarks" / "papers" / "chen_2021"
-
 
 @pytest.fixture(scope="module")
 def benchmark():
-    with pytest.MonkeyPatch.context() as patch:
-        patch.syspath_prepend(str(FOLDER))
-        import virtual_test as module
+    from benchmarks.papers.chen_2021 import virtual_test as module
 
-        yield module
-        for name in ("virtual_test", "loop"):
-            sys.modules.pop(name, None)
+    return module
 
 
 @pytest.fixture(scope="module")
