@@ -11,41 +11,56 @@ from ccfem.arrays import FloatArray
 __all__ = ["GaussSeidel"]
 
 
-@njit(cache=True)
-def _less_row(low, high, indices, data, x, a, b, c):  # type: ignore[no-untyped-def]
-    """Subtract the product of some blocks of a row with x from (a, b, c)."""
-    for s in range(low, high):
-        j, k = 3 * np.uint32(indices[s]), 9 * s
-        u, v, w = x[j], x[j + 1], x[j + 2]
-        a -= data[k] * u + data[k + 1] * v + data[k + 2] * w
-        b -= data[k + 3] * u + data[k + 4] * v + data[k + 5] * w
-        c -= data[k + 6] * u + data[k + 7] * v + data[k + 8] * w
-    return a, b, c
+# Both sweeps run through the blocks in the order of memory, forward or backward, and read each row
+# whole: three times as fast as reading half rows or ascending within descending rows.
 
 
 @njit(cache=True)
-def _sweep(indptr, indices, diagonal, data, inverse, rhs, x, residual):  # type: ignore[no-untyped-def]
-    """One sweep in place: forward from x = 0, or backward from x where residual is empty.
+def _forward(indptr, indices, data, inverse, rhs, x, residual):  # type: ignore[no-untyped-def]
+    """Sweep from x = 0, and leave the residual ``-U x``, U the strict upper triangle.
 
-    Forward also gives the residual it leaves, ``-U x`` with the strict upper triangle U.
+    Row i knows x up to i; what it adds to the residual of the rows above comes from its own lower
+    blocks, since the matrix is symmetric.
     """
-    n = indptr.size - 1
-    forward = residual.size > 0
-    for row in range(n):
-        i = row if forward else n - 1 - row
+    for i in range(indptr.size - 1):
         a, b, c = rhs[3 * i], rhs[3 * i + 1], rhs[3 * i + 2]
-        a, b, c = _less_row(indptr[i], diagonal[i], indices, data, x, a, b, c)
-        if not forward:
-            a, b, c = _less_row(diagonal[i] + 1, indptr[i + 1], indices, data, x, a, b, c)
+        for s in range(indptr[i], indptr[i + 1]):
+            j, k = 3 * indices[s], 9 * s
+            u, v, w = x[j], x[j + 1], x[j + 2]
+            a -= data[k] * u + data[k + 1] * v + data[k + 2] * w
+            b -= data[k + 3] * u + data[k + 4] * v + data[k + 5] * w
+            c -= data[k + 6] * u + data[k + 7] * v + data[k + 8] * w
+        k = 9 * i
+        u = inverse[k] * a + inverse[k + 1] * b + inverse[k + 2] * c
+        v = inverse[k + 3] * a + inverse[k + 4] * b + inverse[k + 5] * c
+        w = inverse[k + 6] * a + inverse[k + 7] * b + inverse[k + 8] * c
+        x[3 * i], x[3 * i + 1], x[3 * i + 2] = u, v, w
+        for s in range(indptr[i], indptr[i + 1]):
+            if indices[s] >= i:
+                break
+            j, k = 3 * indices[s], 9 * s
+            residual[j] -= data[k] * u + data[k + 3] * v + data[k + 6] * w
+            residual[j + 1] -= data[k + 1] * u + data[k + 4] * v + data[k + 7] * w
+            residual[j + 2] -= data[k + 2] * u + data[k + 5] * v + data[k + 8] * w
+
+
+@njit(cache=True)
+def _backward(indptr, indices, data, inverse, rhs, x):  # type: ignore[no-untyped-def]
+    """Sweep backward over x, in place."""
+    for i in range(indptr.size - 2, -1, -1):
+        a, b, c = rhs[3 * i], rhs[3 * i + 1], rhs[3 * i + 2]
+        for s in range(indptr[i + 1] - 1, indptr[i] - 1, -1):
+            if indices[s] == i:
+                continue
+            j, k = 3 * indices[s], 9 * s
+            u, v, w = x[j], x[j + 1], x[j + 2]
+            a -= data[k] * u + data[k + 1] * v + data[k + 2] * w
+            b -= data[k + 3] * u + data[k + 4] * v + data[k + 5] * w
+            c -= data[k + 6] * u + data[k + 7] * v + data[k + 8] * w
         k = 9 * i
         x[3 * i] = inverse[k] * a + inverse[k + 1] * b + inverse[k + 2] * c
         x[3 * i + 1] = inverse[k + 3] * a + inverse[k + 4] * b + inverse[k + 5] * c
         x[3 * i + 2] = inverse[k + 6] * a + inverse[k + 7] * b + inverse[k + 8] * c
-    if forward:
-        for i in range(n):
-            residual[3 * i], residual[3 * i + 1], residual[3 * i + 2] = _less_row(
-                diagonal[i] + 1, indptr[i + 1], indices, data, x, 0.0, 0.0, 0.0
-            )
 
 
 class GaussSeidel:
@@ -66,18 +81,17 @@ class GaussSeidel:
         self._arguments: tuple[Any, ...] = (
             indptr,
             indices,
-            diagonal.astype(np.int32),
             matrix.data.reshape(-1),
             inverse.reshape(-1),
         )
 
     def forward(self, rhs: FloatArray) -> tuple[FloatArray, FloatArray]:
         """Sweep forward from zero: the approximation (3n,) and the residual (3n,) it leaves."""
-        x, residual = np.zeros_like(rhs), np.empty_like(rhs)
-        _sweep(*self._arguments, rhs, x, residual)
+        x, residual = np.zeros_like(rhs), np.zeros_like(rhs)
+        _forward(*self._arguments, rhs, x, residual)
         return x, residual
 
     def backward(self, rhs: FloatArray, x: FloatArray) -> FloatArray:
         """Sweep backward over the approximation x (3n,), in place, and return it."""
-        _sweep(*self._arguments, rhs, x, np.empty(0))
+        _backward(*self._arguments, rhs, x)
         return x
