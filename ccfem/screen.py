@@ -25,13 +25,15 @@ __all__ = ["print_cases", "print_comparison", "print_strategies"]
 
 
 def print_cases() -> None:
-    """Print the name and title of every case."""
+    """Print the cases, what they are, and their parameters with defaults."""
     from ccfem.cases import named_cases
 
-    table = Table("case", "what it is", box=None, header_style="bold")
+    console = Console(highlight=False)
     for name, about in sorted(named_cases().items()):
-        table.add_row(name, _first_line(about))
-    Console().print(table)
+        console.print(f"[bold]{name}[/bold]  {_first_line(about)}")
+        parameters = inspect.signature(about).parameters.values()
+        given = ", ".join(f"{each.name} = {each.default!r}" for each in parameters)
+        console.print(f"    {given}", markup=False)
 
 
 def print_strategies() -> None:

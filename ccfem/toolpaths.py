@@ -94,7 +94,7 @@ class Toolpaths:
         if not keep:
             return cls.empty()
         if closed is None:
-            closed = [bool(np.array_equal(line[0], line[-1])) for line in lines]
+            closed = [len(line) > 0 and np.array_equal(line[0], line[-1]) for line in lines]
         sizes = [len(lines[k]) for k in keep]
         points = layer.to_space(np.concatenate([lines[k] for k in keep]))
         return cls(

@@ -1,0 +1,100 @@
+# ---
+# jupyter:
+#   jupytext:
+#     formats: py:percent
+#   kernelspec:
+#     display_name: Python 3
+#     name: python3
+# ---
+
+# %% [markdown]
+# # First steps
+#
+# From a loaded part to compared fibre paths. Every arrow is one function:
+#
+#     TetMesh -> Problem -> StressField -> Layers -> Strategy -> Toolpaths -> Evaluation
+#
+# Units are mm, N and MPa.
+
+# %%
+import numpy as np
+
+from ccfem.cases import create_case
+from ccfem.compare import compare
+from ccfem.elasticity import solve
+from ccfem.evaluate import evaluate
+from ccfem.headline import headline_values, ranking, verdict
+from ccfem.layers import slice_planar
+from ccfem.strategies import create, plan
+
+# %% [markdown]
+# ## A part with its load
+#
+# A case is a mesh with named patches, a material, supports and loads, and a machine. Coarse
+# elements keep this short.
+
+# %%
+case = create_case("loop", element_size=4.0)
+print(case.title)
+print(len(case.problem.mesh.cells), "tetrahedra, patches", ", ".join(case.problem.mesh.patches))
+
+# %% [markdown]
+# ## Stress
+#
+# One stress field a load case. Every solve says how it went, and the supports must hold what pulls.
+
+# %%
+stress = solve(case.problem)["pull"]
+print(stress.record)
+pull = np.array([0.0, 1000.0, 0.0])
+assert np.allclose(stress.reactions.sum(axis=0), -pull, atol=1e-3)
+
+# %% [markdown]
+# ## Layers and paths
+#
+# A strategy is a small value whose fields are its parameters.
+
+# %%
+layers = slice_planar(case.problem.mesh, case.build, count=3)
+paths = plan(create("isocurve", {"cap": 90.0}), layers, stress, case.machine)
+print(len(paths), "paths,", round(paths.lengths.sum() / 1000.0, 2), "m of fibre")
+assert paths.lengths.min() >= case.machine.minimum_length
+
+# %% [markdown]
+# ## Evaluation
+#
+# Every index for each layer and in total; `to_frame` gives a table.
+
+# %%
+evaluation = evaluate(paths, layers, stress, case.machine)
+print(evaluation.to_frame()[["fibre_length", "paths", "efficiency", "curvature_95"]])
+assert evaluation.total["outside_length"] == 0.0
+
+# %% [markdown]
+# ## Comparison
+#
+# Strategies at equal length of fibre, ranked by the stiffness that the virtual test predicts: the
+# part is solved again with the fibres in it.
+
+# %%
+comparison = compare(case, layers=3)
+for run in ranking(comparison):
+    values = headline_values(run)
+    print(
+        f"{run.name:15} {run.length_per_layer:6.0f} mm a layer, "
+        f"stiffness x {values['stiffness_ratio_tension']:.2f}, "
+        f"efficiency {values['efficiency']:.2f}"
+    )
+print(verdict(comparison))
+
+# %% [markdown]
+# The headline: fibre along the tension makes the stiffest part, by a wide margin.
+
+# %%
+best, second = ranking(comparison)[:2]
+assert best.name == "isocurve"
+gain = best.tested.bracket.tension.stiffness / second.tested.bracket.tension.stiffness
+assert gain > 1.2
+# Nobody laid more than the common length, and the bonded test agrees on the order.
+assert all(run.length_per_layer <= 1.01 * comparison.fibre_per_layer for run in comparison.runs)
+assert verdict(comparison).startswith("isocurve makes the stiffest part")

@@ -1,0 +1,78 @@
+"""README and CONTRIBUTING are true: their examples run, their lists are complete."""
+
+import re
+import shutil
+import subprocess
+import sys
+import textwrap
+from pathlib import Path
+
+import pytest
+
+from ccfem.errors import InputError
+from ccfem.part_file import read_part
+from ccfem.strategies import named
+
+ROOT = Path(__file__).parents[1]
+README = (ROOT / "README.md").read_text()
+CONTRIBUTING = (ROOT / "CONTRIBUTING.md").read_text()
+
+
+def blocks(text, language):
+    """Fenced blocks of a language, without the indent of the list that they stand in."""
+    found = re.findall(rf"^( *)```{language}\n(.*?)^ *```$", text, flags=re.M | re.S)
+    return [textwrap.dedent(body) for _, body in found]
+
+
+def test_the_two_commands_are_there():
+    assert "    pip install -e . && ccfem compare loop\n" in README
+    assert '    pip install -e ".[test]" && pytest\n' in README
+
+
+def test_python_of_the_readme_runs(capsys):
+    space = {}
+    for block in blocks(README, "python"):
+        exec(compile(block, "README.md", "exec"), space)
+    said = capsys.readouterr().out
+    assert "efficiency" in said
+    assert "isocurve makes the stiffest part" in said
+
+
+def test_part_file_of_the_readme_lacks_nothing_but_its_mesh(tmp_path):
+    (block,) = blocks(README, "toml")
+    (tmp_path / "hook.toml").write_text(block)
+    with pytest.raises(InputError, match=r"hook.msh does not exist"):
+        read_part(tmp_path / "hook.toml")
+
+
+def test_every_strategy_is_in_the_readme():
+    for name in named():
+        assert f"| `{name}` |" in README
+
+
+def test_links_lead_somewhere():
+    for text in (README, CONTRIBUTING):
+        for target in re.findall(r"\]\(([^)]+)\)", text):
+            assert target.startswith("http") or (ROOT / target).exists(), target
+
+
+def test_adding_a_strategy_works_as_told(tmp_path):
+    """Do what CONTRIBUTING.md says, to the letter, in a copy of the project."""
+    for folder in ("ccfem", "data", "tests/laws", "tests/strategies"):
+        shutil.copytree(
+            ROOT / folder, tmp_path / folder, ignore=shutil.ignore_patterns("__pycache__")
+        )
+    shutil.copy(ROOT / "pyproject.toml", tmp_path)
+    module, test = blocks(CONTRIBUTING, "python")
+    (tmp_path / "ccfem/strategies/mean_tension.py").write_text(module)
+    (tmp_path / "tests/strategies/test_mean_tension.py").write_text(test)
+    (command,) = re.findall(r"^ +(pytest -n 0 .*mean_tension)$", CONTRIBUTING, flags=re.M)
+    done = subprocess.run(
+        [sys.executable, "-m", *command.split()],
+        cwd=tmp_path,
+        capture_output=True,
+        text=True,
+        check=False,
+    )
+    assert done.returncode == 0, done.stdout + done.stderr
+    assert re.search(r"\d+ passed", done.stdout)
