@@ -61,14 +61,15 @@ class Isocurve:
 
     Attributes
     ----------
-    cap : float, default 84
-        Percentile (by area of the layer) of the stress above which the density grows no more:
-        without it one hot spot sets the spacing of the whole layer.
-    floor : float, default 0.6
+    cap : float, default 86
+        Percentile (by area of the layer) of the stress that the density is measured by: were it
+        the largest, one hot spot would set the spacing of the whole layer.
+    floor : float, default 0.5
         Ends of isocurves are cut back to where the stress is at least this share of the cap.
     density : float > 0, default 1
-        The knob for how much fibre a layer gets: strands lie as densely as they can where the
-        stress is above ``cap / density``, and in proportion to the stress elsewhere. With
+        The knob for how much fibre a layer gets: density of strands where the stress is at the
+        cap, in shares of what fits side by side; elsewhere in proportion to the stress to the
+        power, and nowhere more than what fits. With
         ``spacing="search"`` the number of isocurves is scaled instead.
     power : float, default 1
         p of Eq. 5: density as stress to this power; 0 gives uniform density.
@@ -110,8 +111,8 @@ class Isocurve:
         Cut branches that come nearer than a strand's width to a longer one.
     """
 
-    cap: float = 84.0
-    floor: float = 0.6
+    cap: float = 86.0
+    floor: float = 0.5
     density: float = 1.0
     power: float = 1.0
     spacing_weight: float = 0.1
@@ -252,7 +253,7 @@ class _Planner:
             if not tension.oriented:
                 direction = orient(direction, surface.neighbours)
             direction, size = fill_laplacian(surface, direction, tension.stress, tension.defined)
-        density = np.clip(s.density * size / cap, 1e-9, 1.0) ** s.power
+        density = np.clip(s.density * np.clip(size / cap, 1e-9, None) ** s.power, None, 1.0)
         weight = np.maximum(confidence, _LEAST_WEIGHT)
         if s.spacing != "search":
             fit = fit_constrained if s.spacing == "constrained" else fit_cone
