@@ -1,10 +1,13 @@
 """Nodal forces of loads, consistent with linear and quadratic facets."""
 
 from collections.abc import Callable
+from functools import reduce
 
 import numpy as np
 
 from ccfem.arrays import FloatArray, IntArray
+from ccfem.elasticity.plane_mesh import PlaneMesh, Sheet
+from ccfem.elasticity.plane_problem import PlaneProblem
 from ccfem.elasticity.problem import (
     Bearing,
     Force,
@@ -20,20 +23,20 @@ from ccfem.mesh import TetMesh
 __all__ = ["facet_nodes", "load_case", "nodal_forces"]
 
 
-def facet_nodes(mesh: TetMesh, facets: IntArray) -> IntArray:
+def facet_nodes(mesh: TetMesh | PlaneMesh | Sheet, facets: IntArray) -> IntArray:
     """Nodes of facets: their corners, and on a quadratic mesh the middles of their sides.
 
     Parameters
     ----------
-    mesh : TetMesh
-    facets : (k, 3) int array
+    mesh : TetMesh, PlaneMesh or Sheet
+    facets : (k, 3) int array, or (k, 2) of the edges of a plane mesh
 
     Returns
     -------
-    (k, 3) or (k, 6) int array
+    (k, 3), (k, 6) or (k, 2) int array
         Middles in the order of the sides 01, 12, 20.
     """
-    if mesh.order == 1 or not len(facets):
+    if not isinstance(mesh, TetMesh) or mesh.order == 1 or not len(facets):
         return facets
     n = len(mesh.points)
     on_facet = np.zeros(n, dtype=bool)
@@ -51,7 +54,7 @@ def facet_nodes(mesh: TetMesh, facets: IntArray) -> IntArray:
     return np.hstack([facets, middle[at]])
 
 
-def _facets(mesh: TetMesh, name: str) -> IntArray:
+def _facets(mesh: TetMesh | Sheet, name: str) -> IntArray:
     """Facets of a patch that must not be empty."""
     facets = mesh.patch(name)
     if not len(facets):
@@ -59,13 +62,13 @@ def _facets(mesh: TetMesh, name: str) -> IntArray:
     return facets
 
 
-def _outward(mesh: TetMesh, name: str) -> tuple[IntArray, FloatArray, FloatArray]:
+def _outward(mesh: TetMesh | Sheet, name: str) -> tuple[IntArray, FloatArray, FloatArray]:
     """Facets of a patch with their areas and outward unit normals."""
     facets, n = _facets(mesh, name), len(mesh.points)
 
     def key(corners: IntArray) -> IntArray:
-        a, b, c = np.sort(corners, axis=1).T
-        return (a * n + b) * n + c
+        columns = np.sort(corners, axis=1).T
+        return np.asarray(reduce(lambda high, low: high * n + low, columns))
 
     known, wanted = key(mesh.boundary), key(facets)
     order = np.argsort(known)
@@ -78,43 +81,50 @@ def _outward(mesh: TetMesh, name: str) -> tuple[IntArray, FloatArray, FloatArray
     return facets, *mesh.facet_areas(facets)
 
 
-def _spread(mesh: TetMesh, facets: IntArray, forces: FloatArray) -> FloatArray:
-    """Nodal forces (n, 3) of forces (k, 3) spread evenly over facets.
+def _spread(mesh: TetMesh | Sheet, facets: IntArray, forces: FloatArray) -> FloatArray:
+    """Nodal forces (n, 3) of forces (k, 3) spread evenly over facets; (n, 2) of (k, 2) on a sheet.
 
-    A linear facet gives a third to each corner; a quadratic one a third to each middle.
+    A linear facet gives a third to each corner; a quadratic one a third to each middle; an edge
+    of a sheet a half to each end.
     """
     nodes = facet_nodes(mesh, facets)[:, -3:]
-    result = np.empty((len(mesh.points), 3))
-    for k in range(3):
-        weights = np.repeat(forces[:, k] / 3.0, 3)
+    share = nodes.shape[1]
+    result: FloatArray = np.zeros(mesh.points.shape)
+    for k in range(mesh.points.shape[1]):
+        weights = np.repeat(forces[:, k] / share, share)
         result[:, k] = np.bincount(nodes.reshape(-1), weights, len(mesh.points))
     return result
 
 
-def _force(mesh: TetMesh, load: Force) -> FloatArray:
+def _vector(mesh: TetMesh | Sheet, load: Force | Traction | Bearing | PointForce) -> FloatArray:
+    """Components of a load in the space of the mesh; PlaneProblem refuses one out of its plane."""
+    return np.array(load.vector, dtype=np.float64)[: mesh.points.shape[1]]
+
+
+def _force(mesh: TetMesh | Sheet, load: Force) -> FloatArray:
     facets = _facets(mesh, load.patch)
     area, _ = mesh.facet_areas(facets)
-    return _spread(mesh, facets, area[:, None] / area.sum() * np.array(load.vector))
+    return _spread(mesh, facets, area[:, None] / area.sum() * _vector(mesh, load))
 
 
-def _traction(mesh: TetMesh, load: Traction) -> FloatArray:
+def _traction(mesh: TetMesh | Sheet, load: Traction) -> FloatArray:
     facets = _facets(mesh, load.patch)
     area, _ = mesh.facet_areas(facets)
-    return _spread(mesh, facets, area[:, None] * np.array(load.vector))
+    return _spread(mesh, facets, area[:, None] * _vector(mesh, load))
 
 
-def _pressure(mesh: TetMesh, load: Pressure) -> FloatArray:
+def _pressure(mesh: TetMesh | Sheet, load: Pressure) -> FloatArray:
     facets, area, normal = _outward(mesh, load.patch)
     return _spread(mesh, facets, -load.magnitude * area[:, None] * normal)
 
 
-def _bearing(mesh: TetMesh, load: Bearing) -> FloatArray:
+def _bearing(mesh: TetMesh | Sheet, load: Bearing) -> FloatArray:
     """Pressure ``-normal . a`` where that is positive, the vector a fitted to the total force.
 
     On an evenly meshed half cylinder a is parallel to the force, and the pressure its cosine.
     """
     facets, area, normal = _outward(mesh, load.patch)
-    force = np.array(load.vector, dtype=np.float64)
+    force = _vector(mesh, load)
     touched = normal @ force < 0.0
     for _ in range(50):
         weighted = (area * touched)[:, None] * normal
@@ -132,11 +142,12 @@ def _bearing(mesh: TetMesh, load: Bearing) -> FloatArray:
     return _spread(mesh, facets, forces)
 
 
-def _point(mesh: TetMesh, load: PointForce) -> FloatArray:
+def _point(mesh: TetMesh | Sheet, load: PointForce) -> FloatArray:
     used = np.unique(mesh.cells)
-    distance = np.linalg.norm(mesh.points[used] - np.array(load.point), axis=1)
-    result = np.zeros((len(mesh.points), 3))
-    result[used[distance.argmin()]] = load.vector
+    point = np.array(load.point)[: mesh.points.shape[1]]
+    distance = np.linalg.norm(mesh.points[used] - point, axis=1)
+    result = np.zeros(mesh.points.shape)
+    result[used[distance.argmin()]] = _vector(mesh, load)
     return result
 
 
@@ -149,17 +160,17 @@ _KINDS: dict[type, Callable[..., FloatArray]] = {
 }
 
 
-def nodal_forces(mesh: TetMesh, load: Load) -> FloatArray:
+def nodal_forces(mesh: TetMesh | Sheet, load: Load) -> FloatArray:
     """Return the forces at the nodes that do the same work as a load.
 
     Parameters
     ----------
-    mesh : TetMesh
+    mesh : TetMesh or Sheet
     load : Force, Traction, Pressure, Bearing or PointForce
 
     Returns
     -------
-    (n, 3) array, N
+    (n, 3) array, or (n, 2) on a sheet, N
 
     Raises
     ------
@@ -176,16 +187,16 @@ def nodal_forces(mesh: TetMesh, load: Load) -> FloatArray:
     return _KINDS[type(load)](mesh, load)
 
 
-def load_case(problem: Problem, name: str) -> FloatArray:
-    """Nodal forces (n, 3), N, of one load case of a problem.
+def load_case(problem: Problem | PlaneProblem, name: str) -> FloatArray:
+    """Nodal forces (n, 3), or (n, 2) in the plane, N, of one load case of a problem.
 
     Raises
     ------
     InputError
         For a bad load, or when the loads cancel at every node and no support moves.
     """
-    mesh = problem.mesh
-    total = np.zeros((len(mesh.points), 3))
+    mesh = problem.sheet if isinstance(problem, PlaneProblem) else problem.mesh
+    total = np.zeros(mesh.points.shape)
     largest = 0.0
     for load in problem.loads[name]:
         forces = nodal_forces(mesh, load)

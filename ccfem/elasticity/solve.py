@@ -1,8 +1,10 @@
 """The solve: from a problem to the stress field of every load case."""
 
+from collections.abc import Callable
 from dataclasses import dataclass, replace
 from functools import cached_property
 from time import perf_counter
+from typing import Protocol, TypeVar
 
 import numpy as np
 import scipy.sparse as sp
@@ -19,7 +21,10 @@ from ccfem.errors import InputError, SolveError
 from ccfem.mesh import TetMesh
 from ccfem.tensor import rotate_stiffness
 
-__all__ = ["System", "cell_stiffness", "prepare", "solve"]
+__all__ = ["System", "cell_stiffness", "prepare", "solve", "solve_system"]
+
+ProblemT = TypeVar("ProblemT")
+FieldT = TypeVar("FieldT", covariant=True)
 
 
 def cell_stiffness(problem: Problem) -> FloatArray:
@@ -152,6 +157,34 @@ def solve(
     SolveError
         When a relative residual stays above the tolerance.
     """
+    return solve_system(prepare, problem, backend, tolerance)
+
+
+class _Equations(Protocol[FieldT]):
+    """What `solve_system` asks of the equations of a problem, in space or in the plane."""
+
+    @property
+    def held(self) -> Held: ...
+
+    @property
+    def forces(self) -> dict[str, FloatArray]: ...
+
+    def assemble(self) -> sp.bsr_array: ...
+
+    def factorise(self, matrix: sp.bsr_array, backend: str, solves: int = 1) -> Solver: ...
+
+    def field(
+        self, case: str, displacement: FloatArray, matrix: sp.bsr_array, record: SolveRecord
+    ) -> FieldT: ...
+
+
+def solve_system(
+    prepare: Callable[[ProblemT], _Equations[FieldT]],
+    problem: ProblemT,
+    backend: str,
+    tolerance: float,
+) -> dict[str, FieldT]:
+    """Prepare a problem and solve it for all its load cases: see `solve`."""
     started = perf_counter()
     system = prepare(problem)
     matrix = system.assemble()

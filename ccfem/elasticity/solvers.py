@@ -13,9 +13,10 @@ from ccfem.elasticity import direct, multigrid
 from ccfem.elasticity.conjugate_gradient import conjugate_gradient
 from ccfem.errors import InputError, SolveError
 
-__all__ = ["BACKENDS", "Solution", "Solver", "factorise", "preconditioned_cg"]
+__all__ = ["BACKENDS", "DIRECT", "Solution", "Solver", "factorise", "preconditioned_cg"]
 
-BACKENDS = ("pypardiso", "cholmod", "superlu", "amg", "two-level", "petsc")
+DIRECT = ("pypardiso", "cholmod", "superlu")
+BACKENDS = (*DIRECT, "amg", "two-level", "petsc")
 
 _CURES = {
     "pypardiso": 'pip install "ccfem[mkl]"',
@@ -162,6 +163,11 @@ def direct_backend() -> str:
     return "superlu"
 
 
+def choose_direct(unknowns: int) -> str:
+    """Name the direct backend that suits a system and what is installed."""
+    return "superlu" if unknowns <= _SMALL else direct_backend()
+
+
 def choose(unknowns: int, order: int, solves: int = 1) -> str:
     """Name the backend that suits a system and what is installed.
 
@@ -194,7 +200,8 @@ def factorise(
     Parameters
     ----------
     matrix : bsr_array (3n, 3n) with 3x3 blocks
-        Symmetric positive definite, columns sorted.
+        Symmetric positive definite, columns sorted; (2n, 2n) with 2x2 blocks in the plane, for
+        a direct backend.
     points : (n, 3) array, mm
         Of the nodes that the rows stand for.
     backend : str, default "auto"

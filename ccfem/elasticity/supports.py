@@ -9,6 +9,8 @@ from scipy.sparse.csgraph import connected_components
 
 from ccfem.arrays import BoolArray, FloatArray, IntArray, read_only
 from ccfem.elasticity.loads import facet_nodes
+from ccfem.elasticity.plane_mesh import PlaneMesh
+from ccfem.elasticity.plane_problem import PlaneProblem
 from ccfem.elasticity.problem import Problem
 from ccfem.errors import InputError
 from ccfem.mesh import TetMesh
@@ -18,7 +20,7 @@ __all__ = ["Held", "check_support", "held", "rigid_modes"]
 
 @dataclass(frozen=True)
 class Held:
-    """Which components are held, and where.
+    """Which components are held, and where; in the plane two a node instead of three.
 
     Attributes
     ----------
@@ -40,7 +42,7 @@ class Held:
         Held components of such nodes keep a row with nothing but a diagonal entry, as large as
         the mean one.
         """
-        n, k = len(self.free), len(self.nodes)
+        (n, d), k = self.free.shape, len(self.nodes)
         place = np.full(n, -1, dtype=np.int32)
         place[self.nodes] = np.arange(k, dtype=np.int32)
         row = np.repeat(place, np.diff(matrix.indptr))
@@ -54,21 +56,22 @@ class Held:
             data[cut] *= free[row[cut], :, None] & free[column[cut], None, :]
             diagonal = cut[row[cut] == column[cut]]
             size = float(np.abs(matrix.diagonal()).mean())
-            data[diagonal] += size * np.eye(3) * np.logical_not(free[row[diagonal]])[:, :, None]
+            data[diagonal] += size * np.eye(d) * np.logical_not(free[row[diagonal]])[:, :, None]
         indptr = np.concatenate([[0], np.cumsum(np.bincount(row, minlength=k))]).astype(np.int32)
-        return sp.bsr_array((data, column, indptr), shape=(3 * k, 3 * k))
+        return sp.bsr_array((data, column, indptr), shape=(d * k, d * k))
 
     def right_hand_side(self, matrix: sp.bsr_array, forces: FloatArray) -> FloatArray:
         """Right-hand side (3k,), N, of the reduced matrix, for nodal forces (n, 3)."""
         rest = forces
         if self.value.any():
-            rest = forces - (matrix @ self.value.reshape(-1)).reshape(-1, 3)
+            rest = forces - (matrix @ self.value.reshape(-1)).reshape(forces.shape)
         return np.where(self.free, rest, 0.0)[self.nodes].reshape(-1)
 
     def expand(self, solution: FloatArray) -> FloatArray:
         """Displacement (n, 3) of a solution (3k,) of the reduced system, mm."""
         result = self.value.copy()
-        result[self.nodes] += np.where(self.free[self.nodes], solution.reshape(-1, 3), 0.0)
+        free = self.free[self.nodes]
+        result[self.nodes] += np.where(free, solution.reshape(free.shape), 0.0)
         return result
 
     def restrict(self, displacement: FloatArray) -> FloatArray:
@@ -76,7 +79,7 @@ class Held:
         return np.where(self.free, displacement, 0.0)[self.nodes].reshape(-1)
 
 
-def held(problem: Problem) -> Held:
+def held(problem: Problem | PlaneProblem) -> Held:
     """Collect the supports of a problem and check that they hold the part.
 
     Nodes that belong to no cell are held at zero.
@@ -90,8 +93,9 @@ def held(problem: Problem) -> Held:
     mesh = problem.mesh
     if not problem.supports:
         raise InputError("the part has no support: hold at least one patch")
-    free = np.ones((len(mesh.points), 3), dtype=bool)
-    value = np.zeros((len(mesh.points), 3))
+    free = np.ones(mesh.points.shape, dtype=bool)
+    value = np.zeros(mesh.points.shape)
+    known = "xyz"[: mesh.points.shape[1]]
     for support in problem.supports:
         if not np.isfinite(support.value).all():
             raise InputError(f"a support must be held at finite values; got {support}")
@@ -99,7 +103,7 @@ def held(problem: Problem) -> Held:
         if not len(facets):
             raise InputError(f"patch '{support.patch}' is empty: no boundary facet meets its rule")
         nodes = np.unique(facet_nodes(mesh, facets))
-        for component in sorted(set(support.components)):
+        for component in sorted(set(support.components) & set(known)):
             k = "xyz".index(component)
             before = nodes[~free[nodes, k]]
             if (np.abs(value[before, k] - support.value[k]) > 1e-12).any():
@@ -128,16 +132,17 @@ def rigid_modes(points: FloatArray) -> FloatArray:
     return modes.reshape(-1, 6)
 
 
-def check_support(mesh: TetMesh, fixed: BoolArray) -> None:
+def check_support(mesh: TetMesh | PlaneMesh, fixed: BoolArray) -> None:
     """Check that no piece of the part can move as a rigid body.
 
-    Bodies are cells joined through faces; bodies that share only an edge or a node are hinged
-    there. A piece is held when no rigid motion of its bodies respects the hinges and the supports.
+    Bodies are cells joined through faces (edges in the plane); bodies that share only an edge or a
+    node are hinged there. A piece is held when no rigid motion of its bodies respects the hinges
+    and the supports.
 
     Parameters
     ----------
-    mesh : TetMesh
-    fixed : (n, 3) bool array
+    mesh : TetMesh or PlaneMesh
+    fixed : (n, 3) bool array, or (n, 2) in the plane
 
     Raises
     ------
@@ -147,12 +152,16 @@ def check_support(mesh: TetMesh, fixed: BoolArray) -> None:
     pairs, m = mesh.neighbours, len(mesh.cells)
     links = sp.coo_array((np.ones(len(pairs), dtype=bool), pairs.T), shape=(m, m))
     count, body = connected_components(links, directed=False)
-    corner_body = np.repeat(body, 4)
+    corner_body = np.repeat(body, mesh.corners.shape[1])
+    points = mesh.points
+    if points.shape[1] == 2:  # the plane z = 0 in space, every node held across it
+        points = np.pad(points, ((0, 0), (0, 1)))
+        fixed = np.pad(fixed, ((0, 0), (0, 1)), constant_values=True)
     if count == 1:
         used = np.zeros(len(fixed), dtype=bool)
         used[mesh.corners] = True
         node = np.flatnonzero(used)
-        motion = _free_motions(mesh, fixed, node, np.zeros(len(node), dtype=np.int64))
+        motion = _free_motions(points, fixed, node, np.zeros(len(node), dtype=np.int64))
         if motion is not None:
             raise InputError(f"the part is free to {motion}: add a support that holds it")
         return
@@ -165,16 +174,18 @@ def check_support(mesh: TetMesh, fixed: BoolArray) -> None:
     named = np.unique(piece[:count])
     for k in named:
         chosen = piece[owner] == k
-        motion = _free_motions(mesh, fixed, node[chosen], owner[chosen])
+        motion = _free_motions(points, fixed, node[chosen], owner[chosen])
         if motion is not None:
             which = f" (one of {len(named)} separate pieces)" if len(named) > 1 else ""
             raise InputError(f"the part{which} is free to {motion}: add a support that holds it")
 
 
-def _free_motions(mesh: TetMesh, fixed: BoolArray, node: IntArray, owner: IntArray) -> str | None:
+def _free_motions(
+    points: FloatArray, fixed: BoolArray, node: IntArray, owner: IntArray
+) -> str | None:
     """Words for the rigid motions left to the bodies of one piece; None when it is held."""
     bodies, owner = np.unique(owner, return_inverse=True)
-    points = mesh.points[node]
+    points = points[node]
     centre = points.mean(axis=0)
     radius = float(np.linalg.norm(points - centre, axis=1).max())
     modes = rigid_modes((points - centre) / radius).reshape(-1, 3, 6)
