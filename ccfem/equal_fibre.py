@@ -38,12 +38,12 @@ class Planned:
     Attributes
     ----------
     strategy : Strategy
-        With the value of its amount parameter that was found.
+        With the value of its amount parameter that was found (of most layers, see `note`).
     toolpaths : Toolpaths
     length_per_layer : float, mm
         Fibre length divided by the number of layers.
     note : str
-        Empty, or one line that says why the wanted length was missed.
+        Empty, or one line: which layers have another value, or why the wanted length was missed.
     """
 
     strategy: Strategy
@@ -75,7 +75,9 @@ def plan_to_length(
 
     The value is searched on the bottom, middle and top layer, then checked on the whole stack; the
     ratio of the two lengths corrects the next search. Of the values tried on the whole stack, the
-    one that lays most without laying too much is kept.
+    one that lays most without laying too much is kept. Where the length changes in steps (one
+    contour more or less) and that leaves too much missing, some layers, evenly spread, take the
+    next value that lays more.
 
     Parameters
     ----------
@@ -87,8 +89,8 @@ def plan_to_length(
     wanted : float, mm
         Fibre per layer: mean over the stack.
     tolerance : float, default 0.01
-        The search stops within this share below `wanted`. A strategy whose length changes in steps
-        (one contour more or less) may miss it: `Planned.note` says so.
+        The search stops within this share below `wanted`. A strategy may miss it: `Planned.note`
+        says so.
 
     Returns
     -------
@@ -131,7 +133,38 @@ def plan_to_length(
             break
         ratio, margin = length / sampled[value], 0.3 * tolerance
     best = _best(list(tried.values()), wanted)
+    if best.length_per_layer < (1.0 - tolerance) * wanted:
+        above = [v for v in sampled if sampled[v] * ratio > wanted]
+        if above:
+            value = min(above, key=sampled.__getitem__)
+            more = tried[value] if value in tried else planned(value, layers)
+            best = _mixed(best, more, layers, wanted)
     return replace(best, note=_note(best, amount, wanted, tolerance))
+
+
+def _mixed(less: Planned, more: Planned, layers: Sequence[Layer], wanted: float) -> Planned:
+    """Take as many layers as possible, evenly spread, from the plan that lays too much."""
+    count = len(layers)
+    lengths = np.array(
+        [
+            [plan.toolpaths.on_layer(layer.index).of_kind(FIBRE).lengths.sum() for layer in layers]
+            for plan in (less, more)
+        ]
+    )
+    for taken in range(count - 1, 0, -1):
+        chosen = np.zeros(count, dtype=np.int64)
+        chosen[((np.arange(taken) + 0.5) * count / taken).astype(np.int64)] = 1
+        if lengths[chosen, np.arange(count)].sum() <= wanted * count:
+            break
+    else:
+        return less
+    plans = [(less, more)[k].toolpaths for k in chosen]
+    toolpaths = Toolpaths.concatenate(
+        plan.on_layer(layer.index) for plan, layer in zip(plans, layers, strict=True)
+    )
+    amount = less.strategy.amount.parameter
+    note = f"{amount} = {getattr(more.strategy, amount):.6g} on {taken} of {count} layers"
+    return Planned(less.strategy, toolpaths, length_per_layer(toolpaths, layers), note)
 
 
 def _with_value(strategy: Strategy, amount: Amount, value: float) -> Strategy:
@@ -150,8 +183,9 @@ def _best(tried: list[Planned], wanted: float) -> Planned:
 def _note(best: Planned, amount: Amount, wanted: float, tolerance: float) -> str:
     length, value = best.length_per_layer, getattr(best.strategy, amount.parameter)
     if (1.0 - tolerance) * wanted <= length <= wanted * (1.0 + 1e-9):
-        return ""
-    reached = f"lays {length:.0f} of {wanted:.0f} mm per layer"
+        return best.note
+    mixed = f"{best.note}; " if best.note else ""
+    reached = f"{mixed}lays {length:.0f} of {wanted:.0f} mm per layer"
     if value == amount.most and length < wanted:
         return f"{reached}: its most, at {amount.parameter} = {value:g}"
     if value == amount.least and length > wanted:

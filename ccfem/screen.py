@@ -63,9 +63,8 @@ def print_comparison(comparison: Comparison, where: Path, seconds: float) -> Non
     best = best_values(comparison)
     runs = [run for run in ranking(comparison) if run.evaluation is not None]
     values = [headline_values(run) for run in runs]
-    table = Table(
-        title=comparison.case.title, title_justify="left", header_style="bold", box=box.SIMPLE_HEAD
-    )
+    console.print(comparison.case.title, style="bold", markup=False)
+    table = Table(header_style="bold", box=box.SIMPLE_HEAD)
     table.add_column("")
     for run in runs:
         table.add_column(run.name, justify="right")

@@ -1,5 +1,6 @@
 """Planning to a wanted length: never more, as near as the strategy's steps allow, and honest."""
 
+import re
 from dataclasses import dataclass
 from typing import ClassVar
 
@@ -55,13 +56,35 @@ def plate():
     return solve(problem)["pull"], slice_planar(mesh, count=8)
 
 
-@pytest.mark.parametrize("wanted", [2400.0, 1700.0, 1000.0, 600.0, 130.0])
+@pytest.mark.parametrize("wanted", [2400.0, 1730.0, 1000.0, 600.0, 130.0])
 def test_steps_of_a_line(plate, wanted):
+    """Layers are brought to the wanted mean by one line more on as many as it takes."""
     stress, layers = plate
     planned = plan_to_length(Lines(), layers, stress, MACHINE, wanted)
-    lines = int(wanted / LENGTH)
-    assert planned.length_per_layer == pytest.approx(lines * LENGTH)
-    assert bool(planned.note) == (lines * LENGTH < 0.99 * wanted)
+    lines = int(wanted * len(layers) / LENGTH)
+    assert planned.length_per_layer == pytest.approx(lines * LENGTH / len(layers))
+    on_each = [len(planned.toolpaths.on_layer(layer.index)) for layer in layers]
+    assert max(on_each) - min(on_each) <= 1
+    more = on_each.count(max(on_each)) if max(on_each) > min(on_each) else 0
+    assert (f"on {more} of 8 layers" in planned.note) == bool(more)
+
+
+def test_mixed_layers_are_those_of_the_two_values(plate):
+    stress, layers = plate
+    planned = plan_to_length(Lines(), layers, stress, MACHINE, 1000.0)
+    other = float(re.match(r"spacing = (\S+) on", planned.note)[1])
+    both = [
+        plan(Lines(value), layers, stress, MACHINE) for value in (planned.strategy.spacing, other)
+    ]
+    matched = 0
+    for layer in layers:
+        mine, less, more = (
+            paths.on_layer(layer.index).points for paths in (planned.toolpaths, *both)
+        )
+        same = more if len(mine) == len(more) else less
+        np.testing.assert_allclose(mine, same, atol=1e-3)
+        matched += same is more
+    assert f"on {matched} of 8 layers" in planned.note
 
 
 @pytest.mark.parametrize("wanted", [30.0, 20.0, 10.0, 3.0, 1.0])
