@@ -1,0 +1,340 @@
+"""Medial axis of a section: the centres of its largest inscribed discs, as a graph of curves.
+
+Voronoi diagram of points along the border (Brandt, Convergence and continuity criteria for
+discrete approximations of the continuous planar skeleton, CVGIP 59, 1994); spurs are told from
+limbs by the angle under which the border is seen from the axis, or by the way along the border
+against its chord.
+"""
+
+from dataclasses import dataclass
+from itertools import pairwise
+from typing import Any
+
+import numpy as np
+import shapely
+from scipy.sparse import coo_array
+from scipy.sparse.csgraph import connected_components
+from scipy.spatial import QhullError, Voronoi
+
+from ccfem.arrays import BoolArray, FloatArray, IntArray, read_only
+from ccfem.errors import InputError
+from ccfem.geometry.offsets import rings
+
+__all__ = ["MedialAxis", "MedialSegment", "medial_axis"]
+
+_SAME = 1e-4
+"""Points of the axis nearer than this share of the sampling step are one."""
+
+
+@dataclass(frozen=True)
+class MedialSegment:
+    """A curve of the medial axis between two of its nodes, or a closed one.
+
+    Attributes
+    ----------
+    points : (m, 2) array, mm
+        A closed one repeats its first point.
+    radius : (m,) array, mm
+        Distance of each point to the border.
+    left, right : (m - 1, 2) arrays, mm
+        Points of the border nearest to the middle of each step, at the two sides of the walking
+        direction.
+    ends : tuple of 2 ints
+        Nodes of `MedialAxis` at both ends; the same one of a closed curve, -1 where that has none.
+    """
+
+    points: FloatArray
+    radius: FloatArray
+    left: FloatArray
+    right: FloatArray
+    ends: tuple[int, int]
+
+    def __post_init__(self) -> None:
+        for name in ("points", "radius", "left", "right"):
+            object.__setattr__(self, name, read_only(getattr(self, name)))
+
+    @property
+    def closed(self) -> bool:
+        """Whether the curve is closed."""
+        return self.ends[0] == self.ends[1] and bool((self.points[0] == self.points[-1]).all())
+
+    @property
+    def length(self) -> float:
+        """Length, mm."""
+        return float(np.linalg.norm(np.diff(self.points, axis=0), axis=1).sum())
+
+
+@dataclass(frozen=True)
+class MedialAxis:
+    """The medial axis of a section.
+
+    Attributes
+    ----------
+    nodes : (k, 2) array, mm
+        Ends, junctions, and the centres of parts that have a point for an axis (discs).
+    radius : (k,) array, mm
+        Distance of each node to the border.
+    segments : tuple of MedialSegment
+    """
+
+    nodes: FloatArray
+    radius: FloatArray
+    segments: tuple[MedialSegment, ...]
+
+    def __post_init__(self) -> None:
+        object.__setattr__(self, "nodes", read_only(self.nodes))
+        object.__setattr__(self, "radius", read_only(self.radius))
+
+
+def medial_axis(
+    section: Any,
+    step: float,
+    object_angle: float | None = 105.0,
+    arc_chord: float | None = None,
+    prune: float = 1.0,
+) -> MedialAxis:
+    """Medial axis of a section.
+
+    Parameters
+    ----------
+    section : shapely (Multi)Polygon, mm
+    step : float, mm
+        Largest distance of the samples along the border, below the thickness of the part. Both
+        ends of every straight side are among them, the rest at equal distances, so that a
+        symmetric section has symmetric samples.
+    object_angle : float, degrees, optional
+        Ends of the axis are taken off as long as they see their two nearest points of the border
+        under less than this; 105 takes off the spurs of corners of 90 degrees. None: no such rule.
+    arc_chord : float, optional
+        Ends are taken off as long as the border between their two nearest points is no longer than
+        so many chords, or than 6 steps; a square corner has 1.41.
+    prune : float, default 1
+        Branches with a free end shorter than so many radii of the disc at their junction go.
+
+    Returns
+    -------
+    MedialAxis
+        Every part of the section has a segment or a node; a hole stays surrounded by a cycle.
+
+    Raises
+    ------
+    InputError
+        For a step that is not above 0.
+    """
+    if not 0.0 < step < np.inf:
+        raise InputError(f"step of the medial axis must be above 0 mm; got {step}")
+    border = _Border.of(section, step)
+    nothing = MedialAxis(np.zeros((0, 2)), np.zeros(0), ())
+    if len(border.points) < 4:
+        return nothing
+    graph = _Graph.inside(section, border, step)
+    if graph is None:
+        return nothing
+    firm = np.ones(len(graph.edges), dtype=bool)
+    if object_angle is not None:
+        firm &= graph.seen >= np.radians(object_angle)
+    if arc_chord is not None:
+        firm &= border.way(*graph.sites.T) > np.maximum(6.0 * step, arc_chord * graph.chord)
+    kept = _without_soft_ends(graph.edges, firm, len(graph.points))
+    chains = _pruned(graph, _chains(graph.edges, kept, len(graph.points)), prune, step)
+    return _as_axis(section, graph, chains)
+
+
+@dataclass(frozen=True)
+class _Border:
+    """Samples of the border: ring and way along it of each, and its neighbours on the ring."""
+
+    points: FloatArray
+    ring: IntArray
+    along: FloatArray
+    around: FloatArray
+    before: IntArray
+    after: IntArray
+
+    @classmethod
+    def of(cls, section: Any, step: float) -> "_Border":
+        points, ring, along, around, before, after = [], [], [], [], [], []
+        start = 0
+        for number, line in enumerate(rings(section)):
+            a, side = line[:-1], np.diff(line, axis=0)
+            size = np.linalg.norm(side, axis=1)
+            a, side, size = a[size > 0.0], side[size > 0.0], size[size > 0.0]
+            count = np.maximum(np.ceil(size / step - 1e-9), 1.0).astype(np.int64)
+            n = int(count.sum())
+            if n < 3:
+                continue
+            edge = np.repeat(np.arange(len(a)), count)
+            share = (np.arange(n) - np.repeat(np.cumsum(count) - count, count)) / count[edge]
+            here = start + np.arange(n)
+            points.append(a[edge] + share[:, None] * side[edge])
+            ring.append(np.full(n, number))
+            along.append((np.cumsum(size) - size)[edge] + share * size[edge])
+            around.append(np.full(n, size.sum()))
+            before.append(np.roll(here, 1))
+            after.append(np.roll(here, -1))
+            start += n
+        if not points:
+            none = np.zeros(0, dtype=np.int64)
+            return cls(np.zeros((0, 2)), none, np.zeros(0), np.zeros(0), none, none)
+        return cls(*map(np.concatenate, (points, ring, along, around, before, after)))
+
+    def way(self, one: IntArray, other: IntArray) -> FloatArray:
+        """Way along the border between samples, mm; infinite between two rings."""
+        gap = np.abs(self.along[one] - self.along[other])
+        gap = np.minimum(gap, self.around[one] - gap)
+        return np.where(self.ring[one] == self.ring[other], gap, np.inf)
+
+    def foot(self, site: IntArray, points: FloatArray) -> FloatArray:
+        """Point of the border nearest to each point, on the two pieces beside a sample."""
+        found, least = self.points[site], np.full(len(site), np.inf)
+        for other in (self.before[site], self.after[site]):
+            a, side = self.points[site], self.points[other] - self.points[site]
+            t = np.einsum("ij,ij->i", points - a, side) / np.einsum("ij,ij->i", side, side)
+            foot = a + np.clip(t, 0.0, 1.0)[:, None] * side
+            gap = np.linalg.norm(points - foot, axis=1)
+            found = np.where((gap < least)[:, None], foot, found)
+            least = np.minimum(least, gap)
+        return found
+
+
+@dataclass(frozen=True)
+class _Graph:
+    """Voronoi ridges inside the section."""
+
+    points: FloatArray
+    radius: FloatArray
+    edges: IntArray
+    sites: IntArray
+    feet: FloatArray
+    seen: FloatArray
+    chord: FloatArray
+
+    @classmethod
+    def inside(cls, section: Any, border: _Border, step: float) -> "_Graph | None":
+        try:
+            diagram = Voronoi(border.points)
+        except QhullError:
+            return None
+        edges = np.asarray(diagram.ridge_vertices, dtype=np.int64)
+        sites = np.asarray(diagram.ridge_points, dtype=np.int64)
+        shapely.prepare(section)
+        inner = shapely.contains_xy(section, diagram.vertices)
+        if not inner.any():
+            return None
+        nearest = np.zeros(len(inner) + 1, dtype=np.int64)  # the last one is at infinity
+        nearest[edges] = sites[:, :1]
+        kept = (edges >= 0).all(axis=1) & inner[edges].all(axis=1)
+        sites, edges = sites[kept], (np.cumsum(inner) - 1)[edges[kept]]
+        points, nearest = diagram.vertices[inner], nearest[:-1][inner]
+        # Samples on one circle give several vertices in one place.
+        size = np.linalg.norm(points[edges[:, 0]] - points[edges[:, 1]], axis=1)
+        tiny = edges[size < _SAME * step]
+        join = coo_array((np.ones(len(tiny)), tiny.T), shape=(len(points),) * 2)
+        _, place = connected_components(join, directed=False)
+        _, first = np.unique(place, return_index=True)
+        points, nearest = points[first], nearest[first]
+        edges = np.sort(place[edges], axis=1)
+        _, rows = np.unique(edges[:, 0] * len(points) + edges[:, 1], return_index=True)
+        rows = rows[edges[rows, 0] != edges[rows, 1]]
+        edges, sites = edges[rows], sites[rows]
+        middle = points[edges].mean(axis=1)
+        feet = np.stack([border.foot(sites[:, k], middle) for k in (0, 1)], axis=1)
+        rays = feet - middle[:, None]
+        cosine = np.einsum("ij,ij->i", rays[:, 0], rays[:, 1])
+        cross = rays[:, 0, 0] * rays[:, 1, 1] - rays[:, 0, 1] * rays[:, 1, 0]
+        radius = np.linalg.norm(points - border.foot(nearest, points), axis=1)
+        seen = np.abs(np.arctan2(cross, cosine))
+        chord = np.linalg.norm(feet[:, 0] - feet[:, 1], axis=1)
+        return cls(points, radius, edges, sites, feet, seen, chord)
+
+
+def _without_soft_ends(edges: IntArray, firm: BoolArray, count: int) -> BoolArray:
+    """Edges that stay when free ends that are not firm are taken off until there are none."""
+    kept = np.ones(len(edges), dtype=bool)
+    while True:
+        degree = np.bincount(edges[kept].ravel(), minlength=count)
+        off = kept & ~firm & (degree[edges] == 1).any(axis=1)
+        if not off.any():
+            return kept
+        kept &= ~off
+
+
+def _chains(edges: IntArray, kept: BoolArray, count: int) -> list[list[int]]:
+    """Chains of nodes between ends and junctions of kept edges; closed ones repeat their first."""
+    beside: dict[int, list[int]] = {}
+    for a, b in edges[kept].tolist():
+        beside.setdefault(a, []).append(b)
+        beside.setdefault(b, []).append(a)
+    for others in beside.values():
+        others.sort()
+    seen: set[tuple[int, int]] = set()
+    chains = []
+    for first in sorted(beside, key=lambda node: (len(beside[node]) == 2, node)):
+        for second in beside[first]:
+            if (first, second) in seen:
+                continue
+            chain = [first, second]
+            while len(beside[chain[-1]]) == 2 and chain[-1] != first:
+                a, b = beside[chain[-1]]
+                chain.append(b if a == chain[-2] else a)
+            for a, b in pairwise(chain):
+                seen |= {(a, b), (b, a)}
+            chains.append(chain)
+    return chains
+
+
+def _pruned(graph: _Graph, chains: list[list[int]], prune: float, step: float) -> list[list[int]]:
+    """Chains without short branches at free ends, shortest first, and without specks."""
+    while True:
+        degree: dict[int, int] = {}
+        for chain in chains:
+            for end in (chain[0], chain[-1]):
+                degree[end] = degree.get(end, 0) + 1
+        short = []
+        for number, chain in enumerate(chains):
+            free = [degree[end] == 1 for end in (chain[0], chain[-1])]
+            if not any(free):
+                continue
+            place = graph.points[chain]
+            length = float(np.linalg.norm(np.diff(place, axis=0), axis=1).sum())
+            if all(free):
+                least = min(step, 0.1 * float(graph.radius[chain].max()))
+            else:
+                least = prune * float(graph.radius[chain[-1] if free[0] else chain[0]])
+            if length < least:
+                short.append((length, number))
+        if not short:
+            return chains
+        del chains[min(short)[1]]
+        pairs = [pair for chain in chains for pair in pairwise(chain)]
+        edges = np.array(pairs, dtype=np.int64).reshape(-1, 2)
+        chains = _chains(edges, np.ones(len(edges), dtype=bool), len(graph.points))
+
+
+def _as_axis(section: Any, graph: _Graph, chains: list[list[int]]) -> MedialAxis:
+    """Values of the chains, and a node for every part of the section that has none."""
+    ends = {end for chain in chains if chain[0] != chain[-1] for end in (chain[0], chain[-1])}
+    starts = shapely.points(graph.points[[chain[0] for chain in chains]])
+    for part in shapely.get_parts(section):
+        shapely.prepare(part)
+        if not shapely.contains(part, starts).any():
+            members = np.flatnonzero(shapely.contains_xy(part, graph.points))
+            if len(members):
+                ends.add(int(members[np.argmax(graph.radius[members])]))
+    nodes = sorted(ends)
+    index = {node: k for k, node in enumerate(nodes)}
+    a, b = graph.edges.T
+    edge_of = dict(zip(zip(a.tolist(), b.tolist(), strict=True), range(len(a)), strict=True))
+    segments = []
+    for chain in chains:
+        places = graph.points[chain]
+        rows = [edge_of[(min(p, q), max(p, q))] for p, q in pairwise(chain)]
+        feet, along = graph.feet[rows], np.diff(places, axis=0)
+        aside = feet[:, 0] - 0.5 * (places[1:] + places[:-1])
+        swapped = along[:, 0] * aside[:, 1] - along[:, 1] * aside[:, 0] < 0.0
+        left = np.where(swapped[:, None], feet[:, 1], feet[:, 0])
+        right = np.where(swapped[:, None], feet[:, 0], feet[:, 1])
+        both = (index.get(chain[0], -1), index.get(chain[-1], -1))
+        segments.append(MedialSegment(places, graph.radius[chain], left, right, both))
+    order = sorted(range(len(segments)), key=lambda k: -segments[k].length)
+    return MedialAxis(graph.points[nodes], graph.radius[nodes], tuple(segments[k] for k in order))
