@@ -86,8 +86,8 @@ class AlignmentSamples:
     length : mm
     angle : radians in [0, pi/2]
         NaN where both principal values are equal.
-    largest : MPa
-        S1.
+    largest, smallest : MPa
+        In-plane principal values, S1 the larger.
     along : MPa
         t.S.t.
     """
@@ -95,6 +95,7 @@ class AlignmentSamples:
     length: FloatArray
     angle: FloatArray
     largest: FloatArray
+    smallest: FloatArray
     along: FloatArray
 
 
@@ -124,7 +125,7 @@ def sample_alignment(paths: PlanePaths, stress: LayerStress, step: float) -> Ali
     size = np.maximum(np.abs(largest), np.abs(smallest))
     angle[largest - smallest <= _ISOTROPIC * size] = np.nan
     along = s[:, 0] * t[:, 0] ** 2 + s[:, 1] * t[:, 1] ** 2 + 2.0 * s[:, 2] * t[:, 0] * t[:, 1]
-    return AlignmentSamples(length[inside], angle, largest, along)
+    return AlignmentSamples(length[inside], angle, largest, smallest, along)
 
 
 def alignment_indices(samples: AlignmentSamples) -> dict[str, float]:

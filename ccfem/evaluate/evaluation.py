@@ -17,7 +17,9 @@ from ccfem.evaluate import (
     crossings,
     curvature,
     manufacture,
+    sinuosity,
     spacing,
+    stiffness_alignment,
 )
 from ccfem.evaluate.column import Column
 from ccfem.evaluate.plane_paths import PlanePaths, plane_paths, pool
@@ -32,8 +34,10 @@ __all__ = ["COLUMNS", "Evaluation", "evaluate"]
 
 COLUMNS: tuple[Column, ...] = (
     *manufacture.COLUMNS,
+    *sinuosity.COLUMNS,
     *curvature.COLUMNS,
     *alignment.COLUMNS,
+    *stiffness_alignment.COLUMNS,
     *spacing.COLUMNS,
     *coverage.COLUMNS,
     *containment.COLUMNS,
@@ -165,6 +169,7 @@ def _sample(toolpaths: Toolpaths, layer: Layer, stress: StressField, machine: Ma
     on_layer = stress.on(layer)
     return [
         manufacture.sample_manufacture(paths, toolpaths, machine),
+        sinuosity.sample_sinuosity(paths, width),
         curvature.sample_curvature(paths, width),
         alignment.sample_alignment(paths, on_layer, width),
         spacing.sample_spacing(paths, width),
@@ -175,11 +180,13 @@ def _sample(toolpaths: Toolpaths, layer: Layer, stress: StressField, machine: Ma
 
 
 def _indices(samples: Sequence[Any], machine: Machine) -> dict[str, float]:
-    make, turn, align, space, cover, contain, cross = samples
+    make, wind, turn, align, space, cover, contain, cross = samples
     return {
         **manufacture.manufacture_indices(make, machine),
+        **sinuosity.sinuosity_indices(wind),
         **curvature.curvature_indices(turn, machine),
         **alignment.alignment_indices(align),
+        **stiffness_alignment.stiffness_alignment_indices(align),
         **spacing.spacing_indices(space, machine),
         **coverage.coverage_indices(cover),
         **containment.containment_indices(contain),
