@@ -1,0 +1,185 @@
+"""Streamlines of the principal stress in the plane: lines along the stress of the largest size."""
+
+import numpy as np
+from numba import njit
+
+from ccfem.arrays import FloatArray, IntArray
+from ccfem.errors import InputError
+from ccfem.geometry.locate import locate
+
+__all__ = ["streamlines"]
+
+_SHARPEST = 0.5
+"""Cosine of the largest turn of the direction within one step: beyond 60 degrees two families of
+principal directions take turns."""
+
+
+def streamlines(
+    points: FloatArray,
+    triangles: IntArray,
+    plane_stress: FloatArray,
+    starts: FloatArray,
+    step: float,
+    least: float = 0.02,
+    longest: float | None = None,
+) -> list[FloatArray]:
+    """Lines that follow the direction of the principal stress of the largest size.
+
+    Runge-Kutta of fourth order in both senses from each start; the sign follows the step before.
+    The direction is that of the linearly interpolated stress, in double-angle form: no eigenvector
+    is ever averaged, and where tension and compression take turns the direction jumps within a
+    triangle.
+
+    Parameters
+    ----------
+    points : (n, 2) array, mm
+    triangles : (t, 3) int array
+    plane_stress : (n, 3) array, MPa
+        s11, s22, s12 at the points.
+    starts : (k, 2) array, mm
+        Those outside the triangles give an empty line.
+    step : float, mm
+        Length of a step.
+    least : float in [0, 1), default 0.02
+        A line stops where the difference of the two principal stresses, or the larger of their
+        sizes, is below this share of the largest size on the layer.
+    longest : float, mm, optional
+        Length at which a line stops in either sense; by default ten times the diagonal of the
+        points.
+
+    Returns
+    -------
+    list of (m, 2) arrays, mm
+        From one end to the other; m = 0 where there is no direction at the start. A line that
+        comes back to its start within one step is closed: its last point is its first. Lines end
+        inside the triangles, less than a step from the border that they run out of.
+    """
+    if not 0.0 < step < np.inf:
+        raise InputError(f"step of streamlines must be above 0 mm; got {step}")
+    starts = np.asarray(starts, dtype=np.float64).reshape(-1, 2)
+    if not len(starts) or not len(triangles):
+        return [np.zeros((0, 2)) for _ in starts]
+    s11, s22, s12 = plane_stress.T
+    field = np.stack([0.5 * (s11 + s22), 0.5 * (s11 - s22), s12], axis=1)
+    size = float((np.abs(field[:, 0]) + np.hypot(field[:, 1], field[:, 2])).max())
+    corners = np.ascontiguousarray(points[triangles])
+    beside = _neighbours(triangles, len(points))
+    if longest is None:
+        longest = 10.0 * float(np.linalg.norm(points.max(axis=0) - points.min(axis=0)))
+    steps = int(np.ceil(longest / step))
+    home, _ = locate(points, triangles, starts, 1e-6)
+    values = np.ascontiguousarray(field[triangles])
+    lines = []
+    for start, cell in zip(starts, home, strict=True):
+        if cell < 0:
+            lines.append(np.zeros((0, 2)))
+            continue
+        ahead, closed = _follow(corners, values, beside, start, cell, step, least * size, steps, 1)
+        if closed:
+            lines.append(np.concatenate([ahead, ahead[:1]]))
+            continue
+        back, _ = _follow(corners, values, beside, start, cell, step, least * size, steps, -1)
+        line = np.concatenate([back[:0:-1], ahead])
+        lines.append(line if len(line) > 1 else line[:0])
+    return lines
+
+
+def _neighbours(triangles: IntArray, count: int) -> IntArray:
+    """Triangle beyond the side opposite to each corner, (t, 3), -1 at the border."""
+    sides = np.sort(triangles[:, [[1, 2], [2, 0], [0, 1]]].reshape(-1, 2), axis=1)
+    key = sides[:, 0] * count + sides[:, 1]
+    order = np.argsort(key, kind="stable")
+    same = np.flatnonzero(key[order[1:]] == key[order[:-1]])
+    one, other = order[same], order[same + 1]
+    beside = np.full(len(key), -1, dtype=np.int64)
+    beside[one], beside[other] = other // 3, one // 3
+    return beside.reshape(-1, 3)
+
+
+@njit(cache=True)
+def _direction(corners, values, beside, cell, x, y, either, least, way):  # type: ignore[no-untyped-def]
+    """Return the unit direction at (x, y), the triangle there, and whether there is one.
+
+    The triangle is found by walking from `cell`; `way` is where the line came from, so that the
+    sign can follow; `either` at the start, where there is none.
+    """
+    for _ in range(len(corners)):
+        a, b, c = corners[cell, 0], corners[cell, 1], corners[cell, 2]
+        det = (b[0] - a[0]) * (c[1] - a[1]) - (b[1] - a[1]) * (c[0] - a[0])
+        w1 = ((x - a[0]) * (c[1] - a[1]) - (y - a[1]) * (c[0] - a[0])) / det
+        w2 = ((b[0] - a[0]) * (y - a[1]) - (b[1] - a[1]) * (x - a[0])) / det
+        w0 = 1.0 - w1 - w2
+        worst = 0
+        lowest = w0
+        if w1 < lowest:
+            worst, lowest = 1, w1
+        if w2 < lowest:
+            worst, lowest = 2, w2
+        if lowest >= -1e-9:
+            break
+        cell = beside[cell, worst]
+        if cell < 0:
+            return 0.0, 0.0, cell, False
+    v = values[cell]
+    mean = w0 * v[0, 0] + w1 * v[1, 0] + w2 * v[2, 0]
+    half = w0 * v[0, 1] + w1 * v[1, 1] + w2 * v[2, 1]
+    shear = w0 * v[0, 2] + w1 * v[1, 2] + w2 * v[2, 2]
+    radius = np.sqrt(half * half + shear * shear)
+    if 2.0 * radius < least or abs(mean) + radius < least or radius == 0.0:
+        return 0.0, 0.0, cell, False
+    if mean < 0.0:
+        half, shear = -half, -shear
+    angle = 0.5 * np.arctan2(shear, half)
+    dx, dy = np.cos(angle), np.sin(angle)
+    along = dx * way[0] + dy * way[1]
+    if along < 0.0:
+        dx, dy, along = -dx, -dy, -along
+    return dx, dy, cell, either or along >= _SHARPEST
+
+
+@njit(cache=True)
+def _follow(corners, values, beside, start, cell, step, least, most, sense):  # type: ignore[no-untyped-def]
+    """Points (m, 2) from `start` in one sense, and whether they come back to it."""
+    line = np.empty((most + 1, 2))
+    line[0] = start
+    way = np.zeros(2)
+    dx, dy, cell, fine = _direction(
+        corners, values, beside, cell, start[0], start[1], True, least, way
+    )
+    if not fine:
+        return line[:1].copy(), False
+    way[0], way[1] = sense * dx, sense * dy
+    x, y = start
+    count = 1
+    h = 0.5 * step
+    while count <= most:
+        ax, ay, cell, fine = _direction(corners, values, beside, cell, x, y, False, least, way)
+        if not fine:
+            break
+        way[0], way[1] = ax, ay
+        bx, by, near, fine = _direction(
+            corners, values, beside, cell, x + h * ax, y + h * ay, False, least, way
+        )
+        if not fine:
+            break
+        cx, cy, near, fine = _direction(
+            corners, values, beside, near, x + h * bx, y + h * by, False, least, way
+        )
+        if not fine:
+            break
+        ex, ey, near, fine = _direction(
+            corners, values, beside, near, x + step * cx, y + step * cy, False, least, way
+        )
+        if not fine:
+            break
+        x += step * (ax + 2.0 * bx + 2.0 * cx + ex) / 6.0
+        y += step * (ay + 2.0 * by + 2.0 * cy + ey) / 6.0
+        cell = near
+        line[count, 0], line[count, 1] = x, y
+        count += 1
+        gap = np.sqrt((x - start[0]) ** 2 + (y - start[1]) ** 2)
+        if count > 6 and gap < 0.75 * step:
+            if gap < 0.5 * step:
+                count -= 1
+            return line[:count].copy(), True
+    return line[:count].copy(), False
