@@ -1,0 +1,106 @@
+"""The result of a topology optimisation."""
+
+from dataclasses import dataclass, replace
+
+import numpy as np
+
+from ccfem.arrays import FloatArray, read_only
+from ccfem.elasticity.plane_problem import PlaneProblem
+from ccfem.elasticity.problem import Problem
+from ccfem.errors import InputError
+
+__all__ = ["Design"]
+
+
+@dataclass(frozen=True)
+class Design:
+    """Densities that an optimisation found.
+
+    Attributes
+    ----------
+    full : PlaneProblem or Problem
+        The problem at full density.
+    density : (m,) array in [0, 1]
+        Of each cell (filtered, with a density filter).
+    variables : (m,) array in [0, 1]
+        What the optimiser moves: equal to `density` unless that is filtered. Start from them to go
+        on with a run.
+    factor : (m,) array in (0, 1]
+        What the density makes of the stiffness of each cell.
+    compliance : (k,) array, N mm
+        Weighted compliance of every iterate, the last one being that of `density`.
+    change : (k - 1,) array
+        Largest change of a variable in every iteration.
+    converged : str
+        "change", "objective", or "" when the iterations ran out.
+    angle : (m,) array, radians, or None
+        Of the material axis of each cell, where it was optimised.
+    """
+
+    full: PlaneProblem | Problem
+    density: FloatArray
+    variables: FloatArray
+    factor: FloatArray
+    compliance: FloatArray
+    change: FloatArray
+    converged: str
+    angle: FloatArray | None = None
+
+    def __post_init__(self) -> None:
+        for name in ("density", "variables", "factor", "compliance", "change"):
+            object.__setattr__(self, name, read_only(getattr(self, name)))
+        if self.angle is not None:
+            object.__setattr__(self, "angle", read_only(self.angle))
+
+    @property
+    def iterations(self) -> int:
+        """Iterations taken."""
+        return len(self.change)
+
+    @property
+    def volumes(self) -> FloatArray:
+        """Volume of each cell, (m,), mm^3."""
+        if isinstance(self.full, PlaneProblem):
+            return self.full.mesh.areas * self.full.thickness
+        return self.full.mesh.volumes
+
+    @property
+    def volume_fraction(self) -> float:
+        """Share of the volume that is filled."""
+        return float(self.volumes @ self.density / self.volumes.sum())
+
+    @property
+    def grey(self) -> float:
+        """Sigmund's measure of non-discreteness, the mean of 4 rho (1 - rho): 0 is black/white."""
+        return float(np.mean(4.0 * self.density * (1.0 - self.density)))
+
+    @property
+    def problem(self) -> PlaneProblem | Problem:
+        """The problem with the stiffness that the densities give."""
+        if isinstance(self.full, PlaneProblem):
+            return replace(self.full, stiffness=self.factor[:, None, None] * self.full.stiffness)
+        return replace(self.full, density=self.factor)
+
+    def filled(
+        self, volume_fraction: float | None = None
+    ) -> "np.ndarray[tuple[int], np.dtype[np.bool_]]":
+        """Densest cells that make up a share of the volume.
+
+        Parameters
+        ----------
+        volume_fraction : float in (0, 1], optional
+            Default that of the design.
+
+        Returns
+        -------
+        (m,) bool array
+        """
+        share = self.volume_fraction if volume_fraction is None else volume_fraction
+        if not 0.0 < share <= 1.0:
+            raise InputError(f"a share of the volume must lie in (0, 1]; got {share}")
+        order = np.argsort(-self.density, kind="stable")
+        reached = np.cumsum(self.volumes[order])
+        count = int(np.searchsorted(reached, share * reached[-1] * (1.0 + 1e-12), side="right"))
+        result = np.zeros(len(order), dtype=bool)
+        result[order[: max(count, 1)]] = True
+        return result

@@ -1,0 +1,217 @@
+from dataclasses import replace
+
+import numpy as np
+import pytest
+
+from ccfem.elasticity import (
+    Force,
+    PlaneMesh,
+    PlaneProblem,
+    PointForce,
+    Problem,
+    Support,
+    raster_mesh,
+    rotate_plane,
+    solve,
+    solve_plane,
+)
+from ccfem.errors import InputError
+from ccfem.materials import isotropic, plane_stress
+from ccfem.structured import box_mesh
+from ccfem.topopt import compliance_of, simp, simp_factor
+from ccfem.topopt.simp import parametrise
+
+UNIT = plane_stress(1.0, 1.0, 0.3, 1.0 / 2.6)
+
+
+def mbb(nx, ny, stiffness=UNIT):
+    """Half of the MBB beam on a raster, as in the 88 lines."""
+    mesh = raster_mesh(np.ones((ny, nx), dtype=bool))
+    mesh = mesh.with_patches({"roller": mesh.nearest_nodes([[nx, 0]])[:, None]})
+    supports = (Support("x_min", "x"), Support("roller", "y"))
+    loads = {"load": (PointForce((0.0, ny, 0.0), (0.0, -1.0, 0.0)),)}
+    return PlaneProblem(mesh, stiffness, 1.0, supports, loads)
+
+
+@pytest.mark.parametrize(
+    ("filter", "radius", "compliance"),
+    [("sensitivity", 1.5, 203.2), ("sensitivity", 2.4, 216.8), ("density", 2.4, 233.7)],
+)
+def test_mbb_beam_of_the_88_lines(filter, radius, compliance):
+    # Andreassen et al., Struct. Multidisc. Optim. 43 (2011) 1; f 0.5, p 3, change below 0.01.
+    design = simp(mbb(60, 20), 0.5, 3.0, radius, filter)
+    assert design.compliance[-1] == pytest.approx(compliance, rel=0.005)
+    assert design.converged == "change"
+    assert design.volume_fraction == pytest.approx(0.5, abs=1e-6)
+    # What is reported is the compliance of what is returned.
+    field = solve_plane(design.problem)["load"]
+    assert 2.0 * field.strain_energy == pytest.approx(design.compliance[-1], rel=1e-6)
+
+
+def tets():
+    mesh = box_mesh((6.0, 2.0, 2.0), (6, 2, 2))
+    loads = {
+        "down": (Force("x_max", (0.0, 0.0, -1.0)),),
+        "side": (Force("x_max", (0.2, 1.0, 0.0)),),
+    }
+    return Problem(mesh, isotropic(1.0, 0.3), (Support("x_min"),), loads)
+
+
+def plates():
+    plate = mbb(10, 6)
+    angles = np.random.default_rng(2).uniform(0.0, np.pi, 60)
+    fibre = rotate_plane(plane_stress(20.0, 1.0, 0.3, 0.7), angles)
+    more = {"tip": (PointForce((10.0, 3.0, 0.0), (1.0, 0.5, 0.0)),)}
+    cells = np.vstack([plate.mesh.cells[:, [0, 1, 2]], plate.mesh.cells[:, [0, 2, 3]]])
+    triangles = PlaneMesh(plate.mesh.points, cells, plate.mesh.patches)
+    return [
+        plate,
+        replace(plate, stiffness=fibre, loads={**plate.loads, **more}),
+        replace(
+            plate,
+            mesh=triangles,
+            stiffness=np.vstack([fibre, fibre]),
+            thickness=np.linspace(0.5, 1.5, 120),
+        ),
+    ]
+
+
+@pytest.mark.parametrize("filter", ["sensitivity", "density"])
+@pytest.mark.parametrize("k", range(4))
+def test_sensitivities_by_finite_differences(k, filter):
+    problem = tets() if k == 3 else plates()[k]
+    weights = {name: 0.5 + i for i, name in enumerate(problem.loads)}
+    model = compliance_of(problem, weights, "superlu")
+    m = len(model.volumes)
+    rng = np.random.default_rng(k)
+    solid, void = np.arange(m) == 3, np.arange(m) == 7
+    space = parametrise(model, 0.5, 3.0, 2.3, filter, solid, void, 1e-3)
+    x = rng.uniform(0.2, 0.9, m)
+
+    def compliance(x):
+        return model(simp_factor(space.density(x), 3.0, 1e-3)[0]).compliance
+
+    density = space.density(x)
+    energy = model(simp_factor(density, 3.0, 1e-3)[0]).energy
+    gradient = space.gradient(density, energy)
+    step = 1e-5
+    for cell in rng.choice(m, 8, replace=False):
+        move = step * (np.arange(m) == cell)
+        difference = (compliance(x + move) - compliance(x - move)) / (2 * step)
+        assert gradient[cell] == pytest.approx(difference, rel=1e-5, abs=1e-6 * abs(gradient).max())
+    volume = space.volume_gradient()
+    direction = rng.uniform(-0.1, 0.1, m)
+    change = model.volumes @ (space.density(x + direction) - density)
+    assert volume @ direction == pytest.approx(change, rel=1e-9)
+
+
+def test_compliance_falls_and_beats_the_uniform_plate():
+    design = simp(mbb(30, 10), 0.5, radius=1.5)
+    uniform = design.compliance[0]
+    assert design.compliance[-1] < 0.25 * uniform
+    assert design.density.min() >= 0.0
+    assert design.density.max() <= 1.0
+    assert design.grey < 0.5  # the uniform plate has 1
+
+
+@pytest.mark.parametrize("filter", ["sensitivity", "density"])
+def test_passive_cells_stay(filter):
+    problem = mbb(30, 10)
+    centre = problem.mesh.centres
+    void = np.hypot(centre[:, 0] - 12.0, centre[:, 1] - 5.0) < 2.5
+    solid = centre[:, 1] > 9.0
+    design = simp(problem, 0.5, radius=1.5, filter=filter, solid=solid, void=void, iterations=30)
+    assert (design.density[solid] == 1.0).all()
+    assert (design.density[void] == 0.0).all()
+    assert design.volume_fraction == pytest.approx(0.5, abs=1e-6)
+
+
+def test_load_cases_are_weighted():
+    problem = mbb(20, 10)
+    other = {"other": (PointForce((20.0, 10.0, 0.0), (0.0, -1.0, 0.0)),)}
+    both = replace(problem, loads={**problem.loads, **other})
+    first = simp(problem, 0.5, radius=1.5, iterations=20)
+    only = simp(both, 0.5, radius=1.5, iterations=20, weights={"load": 1.0, "other": 0.0})
+    np.testing.assert_allclose(only.density, first.density, atol=1e-6)
+    shared = simp(both, 0.5, radius=1.5, iterations=20)
+    again = simp(both, 0.5, radius=1.5, iterations=20, weights={"load": 2.0, "other": 2.0})
+    np.testing.assert_allclose(again.density, shared.density, atol=1e-6)
+    np.testing.assert_allclose(again.compliance, 2.0 * shared.compliance, rtol=1e-6)
+    assert np.abs(shared.density - first.density).max() > 0.5
+
+
+def test_mirrored_problem_gives_the_mirrored_design():
+    problem = mbb(24, 8)
+    mesh = problem.mesh
+    flipped = replace(mesh, points=mesh.points * [-1.0, 1.0], cells=mesh.cells[:, ::-1])
+    loads = {"load": (PointForce((0.0, 8.0, 0.0), (0.0, -1.0, 0.0)),)}
+    other = simp(replace(problem, mesh=flipped, loads=loads), 0.5, radius=1.5, iterations=15)
+    first = simp(problem, 0.5, radius=1.5, iterations=15)
+    np.testing.assert_allclose(other.density, first.density, atol=1e-6)
+
+
+def test_a_run_goes_on_where_it_stopped():
+    problem = mbb(20, 10)
+    whole = simp(problem, 0.5, radius=1.5, filter="density", iterations=12)
+    part = simp(problem, 0.5, radius=1.5, filter="density", iterations=5)
+    rest = simp(problem, 0.5, radius=1.5, filter="density", iterations=7, start=part.variables)
+    np.testing.assert_allclose(rest.density, whole.density, atol=1e-9)
+
+
+def test_it_stops_when_the_objective_stands_still():
+    design = simp(mbb(30, 10), 0.5, radius=1.5, tolerance=0.0, objective_tolerance=1e-3)
+    assert design.converged == "objective"
+    recent = design.compliance[-11:]
+    assert np.ptp(recent) < 2e-3 * recent[-1]
+
+
+def test_progress_is_told():
+    told = []
+    simp(mbb(12, 6), 0.5, radius=1.5, iterations=4, progress=lambda *a: told.append(a))
+    assert [share for _, share in told] == [0.25, 0.5, 0.75, 1.0]
+    assert "compliance" in told[0][0]
+    assert "volume 0.5000" in told[0][0]
+
+
+def test_tetrahedra_get_stiffer_too():
+    problem = tets()
+    design = simp(problem, 0.5, radius=1.2, iterations=25, backend="superlu")
+    assert design.compliance[-1] < 0.6 * design.compliance[0]
+    assert design.volume_fraction == pytest.approx(0.5, abs=1e-6)
+    fields = solve(design.problem)
+    total = sum(2.0 * field.strain_energy for field in fields.values())
+    assert total == pytest.approx(design.compliance[-1], rel=1e-6)
+
+
+def test_filled_cells_have_the_volume():
+    design = simp(mbb(30, 10), 0.5, radius=1.5, iterations=20)
+    filled = design.filled(0.4)
+    assert filled.sum() == 120
+    assert design.density[filled].min() >= design.density[~filled].max()
+
+
+@pytest.mark.parametrize(
+    ("more", "message"),
+    [
+        ({"volume_fraction": 1.0}, "0 < volume fraction < 1"),
+        ({"penalty": 0.5}, "penalty >= 1"),
+        ({"filter": "none"}, "there are: sensitivity, density"),
+        ({"radius": 0.0}, "filter radius must be positive"),
+        ({"radius": 1e9, "problem": mbb(120, 100)}, "give a smaller one"),
+        ({"weights": {"other": 1.0}}, "one number >= 0 for each load case"),
+        ({"weights": {"load": 0.0}}, "give one a weight"),
+        ({"solid": np.ones(60, dtype=bool)}, "cannot be met"),
+        ({"void": np.ones(5, dtype=bool)}, r"shape \(60,\)"),
+        ({"start": np.full(60, 2.0)}, r"densities in \[0, 1\]"),
+        ({"iterations": 0}, "at least one iteration"),
+        ({"move": 0.0}, "0 < move"),
+        (
+            {"problem": replace(mbb(10, 6), supports=(Support("x_min", "xy", (1.0, 0.0, 0.0)),))},
+            "supports at rest",
+        ),
+        ({"problem": replace(tets(), mesh=tets().mesh.quadratic())}, "linear tetrahedra"),
+    ],
+)
+def test_bad_parameters_are_refused(more, message):
+    with pytest.raises(InputError, match=message):
+        simp(**{"problem": mbb(10, 6), "volume_fraction": 0.5, "radius": 1.5, **more})
