@@ -11,7 +11,6 @@ from ccfem.comparison import Comparison, Run, Tested
 from ccfem.elasticity.solve import solve
 from ccfem.elasticity.stress_field import StressField
 from ccfem.equal_fibre import (
-    TOLERANCE,
     Planned,
     check_wanted,
     length_per_layer,
@@ -124,8 +123,7 @@ def compare(
     Strategies are compared at equal length of fibre: more fibre wins almost any comparison. When no
     length is given, it is the smallest that any of them lays of its own accord, so that nobody has
     to lay more than it would, and all others are thinned to it by the parameter that each names for
-    the purpose. Where one cannot be thinned so far, its least is the length for all. A strategy
-    that fails stays in the result, with the reason.
+    the purpose. A strategy that fails stays in the result, with the reason.
 
     Parameters
     ----------
@@ -219,7 +217,7 @@ class _Planner:
         return Planned(strategy, toolpaths, length_per_layer(toolpaths, self.layers))
 
     def level(self) -> float | None:
-        """Bring all plans to the smallest natural length, or the smallest that all can go down to.
+        """Bring all plans to the smallest natural length.
 
         Returns
         -------
@@ -230,23 +228,10 @@ class _Planner:
         if not lengths:
             return None
         setter = min(lengths, key=lengths.__getitem__)
-        wanted, note = lengths[setter], "lays the least of its own accord: sets the length"
-        self.plan_each(wanted, but=setter)
-        lengths = {name: one.length_per_layer for name, one in self.found.items()}
-        longest = max(lengths, key=lengths.__getitem__)
-        if lengths[longest] > (1.0 + TOLERANCE) * wanted:
-            setter, wanted = longest, lengths[longest]
-            note = (
-                f"cannot lay less, at {_amount_text(self.found[setter].strategy)}: sets the length"
-            )
-            self.plan_each(wanted, but=setter)
+        self.plan_each(lengths[setter], but=setter)
+        note = "lays the least of its own accord: sets the length"
         self.found[setter] = replace(self.found[setter], note=note)
-        return wanted
-
-
-def _amount_text(strategy: Strategy) -> str:
-    parameter = strategy.amount.parameter
-    return f"{parameter} = {getattr(strategy, parameter):g}"
+        return lengths[setter]
 
 
 def _evaluated(name: str, planner: _Planner, seconds: dict[str, float]) -> Run:

@@ -21,9 +21,9 @@ __all__ = ["TOLERANCE", "Planned", "check_wanted", "length_per_layer", "plan_to_
 
 TOLERANCE = 0.01
 """Share by which the length may fall short before the search stops."""
-_ROUNDS = 4
+_ROUNDS = 3
 """Plans of the whole stack."""
-_STEPS = 9
+_STEPS = 8
 """Plans of the few layers that stand for the stack, in each round."""
 _FINEST = 1e-5
 """Share of the parameter's range below which a step in length is taken for what it is."""
@@ -77,7 +77,7 @@ def plan_to_length(
     ratio of the two lengths corrects the next search. Of the values tried on the whole stack, the
     one that lays most without laying too much is kept. Where the length changes in steps (one
     contour more or less) and that leaves too much missing, some layers, evenly spread, take the
-    next value that lays more.
+    next value that lays more; where even the least is too much, some layers stay without fibre.
 
     Parameters
     ----------
@@ -133,8 +133,11 @@ def plan_to_length(
             break
         ratio, margin = length / sampled[value], 0.3 * tolerance
     best = _best(list(tried.values()), wanted)
-    if best.length_per_layer < (1.0 - tolerance) * wanted:
-        above = [v for v in sampled if sampled[v] * ratio > wanted]
+    if best.length_per_layer > wanted * (1.0 + 1e-9):
+        best = _mixed(replace(best, toolpaths=Toolpaths.empty()), best, layers, wanted)
+    elif best.length_per_layer < (1.0 - tolerance) * wanted:
+        above = [v for v in tried if tried[v].length_per_layer > wanted]
+        above = above or [v for v in sampled if sampled[v] * ratio > wanted]
         if above:
             value = min(above, key=sampled.__getitem__)
             more = tried[value] if value in tried else planned(value, layers)
@@ -143,27 +146,27 @@ def plan_to_length(
 
 
 def _mixed(less: Planned, more: Planned, layers: Sequence[Layer], wanted: float) -> Planned:
-    """Take as many layers as possible, evenly spread, from the plan that lays too much."""
-    count = len(layers)
-    lengths = np.array(
-        [
-            [plan.toolpaths.on_layer(layer.index).of_kind(FIBRE).lengths.sum() for layer in layers]
-            for plan in (less, more)
-        ]
-    )
-    for taken in range(count - 1, 0, -1):
-        chosen = np.zeros(count, dtype=np.int64)
-        chosen[((np.arange(taken) + 0.5) * count / taken).astype(np.int64)] = 1
-        if lengths[chosen, np.arange(count)].sum() <= wanted * count:
-            break
-    else:
-        return less
-    plans = [(less, more)[k].toolpaths for k in chosen]
+    """Take as many layers as fit, evenly spread, from a plan that lays more."""
+    count, index = len(layers), [layer.index for layer in layers]
+    each = [
+        np.bincount(one.toolpaths.layer, one.toolpaths.lengths, minlength=max(index) + 1)[index]
+        for one in (less, more)
+    ]
+    chosen, room = np.zeros(count, dtype=bool), wanted * count - each[0].sum()
+    # Multiples of the golden ratio spread any number of layers over the stack.
+    for k in np.argsort((np.arange(count) * 0.5 * (np.sqrt(5.0) - 1.0)) % 1.0, kind="stable"):
+        gain = each[1][k] - each[0][k]
+        if 0.0 < gain <= room:
+            chosen[k], room = True, room - gain
+    if not chosen.any():
+        return less if len(less.toolpaths) else more
     toolpaths = Toolpaths.concatenate(
-        plan.on_layer(layer.index) for plan, layer in zip(plans, layers, strict=True)
+        (more if taken else less).toolpaths.on_layer(k)
+        for k, taken in zip(index, chosen, strict=True)
     )
     amount = less.strategy.amount.parameter
-    note = f"{amount} = {getattr(more.strategy, amount):.6g} on {taken} of {count} layers"
+    note = f"{amount} = {getattr(more.strategy, amount):.6g} on {chosen.sum()} of {count} layers"
+    note += "" if len(less.toolpaths) else ", no fibre on the others"
     return Planned(less.strategy, toolpaths, length_per_layer(toolpaths, layers), note)
 
 
@@ -231,9 +234,13 @@ def _search(
 def _by_proportion(
     known: Mapping[float, float], amount: Amount, target: float, ends: tuple[float, float]
 ) -> float:
-    """Guess while one side is unknown: the length goes as the parameter or as its inverse."""
-    nearest = min(known, key=lambda value: abs(known[value] - target))
-    unknown = amount.most if known[nearest] <= target else amount.least
+    """Guess while one side is unknown: the length goes as the parameter or as its inverse.
+
+    From the known value that is nearest to the unknown side; the end itself where that leads
+    nowhere new.
+    """
+    unknown = amount.most if min(known.values()) <= target else amount.least
+    nearest = min(known, key=lambda value: abs(value - unknown))
     if not (known[nearest] > 0.0 and ends[0] > 0.0):
         return unknown
     factor = target / known[nearest]

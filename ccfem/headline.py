@@ -80,6 +80,9 @@ TEST_COLUMNS = (
 )
 """Indices of the virtual test, described as those of the evaluator are."""
 
+_EQUAL = 0.02
+"""Difference in length up to which two runs count as laying equally much."""
+
 
 @dataclass(frozen=True)
 class Headline:
@@ -235,16 +238,22 @@ def stiffness_ratios(one: Run, other: Run) -> tuple[float, float]:
 
 
 def verdict(comparison: Comparison) -> str:
-    """One sentence that says which strategy is best, by what, and at how much fibre."""
+    """One sentence that says which strategy is best, by what, and at how much fibre.
+
+    Empty where fewer than two strategies kept to the wanted length.
+    """
     order = [run for run in ranking(comparison) if run.evaluation is not None]
+    order = [run for run in order if not _too_long(run, comparison)]
     if len(order) < 2:
         return ""
     first, second = order[0], order[1]
-    amount = (
-        "each with its own amount of fibre"
-        if comparison.fibre_per_layer is None
-        else f"at {comparison.fibre_per_layer:.0f} mm of fibre per layer"
-    )
+    more = first.length_per_layer / second.length_per_layer - 1.0
+    if comparison.fibre_per_layer is None:
+        amount = "each with its own amount of fibre"
+    elif abs(more) <= _EQUAL:
+        amount = f"at {comparison.fibre_per_layer:.0f} mm of fibre per layer"
+    else:
+        amount = f"with {abs(more):.0%} {'more' if more > 0.0 else 'less'} fibre than {second.name}"
     if first.tested is None or second.tested is None:
         best, following = (headline_values(run)["efficiency"] for run in (first, second))
         return (

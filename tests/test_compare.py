@@ -1,5 +1,6 @@
 """Comparison: equal fibre, nobody dropped, and the order by the virtual test."""
 
+import re
 from dataclasses import replace
 
 import numpy as np
@@ -96,15 +97,20 @@ def test_opposite_orders_are_undecided(compared):
     assert verdict(same).startswith(f"{first.name} makes the stiffest part")
 
 
-def test_the_least_that_all_can_go_down_to_sets_the_length():
-    rings = create("contour_zigzag", {"contours": 4})
-    strategies = {"rings": rings, "zigzag": create("zigzag", {"spacing": 12.0})}
+def test_what_cannot_be_thinned_leaves_layers_out():
+    strategies = {
+        "rings": create("contour_zigzag", {"contours": 4}),
+        "zigzag": create("zigzag", {"spacing": 8.0}),
+    }
     result = compare(strip(), strategies, strand=None)
-    least = plan(replace(rings, spacing=20.0), result.layers, result.stress, result.case.machine)
-    assert result.fibre_per_layer == length_per_layer(least, result.layers)
-    set_by, other = result.runs
-    assert set_by.note == "cannot lay less, at spacing = 20: sets the length"
-    assert 0.95 * result.fibre_per_layer <= other.length_per_layer <= result.fibre_per_layer
+    rings, zigzag = result.runs
+    assert result.fibre_per_layer == zigzag.length_per_layer
+    assert 0.0 < rings.length_per_layer <= result.fibre_per_layer
+    assert re.search(r"spacing = 20 on \d of 4 layers, no fibre on the others", rings.note)
+    whole = plan(rings.strategy, result.layers, result.stress, result.case.machine)
+    for layer in result.layers:
+        mine = rings.toolpaths.on_layer(layer.index).points
+        assert not len(mine) or np.array_equal(mine, whole.on_layer(layer.index).points)
 
 
 def test_more_fibre_than_wanted_comes_last():
@@ -112,13 +118,25 @@ def test_more_fibre_than_wanted_comes_last():
         "rings": create("contour_zigzag", {"contours": 4}),
         "zigzag": create("zigzag", {"turn": 0.0}),
     }
-    result = compare(strip(), strategies, fibre_per_layer=300.0)
+    result = compare(strip(), strategies, layers=1, fibre_per_layer=300.0)
     rings, zigzag = result.runs
     assert rings.length_per_layer > 330.0
     assert rings.tested.bracket.tension.ratio > zigzag.tested.bracket.tension.ratio
     assert ranking(result) == (zigzag, rings)
     assert any("rings: lays" in line and "placed last" in line for line in remarks(result))
     assert "stiffness_ratio_tension" not in best_values(result)
+    assert verdict(result) == ""
+
+
+def test_unequal_fibre_is_in_the_verdict():
+    strategies = {
+        "thin": create("zigzag", {"angle": 90.0, "turn": 0.0, "spacing": 6.0}),
+        "dense": create("zigzag", {"angle": 0.0, "turn": 0.0, "spacing": 2.0}),
+    }
+    result = compare(strip(), strategies, natural=True)
+    dense = result.runs[1].length_per_layer / result.runs[0].length_per_layer - 1.0
+    assert "each with its own amount of fibre" in verdict(result)
+    assert f"{dense:.0%} more fibre than thin" in verdict(replace(result, fibre_per_layer=1e4))
 
 
 def test_a_strategy_that_fails_stays_with_its_reason():

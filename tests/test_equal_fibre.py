@@ -98,14 +98,24 @@ def test_a_length_that_can_be_met_is_met(plate, wanted):
     assert length_per_layer(again, layers) == planned.length_per_layer
 
 
-def test_more_than_the_most_and_less_than_the_least_are_said(plate):
+def test_more_than_the_most_is_said(plate):
     stress, layers = plate
     most = plan_to_length(Lines(), layers, stress, MACHINE, 9000.0)
     assert most.length_per_layer == pytest.approx(40 * LENGTH)
     assert "its most, at spacing = 1" in most.note
-    least = plan_to_length(Lines(), layers, stress, MACHINE, 60.0)
-    assert least.length_per_layer == pytest.approx(2 * LENGTH)
-    assert "its least, at spacing = 20" in least.note
+
+
+def test_where_the_least_is_too_much_layers_stay_empty(plate):
+    stress, layers = plate
+    least = plan_to_length(Lines(), layers, stress, MACHINE, 61.0)
+    assert least.length_per_layer == pytest.approx(LENGTH)
+    assert least.note.startswith("spacing = 20 on 4 of 8 layers, no fibre on the others")
+    filled = np.unique(least.toolpaths.layer)
+    assert len(filled) == 4
+    assert np.diff(filled).max() <= 3
+    single = plan_to_length(Lines(), layers[:1], stress, MACHINE, 61.0)
+    assert single.length_per_layer == pytest.approx(2 * LENGTH)
+    assert "its least, at spacing = 20" in single.note
 
 
 @pytest.mark.parametrize("wanted", [0.0, -5.0, float("nan"), float("inf")])
