@@ -250,7 +250,11 @@ def _all_indices(comparison: Comparison) -> str:
 
 
 def _number(value: float) -> str:
-    return f"{value:.4g}" if np.isfinite(value) else "–"
+    if not np.isfinite(value):
+        return "–"
+    if abs(value) < 1e-9:
+        return "0"
+    return f"{value:,.0f}" if abs(value) >= 1000.0 else f"{value:.4g}"
 
 
 def _parameters(comparison: Comparison) -> str:
