@@ -19,7 +19,7 @@ __all__ = ["extract_levels", "levels_at", "start_count", "unit_levels"]
 def levels_at(surface: Surface, values: FloatArray, count: int) -> Isocontours:
     """Isocurves at `count` levels, half a step from the extremes [paper 000, Eq. 7]."""
     first, step = _levels(values, count)
-    return isocontours(surface.points, surface.triangles, values, first, step)
+    return isocontours(surface.points, surface.triangles, values, first, step, surface.edges)
 
 
 def unit_levels(surface: Surface, values: FloatArray) -> Isocontours:
@@ -30,7 +30,7 @@ def unit_levels(surface: Surface, values: FloatArray) -> Isocontours:
     low, high = float(values.min()), float(values.max())
     count = int(np.floor(high - low + 0.5))
     first = 0.5 * (low + high) - 0.5 * (count - 1)
-    return isocontours(surface.points, surface.triangles, values, first, 1.0)
+    return isocontours(surface.points, surface.triangles, values, first, 1.0, surface.edges)
 
 
 def extract_levels(surface: Surface, values: FloatArray, width: float) -> Isocontours:
@@ -65,7 +65,7 @@ def extract_levels(surface: Surface, values: FloatArray, width: float) -> Isocon
         least = steepest_spacing(surface.areas, gradient, surface.triangles, values, first, step)
         if least <= enough:
             return float(least)
-        curves = isocontours(surface.points, surface.triangles, values, first, step)
+        curves = isocontours(surface.points, surface.triangles, values, first, step, surface.edges)
         return float(
             least_distance(curves.points, curves.offsets, curves.level, 2.0 * width, enough)
         )

@@ -9,6 +9,7 @@ import scipy.sparse as sparse
 from scipy.sparse.linalg import splu
 
 from ccfem.arrays import FloatArray, IntArray, read_only
+from ccfem.geometry.isocontours import triangle_edges
 from ccfem.layers.layer import Layer
 
 __all__ = ["Surface", "positive_definite"]
@@ -112,12 +113,17 @@ class Surface:
         return self.lumped(values) / np.maximum(self.lumped(np.ones(len(values))), 1e-300)
 
     @cached_property
+    def edges(self) -> tuple[IntArray, IntArray]:
+        """Unique edges (e, 2), and the edges (t, 3) opposite to the corners of each triangle."""
+        return triangle_edges(self.triangles, len(self.points))
+
+    @cached_property
     def neighbours(self) -> IntArray:
-        """Pairs of triangles that share an edge, (e, 2)."""
-        n = len(self.points)
-        t = self.triangles
-        edges = np.concatenate([t[:, [0, 1]], t[:, [1, 2]], t[:, [2, 0]]])
-        key = edges.min(axis=1) * n + edges.max(axis=1)
-        order = np.argsort(key, kind="stable")
-        first = np.flatnonzero(key[order[1:]] == key[order[:-1]])
-        return read_only(np.stack([order[first], order[first + 1]], axis=1) % len(t), np.int64)
+        """Pairs of triangles that share an edge, (f, 2)."""
+        edges, of_triangle = self.edges
+        triangle = np.repeat(np.arange(len(self.triangles)), 3)
+        shape = (len(edges), len(self.triangles))
+        ones = np.ones(len(triangle), dtype=np.int8)
+        table = sparse.csr_array((ones, (of_triangle.ravel(), triangle)), shape=shape)
+        shared = table.indptr[:-1][np.diff(table.indptr) == 2]
+        return read_only(np.stack([table.indices[shared], table.indices[shared + 1]], 1), np.int64)

@@ -7,7 +7,7 @@ from numba import njit
 
 from ccfem.arrays import FloatArray, IntArray
 
-__all__ = ["Isocontours", "isocontours", "least_distance", "steepest_spacing"]
+__all__ = ["Isocontours", "isocontours", "least_distance", "steepest_spacing", "triangle_edges"]
 
 
 @dataclass(frozen=True)
@@ -44,7 +44,12 @@ class Isocontours:
 
 
 def isocontours(
-    points: FloatArray, triangles: IntArray, values: FloatArray, first: float, step: float
+    points: FloatArray,
+    triangles: IntArray,
+    values: FloatArray,
+    first: float,
+    step: float,
+    edges: tuple[IntArray, IntArray] | None = None,
 ) -> Isocontours:
     """Extract the isocurves at ``first + i * step`` for all whole i that the field reaches.
 
@@ -59,6 +64,8 @@ def isocontours(
         The field; taken as linear on each triangle.
     first, step : float
         A level, and the distance (> 0) to the next.
+    edges : tuple of arrays, optional
+        `triangle_edges` of the triangles, where they are known already.
 
     Returns
     -------
@@ -68,19 +75,19 @@ def isocontours(
     scaled = (values - first) / step
     # A level exactly through a node would cross none or all of its edges.
     scaled = np.where(scaled == np.round(scaled), scaled + 1e-9, scaled)
-    edges, of_triangle = _edges(triangles, len(points))
-    low = np.ceil(np.minimum(scaled[edges[:, 0]], scaled[edges[:, 1]])).astype(np.int64)
-    high = np.floor(np.maximum(scaled[edges[:, 0]], scaled[edges[:, 1]])).astype(np.int64)
+    ends, of_triangle = triangle_edges(triangles, len(points)) if edges is None else edges
+    low = np.ceil(np.minimum(scaled[ends[:, 0]], scaled[ends[:, 1]])).astype(np.int64)
+    high = np.floor(np.maximum(scaled[ends[:, 0]], scaled[ends[:, 1]])).astype(np.int64)
     start = np.concatenate([[0], np.cumsum(np.maximum(high - low + 1, 0))])
-    edge, level, weights = _crossings(scaled, edges, low, start)
+    edge, level, weights = _crossings(scaled, ends, low, start)
     line, offsets = _chain(of_triangle, low, high, start)
     order = np.argsort(level[line[offsets[:-1]]], kind="stable")
     sizes = np.diff(offsets)[order]
     taken = _gather(line, offsets, order, sizes)
     new_offsets = np.concatenate([[0], np.cumsum(sizes)]).astype(np.int64)
-    ends, w = edges[edge[taken]], weights[taken]
-    curve = (1.0 - w)[:, None] * points[ends[:, 0]] + w[:, None] * points[ends[:, 1]]
-    return Isocontours(curve, new_offsets, level[taken[new_offsets[:-1]]], ends, w)
+    on, w = ends[edge[taken]], weights[taken]
+    curve = (1.0 - w)[:, None] * points[on[:, 0]] + w[:, None] * points[on[:, 1]]
+    return Isocontours(curve, new_offsets, level[taken[new_offsets[:-1]]], on, w)
 
 
 def _gather(line: IntArray, offsets: IntArray, order: IntArray, sizes: IntArray) -> IntArray:
@@ -88,7 +95,7 @@ def _gather(line: IntArray, offsets: IntArray, order: IntArray, sizes: IntArray)
     return line[np.arange(int(sizes.sum())) + shift]
 
 
-def _edges(triangles: IntArray, n: int) -> tuple[IntArray, IntArray]:
+def triangle_edges(triangles: IntArray, n: int) -> tuple[IntArray, IntArray]:
     """Return unique edges (e, 2) and the edges (t, 3) opposite to the corners of each triangle."""
     pairs = np.concatenate([triangles[:, [1, 2]], triangles[:, [2, 0]], triangles[:, [0, 1]]])
     key = pairs.min(axis=1) * n + pairs.max(axis=1)
