@@ -1,5 +1,6 @@
 """Direct factorisations, each of one library."""
 
+import os
 import weakref
 from collections.abc import Callable
 
@@ -38,6 +39,8 @@ def pardiso(matrix: sp.bsr_array) -> Apply:
 
     upper = sp.csr_matrix(sp.triu(matrix.tocsr(), format="csr"))
     solver = PyPardisoSolver(mtype=2)
+    # It searches the whole environment for the library every time unless told where that is.
+    os.environ.setdefault("PYPARDISO_MKL_RT", solver.libmkl._name)
     try:
         solver.factorize(upper)
     except PyPardisoError as error:
