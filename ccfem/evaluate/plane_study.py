@@ -1,0 +1,291 @@
+"""A plate with the fibre as laid: strain energy, stress, and the price of printing it."""
+
+from collections.abc import Sequence
+from dataclasses import dataclass, replace
+from functools import cached_property
+from itertools import pairwise
+
+import numpy as np
+import shapely
+
+from ccfem.arrays import BoolArray, FloatArray, IntArray, read_only
+from ccfem.elasticity.plane import (
+    PlaneField,
+    PlaneProblem,
+    prepare_plane,
+    rotate_plane,
+    solve_plane,
+    stack_plane,
+)
+from ccfem.evaluate.fibre_map import FibreMap
+from ccfem.evaluate.plane_paths import PlanePaths
+from ccfem.evaluate.sensitivity import ANGLES, Sensitivity, plane_compliance
+from ccfem.evaluate.sinuosity import LONG
+from ccfem.evaluate.stiffness_alignment import Reading, agreement, performance_index, strongest
+from ccfem.materials import Material
+from ccfem.tensor import largest_in_plane
+
+__all__ = [
+    "PRINT_SPEED",
+    "TRAVEL_SPEED",
+    "Benchmark",
+    "LaidPlate",
+    "bead_area",
+    "benchmark",
+    "laid_plate",
+    "mixed_stiffness",
+    "nearest_end_order",
+    "print_seconds",
+    "reduced_stiffness",
+    "turned_energies",
+]
+
+PRINT_SPEED, TRAVEL_SPEED = 8.3, 91.6
+"""Speeds, mm/s, of the printer of Plocher et al. (2022), table 4."""
+
+_HEADLINE = 99.9
+"""Percentile of the largest stress component over cells and layers that stands for the maximum."""
+
+
+def reduced_stiffness(material: Material) -> FloatArray:
+    """Reduced stiffness (3, 3), MPa, of a sheet of a material in plane stress."""
+    stiffness: FloatArray = np.linalg.inv(plane_compliance(material))
+    return stiffness
+
+
+@dataclass(frozen=True)
+class LaidPlate:
+    """Solution of a plate with fibre in given directions.
+
+    Attributes
+    ----------
+    field : PlaneField
+    components : (L, m, 3) array, MPa
+        s11, s22, s12 at the centre of each cell in the axes of each layer.
+    """
+
+    field: PlaneField
+    components: FloatArray
+
+    def __post_init__(self) -> None:
+        object.__setattr__(self, "components", read_only(self.components))
+
+    @property
+    def strain_energy(self) -> float:
+        """Total strain energy, N mm: half the compliance."""
+        return self.field.strain_energy
+
+    @property
+    def density_sum(self) -> float:
+        """Sum of the strain energy densities of the cells, MPa: the index of the paper."""
+        return float(self.field.energy_density.sum())
+
+    @cached_property
+    def largest(self) -> FloatArray:
+        """Largest absolute component in each layer and cell, (L, m), MPa."""
+        return read_only(np.abs(self.components).max(axis=2))
+
+    @property
+    def stress(self) -> float:
+        """Largest stress, MPa, as the 99.9th percentile over layers and cells."""
+        return float(np.percentile(self.largest, _HEADLINE))
+
+    @property
+    def raw_stress(self) -> float:
+        """Largest stress of all, MPa; it grows as the cells shrink."""
+        return float(self.largest.max())
+
+    def energy_in(self, cells: BoolArray) -> float:
+        """Strain energy of some cells, a (m,) mask, N mm."""
+        return float(self.field.cell_energy[cells].sum())
+
+
+def laid_plate(problem: PlaneProblem, angles: FloatArray, stiffness: FloatArray) -> LaidPlate:
+    """Solve a plate with the fibre at given angles.
+
+    Parameters
+    ----------
+    problem : PlaneProblem
+        With one load case; its stiffness is not used.
+    angles : (L, m) array, radians
+        Of the fibre in each of L layers of equal thickness, bonded to each other.
+    stiffness : (3, 3) or (L, m, 3, 3) array, MPa
+        Reduced stiffness along the fibre.
+    """
+    angles = np.atleast_2d(angles)
+    turned = rotate_plane(stiffness, angles)
+    solved = solve_plane(replace(problem, stiffness=stack_plane(turned)))
+    (field,) = solved.values()
+    per_layer = np.broadcast_to(stiffness, (*angles.shape, 3, 3))
+    parts = [field.stress_in(a, own) for a, own in zip(angles, per_layer, strict=True)]
+    return LaidPlate(field, np.stack(parts))
+
+
+def turned_energies(
+    problem: PlaneProblem,
+    direction: FloatArray,
+    stiffness: FloatArray,
+    side: FloatArray | float = 1.0,
+    angles: Sequence[float] = ANGLES,
+) -> Sensitivity:
+    """Solve a plate with the fibre of every cell turned away from a direction.
+
+    Parameters
+    ----------
+    problem : PlaneProblem
+        With one load case; its stiffness is not used.
+    direction : (m,) array, radians
+    stiffness : (3, 3) array, MPa
+        Reduced stiffness along the fibre.
+    side : (m,) array or float, default 1
+        Sense of the turn, 1 or -1: Plocher et al. (2022), figure 8, turn the halves of a
+        symmetric plate in mirrored senses.
+    angles : sequence of floats, degrees
+    """
+    elements = prepare_plane(problem).elements
+    energies = []
+    for angle in angles:
+        turned = rotate_plane(stiffness, direction + np.radians(angle) * side)
+        (field,) = solve_plane(replace(problem, stiffness=turned), elements=elements).values()
+        energies.append(field.strain_energy)
+    return Sensitivity(np.array(angles), np.array(energies))
+
+
+@dataclass(frozen=True)
+class Benchmark:
+    """The plate with its fibre along the principal direction everywhere, without paths.
+
+    Attributes
+    ----------
+    direction : (m,) array, radians
+        Of the stress of the largest size, with an isotropic material.
+    defined : (m,) bool array
+        Where there is such a direction (`strongest`).
+    laid : LaidPlate
+        With the fibre along `direction`.
+    curve : Sensitivity
+        Strain energies with the fibre turned from it.
+    """
+
+    direction: FloatArray
+    defined: BoolArray
+    laid: LaidPlate
+    curve: Sensitivity
+
+    def agreement(self, maps: Sequence[FibreMap]) -> float:
+        """Mean agreement of the fibre with `direction` over cells and layers, in [0, 1]."""
+        return float(np.mean([agreement(m.angle - self.direction)[self.defined] for m in maps]))
+
+    def index(self, maps: Sequence[FibreMap], reading: Reading = "weighted") -> float:
+        """Stiffness-alignment index PI of the fibre: see `performance_index`."""
+        factor = np.mean([self.curve(m.angle - self.direction) for m in maps], axis=0)
+        energy = self.laid.field.cell_energy
+        return performance_index(factor[self.defined], energy[self.defined], reading)
+
+
+def benchmark(
+    isotropic: PlaneField,
+    stiffness: FloatArray,
+    side: FloatArray | float = 1.0,
+    angles: Sequence[float] = ANGLES,
+) -> Benchmark:
+    """Solve the benchmark of a plate and its sensitivity to turned fibre.
+
+    Parameters
+    ----------
+    isotropic : PlaneField
+        The plate with an isotropic material.
+    stiffness : (3, 3) array, MPa
+        Reduced stiffness along the fibre.
+    side, angles
+        See `turned_energies`.
+    """
+    largest, smallest, angle = largest_in_plane(isotropic.stress)
+    across, defined = strongest(largest, smallest)
+    direction = angle + np.where(across, 0.5 * np.pi, 0.0)
+    laid = laid_plate(isotropic.problem, direction, stiffness)
+    curve = turned_energies(isotropic.problem, direction, stiffness, side, angles)
+    return Benchmark(direction, defined, laid, curve)
+
+
+def mixed_stiffness(
+    paths: Sequence[PlanePaths],
+    maps: Sequence[FibreMap],
+    long: FloatArray,
+    short: FloatArray,
+    limit: float = LONG,
+) -> FloatArray:
+    """Reduced stiffness (L, m, 3, 3), MPa, of cells by the length of the path in them.
+
+    Paths longer than `limit`, mm, are of the material `long` (continuous fibre), the others and
+    cells without a path of `short` (Plocher et al. 2022, figures 4 and 14).
+    """
+    layers = []
+    for laid, found in zip(paths, maps, strict=True):
+        is_long = np.append(laid.lengths > limit, False)[found.path]
+        layers.append(np.where(is_long[:, None, None], long, short))
+    return np.stack(layers)
+
+
+def nearest_end_order(starts: FloatArray, ends: FloatArray) -> tuple[IntArray, BoolArray, float]:
+    """Order of printing: always on to the path with the nearest end.
+
+    Parameters
+    ----------
+    starts, ends : (k, 2) arrays, mm
+        Ends of the paths; of a closed one the same point twice. The first path comes first.
+
+    Returns
+    -------
+    order : (k,) int array
+    reversed : (k,) bool array
+        Whether the path at that place of the order is walked from its end.
+    travel : float, mm
+        Sum of the straight ways between them.
+    """
+    count = len(starts)
+    order, backward = np.zeros(count, dtype=np.int64), np.zeros(count, dtype=bool)
+    left = np.ones(count, dtype=bool)
+    travel = 0.0
+    for k in range(count):
+        if k:
+            here = starts[order[k - 1]] if backward[k - 1] else ends[order[k - 1]]
+            off = np.stack([np.linalg.norm(p - here, axis=1) for p in (starts, ends)])
+            off[:, ~left] = np.inf
+            side, best = divmod(int(off.argmin()), count)
+            order[k], backward[k] = best, bool(side)
+            travel += float(off[side, best])
+        left[order[k]] = False
+    return order, backward, travel
+
+
+def print_seconds(paths: PlanePaths) -> float:
+    """Time, s, to print a layer: paths at 8.3 mm/s, ways between them at 91.6 mm/s."""
+    if not len(paths):
+        return 0.0
+    starts, ends = paths.points[paths.offsets[:-1]], paths.points[paths.offsets[1:] - 1]
+    _, _, travel = nearest_end_order(starts, ends)
+    return float(paths.lengths.sum()) / PRINT_SPEED + travel / TRAVEL_SPEED
+
+
+def bead_area(paths: PlanePaths, bead: float) -> tuple[float, float]:
+    """Shares of the area of a layer that beads cover twice, and that none covers.
+
+    Parameters
+    ----------
+    paths : PlanePaths
+    bead : float, mm
+        Width of a bead; its ends are cut square, its corners round.
+
+    Returns
+    -------
+    overlap, gaps : float
+        Sum of the areas of the beads less that of their union, and area of the section outside
+        their union, both over the area of the section.
+    """
+    section = paths.layer.polygon
+    lines = [shapely.LineString(paths.points[a:b]) for a, b in pairwise(paths.offsets.tolist())]
+    beads = shapely.buffer(lines, 0.5 * bead, cap_style="flat", quad_segs=8)
+    union = shapely.union_all(beads, grid_size=1e-5 * bead)
+    overlap = float(shapely.area(beads).sum() - union.area)
+    return overlap / section.area, section.difference(union).area / section.area
