@@ -1,0 +1,308 @@
+"""Taking fibre off where it carries least, until a wanted length is left.
+
+Where a piece of stretched fibre is taken away the compliance grows, to first order, by ``EA eps^2``
+per length. The paths are tested with their fibre, the pieces worth least are taken off, and what is
+left is tested again, for it takes over the load.
+"""
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+
+import numpy as np
+from numba import njit
+
+from ccfem.arrays import BoolArray, FloatArray
+from ccfem.elasticity.stress_field import StressField
+from ccfem.errors import InputError
+from ccfem.evaluate.virtual_test.equilibrium import equilibrium
+from ccfem.evaluate.virtual_test.specimen import Specimen
+from ccfem.evaluate.virtual_test.strand import Strand
+from ccfem.evaluate.virtual_test.strands import Strands, cut_strands
+from ccfem.machine import Machine
+from ccfem.toolpaths import FIBRE, Toolpaths
+
+__all__ = ["Profile", "least_price", "profiles", "prune", "shorten"]
+
+_STATION = 1.0
+"""Length of path, mm, that is kept or taken off as a whole."""
+
+_WINDOW = 10
+"""Stations over which the least valuable place of a closed path is looked for."""
+
+_BISECTIONS = 50
+
+
+def prune(
+    toolpaths: Toolpaths,
+    part: StressField | Specimen,
+    length: float,
+    machine: Machine,
+    strand: Strand | None = None,
+    rounds: int = 2,
+    cut_cost: float = 20.0,
+    backend: str = "auto",
+) -> Toolpaths:
+    """Take the least valuable fibre off until no more than a wanted length is left.
+
+    Paths are planned too long on purpose and pruned: what goes is the fibre that helps least.
+    Each round tests the part with fibres that carry tension only, and takes off half of the
+    excess, the last one all of it.
+
+    Parameters
+    ----------
+    toolpaths : Toolpaths
+        Of any strategy; paths of other kinds than fibre stay as they are.
+    part : StressField or Specimen
+        The part without fibres, under the load that counts.
+    length : float, mm
+        Largest total length of fibre that remains.
+    machine : Machine
+        Every stretch that remains has its minimum length; shorter paths stay or go as a whole.
+    strand : Strand, optional
+        Stiffness of a strand; default rho = EA/E = 4 mm^2.
+    rounds : int, default 2
+        Virtual tests, at least 1.
+    cut_cost : float, mm, default 20
+        A path is parted only where that saves more than so much of the least valuable fibre.
+    backend : str, default "auto"
+        Solver, where `part` is a StressField.
+
+    Returns
+    -------
+    Toolpaths
+        The given ones where they are short enough.
+
+    Raises
+    ------
+    InputError
+        When the length is not positive, `rounds` is below 1, or there is no fibre.
+    """
+    if not 0.0 < length < np.inf or rounds < 1 or not 0.0 <= cut_cost < np.inf:
+        raise InputError(
+            "prune expects a length above 0 mm, at least 1 round and a cut cost >= 0 mm; got "
+            f"{length}, {rounds} and {cut_cost}"
+        )
+    laid = _fibre_length(toolpaths)
+    if laid <= length:
+        return toolpaths
+    specimen = Specimen.of(part, backend) if isinstance(part, StressField) else part
+    axial = (Strand() if strand is None else strand).stiffness(specimen.modulus)
+    displacement = None
+    for k in range(rounds):
+        strands = cut_strands(toolpaths, specimen.unreinforced.mesh)
+        found = equilibrium(specimen, strands, axial, start=displacement, tolerance=1e-5)
+        displacement = found.displacement
+        value = np.where(found.carries, found.strain, 0.0) ** 2
+        wanted = length if k == rounds - 1 else length + 0.5 * (laid - length)
+        along = profiles(toolpaths, strands, value)
+        toolpaths = shorten(toolpaths, along, wanted, machine.minimum_length, cut_cost)
+        laid = _fibre_length(toolpaths)
+        if laid <= length:
+            break
+    return toolpaths
+
+
+def _fibre_length(toolpaths: Toolpaths) -> float:
+    return float(toolpaths.lengths[toolpaths.kind == FIBRE].sum())
+
+
+@dataclass(frozen=True)
+class Profile:
+    """What each piece of one fibre path is worth.
+
+    Attributes
+    ----------
+    path : int
+        Number of the path in the toolpaths.
+    value : (n,) array
+        Mean value per length of equal pieces; of a closed path, from its least valuable place on.
+    step : float, mm
+        Length of a piece.
+    origin : float, mm
+        Arc length of the path at which the first piece starts.
+    """
+
+    path: int
+    value: FloatArray
+    step: float
+    origin: float
+
+    def kept(self, price: float, minimum: float, cut_cost: float) -> tuple[BoolArray, float]:
+        """Pieces to keep where a mm of fibre costs `price`, and what they are worth beyond it.
+
+        Of all ways to part the path into stretches no shorter than `minimum`, mm, the one with the
+        largest ``sum of (value - price) * length - cut_cost * price * (stretches - 1)``.
+        """
+        least = int(np.ceil(minimum / self.step - 1e-9))
+        least = min(max(least, 1), len(self.value))
+        keep = np.empty(len(self.value), dtype=np.bool_)
+        gain = _best_stretches((self.value - price) * self.step, least, cut_cost * price, keep)
+        return keep, float(gain)
+
+
+@njit(cache=True)
+def _best_stretches(gain, least, cost, keep):  # type: ignore[no-untyped-def]  # pragma: no cover
+    """Mark the pieces to keep and return their gain: dynamic programming over the pieces.
+
+    `free[i]` is the most that the first i pieces can gain, `held[i]` the most where piece i is
+    kept. Stretches are at least `least` pieces long; each but the first costs `cost`.
+    """
+    n = len(gain)
+    total = np.zeros(n + 1)
+    for i in range(n):
+        total[i + 1] = total[i] + gain[i]
+    free = np.zeros(n + 1)
+    ends_here = np.zeros(n + 1, np.bool_)
+    held = np.full(n + 1, -np.inf)
+    start = np.zeros(n + 1, np.int64)
+    for i in range(least, n + 1):
+        held[i] = held[i - 1] + gain[i - 1]
+        start[i] = start[i - 1]
+        before = free[i - least]
+        opened = total[i] - total[i - least] + (before - cost if before > 0.0 else 0.0)
+        if opened >= held[i]:
+            held[i], start[i] = opened, i - least
+        free[i] = free[i - 1]
+        if held[i] > free[i]:
+            free[i], ends_here[i] = held[i], True
+    keep[:] = False
+    i = n
+    while i > 0:
+        if ends_here[i]:
+            keep[start[i] : i] = True
+            i = start[i]
+        else:
+            i -= 1
+    return free[n]
+
+
+def profiles(toolpaths: Toolpaths, strands: Strands, value: FloatArray) -> list[Profile]:
+    """Profiles of the fibre paths.
+
+    Parameters
+    ----------
+    toolpaths : Toolpaths
+    strands : Strands
+        Of these toolpaths.
+    value : (s,) array
+        Of each piece of strand, per length.
+    """
+    order = np.argsort(strands.path, kind="stable")
+    arc, work = strands.arc[order], (value * strands.length)[order]
+    bounds = np.searchsorted(strands.path[order], np.arange(len(toolpaths) + 1))
+    total = toolpaths.lengths
+    result = []
+    for k in np.flatnonzero((toolpaths.kind == FIBRE) & (total > 0.0)).tolist():
+        count = max(int(np.ceil(total[k] / _STATION)), 1)
+        step = float(total[k]) / count
+        own = slice(bounds[k], bounds[k + 1])
+        piece = np.clip((arc[own] / step).astype(np.int64), 0, count - 1)
+        mean = np.bincount(piece, work[own], minlength=count) / step
+        turn = _least_valuable(mean) if toolpaths.closed[k] else 0
+        result.append(Profile(k, np.roll(mean, -turn), step, turn * step))
+    return result
+
+
+def _least_valuable(value: FloatArray) -> int:
+    """Piece in the middle of the least valuable window of a closed path."""
+    window = min(_WINDOW, len(value))
+    total = np.cumsum(np.concatenate([[0.0], value, value[:window]]))
+    mean = total[window : window + len(value)] - total[: len(value)]
+    return int((np.argmin(mean) + window // 2) % len(value))
+
+
+def shorten(
+    toolpaths: Toolpaths,
+    along: Sequence[Profile],
+    length: float,
+    minimum: float,
+    cut_cost: float = 20.0,
+) -> Toolpaths:
+    """Keep the most valuable stretches of fibre paths, at most a wanted length in total.
+
+    Parameters
+    ----------
+    toolpaths : Toolpaths
+    along : sequence of Profile
+        Of its fibre paths, from `profiles`.
+    length : float, mm
+    minimum : float, mm
+        Least length of a stretch.
+    cut_cost : float, mm, default 20
+        See `Profile.kept`.
+
+    Returns
+    -------
+    Toolpaths
+        The price of fibre, the same for all paths, is the smallest that keeps to the length.
+    """
+    price = least_price(along, length, minimum, cut_cost)
+    chosen = {one.path: one.kept(price, minimum, cut_cost)[0] for one in along}
+    return _cut(toolpaths, along, chosen)
+
+
+def least_price(
+    along: Sequence[Profile], length: float, minimum: float, cut_cost: float = 20.0
+) -> float:
+    """Smallest price of fibre at which no more than a length, mm, is worth keeping."""
+
+    def left(price: float) -> float:
+        return sum(one.step * float(one.kept(price, minimum, cut_cost)[0].sum()) for one in along)
+
+    if left(0.0) <= length:
+        return 0.0
+    low, high = 0.0, 2.0 * max(float(one.value.max()) for one in along)
+    for _ in range(_BISECTIONS):
+        middle = 0.5 * (low + high)
+        low, high = (middle, high) if left(middle) > length else (low, middle)
+    return high
+
+
+def _cut(toolpaths: Toolpaths, along: Sequence[Profile], chosen: dict[int, BoolArray]) -> Toolpaths:
+    """Toolpaths with each profiled path cut to its stretches."""
+    profile = {one.path: one for one in along}
+    parts, source, closed = [], [], []
+    for k in range(len(toolpaths)):
+        own = slice(toolpaths.offsets[k], toolpaths.offsets[k + 1])
+        line = np.hstack([toolpaths.points[own], toolpaths.normals[own]])
+        whole = k not in chosen or bool(chosen[k].all())
+        found = [line] if whole else _stretches(line, profile[k], chosen[k], toolpaths.closed[k])
+        parts += found
+        source += len(found) * [k]
+        closed += len(found) * [bool(toolpaths.closed[k]) and whole]
+    if not parts:
+        return Toolpaths.empty()
+    columns = np.concatenate(parts)
+    normals = columns[:, 3:] / np.linalg.norm(columns[:, 3:], axis=1)[:, None]
+    return Toolpaths(
+        points=columns[:, :3],
+        normals=normals,
+        offsets=np.concatenate([[0], np.cumsum([len(part) for part in parts])]),
+        layer=toolpaths.layer[source],
+        kind=toolpaths.kind[source],
+        closed=np.array(closed),
+    )
+
+
+def _stretches(
+    line: FloatArray, profile: Profile, keep: BoolArray, closed: bool
+) -> list[FloatArray]:
+    """Kept stretches of a line (n, 6); those on both sides of the seam of a ring are one."""
+    turns = np.flatnonzero(np.diff(np.concatenate([[False], keep, [False]]).astype(np.int8)))
+    runs = [(int(a), int(b)) for a, b in zip(turns[::2], turns[1::2], strict=True)]
+    if closed and len(runs) > 1 and keep[0] and keep[-1]:
+        runs = [*runs[1:-1], (runs[-1][0], len(keep) + runs[0][1])]
+    step, origin = profile.step, profile.origin
+    return [_between(line, origin + a * step, origin + b * step) for a, b in runs]
+
+
+def _between(line: FloatArray, start: float, end: float) -> FloatArray:
+    """Part of a line (n, 6) between two arc lengths, which may go on past the end of a ring."""
+    size = np.linalg.norm(np.diff(line[:, :3], axis=0), axis=1)
+    along = np.concatenate([[0.0], np.cumsum(size)])
+    if end > along[-1] * (1.0 + 1e-12):  # on past the seam, at most once round
+        line = np.concatenate([line, line[1:], line[1:]])
+        along = np.concatenate([along, along[-1] + along[1:], 2.0 * along[-1] + along[1:]])
+    inside = along[(along > start + 1e-9) & (along < end - 1e-9)]
+    wanted = np.concatenate([[start], inside, [end]])
+    return np.column_stack([np.interp(wanted, along, column) for column in line.T])

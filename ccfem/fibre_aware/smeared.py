@@ -1,0 +1,285 @@
+"""A part with fibre smeared over its cells, solved without assembling the fibre.
+
+Fibre of density m (mm of strand per mm^3) along the unit vector t in a cell of volume V adds the
+energy ``EA V m eps^2 / 2``, eps being the strain along t. Fibre lies in the planes of the layers,
+so its stiffness acts on the three strains in the plane only.
+"""
+
+from collections.abc import Callable
+from dataclasses import dataclass, replace
+from functools import cached_property
+from typing import Any
+
+import numpy as np
+from numba import njit
+
+from ccfem.arrays import FloatArray, IntArray, read_only
+from ccfem.elasticity.assembly import cell_gradients
+from ccfem.elasticity.solve import solve
+from ccfem.elasticity.solvers import preconditioned_cg
+from ccfem.elasticity.stress_field import StressField
+from ccfem.errors import SolveError
+from ccfem.evaluate.virtual_test.specimen import Specimen
+from ccfem.mesh import TetMesh
+
+__all__ = ["SmearedPart", "SmearedSolution", "on_linear_cells"]
+
+_UPDATES = 40
+"""Updates of the displacement after which to give up."""
+
+_PROGRESS = 1e-3
+"""What one solve leaves of the residual: the fibre in tension may be another one after it."""
+
+_DIRECT_UNKNOWNS = 25_000
+"""Largest system that is factorised: solves are then as quick as with multigrid, and turn with the
+part to the last digits."""
+
+_PACKED = (np.array([0, 0, 0, 1, 1, 2]), np.array([0, 1, 2, 1, 2, 2]))
+"""Rows and columns of the upper triangle of a symmetric 3 x 3 matrix."""
+
+
+@dataclass(frozen=True)
+class SmearedSolution:
+    """Equilibrium of a part with smeared fibre.
+
+    Attributes
+    ----------
+    displacement : (n, 3) array, mm
+    strain : (m, 3) array
+        Strains 11, 22 and 12 (engineering shear) in the plane of the layers.
+    work : float, N mm
+        Twice the strain energy of matrix and fibre: the compliance under forces.
+    residual : float
+        Relative, with the fibre that this displacement puts in tension.
+    iterations : int
+        Of conjugate gradients.
+    """
+
+    displacement: FloatArray
+    strain: FloatArray
+    work: float
+    residual: float
+    iterations: int
+
+    def __post_init__(self) -> None:
+        object.__setattr__(self, "displacement", read_only(self.displacement))
+        object.__setattr__(self, "strain", read_only(self.strain))
+
+
+Fibre = Callable[[FloatArray], FloatArray]
+"""Stiffness (m, 3, 3), MPa, of the fibre in each cell at strains (m, 3) in the plane."""
+
+
+@dataclass(frozen=True)
+class SmearedPart:
+    """A part without fibre, ready for any number of solves with fibre smeared over it.
+
+    Attributes
+    ----------
+    specimen : Specimen
+        On linear cells.
+    frame : (3, 3) array
+        Of the layers: two unit vectors in their plane, and their normal.
+    """
+
+    specimen: Specimen
+    frame: FloatArray
+
+    @classmethod
+    def of(
+        cls, stress: StressField, frame: FloatArray, backend: str | None = None
+    ) -> "SmearedPart":
+        """Part of a solved problem; quadratic cells are replaced by linear ones.
+
+        Parameters
+        ----------
+        stress : StressField
+        frame : (3, 3) array
+        backend : str, optional
+            Preconditioner; default "superlu" for small systems, else "amg". Both are always
+            installed: paths do not depend on what else is.
+        """
+        if backend is None:
+            small = 3 * len(stress.mesh.points) <= _DIRECT_UNKNOWNS
+            backend = "superlu" if small else "amg"
+        return cls(Specimen.of(on_linear_cells(stress, backend), backend), read_only(frame))
+
+    @property
+    def mesh(self) -> TetMesh:
+        """Mesh of linear cells."""
+        return self.specimen.system.problem.mesh
+
+    @property
+    def modulus(self) -> float:
+        """Young's modulus of the matrix, MPa."""
+        return self.specimen.modulus
+
+    @cached_property
+    def unreinforced(self) -> SmearedSolution:
+        """Solution without fibre."""
+        field = self.specimen.unreinforced
+        strain = self.strain(field.displacement)
+        work = 2.0 * field.strain_energy
+        return SmearedSolution(field.displacement, strain, work, field.record.residual, 0)
+
+    @cached_property
+    def forced(self) -> bool:
+        """Whether forces load the part; otherwise supports move."""
+        return not self.specimen.system.held.value.any()
+
+    def ratio(self, work: float) -> float:
+        """Stiffness over that of the part without fibre, where the load does so much work."""
+        before = self.unreinforced.work
+        return before / work if self.forced else work / before
+
+    @cached_property
+    def _slopes(self) -> FloatArray:
+        """Gradients (m, 4, 2) of the barycentric coordinates in the plane, 1/mm."""
+        return np.ascontiguousarray(cell_gradients(self.mesh) @ self.frame[:2].T)
+
+    @cached_property
+    def _cells(self) -> IntArray:
+        return np.ascontiguousarray(self.mesh.corners)
+
+    @cached_property
+    def _reduced(self) -> Any:
+        return self.specimen.system.held.reduce(self.specimen.matrix)
+
+    def strain(self, displacement: FloatArray) -> FloatArray:
+        """Strains (m, 3) in the plane: 11, 22 and 12 (engineering shear)."""
+        plane = np.ascontiguousarray(displacement @ self.frame[:2].T)
+        result = np.empty((len(self._cells), 3))
+        _strains(self._cells, self._slopes, plane, result)
+        return result
+
+    def _force(self, packed: FloatArray, displacement: FloatArray) -> FloatArray:
+        """Nodal forces (n, 3) of fibre with packed stiffness (m, 6) times volume."""
+        plane = np.ascontiguousarray(displacement @ self.frame[:2].T)
+        result = np.zeros_like(plane)
+        _forces(self._cells, self._slopes, packed, plane, result)
+        return result @ self.frame[:2]
+
+    def pack(self, stiffness: FloatArray) -> FloatArray:
+        """Upper triangles (m, 6) of stiffnesses (m, 3, 3), times the volumes of the cells."""
+        return np.ascontiguousarray(stiffness[:, *_PACKED] * self.mesh.volumes[:, None])
+
+    def solve(
+        self, fibre: Fibre, start: SmearedSolution | None = None, tolerance: float = 1e-5
+    ) -> SmearedSolution:
+        """Find the equilibrium with fibre whose stiffness may depend on the strain.
+
+        Newton's method on the convex energy: the fibre at the last strains is taken, and the
+        residual solved for by conjugate gradients, until the residual with the fibre at the new
+        strains meets the tolerance.
+
+        Parameters
+        ----------
+        fibre : callable
+            Stiffness (m, 3, 3), MPa, at strains (m, 3).
+        start : SmearedSolution, optional
+            Where to start; default the part without fibre.
+        tolerance : float
+            Largest relative residual.
+
+        Raises
+        ------
+        SolveError
+            When the residual stays above the tolerance.
+        """
+        specimen, held = self.specimen, self.specimen.system.held
+        begin = self.unreinforced if start is None else start
+        u, strain = begin.displacement, begin.strain
+        matrix, solver = specimen.matrix, specimen.solver
+        # Of the load, also where it is a moving support: the force that holds the part back.
+        size = self._load_size
+        iterations, residual = 0, np.inf
+        for _ in range(_UPDATES):
+            packed = self.pack(fibre(strain))
+            internal = (matrix @ u.reshape(-1)).reshape(-1, 3) + self._force(packed, u)
+            rest = held.restrict(specimen.forces - internal)
+            residual = float(np.linalg.norm(rest)) / size
+            if residual <= tolerance:
+                work = float(np.vdot(u, internal))
+                return SmearedSolution(u, strain, work, residual, iterations)
+            operator = _Operator(self, packed)
+            goal = max(0.5 * tolerance / residual, _PROGRESS)
+            step = preconditioned_cg(operator, rest, solver, tolerance=min(goal, 0.3))
+            iterations += step.iterations
+            u = u + operator.expand(step.values)
+            strain = self.strain(u)
+        raise SolveError(
+            f"smeared fibre: relative residual {residual:.1e} after {_UPDATES} updates of the "
+            f"fibre in tension, above the tolerance {tolerance:.1e}"
+        )
+
+    @cached_property
+    def _load_size(self) -> float:
+        held = self.specimen.system.held
+        rhs = held.right_hand_side(self.specimen.matrix, self.specimen.forces)
+        return float(np.linalg.norm(rhs))
+
+
+@dataclass(frozen=True)
+class _Operator:
+    """Stiffness of part and fibre on the components that can move: only ``@`` is needed."""
+
+    part: SmearedPart
+    packed: FloatArray
+
+    def expand(self, x: FloatArray) -> FloatArray:
+        held = self.part.specimen.system.held
+        u = np.zeros_like(held.value)
+        u[held.nodes] = np.where(held.free[held.nodes], x.reshape(-1, 3), 0.0)
+        return u
+
+    def __matmul__(self, x: FloatArray) -> FloatArray:
+        held = self.part.specimen.system.held
+        fibre = self.part._force(self.packed, self.expand(x))
+        return np.asarray(self.part._reduced @ x) + held.restrict(fibre)
+
+
+def on_linear_cells(stress: StressField, backend: str = "auto") -> StressField:
+    """Solution of the same problem on linear cells; the given one where its cells are linear."""
+    problem = stress.problem
+    mesh = problem.mesh
+    if mesh.order == 1:
+        return stress
+    kept, corners = np.unique(mesh.corners, return_inverse=True)
+    place = np.full(len(mesh.points), -1)
+    place[kept] = np.arange(len(kept))
+    patches = {name: place[facets] for name, facets in mesh.patches.items()}
+    linear = TetMesh(mesh.points[kept], corners.reshape(-1, 4), patches)
+    loads = {stress.case: problem.loads[stress.case]}
+    return solve(replace(problem, mesh=linear, loads=loads), backend)[stress.case]
+
+
+@njit(cache=True)
+def _strains(cells, slopes, plane, result):  # type: ignore[no-untyped-def]  # pragma: no cover
+    for c in range(len(cells)):
+        e1, e2, e12 = 0.0, 0.0, 0.0
+        for a in range(4):
+            u, v = plane[cells[c, a], 0], plane[cells[c, a], 1]
+            x, y = slopes[c, a, 0], slopes[c, a, 1]
+            e1 += u * x
+            e2 += v * y
+            e12 += u * y + v * x
+        result[c, 0], result[c, 1], result[c, 2] = e1, e2, e12
+
+
+@njit(cache=True)
+def _forces(cells, slopes, packed, plane, result):  # type: ignore[no-untyped-def]  # pragma: no cover
+    for c in range(len(cells)):
+        e1, e2, e12 = 0.0, 0.0, 0.0
+        for a in range(4):
+            u, v = plane[cells[c, a], 0], plane[cells[c, a], 1]
+            x, y = slopes[c, a, 0], slopes[c, a, 1]
+            e1 += u * x
+            e2 += v * y
+            e12 += u * y + v * x
+        s1 = packed[c, 0] * e1 + packed[c, 1] * e2 + packed[c, 2] * e12
+        s2 = packed[c, 1] * e1 + packed[c, 3] * e2 + packed[c, 4] * e12
+        s12 = packed[c, 2] * e1 + packed[c, 4] * e2 + packed[c, 5] * e12
+        for a in range(4):
+            x, y = slopes[c, a, 0], slopes[c, a, 1]
+            result[cells[c, a], 0] += s1 * x + s12 * y
+            result[cells[c, a], 1] += s2 * y + s12 * x

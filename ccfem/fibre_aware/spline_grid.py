@@ -1,0 +1,115 @@
+"""Smooth scalar fields in the plane: quadratic B-splines on a square grid."""
+
+from dataclasses import dataclass
+from functools import cached_property
+from typing import Any
+
+import numpy as np
+import scipy.sparse as sp
+
+from ccfem.arrays import FloatArray, IntArray, read_only
+
+__all__ = ["SplineGrid"]
+
+
+@dataclass(frozen=True)
+class SplineGrid:
+    """Quadratic B-splines on the squares of a grid that a part touches.
+
+    A field has one coefficient a spline. Fields and their gradients are continuous.
+
+    Attributes
+    ----------
+    centre : (2,) array, mm
+        A corner of the grid.
+    axes : (2, 2) array
+        Rows: unit vectors along the sides of the squares.
+    size : float, mm
+        Side of a square.
+    used : (k, 2) int array
+        Numbers of the splines that have a coefficient: spline (i, j) covers the squares i - 1 to
+        i + 1 and j - 1 to j + 1, and square (0, 0) begins at `centre`. Sorted.
+    """
+
+    centre: FloatArray
+    axes: FloatArray
+    size: float
+    used: IntArray
+
+    def __post_init__(self) -> None:
+        object.__setattr__(self, "centre", read_only(self.centre))
+        object.__setattr__(self, "axes", read_only(self.axes))
+        object.__setattr__(self, "used", read_only(self.used, np.int64))
+
+    @classmethod
+    def over(
+        cls, points: FloatArray, centre: FloatArray, axes: FloatArray, size: float
+    ) -> "SplineGrid":
+        """Grid with all splines that reach any of the points (n, 2), mm."""
+        square = np.floor((points - centre) @ axes.T / size).astype(np.int64)
+        square = np.unique(square, axis=0)
+        near = square[:, None] + np.stack(np.meshgrid(*2 * [[-1, 0, 1]]), axis=-1).reshape(-1, 2)
+        return cls(centre, axes, size, np.unique(near.reshape(-1, 2), axis=0))
+
+    def __len__(self) -> int:
+        return len(self.used)
+
+    @cached_property
+    def _number(self) -> tuple[IntArray, IntArray]:
+        """Smallest (i, j), and a table from (i, j) to the coefficient, -1 where there is none."""
+        low = self.used.min(axis=0)
+        table = np.full(np.ptp(self.used, axis=0) + 1, -1, dtype=np.int64)
+        table[tuple((self.used - low).T)] = np.arange(len(self.used))
+        return low, table
+
+    def values(self, points: FloatArray) -> Any:
+        """Matrix (n, k) from coefficients to values at points (n, 2)."""
+        return self._matrices(points)[0]
+
+    def slopes(self, points: FloatArray) -> tuple[Any, Any]:
+        """Matrices (n, k) from coefficients to both components of the gradient, 1/mm."""
+        _, along, across = self._matrices(points)
+        (a, b), (c, d) = self.axes.T
+        return (a * along + b * across).tocsr(), (c * along + d * across).tocsr()
+
+    def _matrices(self, points: FloatArray) -> tuple[Any, Any, Any]:
+        """Values, and slopes along both sides of the squares."""
+        low, table = self._number
+        place = (points - self.centre) @ self.axes.T / self.size
+        square = np.floor(place).astype(np.int64)
+        x = place - square
+        weight = np.stack([0.5 * (1.0 - x) ** 2, 0.5 + x - x * x, 0.5 * x * x], axis=2)
+        slope = np.stack([x - 1.0, 1.0 - 2.0 * x, x], axis=2) / self.size
+        i = square[:, 0, None] + np.arange(-1, 2) - low[0]
+        j = square[:, 1, None] + np.arange(-1, 2) - low[1]
+        column = table[i[:, :, None], j[:, None, :]].reshape(-1)
+        if len(column) and column.min() < 0:
+            raise ValueError("points must lie in squares that the grid was made over")
+        row = np.repeat(np.arange(len(points)), 9)
+
+        def matrix(first: FloatArray, second: FloatArray) -> Any:
+            entries = (first[:, :, None] * second[:, None, :]).reshape(-1)
+            return sp.csr_array((entries, (row, column)), shape=(len(points), len(self)))
+
+        return (
+            matrix(weight[:, 0], weight[:, 1]),
+            matrix(slope[:, 0], weight[:, 1]),
+            matrix(weight[:, 0], slope[:, 1]),
+        )
+
+    @cached_property
+    def laplacian(self) -> Any:
+        """Graph Laplacian (k, k) of neighbouring splines: positive semi-definite, no unit."""
+        _, table = self._number
+        padded = np.pad(table, 1, constant_values=-1)
+        pairs = []
+        for first, second in (
+            (padded[:-1], padded[1:]),
+            (padded[:, :-1], padded[:, 1:]),
+        ):
+            both = (first >= 0) & (second >= 0)
+            pairs.append(np.stack([first[both], second[both]]))
+        i, j = np.concatenate(pairs, axis=1)
+        links = sp.coo_array((np.ones(len(i)), (i, j)), shape=2 * (len(self),)).tocsr()
+        links = links + links.T
+        return (sp.diags_array(links.sum(axis=1)) - links).tocsr()

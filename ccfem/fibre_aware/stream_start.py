@@ -1,0 +1,185 @@
+"""Where the design of a stream function starts: its grid, and a field that follows the tension."""
+
+from collections.abc import Sequence
+
+import numpy as np
+import scipy.sparse as sp
+
+from ccfem.arrays import FloatArray, IntArray
+from ccfem.elasticity.stress_field import StressField
+from ccfem.fibre_aware.smeared import SmearedPart
+from ccfem.fibre_aware.stream_design import StreamProblem
+from ccfem.fields.fill import fill_screened
+from ccfem.fields.layer_tension import SampledTension, layer_tension
+from ccfem.fields.orientation import orient
+from ccfem.fields.surface import Surface, positive_definite
+from ccfem.layers.layer import Layer
+from ccfem.tensor import in_plane
+
+__all__ = ["alike_layers", "groups_by_height", "plane_axes", "start_field"]
+
+_SPACING_WEIGHT = 0.1
+"""Weight of the wanted density against the direction, as in `fields.scalar.fit_weighted`."""
+
+_FILL_LENGTH = 3.0
+"""Reach, mm, of the screened fill."""
+
+_FULLEST = 0.85
+"""Largest share of the fibre at the bound of the density that the first field is scaled to."""
+
+_LEAST_WEIGHT = 1e-3
+_SMOOTH = 1e-5
+_REGULARISATION = 1e-9
+
+
+def plane_axes(part: SmearedPart, energy: FloatArray) -> tuple[FloatArray, FloatArray]:
+    """Centre (2,) and axes (2, 2) in the plane that turn with the part and its load.
+
+    The principal axes of inertia in the plane, of the volume and the strain energy, half each:
+    where the part is symmetric its load hardly ever is.
+
+    Parameters
+    ----------
+    part : SmearedPart
+    energy : (m,) array
+        Strain energy of each cell, in any unit.
+    """
+    mesh = part.mesh
+    place = mesh.points[mesh.corners].mean(axis=1) @ part.frame[:2].T
+    weight = mesh.volumes / mesh.volumes.sum() + energy / energy.sum()
+    centre = weight @ place / weight.sum()
+    away = place - centre
+    _, vectors = np.linalg.eigh((away * weight[:, None]).T @ away)
+    first = vectors[:, 1] * (1.0 if vectors[np.abs(vectors[:, 1]).argmax(), 1] > 0.0 else -1.0)
+    return centre, np.stack([first, [-first[1], first[0]]])
+
+
+def alike_layers(part: SmearedPart, stress: FloatArray, place: FloatArray, size: float) -> float:
+    """How much of the stress in the plane is the same at all heights, in [0, 1].
+
+    Parameters
+    ----------
+    part : SmearedPart
+    stress : (m, 3, 3) array, MPa
+    place : (m, 2) array, mm
+        Of the cells in the plane.
+    size : float, mm
+        Side of the squares above which the stress is averaged over the height.
+
+    Returns
+    -------
+    float
+        1 for a plate loaded in its plane, about 0 for a plate that is bent.
+    """
+    volume = part.mesh.volumes
+    plane = in_plane(stress, part.frame) * np.array([1.0, 1.0, np.sqrt(2.0)])
+    square = np.floor((place - place.min(axis=0)) / size).astype(np.int64)
+    _, column = np.unique(square, axis=0, return_inverse=True)
+    total = np.bincount(column, volume)
+    mean = np.stack([np.bincount(column, volume * s) / total for s in plane.T], axis=1)
+    whole = float(volume @ (plane**2).sum(axis=1))
+    return float(total @ (mean**2).sum(axis=1)) / whole if whole > 0.0 else 1.0
+
+
+def start_field(
+    problem: StreamProblem,
+    stress: StressField,
+    layers: Sequence[Layer],
+    cap: float,
+) -> FloatArray:
+    """Fields that follow the tension, as dense as the budget allows.
+
+    Parameters
+    ----------
+    problem : StreamProblem
+    stress : StressField
+        Of the part without fibre.
+    layers : sequence of Layer
+        One for each group, whose tension its field follows.
+    cap : float
+        Percentile of the stress above which the density grows no more.
+
+    Returns
+    -------
+    (c,) array
+        Coefficients; zero for a group without tension.
+    """
+    tensions = [layer_tension(stress.on(layer)) for layer in layers]
+    values = np.concatenate([np.where(t.defined, t.stress, 0.0) for t in tensions])
+    weight = np.concatenate([layer.areas for layer in layers])
+    order = np.argsort(values, kind="stable")
+    below = np.cumsum(weight[order])
+    at = int(np.searchsorted(below, cap / 100.0 * below[-1] * (1.0 - 1e-12)))
+    top = max(float(values[order[min(at, len(order) - 1)]]), 1e-300)
+    field = np.concatenate(
+        [
+            _fit(problem, layer, tension, top)
+            for layer, tension in zip(layers, tensions, strict=True)
+        ]
+    )
+    return _to_budget(problem, field)
+
+
+def _fit(problem: StreamProblem, layer: Layer, tension: SampledTension, top: float) -> FloatArray:
+    """Coefficients (k,) of the field along the tension of one layer."""
+    grid = problem.grid
+    if not tension.defined.any():
+        return np.zeros(len(grid))
+    surface = Surface.of(layer)
+    confidence = np.where(tension.defined, np.minimum(tension.stress / top, 1.0), 0.0)
+    direction, size = fill_screened(
+        surface, tension.direction, tension.stress, confidence, _FILL_LENGTH
+    )
+    direction = orient(direction, surface.neighbours, confidence)
+    density = problem.densest * np.clip(size / top, 0.0, 1.0)
+    weight = np.maximum(confidence, _LEAST_WEIGHT) * surface.areas
+    weight = weight / weight.sum()
+    x, y = grid.slopes(surface.points[surface.triangles].mean(axis=1))
+    a, b = direction.T
+    along = problem.width * (sp.diags_array(a) @ x + sp.diags_array(b) @ y)
+    across = problem.width * (sp.diags_array(a) @ y - sp.diags_array(b) @ x)
+    weighted = (_SPACING_WEIGHT * across).T * weight
+    bend = grid.laplacian.T @ grid.laplacian / len(grid)
+    matrix = (along.T * weight) @ along + weighted @ across + _SMOOTH * bend
+    matrix = matrix + _REGULARISATION * sp.eye_array(len(grid))
+    return np.asarray(positive_definite(matrix).solve(weighted @ density))
+
+
+def _to_budget(problem: StreamProblem, field: FloatArray) -> FloatArray:
+    """Field times the factor that uses the budget where the density stays below its bound."""
+    size = np.hypot(*(slope @ field for slope in problem.slopes))
+    most = _FULLEST * problem.densest * float(problem.room.sum())
+    low, high = 1e-2, 1e2
+    for _ in range(60):
+        middle = float(np.sqrt(low * high))
+        length = problem.room @ np.minimum(middle * size, problem.densest)
+        low, high = (middle, high) if length < min(problem.budget, most) else (low, middle)
+    return low * field
+
+
+def groups_by_height(
+    part: SmearedPart, layers: Sequence[Layer], groups: int
+) -> tuple[IntArray, IntArray]:
+    """Nearest layer of each cell, and group of each layer.
+
+    Parameters
+    ----------
+    part : SmearedPart
+    layers : sequence of Layer
+    groups : int
+        At most the number of layers.
+
+    Returns
+    -------
+    layer : (m,) int array
+        Position in `layers`.
+    group : (n,) int array
+        Of each layer, ascending from the bottom.
+    """
+    heights = np.array([layer.height for layer in layers])
+    order = np.argsort(heights, kind="stable")
+    bounds = 0.5 * (heights[order][1:] + heights[order][:-1])
+    level = part.mesh.points[part.mesh.corners].mean(axis=1) @ part.frame[2]
+    group = np.empty(len(layers), dtype=np.int64)
+    group[order] = np.arange(len(layers)) * groups // len(layers)
+    return order[np.searchsorted(bounds, level)], group

@@ -1,0 +1,275 @@
+"""Isocurves of a field that is designed for the stiffness of the part with its fibre in it.
+
+Beyond the papers: the density of fibre and its direction follow from the gradient of one scalar
+field, as in `isocurve`, but the field is not fitted to the stress of the part without fibre. It is
+optimised for the compliance of the part with the fibre that its isocurves lay.
+"""
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+from typing import ClassVar
+
+import numpy as np
+
+from ccfem.arrays import FloatArray, IntArray
+from ccfem.elasticity.stress_field import LayerStress, StressField
+from ccfem.errors import InputError
+from ccfem.evaluate.virtual_test.bars import strain_operator
+from ccfem.evaluate.virtual_test.strand import RHO
+from ccfem.evaluate.virtual_test.strands import cut_strands
+from ccfem.fibre_aware.prune import Profile, least_price, profiles, shorten
+from ccfem.fibre_aware.smeared import SmearedPart, on_linear_cells
+from ccfem.fibre_aware.spline_grid import SplineGrid
+from ccfem.fibre_aware.stream_design import StreamDesign, StreamProblem, design
+from ccfem.fibre_aware.stream_start import (
+    alike_layers,
+    groups_by_height,
+    plane_axes,
+    start_field,
+)
+from ccfem.fields.layer_tension import layer_tension
+from ccfem.geometry.clearance import trim_to_clearance
+from ccfem.geometry.isocontours import isocontours
+from ccfem.geometry.joining import link_ends
+from ccfem.geometry.rings import close_short_ring
+from ccfem.layers.layer import Layer
+from ccfem.machine import Machine
+from ccfem.strategies.strategy import Amount, LayerStrategy
+from ccfem.toolpaths import Toolpaths
+
+__all__ = ["StreamFunction"]
+
+_CLEARANCE = 0.95
+"""Least distance of strands in widths: they are designed to be 1 / 0.95 apart, and what is cut for
+a hundredth of a width would be lost."""
+
+_SHORTEST = 5.0
+"""Length, in strand widths, of the shortest pieces that are kept for linking."""
+
+_CUT_COST = 20.0
+"""Length, mm, of the least valuable fibre that another cut has to save."""
+
+_ALIKE = 0.8
+"""Share of the stress that all heights have in common, above which all layers get one field."""
+
+_MOST_GROUPS = 6
+
+
+@dataclass(frozen=True)
+class StreamFunction:
+    """Fibre where and along which it makes the part stiffest.
+
+    All layers share one field where the stress is about the same at all heights; otherwise the
+    stack is divided into groups of layers with a field each. The fields are designed for somewhat
+    too much fibre, and of their isocurves the stretches worth most are kept. The load is the one
+    of the stress that the strategy is given; fibre is taken to carry tension only.
+
+    Attributes
+    ----------
+    coverage : float, default 0.45
+        Fibre length times strand width over area of the layers, in (0, 1].
+    overfill : float, default 1.15
+        Fibre length of the design over that kept, at least 1.
+    rho : float, mm^2, default 4
+        Axial stiffness of a strand over Young's modulus of the matrix.
+    evaluations : int, default 50
+        Of the stiffness, in the design.
+    groups : int, default 0
+        Number of fields over the height of the part; 0 for one, or for at most six where the
+        stress differs over the height.
+    grid : float, default 2
+        Side of the squares of the field, in strand widths; never finer than the cells of the mesh.
+    cap : float, default 90
+        Percentile of the stress above which the density of the first field grows no more.
+    phases : int, default 5
+        Positions of the levels of which the best is taken, layer by layer.
+    link_limit : float, default 7
+        Longest link between two ends, in strand widths.
+    """
+
+    coverage: float = 0.45
+    overfill: float = 1.15
+    rho: float = RHO
+    evaluations: int = 50
+    groups: int = 0
+    grid: float = 2.0
+    cap: float = 90.0
+    phases: int = 5
+    link_limit: float = 7.0
+
+    amount: ClassVar[Amount] = Amount("coverage", most=0.85, least=0.1)
+
+    def __post_init__(self) -> None:
+        checks = {
+            "coverage": (0.0 < self.coverage <= 1.0, "a share in (0, 1]"),
+            "overfill": (1.0 <= self.overfill < np.inf, "a finite number >= 1"),
+            "rho": (0.0 < self.rho < np.inf, "a finite number > 0 mm^2"),
+            "evaluations": (self.evaluations >= 1, "at least 1"),
+            "groups": (self.groups >= 0, "at least 1, or 0 to choose"),
+            "grid": (0.0 < self.grid < np.inf, "a finite number > 0"),
+            "cap": (0.0 < self.cap <= 100.0, "a percentile in (0, 100]"),
+            "phases": (self.phases >= 1, "at least 1"),
+            "link_limit": (0.0 <= self.link_limit < np.inf, "a finite number >= 0"),
+        }
+        for name, (good, expected) in checks.items():
+            if not good:
+                raise InputError(
+                    f"stream_function.{name} must be {expected}; got {getattr(self, name)!r}"
+                )
+
+    def for_part(
+        self, stress: StressField, layers: Sequence[Layer], machine: Machine
+    ) -> LayerStrategy:
+        """Design the fields of the whole part and plan all its layers.
+
+        Layers that are not given are taken to be filled like the nearest one that is.
+
+        Raises
+        ------
+        InputError
+            When no layer has a tensile direction.
+        """
+        if not any(layer_tension(stress.on(layer)).defined.any() for layer in layers):
+            largest = float(np.linalg.eigvalsh(stress.stress).max())
+            raise InputError(
+                "expected tension that fibre can carry; the largest tensile stress found is "
+                f"{largest:.3g} MPa, outweighed by compression: turn the load round"
+            )
+        problem, group, found = self.designed(stress, layers, machine)
+        return _Planned(_Extraction(self, problem, found, stress, machine).plan(layers, group))
+
+    def __call__(self, layer: Layer, stress: LayerStress, machine: Machine) -> Toolpaths:
+        """Plan one layer by itself, as if all others were like it."""
+        return self.for_part(stress.part, [layer], machine)(layer, stress, machine)
+
+    def designed(
+        self, stress: StressField, layers: Sequence[Layer], machine: Machine
+    ) -> tuple[StreamProblem, IntArray, StreamDesign]:
+        """Design the fields: the problem, the group of each layer, and the design."""
+        linear = on_linear_cells(stress)
+        part = SmearedPart.of(linear, layers[0].frame)
+        mesh = part.mesh
+        centres = mesh.points[mesh.corners].mean(axis=1) @ part.frame[:2].T
+        size = max(self.grid * machine.fibre_width, float(np.cbrt(6.0 * mesh.volumes.mean())))
+        groups = self.groups
+        if not groups:
+            alike = alike_layers(part, linear.stress, centres, size)
+            groups = 1 if alike > _ALIKE else _MOST_GROUPS
+        nearest, group = groups_by_height(part, layers, min(groups, len(layers)))
+        corners = mesh.points[np.unique(mesh.corners)] @ part.frame[:2].T
+        points = [corners, centres, *(_refined(layer)[0] for layer in layers)]
+        energy = mesh.volumes * np.einsum("cij,cij->c", linear.stress, linear.stress)
+        grid = SplineGrid.over(np.concatenate(points), *plane_axes(part, energy), size)
+        thickness = np.array([layer.thickness for layer in layers])[nearest]
+        capacity = 1.0 / (machine.fibre_width * thickness)
+        problem = StreamProblem(
+            part=part,
+            grid=grid,
+            group=group[nearest],
+            centres=centres,
+            capacity=capacity,
+            width=machine.fibre_width,
+            axial_stiffness=self.rho * part.modulus,
+            budget=self.overfill * self.coverage * float(mesh.volumes @ capacity),
+        )
+        chosen = [layers[_middle(np.flatnonzero(group == k))] for k in range(group.max() + 1)]
+        start = start_field(problem, stress, chosen, self.cap)
+        return problem, group, design(problem, start, self.evaluations)
+
+
+def _middle(numbers: IntArray) -> int:
+    return int(numbers[len(numbers) // 2])
+
+
+@dataclass(frozen=True)
+class _Planned:
+    """All layers of the part, planned."""
+
+    toolpaths: Toolpaths
+
+    def __call__(self, layer: Layer, stress: LayerStress, machine: Machine) -> Toolpaths:
+        return self.toolpaths.on_layer(layer.index)
+
+
+@dataclass(frozen=True)
+class _Extraction:
+    """Paths from designed fields."""
+
+    strategy: StreamFunction
+    problem: StreamProblem
+    design: StreamDesign
+    stress: StressField
+    machine: Machine
+
+    def plan(self, layers: Sequence[Layer], group: IntArray) -> Toolpaths:
+        """Paths of all layers, as long as the coverage says."""
+        s, minimum = self.strategy, self.machine.minimum_length
+        fields = [self.field(k) for k in range(self.problem.groups)]
+        shifts = (np.arange(s.phases) + 0.5) / s.phases
+        variants = [
+            [self.layer_paths(layer, fields[k], shift) for shift in shifts]
+            for layer, k in zip(layers, group, strict=True)
+        ]
+        length = s.coverage * sum(float(layer.areas.sum()) for layer in layers)
+        length /= self.machine.fibre_width
+        worth = [[self.profiles(paths) for paths in row] for row in variants]
+        middle = [one for row in worth for one in row[s.phases // 2]]
+        price = least_price(middle, length, minimum, _CUT_COST) if middle else 0.0
+
+        def gain(along: list[Profile]) -> float:
+            return sum(one.kept(price, minimum, _CUT_COST)[1] for one in along)
+
+        best = [max(range(s.phases), key=lambda k: gain(row[k])) for row in worth]
+        toolpaths = Toolpaths.concatenate(row[k] for row, k in zip(variants, best, strict=True))
+        if not len(toolpaths):
+            return toolpaths
+        return shorten(toolpaths, self.profiles(toolpaths), length, minimum, _CUT_COST)
+
+    def field(self, group: int) -> FloatArray:
+        """Coefficients of one field, with the sign that does not depend on the axes."""
+        count = len(self.problem.grid)
+        field = self.design.field[group * count : (group + 1) * count]
+        inside = self.problem.group == group
+        values = self.problem.grid.values(self.problem.centres[inside]) @ field
+        weight = self.problem.part.mesh.volumes[inside]
+        values = values - weight @ values / weight.sum()
+        return field if weight @ values**3 >= 0.0 else -field
+
+    def layer_paths(self, layer: Layer, field: FloatArray, shift: float) -> Toolpaths:
+        """Paths of one layer along unit levels, the first one `shift` above the lowest value."""
+        width, section = self.problem.width, layer.polygon
+        points, triangles = _refined(layer)
+        values = self.problem.grid.values(points) @ field
+        curves = isocontours(points, triangles, values, float(values.min()) + shift, 1.0)
+        lines = trim_to_clearance(curves.lines(), _CLEARANCE * width, _SHORTEST * width)
+        lines = link_ends(lines, section, self.strategy.link_limit * width, width)
+        lines = [close_short_ring(line, self.machine.minimum_length) for line in lines]
+        long = [line for line in lines if _length(line) >= self.machine.minimum_length]
+        return Toolpaths.from_plane(long, layer)
+
+    def profiles(self, toolpaths: Toolpaths) -> list[Profile]:
+        """Value of the paths at the strains of the designed part."""
+        if not len(toolpaths):
+            return []
+        mesh = self.problem.part.mesh
+        strands = cut_strands(toolpaths, mesh)
+        displacement = self.design.objective.solution.displacement
+        strain = strain_operator(strands, mesh) @ displacement.reshape(-1)
+        return profiles(toolpaths, strands, np.maximum(strain, 0.0) ** 2)
+
+
+def _refined(layer: Layer) -> tuple[FloatArray, IntArray]:
+    """Points (n, 2) and triangles (t, 3) of a layer, each triangle cut in four."""
+    points, corners = layer.plane_points, layer.triangles
+    pairs = np.sort(corners[:, [[1, 2], [2, 0], [0, 1]]].reshape(-1, 2), axis=1)
+    key, number = np.unique(pairs[:, 0] * len(points) + pairs[:, 1], return_inverse=True)
+    first, second = np.divmod(key, len(points))
+    a, b, c = corners.T
+    x, y, z = number.reshape(-1, 3).T + len(points)
+    four = [np.stack(three, axis=1) for three in ((a, z, y), (z, b, x), (y, x, c), (x, y, z))]
+    middle = 0.5 * (points[first] + points[second])
+    return np.concatenate([points, middle]), np.concatenate(four)
+
+
+def _length(line: FloatArray) -> float:
+    return float(np.linalg.norm(np.diff(line, axis=0), axis=1).sum())
