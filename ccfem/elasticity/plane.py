@@ -147,7 +147,7 @@ class PlaneSystem:
         """Factorise a stiffness matrix (2n, 2n) with the supports in place, directly."""
         reduced = self.held.reduce(matrix)
         if backend == "auto":
-            backend = choose_direct(reduced.shape[0])
+            backend = choose_direct(reduced)
         elif backend not in DIRECT:
             raise InputError(
                 f"a plane problem takes a direct backend: auto, {', '.join(DIRECT)}; got "
@@ -239,7 +239,7 @@ def solve_plane(
     ----------
     problem : PlaneProblem
     backend : str, default "auto"
-        A direct one; "auto" chooses by what is installed.
+        A direct one; "auto" chooses by the band of the matrix and by what is installed.
     tolerance : float, default 1e-8
         Largest relative residual that is accepted.
     elements : PlaneElements, optional

@@ -11,11 +11,12 @@ import scipy.sparse as sp
 from ccfem.arrays import FloatArray, IntArray
 from ccfem.elasticity import direct, multigrid
 from ccfem.elasticity.conjugate_gradient import conjugate_gradient
+from ccfem.elasticity.skyline import skyline, skyline_operations
 from ccfem.errors import InputError, SolveError
 
 __all__ = ["BACKENDS", "DIRECT", "Solution", "Solver", "factorise", "preconditioned_cg"]
 
-DIRECT = ("pypardiso", "cholmod", "superlu")
+DIRECT = ("pypardiso", "cholmod", "superlu", "skyline")
 BACKENDS = (*DIRECT, "amg", "two-level", "petsc")
 
 _CURES = {
@@ -32,6 +33,9 @@ _MANY = 4
 """Right-hand sides from which a sparse Cholesky is quicker than a multigrid (measured)."""
 
 _RESTARTS = 2
+
+_SKYLINE = 1e9
+"""Operations up to which the skyline is quicker than the sparse factorisations (measured)."""
 
 LARGEST_DIRECT = 100_000
 """Unknowns up to which a direct backend is worth its memory."""
@@ -100,8 +104,10 @@ class Solver:
 
 
 def _residual(matrix: sp.bsr_array, x: FloatArray, rhs: FloatArray) -> float:
-    size = float(np.linalg.norm(rhs))
-    return float(np.linalg.norm(rhs - matrix @ x)) / (size or 1.0)
+    # Sums of squares without the threads of a BLAS, which cost more than they save here.
+    rest = rhs - matrix @ x
+    size = float(np.sqrt(np.einsum("i,i->", rhs, rhs)))
+    return float(np.sqrt(np.einsum("i,i->", rest, rest))) / (size or 1.0)
 
 
 def _checked(
@@ -163,9 +169,11 @@ def direct_backend() -> str:
     return "superlu"
 
 
-def choose_direct(unknowns: int) -> str:
-    """Name the direct backend that suits a system and what is installed."""
-    return "superlu" if unknowns <= _SMALL else direct_backend()
+def choose_direct(matrix: sp.bsr_array) -> str:
+    """Name the direct backend that suits a plane system and what is installed."""
+    if skyline_operations(matrix) <= _SKYLINE:
+        return "skyline"
+    return direct_backend()
 
 
 def choose(unknowns: int, order: int, solves: int = 1) -> str:
@@ -233,5 +241,10 @@ def factorise(
         return Solver(backend, matrix, multigrid.two_level(matrix, points, parents), False)
     if backend == "petsc":
         return Solver(backend, matrix, multigrid.petsc_gamg(matrix, points), False)
-    makers = {"pypardiso": direct.pardiso, "cholmod": direct.cholmod, "superlu": direct.superlu}
+    makers = {
+        "pypardiso": direct.pardiso,
+        "cholmod": direct.cholmod,
+        "superlu": direct.superlu,
+        "skyline": skyline,
+    }
     return Solver(backend, matrix, makers[backend](matrix), True)

@@ -67,7 +67,7 @@ class _Answer:
             np.zeros_like(next(iter(energies.values()))),
         )
         cases = {
-            case: float(np.vdot(forces, self._before[case]))
+            case: float(np.einsum("ij,ij->", forces, self._before[case]))
             for case, forces in self.system.forces.items()
         }
         total = sum(self.weights[case] * work for case, work in cases.items())

@@ -254,7 +254,7 @@ def test_one_matrix_of_elements_serves_every_stiffness():
         np.testing.assert_array_equal(shared.displacement, alone.displacement)
 
 
-@pytest.mark.parametrize("backend", ["superlu", "auto"])
+@pytest.mark.parametrize("backend", ["superlu", "skyline", "auto"])
 def test_backends_agree(backend):
     mesh = plate(80.0, 60.0, 80, 60)
     problem = PlaneProblem(
