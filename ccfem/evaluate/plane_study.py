@@ -3,7 +3,6 @@
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
 from functools import cached_property
-from itertools import pairwise
 
 import numpy as np
 import shapely
@@ -49,8 +48,7 @@ _HEADLINE = 99.9
 
 def reduced_stiffness(material: Material) -> FloatArray:
     """Reduced stiffness (3, 3), MPa, of a sheet of a material in plane stress."""
-    stiffness: FloatArray = np.linalg.inv(plane_compliance(material))
-    return stiffness
+    return np.asarray(np.linalg.inv(plane_compliance(material)), dtype=np.float64)
 
 
 @dataclass(frozen=True)
@@ -280,12 +278,23 @@ def bead_area(paths: PlanePaths, bead: float) -> tuple[float, float]:
     Returns
     -------
     overlap, gaps : float
-        Sum of the areas of the beads less that of their union, and area of the section outside
-        their union, both over the area of the section.
+        Length times width of the beads less the area that they cover, and the area of the section
+        that they do not cover, both over the area of the section.
     """
     section = paths.layer.polygon
-    lines = [shapely.LineString(paths.points[a:b]) for a, b in pairwise(paths.offsets.tolist())]
-    beads = shapely.buffer(lines, 0.5 * bead, cap_style="flat", quad_segs=8)
-    union = shapely.union_all(beads, grid_size=1e-5 * bead)
-    overlap = float(shapely.area(beads).sum() - union.area)
-    return overlap / section.area, section.difference(union).area / section.area
+    points, total = paths.points, float(paths.lengths.sum())
+    start = np.ones(len(points), dtype=bool)
+    start[paths.offsets[1:] - 1] = False
+    first = np.flatnonzero(start)
+    step = points[first + 1] - points[first]
+    size = np.linalg.norm(step, axis=1)[:, None]
+    aside = 0.5 * bead * np.stack([-step[:, 1], step[:, 0]], axis=1) / size
+    a, b = points[first], points[first + 1]
+    strips = shapely.polygons(np.stack([a + aside, a - aside, b - aside, b + aside], axis=1))
+    joint = np.ones(len(points), dtype=bool)
+    ends = np.concatenate([paths.offsets[:-1][~paths.closed], paths.offsets[1:][~paths.closed] - 1])
+    joint[ends] = False
+    discs = shapely.buffer(shapely.points(points[joint]), 0.5 * bead, quad_segs=8)
+    covered = shapely.union_all([*strips, *discs], grid_size=1e-6 * bead)
+    overlap = (total * bead - covered.area) / section.area
+    return overlap, section.difference(covered).area / section.area
