@@ -204,15 +204,15 @@ class _Planner:
             self.done(f"planning {name}{amount}")
             try:
                 with _timed(self.spent[name], "plan"):
-                    self.found[name] = self.planned(strategy, wanted)
+                    self.found[name] = self.planned(strategy, wanted, self.found.get(name))
             except (InputError, SolveError) as error:
                 self.failures[name] = str(error)
 
-    def planned(self, strategy: Strategy, wanted: float | None) -> Planned:
-        """Plan one strategy."""
+    def planned(self, strategy: Strategy, wanted: float | None, start: Planned | None) -> Planned:
+        """Plan one strategy, from its natural plan where there is one."""
         machine = self.case.machine
         if wanted is not None:
-            return plan_to_length(strategy, self.layers, self.stress, machine, wanted)
+            return plan_to_length(strategy, self.layers, self.stress, machine, wanted, start=start)
         toolpaths = plan(strategy, self.layers, self.stress, machine)
         return Planned(strategy, toolpaths, length_per_layer(toolpaths, self.layers))
 

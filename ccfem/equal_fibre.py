@@ -21,6 +21,8 @@ __all__ = ["TOLERANCE", "Planned", "check_wanted", "length_per_layer", "plan_to_
 
 TOLERANCE = 0.01
 """Share by which the length may fall short before the search stops."""
+_GUESSES = 2
+"""Plans of the whole stack from a known one, before anything is searched."""
 _ROUNDS = 3
 """Plans of the whole stack."""
 _STEPS = 8
@@ -70,10 +72,12 @@ def plan_to_length(
     machine: Machine,
     wanted: float,
     tolerance: float = TOLERANCE,
+    start: Planned | None = None,
 ) -> Planned:
     """Plan with the value of the amount parameter that lays at most the wanted fibre.
 
-    The value is searched on the bottom, middle and top layer, then checked on the whole stack; the
+    Where a plan of the whole stack is known, two guesses are made from it. After that the value is
+    searched on the bottom, middle and top layer, then checked on the whole stack; the
     ratio of the two lengths corrects the next search. Of the values tried on the whole stack, the
     one that lays most without laying too much is kept. Where the length changes in steps (one
     contour more or less) and that leaves too much missing, some layers, evenly spread, take the
@@ -91,6 +95,8 @@ def plan_to_length(
     tolerance : float, default 0.01
         The search stops within this share below `wanted`. A strategy may miss it: `Planned.note`
         says so.
+    start : Planned, optional
+        The strategy's plan with its own value, where there is one already.
 
     Returns
     -------
@@ -121,6 +127,16 @@ def plan_to_length(
         return sampled[value]
 
     own = getattr(strategy, amount.parameter)
+    if start is not None and own is not None:
+        tried[float(own)] = start
+        for _ in range(_GUESSES):
+            lengths = {value: one.length_per_layer for value, one in tried.items()}
+            guess = _by_power(lengths, amount, wanted * (1.0 - 0.5 * tolerance))
+            if guess in tried:
+                break
+            tried[guess] = planned(guess, layers)
+            if (1.0 - tolerance) * wanted <= tried[guess].length_per_layer <= wanted:
+                return tried[guess]
     value, ratio, margin = amount.most if own is None else float(own), 1.0, 0.0
     for _ in range(1 if few is layers else _ROUNDS):
         target = wanted * (1.0 - margin) / ratio
@@ -136,12 +152,12 @@ def plan_to_length(
     if best.length_per_layer > wanted * (1.0 + 1e-9):
         best = _mixed(replace(best, toolpaths=Toolpaths.empty()), best, layers, wanted)
     elif best.length_per_layer < (1.0 - tolerance) * wanted:
-        above = [v for v in tried if tried[v].length_per_layer > wanted]
-        above = above or [v for v in sampled if sampled[v] * ratio > wanted]
-        if above:
-            value = min(above, key=sampled.__getitem__)
-            more = tried[value] if value in tried else planned(value, layers)
-            best = _mixed(best, more, layers, wanted)
+        above = [one for one in tried.values() if one.length_per_layer > wanted]
+        if not above:
+            values = [value for value in sampled if sampled[value] * ratio > wanted]
+            above = [planned(min(values, key=sampled.__getitem__), layers)] if values else []
+        mixed = [best, *(_mixed(best, more, layers, wanted) for more in above)]
+        best = max(mixed, key=lambda one: one.length_per_layer)
     return replace(best, note=_note(best, amount, wanted, tolerance))
 
 
@@ -218,7 +234,7 @@ def _search(
         low = max((v for v in known if known[v] <= target), key=known.__getitem__, default=None)
         high = min((v for v in known if known[v] > target), key=known.__getitem__, default=None)
         if low is None or high is None:
-            value = _by_proportion(known, amount, target, ends)
+            value = _by_proportion(known, amount, target, 0.05)
         elif known[low] >= enough or abs(high - low) <= _FINEST * (ends[1] - ends[0]):
             return low
         else:
@@ -231,20 +247,34 @@ def _search(
     return low if low is not None else value
 
 
+def _by_power(lengths: Mapping[float, float], amount: Amount, target: float) -> float:
+    """Guess from known lengths: the length goes as a power of the parameter."""
+    ends = min(amount.least, amount.most), max(amount.least, amount.most)
+    nearest = sorted(lengths, key=lambda value: abs(lengths[value] - target))[:2]
+    if ends[0] <= 0.0 or min(lengths[value] for value in nearest) <= 0.0:
+        return _by_proportion(lengths, amount, target, 0.0)
+    power = 1.0 if amount.most > amount.least else -1.0
+    if len(nearest) == 2:
+        (p, q), (a, b) = nearest, (lengths[value] for value in nearest)
+        power = np.log(a / b) / np.log(p / q) if a != b else power
+    guess = nearest[0] * (target / lengths[nearest[0]]) ** (1.0 / power)
+    return float(np.clip(guess, *ends))
+
+
 def _by_proportion(
-    known: Mapping[float, float], amount: Amount, target: float, ends: tuple[float, float]
+    known: Mapping[float, float], amount: Amount, target: float, beyond: float
 ) -> float:
     """Guess while one side is unknown: the length goes as the parameter or as its inverse.
 
-    From the known value that is nearest to the unknown side; the end itself where that leads
-    nowhere new.
+    From the known value that is nearest to the unknown side, and a share `beyond` further, so that
+    the target comes to lie between two known lengths; the end itself where there is no proportion.
     """
+    ends = min(amount.least, amount.most), max(amount.least, amount.most)
     unknown = amount.most if min(known.values()) <= target else amount.least
     nearest = min(known, key=lambda value: abs(value - unknown))
     if not (known[nearest] > 0.0 and ends[0] > 0.0):
         return unknown
     factor = target / known[nearest]
-    # A little beyond, so that the target comes to lie between two known lengths.
-    factor *= 1.05 if factor > 1.0 else 0.95
+    factor *= 1.0 + beyond if factor > 1.0 else 1.0 - beyond
     guess = nearest * factor if amount.most > amount.least else nearest / factor
     return float(np.clip(guess, *ends))

@@ -196,7 +196,7 @@ def write_results(
     seconds: Mapping[str, float] | None = None,
     progress: Progress = silent,
 ) -> None:
-    """Write ``results.csv``, ``results.json``, ``paths.vtp``, the pictures and ``report.html``.
+    """Write ``results.csv``, ``results.json``, ``report.html``, pictures and paths.
 
     In ``paths.vtp`` the cell array "strategy" numbers the strategies that did not fail, in the
     order of ``results.json``.
@@ -213,6 +213,7 @@ def write_results(
     progress : callable, optional
     """
     from ccfem.export.vtk import write_paths
+    from ccfem.export.waypoints import write_waypoints
     from ccfem.plot.pictures import draw_pictures
     from ccfem.plot.report import report_html
 
@@ -228,6 +229,8 @@ def write_results(
     (folder / "overview.png").write_bytes(pictures.overview)
     results_frame(comparison).to_csv(folder / "results.csv", index=False)
     runs = comparison.succeeded
+    for run in runs:
+        write_waypoints(folder / f"{run.name}_waypoints.txt", run.toolpaths, comparison.layers)
     every = Toolpaths.concatenate(run.toolpaths for run in runs)
     number = np.repeat(np.arange(float(len(runs))), [len(run.toolpaths) for run in runs])
     write_paths(every, folder / "paths.vtp", path_data={"strategy": number})

@@ -11,6 +11,7 @@ import pytest
 
 from ccfem import __version__
 from ccfem.cli import main
+from ccfem.export.waypoints import read_waypoints
 from ccfem.io import write_mesh
 from ccfem.structured import box_mesh
 
@@ -31,11 +32,16 @@ patch = "x_max"
 vector = [1000, 0, 0]
 """
 
-PICTURES = {
+FILES = {
     *(f"{name}_layer_{k:02d}.png" for name in ("isocurve", "zigzag") for k in range(3)),
     *(f"{name}_force.png" for name in ("isocurve", "zigzag")),
+    *(f"{name}_waypoints.txt" for name in ("isocurve", "zigzag")),
     "tension.png",
     "overview.png",
+    "results.csv",
+    "results.json",
+    "paths.vtp",
+    "report.html",
 }
 
 CUBE = "v 0 0 0\nv 9 0 0\nv 9 9 0\nv 0 9 0\nv 0 0 9\nv 9 0 9\nv 9 9 9\nv 0 9 9\n" + "".join(
@@ -81,7 +87,7 @@ def test_compare_writes_everything(ccfem, folder):
     assert "isocurve" in out
     where = folder / "results" / "new"
     written = {path.name for path in where.iterdir()}
-    assert written == PICTURES | {"results.csv", "results.json", "paths.vtp", "report.html"}
+    assert written == FILES
     assert [p.name for p in folder.rglob(".ccfem*")] == []
 
     about = json.loads((where / "results.json").read_text())
@@ -107,6 +113,11 @@ def test_compare_writes_everything(ccfem, folder):
             total = runs[row["strategy"]]["total"]
             for column in ("fibre_length", "efficiency", "stiffness_ratio_bonded"):
                 assert float(row[column]) == pytest.approx(total[column], rel=1e-12)
+
+    for name, run in runs.items():
+        waypoints = read_waypoints(where / f"{name}_waypoints.txt", np.eye(3))
+        assert len(waypoints) == run["total"]["paths"]
+        assert waypoints.lengths.sum() == pytest.approx(run["total"]["fibre_length"], rel=1e-5)
 
     import pyvista
 

@@ -9,7 +9,7 @@ import pytest
 
 from ccfem.elasticity.problem import Force, Problem, Support
 from ccfem.elasticity.solve import solve
-from ccfem.equal_fibre import length_per_layer, plan_to_length
+from ccfem.equal_fibre import Planned, length_per_layer, plan_to_length
 from ccfem.errors import InputError
 from ccfem.layers import slice_planar
 from ccfem.machine import Machine
@@ -116,6 +116,31 @@ def test_where_the_least_is_too_much_layers_stay_empty(plate):
     single = plan_to_length(Lines(), layers[:1], stress, MACHINE, 61.0)
     assert single.length_per_layer == pytest.approx(2 * LENGTH)
     assert "its least, at spacing = 20" in single.note
+
+
+@dataclass(frozen=True)
+class Counted:
+    """One line of a length in proportion to the parameter; counts how often it plans."""
+
+    share: float = 50.0
+    amount: ClassVar[Amount] = Amount("share", most=100.0, least=1.0)
+    planned: ClassVar[list[int]] = []
+
+    def __call__(self, layer, stress, machine):
+        self.planned.append(layer.index)
+        x = 0.01 * self.share * LENGTH
+        return Toolpaths.from_plane([np.array([[0.0, 1.0], [x, 1.0]])], layer)
+
+
+def test_a_known_plan_saves_the_search(plate):
+    """Where lengths are in proportion one more plan has to do: a strategy may take a minute."""
+    stress, layers = plate
+    toolpaths = plan(Counted(), layers, stress, MACHINE)
+    natural = Planned(Counted(), toolpaths, length_per_layer(toolpaths, layers))
+    Counted.planned.clear()
+    result = plan_to_length(Counted(), layers, stress, MACHINE, 12.0, start=natural)
+    assert 0.99 * 12.0 <= result.length_per_layer <= 12.0
+    assert len(Counted.planned) == len(layers)
 
 
 @pytest.mark.parametrize("wanted", [0.0, -5.0, float("nan"), float("inf")])
