@@ -1,4 +1,4 @@
-"""Topology optimisation: density filter, optimality criteria, SIMP."""
+"""Topology optimisation: density filter, optimality criteria, SIMP and SOMP."""
 
 from ccfem.topopt.compliance import compliance_of
 from ccfem.topopt.criteria import optimality_criteria
@@ -6,10 +6,12 @@ from ccfem.topopt.design import Design
 from ccfem.topopt.filters import ConeFilter
 from ccfem.topopt.outline import outline
 from ccfem.topopt.simp import FILTERS, simp, simp_factor
+from ccfem.topopt.somp import ORIENTATIONS, somp
 from ccfem.topopt.three_point_bending import BendingBeam, three_point_bending
 
 __all__ = [
     "FILTERS",
+    "ORIENTATIONS",
     "BendingBeam",
     "ConeFilter",
     "Design",
@@ -18,5 +20,6 @@ __all__ = [
     "outline",
     "simp",
     "simp_factor",
+    "somp",
     "three_point_bending",
 ]

@@ -89,6 +89,7 @@ class PlaneCompliance:
         self, problem: PlaneProblem, weights: Mapping[str, float], backend: str = "auto"
     ) -> None:
         self.system = prepare_plane(problem)
+        self.weights = weights
         self._answer = _Answer(self.system, weights, backend)
         self.centres = problem.mesh.centres
         self.volumes = problem.mesh.areas * problem.thickness

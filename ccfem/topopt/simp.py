@@ -281,7 +281,6 @@ def iterate(
         compliance=np.array(compliance),
         change=np.array(changes),
         converged=converged,
-        angle=getattr(model, "angle", None),
     )
 
 
