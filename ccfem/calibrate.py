@@ -24,6 +24,7 @@ from ccfem.evaluate.virtual_test.strands import cut_strands
 from ccfem.evaluate.virtual_test.strength import matrix_peak
 from ccfem.evaluate.virtual_test.virtual_test import virtual_test
 from ccfem.force_displacement import Curve
+from ccfem.io import whole_file
 from ccfem.materials import Material, isotropic
 from ccfem.toolpaths import Toolpaths
 
@@ -83,7 +84,8 @@ class Calibration:
         ]
         if self.rho is not None:
             lines.append(f"rho = {self.rho!r}")
-        Path(path).write_text("\n".join(lines) + "\n", encoding="utf-8")
+        with whole_file(path) as temporary:
+            temporary.write_text("\n".join(lines) + "\n", encoding="utf-8")
 
 
 def calibrate(

@@ -1,4 +1,4 @@
-"""The command line: ``ccfem cases``, ``strategies``, ``compare``, ``plan``.
+"""The command line: ``ccfem cases``, ``strategies``, ``compare``, ``plan``, ``calibrate``.
 
 Only this module turns strings into objects. Everything heavy is imported by the command that needs
 it, so that ``ccfem --help`` answers at once.
@@ -7,8 +7,10 @@ it, so that ``ccfem --help`` answers at once.
 import shlex
 import sys
 import time
-from collections.abc import Iterator
+from collections.abc import Callable, Iterator
 from contextlib import contextmanager
+from dataclasses import replace
+from functools import partial
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Any
 
@@ -79,6 +81,14 @@ _LoadCase = Annotated[
     str | None,
     typer.Option("--load-case", metavar="NAME", help="Load case to plan for; default the first."),
 ]
+_Calibration = Annotated[
+    Path | None,
+    typer.Option(
+        "--calibration",
+        metavar="MATERIAL.toml",
+        help="Material of ccfem calibrate, instead of the part's own.",
+    ),
+]
 _Backend = Annotated[
     str, typer.Option("--backend", metavar="NAME", help="Linear solver; default by size.")
 ]
@@ -132,6 +142,7 @@ def compare(
     ] = None,
     virtual_test: _VirtualTest = True,
     load_case: _LoadCase = None,
+    calibration: _Calibration = None,
     backend: _Backend = "auto",
     out: _Out = None,
 ) -> None:
@@ -147,7 +158,8 @@ def compare(
             raise InputError(f"--set expects STRATEGY.NAME=VALUE; got '{text}'")
         parameters.setdefault(strategy, {})[name] = value
     options = _options(layers, heights, fibre_per_layer, virtual_test, load_case, backend)
-    _run(case, "", set_case, names, parameters, out, {**options, "natural": natural})
+    options["natural"] = natural
+    _run(partial(_load, case, set_case), "", names, parameters, out, options, calibration)
 
 
 @app.command()
@@ -164,6 +176,7 @@ def plan(
     fibre_per_layer: _Fibre = None,
     virtual_test: _VirtualTest = True,
     load_case: _LoadCase = None,
+    calibration: _Calibration = None,
     backend: _Backend = "auto",
     out: _Out = None,
 ) -> None:
@@ -171,7 +184,67 @@ def plan(
     parameters = {strategy: dict(_assignment(text) for text in set_ or ())}
     options = _options(layers, heights, fibre_per_layer, virtual_test, load_case, backend)
     options["natural"] = fibre_per_layer is None
-    _run(case, f"-{strategy}", set_case, (strategy,), parameters, out, options)
+    load = partial(_load, case, set_case)
+    _run(load, f"-{strategy}", (strategy,), parameters, out, options, calibration)
+
+
+@app.command()
+def calibrate(
+    case: _CasePath,
+    unreinforced: Annotated[
+        Path, typer.Option(metavar="CURVE.csv", help="Test of the part printed without fibre.")
+    ],
+    reinforced: Annotated[
+        Path | None,
+        typer.Option(metavar="CURVE.csv", help="Test of the part printed with fibre."),
+    ] = None,
+    strategy: Annotated[
+        str | None, typer.Option(metavar="S", help="Strategy that planned the reinforced part.")
+    ] = None,
+    set_: Annotated[
+        list[str] | None,
+        typer.Option("--set", metavar="NAME=VALUE", help="Parameter of it; repeatable."),
+    ] = None,
+    set_case: _SetCase = None,
+    layers: _Layers = None,
+    fibre_per_layer: _Fibre = None,
+    load_case: _LoadCase = None,
+    out: Annotated[
+        Path, typer.Option("--out", metavar="MATERIAL.toml", help="File that is written.")
+    ] = Path("calibrated.toml"),
+) -> None:
+    """Fit modulus, matrix strength and strand stiffness to force-displacement curves (CSV).
+
+    The paths of the reinforced part are planned again as they were printed: give the strategy, its
+    parameters and the amount of fibre of that print.
+    """
+    from ccfem.calibrate import calibrate as fit
+    from ccfem.compare import compare as run_comparison
+    from ccfem.compare import create_all
+    from ccfem.force_displacement import read_curve
+
+    curves = [None if path is None else read_curve(path) for path in (unreinforced, reinforced)]
+    if (reinforced is None) != (strategy is None):
+        raise InputError("--reinforced and --strategy belong together; got only one of them")
+    loaded = _load(case, set_case)
+    paths = None
+    if strategy is not None:
+        chosen = create_all(
+            loaded, (strategy,), {strategy: dict(_assignment(text) for text in set_ or ())}
+        )
+        options = _options(layers, None, fibre_per_layer, False, load_case, "auto")
+        (run,) = run_comparison(loaded, chosen, natural=fibre_per_layer is None, **options).runs
+        if not len(run.toolpaths):
+            raise InputError(f"{strategy} could not plan the part: {run.failure}")
+        paths = run.toolpaths
+    assert curves[0] is not None
+    found = fit(loaded.problem, curves[0], curves[1], paths, load_case, out.stem)
+    found.write(out)
+    rho = "" if found.rho is None else f", rho {found.rho:.3g} mm^2"
+    print(
+        f"{out}: modulus {found.modulus:.4g} MPa, matrix strength {found.matrix_strength:.3g} MPa"
+        f"{rho}; use it with --calibration {out}"
+    )
 
 
 def _options(
@@ -197,13 +270,13 @@ def _options(
 
 
 def _run(
-    case_name: str,
+    load: Callable[[], "Case"],
     suffix: str,
-    set_case: list[str] | None,
     names: tuple[str, ...],
     parameters: dict[str, dict[str, Any]],
     out: Path | None,
     options: dict[str, Any],
+    calibration: Path | None,
 ) -> None:
     """Compare and write; a failure leaves nothing behind."""
     from ccfem.compare import compare as run_comparison
@@ -212,8 +285,15 @@ def _run(
     from ccfem.screen import print_comparison
 
     imported = time.perf_counter()
-    case = _load(case_name, set_case)
+    case = load()
     seconds = {"start": imported - _STARTED, "mesh": time.perf_counter() - imported}
+    if calibration is not None:
+        from ccfem.calibrate import read_calibration
+
+        fitted = read_calibration(calibration)
+        case = replace(case, problem=replace(case.problem, material=fitted.material))
+        if options["strand"] is not None:
+            options["strand"] = fitted.strand(options["strand"])
     chosen = create_all(case, names, parameters)
     where = out if out is not None else Path("results") / f"{case.name}{suffix}"
     with staged(where) as folder, _bar() as progress:
