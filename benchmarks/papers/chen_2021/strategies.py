@@ -4,13 +4,15 @@
 
 At most the fibre of the authors' own paths (Table 2: 34.658 m in 12 layers). ``literal`` is the
 algorithm as the paper prints it, with all of its steps; it lays what its search for the number of
-isocurves allows. The stress and the virtual test are those of ``authors_loop``.
+isocurves allows. The stress and the virtual test are those of ``authors_loop``. PrusaSlicer's rows
+are left out where the program is not installed.
 """
 
 import time
 from collections.abc import Callable
 
 from benchmarks.papers.chen_2021.loop import authors_loop
+from benchmarks.papers.chen_2021.slicers import PATTERNS, slicer_found, slicer_paths_to_length
 from benchmarks.papers.chen_2021.virtual_test import MATRIX_STRENGTH, authors_paths
 from ccfem.elasticity import solve
 from ccfem.equal_fibre import plan_to_length
@@ -54,6 +56,9 @@ def main() -> None:
     def as_is(strategy: Strategy) -> Callable[[], Toolpaths]:
         return lambda: plan(strategy, layers, field, case.machine)
 
+    def sliced(pattern: str, angle: float, turn: float) -> Callable[[], Toolpaths]:
+        return lambda: slicer_paths_to_length(layers, pattern, angle, wanted, turn)
+
     rows: dict[str, Callable[[], Toolpaths]] = {
         "authors, ours": lambda: authors,
         "authors, zigzag-contour": lambda: authors_paths("zigzag"),
@@ -64,8 +69,12 @@ def main() -> None:
         "isocurve, literal": as_is(Isocurve.literal()),
         **{name: at_length(create(name)) for name in ("concentric", "zigzag", "contour_zigzag")},
     }
+    if slicer_found():
+        rows |= {name: sliced(*settings) for name, settings in PATTERNS.items()}
+    else:
+        print("PrusaSlicer not found: rows left out")
     heads = [head for head, _ in COLUMNS.values()]
-    print(f"{'':24}" + "".join(f"{h:>12}" for h in [*heads, "T", "B", "failure N", "seconds"]))
+    print(f"{'':28}" + "".join(f"{h:>12}" for h in [*heads, "T", "B", "failure N", "seconds"]))
     for name, paths_of in rows.items():
         started = time.perf_counter()
         paths = paths_of()
@@ -76,7 +85,7 @@ def main() -> None:
         failure = first_failure(tension, matrix_strength=MATRIX_STRENGTH)
         values = [total[key] * factor for key, (_, factor) in COLUMNS.items()]
         values += [tension.ratio, bonded.ratio, failure.load, seconds]
-        print(f"{name:24}" + "".join(f"{value:12.4g}" for value in values), flush=True)
+        print(f"{name:28}" + "".join(f"{value:12.4g}" for value in values), flush=True)
 
 
 if __name__ == "__main__":
