@@ -103,6 +103,21 @@ def _substitute(first, start, values, x):  # type: ignore[no-untyped-def]
             left[k] -= row[k] * y
 
 
+@njit(cache=True)
+def _fill(indptr, indices, place, start, data, values):  # type: ignore[no-untyped-def]
+    """Put the lower triangle of a block matrix in its place."""
+    d = data.shape[1]
+    for block in range(indptr.size - 1):
+        for slot in range(indptr[block], indptr[block + 1]):
+            if place[indices[slot]] > place[block]:
+                continue
+            row, column = d * place[block], d * place[indices[slot]]
+            for p in range(d):
+                for r in range(d):
+                    if column + r <= row + p:
+                        values[start[row + p] + column + r] = data[slot, p, r]
+
+
 def _lowest(matrix: sp.bsr_array, place: IntArray) -> IntArray:
     """Lowest new place among the columns of each block row, in new order."""
     columns = np.minimum.reduceat(place[matrix.indices], matrix.indptr[:-1])
@@ -166,13 +181,7 @@ def skyline(matrix: sp.bsr_array) -> Callable[[FloatArray], FloatArray]:
     begin = np.cumsum(length) - length
     start = begin - first
     values = np.zeros(int(length.sum()))
-    row = np.repeat(place, np.diff(matrix.indptr))
-    column = place[matrix.indices]
-    for p in range(d):
-        for r in range(d):
-            i, j = d * row + p, d * column + r
-            lower = np.flatnonzero(i >= j)
-            values[start[i[lower]] + j[lower]] = matrix.data[lower, p, r]
+    _fill(matrix.indptr, matrix.indices, place, start, matrix.data, values)
     values[start[n:] + np.arange(n, padded)] = 1.0
     bad = _factorise(first, start, values)
     if bad >= 0:
