@@ -1,0 +1,243 @@
+"""Strands parallel to given curves, outward from them, and strands in what those leave open."""
+
+from collections.abc import Sequence
+from itertools import pairwise
+from typing import Any
+
+import numpy as np
+import shapely
+
+from ccfem.arrays import FloatArray
+from ccfem.geometry.shells import concentric
+
+__all__ = ["fill_rest", "grow", "lengthened", "open_lines", "parallels"]
+
+_ARC = 16
+"""Segments of a quarter turn round an end or a corner of a curve."""
+_LEAST_REST = 1.0
+"""Smallest rest that is filled, in squares of the pitch."""
+_SLIVER = 0.19
+"""Half of the width, in pitches, below which a strip is no rest."""
+_OFF = 0.02
+"""Deviation of the distance to the nearest curve, in pitches, up to which a piece of a border
+counts as parallel to that curve."""
+_TOLERANCE = 2e-3
+"""Deviation, in pitches, up to which points of a curve are left out."""
+
+
+def grow(
+    curves: Sequence[FloatArray],
+    region: Any,
+    pitch: float,
+    closest: float,
+    count: int | None = None,
+    whole: bool = False,
+) -> list[FloatArray]:
+    """Fill a region with strands: curves, strands parallel to them, concentric ones in the rest.
+
+    Parameters
+    ----------
+    curves : sequence of (k, 2) arrays, mm
+        May stand out of the region.
+    region : shapely (Multi)Polygon, mm
+        Its border is the edge of other strands.
+    pitch, closest, count, whole
+        As in `parallels`.
+
+    Returns
+    -------
+    list of (k, 2) arrays, mm
+    """
+    if shapely.is_empty(region):
+        return []
+    smooth = [_smooth(curve, _TOLERANCE * pitch) for curve in curves]
+    slack = (closest - 0.5) * pitch
+    room = shapely.buffer(region, -slack, join_style="mitre")
+    inner = open_lines(shapely.intersection([shapely.LineString(c) for c in smooth], room))
+    inner += parallels(smooth, room, pitch, closest, count, whole)
+    # The sides of a strand keep their distance to the border; its ends may reach it.
+    lines = [
+        line
+        for part in inner
+        for line in open_lines(
+            shapely.intersection(
+                shapely.LineString(lengthened(part, room, 1e-6 * pitch, 1.4 * slack)), region
+            )
+        )
+        if _length(line) >= pitch
+    ]
+    return lines + fill_rest(region, lines, pitch, closest)
+
+
+def parallels(
+    curves: Sequence[FloatArray],
+    region: Any,
+    pitch: float,
+    closest: float,
+    count: int | None = None,
+    whole: bool = False,
+) -> list[FloatArray]:
+    """Lines at whole multiples of a pitch from the nearest of several curves.
+
+    The borders of the buffers of all curves together, so that lines of different distance never
+    come nearer to each other than the pitch; where two fronts of one distance come nearer than
+    `closest` pitches neither is laid.
+
+    Parameters
+    ----------
+    curves : sequence of (k, 2) arrays, mm
+        Closed ones repeat their first point.
+    region : shapely (Multi)Polygon, mm
+        Lines are clipped to it.
+    pitch : float, mm
+    closest : float
+        Least distance of lines, in pitches.
+    count : int, optional
+        Number of lines at each side; by default until the region is full.
+    whole : bool, default False
+        Whether lines go round the free ends of curves and on from one curve to the next. By
+        default each line belongs to one curve, and nothing is laid beyond the ends of that.
+
+    Returns
+    -------
+    list of (k, 2) arrays, mm
+        Without the curves themselves.
+    """
+    if not len(curves):
+        return []
+    strings = np.array([shapely.LineString(curve) for curve in curves])
+    if whole:
+        strings = np.array([shapely.multilinestrings(strings)])
+    shapely.prepare(strings)
+    half = 0.5 * closest * pitch
+    lines: list[FloatArray] = []
+    level = idle = 0
+    # Where a channel is closed there may be no line at one distance and some at the next.
+    while (count is None or level < count) and idle < 3:
+        level += 1
+        distance = level * pitch
+        cap = "round" if whole else "flat"
+        covered = shapely.union_all(
+            shapely.buffer(strings, distance, cap_style=cap, quad_segs=_ARC)
+        )
+        # Channels that are too narrow are closed.
+        covered = shapely.buffer(shapely.buffer(covered, half, quad_segs=4), -half, quad_segs=4)
+        found = [
+            shapely.LineString(line)
+            for part in shapely.get_parts(covered)
+            for ring in (part.exterior, *part.interiors)
+            for line in _own_pieces(shapely.get_coordinates(ring), strings, distance, _OFF * pitch)
+        ]
+        inside = open_lines(shapely.intersection(found, region))
+        idle = 0 if inside else idle + 1
+        lines += inside
+    return lines
+
+
+def _own_pieces(
+    ring: FloatArray, strings: Any, distance: float, tolerance: float
+) -> list[FloatArray]:
+    """Pieces of a ring that lie at a distance from their nearest curve, split where that changes.
+
+    Straight ends of buffers and rounded cusps drop out.
+    """
+    middle = shapely.points(0.5 * (ring[1:] + ring[:-1]))
+    gaps = shapely.distance(strings[:, None], middle[None])
+    owner = np.argmin(gaps, axis=0)
+    owner[np.abs(gaps.min(axis=0) - distance) > tolerance] = -1
+    change = np.flatnonzero(np.diff(owner)) + 1
+    if not len(change):
+        return [ring] if owner[0] >= 0 else []
+    # Start at a change, so that no piece is cut at the arbitrary start of the ring.
+    ring = np.concatenate([ring[change[0] : -1], ring[: change[0] + 1]])
+    owner = np.roll(owner, -change[0])
+    cuts = [0, *(np.flatnonzero(np.diff(owner)) + 1).tolist(), len(owner)]
+    return [ring[a : b + 1] for a, b in pairwise(cuts) if owner[a] >= 0]
+
+
+def fill_rest(
+    region: Any, lines: Sequence[FloatArray], pitch: float, closest: float
+) -> list[FloatArray]:
+    """Concentric strands in the part of a region that strands along given lines leave open.
+
+    Parameters
+    ----------
+    region : shapely (Multi)Polygon, mm
+    lines : sequence of (k, 2) arrays, mm
+    pitch : float, mm
+        Width that each strand takes.
+    closest : float
+        As in `geometry.shells.concentric`.
+
+    Returns
+    -------
+    list of (k, 2) arrays, mm
+        Strips narrower than 0.4 pitches and specks stay open.
+    """
+    strips = shapely.buffer(
+        [_string(line) for line in lines],
+        0.5 * pitch,
+        cap_style="flat",
+        join_style="mitre",
+        mitre_limit=1.5,
+    )
+    rest = shapely.difference(region, shapely.union_all(strips))
+    rest = shapely.buffer(rest, -_SLIVER * pitch, join_style="mitre")
+    rest = shapely.buffer(rest, _SLIVER * pitch, join_style="mitre")
+    parts = shapely.get_parts(rest)
+    parts = parts[shapely.area(parts) > _LEAST_REST * pitch**2]
+    if not len(parts):
+        return []
+    return concentric(shapely.multipolygons(parts), pitch, closest, walls=False)
+
+
+def open_lines(shapes: Any) -> list[FloatArray]:
+    """Lines of geometries as (k, 2) arrays, pieces that touch end to end joined."""
+    found = []
+    for shape in np.atleast_1d(shapes):
+        merged = shape if shape.geom_type == "LineString" else shapely.line_merge(shape)
+        found += [
+            shapely.get_coordinates(part)
+            for part in shapely.get_parts(merged)
+            if part.geom_type == "LineString" and part.length > 0.0
+        ]
+    return found
+
+
+def lengthened(line: FloatArray, region: Any, near: float, length: float) -> FloatArray:
+    """Open line made longer, straight, at ends that lie near the border of a region.
+
+    Parameters
+    ----------
+    line : (m, 2) array, mm
+        Returned as it is when closed.
+    region : shapely (Multi)Polygon, mm
+    near : float, mm
+        Distance to the border up to which an end is made longer.
+    length : float, mm
+        By how much.
+    """
+    if bool((line[0] == line[-1]).all()):
+        return line
+    gap = shapely.distance(region.boundary, shapely.points(line[[0, -1]]))
+    parts = [line]
+    if gap[0] <= near:
+        way = line[0] - line[1]
+        parts.insert(0, line[:1] + length * way / np.linalg.norm(way))
+    if gap[1] <= near:
+        way = line[-1] - line[-2]
+        parts.append(line[-1:] + length * way / np.linalg.norm(way))
+    return np.concatenate(parts)
+
+
+def _smooth(line: FloatArray, tolerance: float) -> FloatArray:
+    return shapely.get_coordinates(shapely.simplify(shapely.LineString(line), tolerance))
+
+
+def _string(line: FloatArray) -> Any:
+    closed = len(line) > 3 and bool((line[0] == line[-1]).all())
+    return shapely.LinearRing(line) if closed else shapely.LineString(line)
+
+
+def _length(line: FloatArray) -> float:
+    return float(np.linalg.norm(np.diff(line, axis=0), axis=1).sum())

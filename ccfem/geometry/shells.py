@@ -1,0 +1,200 @@
+"""Concentric strands: rings along the border, and lines along the middle of what they leave."""
+
+from typing import Any
+
+import numpy as np
+import shapely
+
+from ccfem.arrays import BoolArray, FloatArray
+from ccfem.geometry.medial_axis import MedialAxis, medial_axis
+from ccfem.geometry.offsets import inset, offset_rings
+
+__all__ = ["concentric", "middle_lines", "shells"]
+
+_LEAST_GAP = 0.4
+"""Narrowest strip, in pitches, that a strand is laid along, the rest of it on its neighbours: the
+overlap and the gaps of the plates of paper 004 are then about equal."""
+_STRAIGHT = 0.03
+"""Deviation, in pitches, up to which points of a middle line are left out."""
+
+
+def shells(
+    section: Any, width: float, pitch: float, count: int, closest: float
+) -> tuple[list[FloatArray], Any]:
+    """Rings along every border of a section, and what they leave inside.
+
+    Parameters
+    ----------
+    section : shapely (Multi)Polygon, mm
+    width : float, mm
+        Of a strand; the first ring lies half of it inside the border.
+    pitch : float, mm
+        Distance of neighbouring rings.
+    count : int
+        Number of rings. Parts thinner than twice as many are filled by them.
+    closest : float
+        As in `concentric`.
+
+    Returns
+    -------
+    lines : list of (k, 2) arrays, mm
+        Closed rings, and open lines along the middle of parts that the rings leave no room in.
+    interior : shapely (Multi)Polygon, mm
+        The rest of the section, half a pitch inside the innermost rings.
+    """
+    if count == 0:
+        return [], inset(section, 0.5 * (width - pitch)) if pitch > width else section
+    interior = inset(section, 0.5 * width + (count - 0.5) * pitch)
+    return concentric(section, pitch, closest, 0.5 * width, count), interior
+
+
+def concentric(
+    section: Any,
+    pitch: float,
+    closest: float,
+    first: float | None = None,
+    count: int | None = None,
+    middle: bool = True,
+    walls: bool = True,
+) -> list[FloatArray]:
+    """Fill a section with rings parallel to its border.
+
+    Parameters
+    ----------
+    section : shapely (Multi)Polygon, mm
+    pitch : float, mm
+        Distance of neighbouring rings.
+    closest : float
+        Least distance of opposite sides of a ring, in pitches; where the section is narrower the
+        ring is cut short.
+    first : float, mm, optional
+        Distance of the first ring to the border; default half a pitch.
+    count : int, optional
+        Number of rings; by default as many as fit.
+    middle : bool, default True
+        Whether to lay `middle_lines` in what the rings leave.
+    walls : bool, default True
+        Whether the border is that of the part, which no strand oversteps. The border of other
+        strands may be overlapped where the section is narrower than a pitch.
+
+    Returns
+    -------
+    list of (k, 2) arrays, mm
+        Closed rings from the border inward, then open lines.
+    """
+    first = 0.5 * pitch if first is None else first
+    if shapely.is_empty(section):
+        return []
+    levels = offset_rings(section, first, pitch, closest * pitch, count)
+    rings = [ring for level in levels for ring in level]
+    if not middle or (count is not None and not _narrow(section, first, pitch, closest, count)):
+        return rings
+    axis = medial_axis(section, 0.5 * min(pitch, 2.0 * first))
+    return rings + middle_lines(axis, rings, pitch, closest, first, count, walls)
+
+
+def _narrow(section: Any, first: float, pitch: float, closest: float, count: int) -> bool:
+    """Whether some part of the section is too narrow for `count` rings, corners left aside."""
+    depth = first + (count - 1 + 0.5 * closest) * pitch
+    core = shapely.buffer(section, -depth, join_style="mitre")
+    reached = shapely.buffer(core, 1.05 * depth + 0.1 * pitch, join_style="mitre")
+    rest = shapely.difference(section, reached)
+    return not shapely.is_empty(rest)
+
+
+def middle_lines(
+    axis: MedialAxis,
+    rings: list[FloatArray],
+    pitch: float,
+    closest: float,
+    first: float,
+    count: int | None = None,
+    walls: bool = True,
+) -> list[FloatArray]:
+    """Lines along the medial axis of a section where its rings leave a strip.
+
+    Between the innermost rings at both sides of the axis there is a strip, at most two pitches
+    wide; a strand is laid along its middle where it is at least 0.4 pitches wide.
+
+    Parameters
+    ----------
+    axis : MedialAxis
+        Of the section.
+    rings : list of (k, 2) arrays, mm
+        Those of `offset_rings`.
+    pitch, closest, first, count, walls
+        As in `concentric`. With a `count`, only where there is room for fewer rings.
+
+    Returns
+    -------
+    list of (k, 2) arrays, mm
+        A line that goes round a hole is closed.
+    """
+    pieces = []
+    degree = np.bincount([end for s in axis.segments for end in s.ends if end >= 0])
+    for segment in axis.segments:
+        points, depth = segment.points, segment.radius - first
+        wanted = _wanted(depth, pitch, closest, count)
+        if walls:
+            wanted &= depth >= -1e-3 * pitch
+        if not segment.closed:
+            free = degree[list(segment.ends)] == 1
+            points, wanted = _to_the_end(points, depth if walls else segment.radius, wanted, free)
+        pieces += _runs(points, wanted)
+    if not pieces:
+        return []
+    pairs = [np.stack([ring[:-1], ring[1:]], axis=1) for ring in rings]
+    sides = np.concatenate([np.zeros((0, 2, 2)), *pairs])
+    tree = shapely.STRtree(shapely.linestrings(sides))
+    lines = []
+    for piece in pieces:
+        near, _ = tree.query(
+            shapely.points(piece), predicate="dwithin", distance=(closest - 1e-3) * pitch
+        )
+        clear = np.ones(len(piece), dtype=bool)
+        clear[near] = False
+        lines += _runs(piece, clear)
+    tolerance = _STRAIGHT * pitch
+    lines = [shapely.get_coordinates(shapely.LineString(x).simplify(tolerance)) for x in lines]
+    return [line for line in lines if _length(line) >= pitch]
+
+
+def _to_the_end(
+    points: FloatArray, depth: FloatArray, wanted: BoolArray, free: BoolArray
+) -> tuple[FloatArray, BoolArray]:
+    """Line made longer, straight, at its free ends, up to the end of the strip that it lies in."""
+    before, after = points[:1], points[-1:]
+    if free[0]:
+        way = points[0] - points[1]
+        before = before + max(depth[0], 0.0) * way / np.linalg.norm(way)
+    if free[1]:
+        way = points[-1] - points[-2]
+        after = after + max(depth[-1], 0.0) * way / np.linalg.norm(way)
+    wanted = np.concatenate([wanted[:1] & free[0], wanted, wanted[-1:] & free[1]])
+    return np.concatenate([before, points, after]), wanted
+
+
+def _wanted(depth: FloatArray, pitch: float, closest: float, count: int | None) -> BoolArray:
+    """Where along the axis a strand is laid; `depth` is the distance to the first ring."""
+    room = depth / pitch + 0.5  # in pitches, from the outer edge of the first ring's share
+    fitting = np.maximum(np.floor(room + 0.5 - 0.5 * closest + 1e-3), 0.0)
+    strip = 2.0 * (room - fitting)
+    wanted = strip >= max(_LEAST_GAP, 2.0 * closest - 1.0) - 1e-6
+    return wanted if count is None else wanted & (fitting < count)
+
+
+def _runs(line: FloatArray, wanted: BoolArray) -> list[FloatArray]:
+    """Pieces of a polyline between neighbouring wanted points; one that goes all round stays so."""
+    if wanted.all():
+        return [line]
+    closed = len(line) > 2 and bool((line[0] == line[-1]).all())
+    if closed and wanted[0]:
+        start = int(np.argmin(wanted))
+        line = np.concatenate([line[start:-1], line[: start + 1]])
+        wanted = np.concatenate([wanted[start:-1], wanted[: start + 1]])
+    edge = np.flatnonzero(np.diff(np.concatenate([[False], wanted, [False]]).astype(np.int8)))
+    return [line[a:b] for a, b in edge.reshape(-1, 2) if b - a > 1]
+
+
+def _length(line: FloatArray) -> float:
+    return float(np.linalg.norm(np.diff(line, axis=0), axis=1).sum())
