@@ -1,0 +1,96 @@
+"""Shells and parallel straight lines: the grids of paper 004.
+
+J. Plocher, J.-B. Wioland, A. Panesar, Rapid Prototyping Journal 28 (2022) 1241 (paper 004).
+"""
+
+from dataclasses import dataclass
+from typing import ClassVar, Literal
+
+import numpy as np
+
+from ccfem.elasticity.stress_field import LayerStress
+from ccfem.errors import InputError
+from ccfem.geometry.hatch import hatch
+from ccfem.geometry.shells import shells
+from ccfem.layers.layer import Layer
+from ccfem.machine import Machine
+from ccfem.strategies.strategy import Amount
+from ccfem.toolpaths import Toolpaths
+
+__all__ = ["Grid"]
+
+
+@dataclass(frozen=True)
+class Grid:
+    """Shells along the border, and inside straight lines in two directions. The stress is unseen.
+
+    Every line is a path of its own, as in the paper; `Zigzag` links them.
+
+    Attributes
+    ----------
+    spacing : float, default 1
+        Distance of neighbouring strands in fibre widths, at least 1.
+    shells : int, default 3
+        Number of rings along every border.
+    angle, turn : float, degrees, default 45 and 90
+        Direction of the first family of lines to the first axis of the layer, and its turn to the
+        second one: 45 for +-45, 0 for 0/90.
+    families : {"alternate", "both"}, default "alternate"
+        One family a layer, in turn, or both on every layer, where they cross.
+    lines : {"printable", "paper"}, default "printable"
+        Lines at the true spacing; or as near as rows of pixels of one spacing are, every diagonal
+        a line, which overlap by a factor of sqrt 2 at 45 degrees (the paper).
+    closest : float, default 0.6
+        As in `Mps`, for the shells of thin parts.
+    minimum_length : float, mm, optional
+        Shorter paths are dropped; by default the shortest that the machine can cut.
+    """
+
+    spacing: float = 1.0
+    shells: int = 3
+    angle: float = 45.0
+    turn: float = 90.0
+    families: Literal["alternate", "both"] = "alternate"
+    lines: Literal["printable", "paper"] = "printable"
+    closest: float = 0.6
+    minimum_length: float | None = None
+
+    amount: ClassVar[Amount] = Amount("spacing", most=1.0, least=20.0)
+    direction: ClassVar[str] = "angle"
+
+    def __post_init__(self) -> None:
+        if not 1.0 <= self.spacing < float("inf"):
+            raise InputError(f"grid.spacing must be at least 1 fibre width; got {self.spacing}")
+        if self.shells < 0:
+            raise InputError(f"grid.shells must be at least 0; got {self.shells}")
+        if not np.isfinite([self.angle, self.turn]).all():
+            raise InputError(
+                f"grid.angle and grid.turn must be finite degrees; got {self.angle} and {self.turn}"
+            )
+        if self.families not in ("alternate", "both"):
+            raise InputError(f"grid.families must be alternate or both; got {self.families!r}")
+        if self.lines not in ("printable", "paper"):
+            raise InputError(f"grid.lines must be printable or paper; got {self.lines!r}")
+        if not 0.5 <= self.closest <= 1.0:
+            raise InputError(f"grid.closest must lie between 0.5 and 1; got {self.closest}")
+        if self.minimum_length is not None and not 0.0 <= self.minimum_length < float("inf"):
+            raise InputError(
+                f"grid.minimum_length must be a finite number >= 0; got {self.minimum_length}"
+            )
+
+    def __call__(self, layer: Layer, stress: LayerStress, machine: Machine) -> Toolpaths:
+        """Plan the paths of one layer; none where the section is thinner than a fibre."""
+        pitch = self.spacing * machine.fibre_width
+        lines, interior = shells(
+            layer.polygon, machine.fibre_width, pitch, self.shells, self.closest
+        )
+        turns = (0, 1) if self.families == "both" else (layer.index,)
+        for number in turns:
+            angle = np.radians(self.angle + self.turn * number)
+            step = pitch
+            if self.lines == "paper":
+                step *= max(abs(np.cos(angle)), abs(np.sin(angle)))
+            lines += hatch(interior, angle, step).lines
+        paths = Toolpaths.from_plane(lines, layer)
+        least = machine.minimum_length if self.minimum_length is None else self.minimum_length
+        return paths.select(paths.lengths >= least)

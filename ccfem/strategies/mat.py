@@ -1,0 +1,83 @@
+"""Shells, strands along the medial axis, and concentric strands in the rest: MAT of paper 004.
+
+J. Plocher, J.-B. Wioland, A. Panesar, Rapid Prototyping Journal 28 (2022) 1241 (paper 004).
+"""
+
+from dataclasses import dataclass
+from typing import ClassVar
+
+import numpy as np
+
+from ccfem.elasticity.stress_field import LayerStress
+from ccfem.errors import InputError
+from ccfem.geometry.dilation import grow
+from ccfem.geometry.medial_axis import medial_axis
+from ccfem.geometry.shells import concentric, shells
+from ccfem.layers.layer import Layer
+from ccfem.machine import Machine
+from ccfem.strategies.strategy import Amount
+from ccfem.toolpaths import Toolpaths
+
+__all__ = ["Mat"]
+
+_SHORTEST = 4.0
+"""Segments of the medial axis shorter than so many spacings are left out."""
+
+
+@dataclass(frozen=True)
+class Mat:
+    """Shells along the border, and strands along the medial axis of what they leave.
+
+    Strands parallel to the medial axis follow, until the first of them would touch a shell;
+    concentric strands fill the rest. A part without holes and limbs (a disc) is filled by
+    concentric strands alone. The stress is unseen.
+
+    Attributes
+    ----------
+    spacing : float, default 1
+        Distance of neighbouring strands in fibre widths, at least 1.
+    shells : int, default 3
+        Number of rings along every border.
+    closest : float, default 0.6
+        As in `Mps`.
+    minimum_length : float, mm, optional
+        Shorter paths are dropped; by default the shortest that the machine can cut.
+    """
+
+    spacing: float = 1.0
+    shells: int = 3
+    closest: float = 0.6
+    minimum_length: float | None = None
+
+    amount: ClassVar[Amount] = Amount("spacing", most=1.0, least=20.0)
+
+    def __post_init__(self) -> None:
+        if not 1.0 <= self.spacing < float("inf"):
+            raise InputError(f"mat.spacing must be at least 1 fibre width; got {self.spacing}")
+        if self.shells < 0:
+            raise InputError(f"mat.shells must be at least 0; got {self.shells}")
+        if not 0.5 <= self.closest <= 1.0:
+            raise InputError(f"mat.closest must lie between 0.5 and 1; got {self.closest}")
+        if self.minimum_length is not None and not 0.0 <= self.minimum_length < float("inf"):
+            raise InputError(
+                f"mat.minimum_length must be a finite number >= 0; got {self.minimum_length}"
+            )
+
+    def __call__(self, layer: Layer, stress: LayerStress, machine: Machine) -> Toolpaths:
+        """Plan the paths of one layer; none where the section is thinner than a fibre."""
+        pitch = self.spacing * machine.fibre_width
+        lines, interior = shells(
+            layer.polygon, machine.fibre_width, pitch, self.shells, self.closest
+        )
+        axis = medial_axis(interior, 0.5 * pitch)
+        segments = [s for s in axis.segments if s.length >= _SHORTEST * pitch]
+        if segments:
+            narrowest = min(float(s.radius.min()) for s in segments)
+            count = max(int(np.floor(narrowest / pitch - 0.5 + 1e-3)), 0)
+            curves = [s.points for s in segments]
+            lines += grow(curves, interior, pitch, self.closest, count, whole=True)
+        else:
+            lines += concentric(interior, pitch, self.closest, walls=False)
+        paths = Toolpaths.from_plane(lines, layer)
+        least = machine.minimum_length if self.minimum_length is None else self.minimum_length
+        return paths.select(paths.lengths >= least)
