@@ -53,7 +53,7 @@ class OrientedCompliance:
 
     def stiffness(self, derivative: bool = False) -> FloatArray:
         """Stiffness (m, 3, 3) in the global axes, MPa, or its derivative by the angle."""
-        return np.tensordot(turned_by(self.angle, derivative), self._harmonics, axes=1)
+        return np.einsum("mk,kij->mij", turned_by(self.angle, derivative), self._harmonics)
 
     def __call__(self, factor: FloatArray) -> Loaded:
         """Answer with a factor (m,) on the stiffness of each cell, at the present angles."""
