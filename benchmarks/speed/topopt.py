@@ -3,8 +3,8 @@
 Everything printed is measured in this run, ours and the peer alternating; read the ratios, not
 the seconds. Ratios come twice: of wall time, and of processor time, which other work on the
 machine disturbs less but which counts every thread. ``pip install pymoto`` brings the peer; it
-takes PARDISO when that is installed. Its volume constraint is on the variables, ours on the filtered
-densities, so the compliances after some iterations are close, not equal.
+takes PARDISO when that is installed. Its volume constraint is on the variables, ours on the
+filtered densities, so the compliances after some iterations are close, not equal.
 
     python benchmarks/speed/topopt.py
 """
