@@ -42,6 +42,8 @@ __all__ = [
 PRINT_SPEED, TRAVEL_SPEED = 8.3, 91.6
 """Speeds, mm/s, of the printer of Plocher et al. (2022), table 4."""
 
+_STRAIGHT = 0.005
+"""Bends of beads smaller than this, in bead widths, do not change the area that they cover."""
 _HEADLINE = 99.9
 """Percentile of the largest stress component over cells and layers that stands for the maximum."""
 
@@ -282,19 +284,18 @@ def bead_area(paths: PlanePaths, bead: float) -> tuple[float, float]:
         that they do not cover, both over the area of the section.
     """
     section = paths.layer.polygon
-    points, total = paths.points, float(paths.lengths.sum())
-    start = np.ones(len(points), dtype=bool)
-    start[paths.offsets[1:] - 1] = False
-    first = np.flatnonzero(start)
-    step = points[first + 1] - points[first]
-    size = np.linalg.norm(step, axis=1)[:, None]
-    aside = 0.5 * bead * np.stack([-step[:, 1], step[:, 0]], axis=1) / size
-    a, b = points[first], points[first + 1]
-    strips = shapely.polygons(np.stack([a + aside, a - aside, b - aside, b + aside], axis=1))
-    joint = np.ones(len(points), dtype=bool)
-    ends = np.concatenate([paths.offsets[:-1][~paths.closed], paths.offsets[1:][~paths.closed] - 1])
-    joint[ends] = False
-    discs = shapely.buffer(shapely.points(points[joint]), 0.5 * bead, quad_segs=8)
-    covered = shapely.union_all([*strips, *discs], grid_size=1e-6 * bead)
-    overlap = (total * bead - covered.area) / section.area
+    index = np.repeat(np.arange(len(paths)), np.diff(paths.offsets))
+    lines = shapely.linestrings(paths.points, indices=index)
+    points, index = shapely.get_coordinates(
+        shapely.simplify(lines, _STRAIGHT * bead), return_index=True
+    )
+    joined = index[1:] == index[:-1]
+    # Strip by strip: the outline of a long winding bead as a whole may cross itself.
+    steps = shapely.linestrings(np.stack([points[:-1], points[1:]], axis=1)[joined])
+    strips = shapely.buffer(steps, 0.5 * bead, cap_style="flat")
+    begins, ends = np.append(True, ~joined), np.append(~joined, True)
+    inner = ~(begins | ends) | paths.closed[index]
+    discs = shapely.buffer(shapely.points(points[inner]), 0.5 * bead, quad_segs=6)
+    covered = shapely.union_all(np.concatenate([strips, discs]))
+    overlap = (float(paths.lengths.sum()) * bead - covered.area) / section.area
     return overlap, section.difference(covered).area / section.area

@@ -1,0 +1,92 @@
+"""What was tried where a number of the paper may hang on what it does not state."""
+
+from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
+
+from benchmarks.papers.plocher_2022.study import machine_of
+from ccfem.cases.plates import Plate, five_holes, single_hole
+from ccfem.elasticity.plane import PlaneField
+from ccfem.evaluate.fibre_map import fibre_map
+from ccfem.evaluate.plane_paths import plane_paths
+from ccfem.evaluate.plane_study import laid_plate, print_seconds, reduced_stiffness
+from ccfem.evaluate.sinuosity import sample_sinuosity, sinuosity_indices
+from ccfem.evaluate.stiffness_alignment import agreement, strongest
+from ccfem.materials import named_material
+from ccfem.strategies import create, plan
+from ccfem.tensor import largest_in_plane
+
+__all__ = ["VARIANTS", "Tried", "try_variant", "variant_table"]
+
+_MPS: tuple[str, dict[str, Any]] = ("mps", {})
+_ENDS: tuple[str, dict[str, Any]] = ("mps", {"seeds": "ends"})
+_GRID: tuple[str, dict[str, Any]] = ("grid", {"angle": 45.0})
+_DIAGONALS: tuple[str, dict[str, Any]] = ("grid", {"angle": 45.0, "lines": "paper"})
+
+VARIANTS: tuple[tuple[str, Any, dict[str, float], tuple[str, dict[str, Any]]], ...] = (
+    *(
+        (f"bead {bead:g} mm, I, {label}", single_hole, {"bead": bead}, strategy)
+        for bead in (0.8, 1.0, 1.2)
+        for label, strategy in (("grid 45", _GRID), ("mps", _MPS))
+    ),
+    ("every diagonal of pixels a path, I, grid 45", single_hole, {}, _DIAGONALS),
+    ("radius 6.46 mm, I, grid 45", single_hole, {"radius": 6.46}, _GRID),
+    ("radius 6.46 mm, I, mps", single_hole, {"radius": 6.46}, _MPS),
+    ("seeds at load and support, I, mps", single_hole, {}, _ENDS),
+    ("seeds at load and support, II, mps", five_holes, {}, _ENDS),
+)
+"""Name, plate, its parameters, and the strategy with its parameters."""
+
+
+@dataclass(frozen=True)
+class Tried:
+    """What a variant gives: C-FRAM, one layer or two."""
+
+    agreement: float
+    energy: float
+    stress: float
+    print_seconds: float
+    over_40: float
+
+
+def strongest_direction(field: PlaneField) -> Any:
+    """Direction (m,) of the largest stress, radians, and where there is one."""
+    largest, smallest, angle = largest_in_plane(field.stress)
+    across, defined = strongest(largest, smallest)
+    return angle + np.where(across, 0.5 * np.pi, 0.0), defined
+
+
+def try_variant(plate: Plate, strategy: str, parameters: dict[str, Any]) -> Tried:
+    """Plan and solve one pattern on one plate."""
+    stiffness = reduced_stiffness(named_material("c_fram"))
+    layers, stress = plate.planned_on(2)
+    toolpaths = plan(create(strategy, parameters), layers, stress, machine_of(plate))
+    paths = [plane_paths(toolpaths, layer) for layer in layers]
+    maps = [fibre_map(p, plate.mesh.centres, plate.bead) for p in paths]
+    laid = laid_plate(plate.problem(stiffness), np.stack([m.angle for m in maps]), stiffness)
+    direction, defined = strongest_direction(plate.isotropic_field)
+    winding = sinuosity_indices(sample_sinuosity(paths[0], plate.bead))
+    return Tried(
+        100.0 * float(np.mean([agreement(m.angle - direction)[defined] for m in maps])),
+        1e6 * laid.strain_energy,
+        laid.stress,
+        float(np.mean([print_seconds(p) for p in paths])),
+        100.0 * winding["over_40_count"],
+    )
+
+
+def variant_table() -> str:
+    """Markdown table of all variants."""
+    lines = [
+        "| variant | agreement, % | energy C, 1e-6 N mm | stress p99.9 C, MPa | print, s | "
+        "> 40 mm, % |",
+        "|---|---|---|---|---|---|",
+    ]
+    for name, make, parameters, (strategy, options) in VARIANTS:
+        found = try_variant(make(**parameters), strategy, options)
+        lines.append(
+            f"| {name} | {found.agreement:.1f} | {found.energy:.1f} | {found.stress:.3f} | "
+            f"{found.print_seconds:.0f} | {found.over_40:.0f} |"
+        )
+    return "\n".join(lines) + "\n"
