@@ -24,6 +24,7 @@ from ccfem.evaluate.virtual_test.strand import Strand
 from ccfem.evaluate.virtual_test.strands import cut_strands
 from ccfem.evaluate.virtual_test.strength import first_failure
 from ccfem.evaluate.virtual_test.virtual_test import Bracket, virtual_test
+from ccfem.fibre_aware.upper_bound import upper_bound
 from ccfem.layers import Layer, slice_planar
 from ccfem.progress import Progress, silent
 from ccfem.strategies import Strategy, create, plan
@@ -165,7 +166,7 @@ def compare(
     progress(f"solving {case.name}", 0.0)
     stress, stack, seconds = solve_and_slice(case, layers, load_case, backend)
     spent: dict[str, dict[str, float]] = {name: {} for name in strategies}
-    done = _Steps(progress, 0.1, 4 * len(strategies))
+    done = _Steps(progress, 0.1, 4 * len(strategies) + 1)
     planner = _Planner(stress, stack, case, spent, done, dict(strategies))
     if fibre_per_layer is not None:
         planner.plan_each(fibre_per_layer)
@@ -179,7 +180,13 @@ def compare(
         runs.append(_evaluated(name, planner, spent[name]))
     if strand is not None:
         runs = _all_tested(runs, stress, strand, backend, spent, done)
-    return Comparison(case, stress, stack, tuple(runs), wanted, seconds)
+    bound = None
+    if any(run.tested is not None for run in runs):
+        done("bounding what any paths could reach")
+        length = max(float(run.toolpaths.lengths.sum()) for run in runs if run.tested is not None)
+        with _timed(seconds, "bound"):
+            bound = upper_bound(stress, stack, length, case.machine, strand)
+    return Comparison(case, stress, stack, tuple(runs), wanted, seconds, bound)
 
 
 @dataclass

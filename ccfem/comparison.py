@@ -11,6 +11,7 @@ from ccfem.elasticity.stress_field import StressField
 from ccfem.evaluate import Evaluation
 from ccfem.evaluate.virtual_test.strength import FirstFailure
 from ccfem.evaluate.virtual_test.virtual_test import Bracket
+from ccfem.fibre_aware.upper_bound import UpperBound
 from ccfem.layers import Layer
 from ccfem.strategies import Strategy
 from ccfem.toolpaths import Toolpaths
@@ -98,6 +99,8 @@ class Comparison:
         Length that every strategy was held to; None where each laid its own.
     seconds : mapping of stage to float
         Solve and slice; the stages of each strategy are in its run.
+    bound : UpperBound or None
+        Stiffness that no paths exceed at the largest length of any run; None without virtual tests.
     """
 
     case: Case
@@ -106,6 +109,7 @@ class Comparison:
     runs: tuple[Run, ...]
     fibre_per_layer: float | None
     seconds: Mapping[str, float]
+    bound: UpperBound | None = None
 
     def __post_init__(self) -> None:
         object.__setattr__(self, "seconds", MappingProxyType(dict(self.seconds)))

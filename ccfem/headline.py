@@ -226,7 +226,20 @@ def remarks(comparison: Comparison) -> list[str]:
                 f"{run.name}: undecided against {', '.join(unclear)}, for tension-only and bonded "
                 "fibres do not agree on an order"
             )
-    return found
+    return [*found, bound_remark(comparison)] if comparison.bound is not None else found
+
+
+def bound_remark(comparison: Comparison) -> str:
+    """Say how far the best run is from what any paths could reach; empty without a bound."""
+    tested = [run for run in ranking(comparison) if run.tested is not None]
+    if comparison.bound is None or not tested:
+        return ""
+    length = max(run.length_per_layer for run in tested)
+    return (
+        f"no paths of {length:.0f} mm a layer in {len(comparison.layers)} layers can make the part "
+        f"more than {comparison.bound.ratio:.2f} times as stiff (fibres carrying tension only): "
+        f"{tested[0].name} reaches {comparison.bound.share(_ratio(tested[0])):.0%} of that gain"
+    )
 
 
 def stiffness_ratios(one: Run, other: Run) -> tuple[float, float]:

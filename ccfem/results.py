@@ -146,6 +146,7 @@ def record(comparison: Comparison, command: str, seconds: Mapping[str, float]) -
             "solver": vars(stress.record),
             "strain_energy": stress.strain_energy,
             "fibre_per_layer": comparison.fibre_per_layer,
+            "upper_bound": None if comparison.bound is None else comparison.bound.ratio,
             "seconds": {**seconds, **comparison.seconds},
             "strategies": [_run_record(run) for run in comparison.runs],
         }
