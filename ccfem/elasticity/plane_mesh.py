@@ -4,6 +4,7 @@ from collections.abc import Mapping
 from dataclasses import dataclass, field, replace
 from functools import cached_property
 from types import MappingProxyType
+from typing import NamedTuple
 
 import numpy as np
 from numpy.typing import ArrayLike
@@ -11,7 +12,7 @@ from numpy.typing import ArrayLike
 from ccfem.arrays import BoolArray, FloatArray, IntArray, read_only
 from ccfem.errors import InputError
 
-__all__ = ["PlaneMesh", "Sheet", "raster_mesh"]
+__all__ = ["PlaneMesh", "Raster", "Sheet", "raster_image", "raster_mesh"]
 
 
 @dataclass(frozen=True)
@@ -255,3 +256,46 @@ def raster_mesh(
         for side, level in (("min", place[:, k].min()), ("max", place[:, k].max())):
             patches[f"{axis}_{side}"] = mesh.boundary_where(place[:, k] == level)
     return mesh.with_patches(patches)
+
+
+class Raster(NamedTuple):
+    """Values of the cells of a raster mesh as an image.
+
+    Attributes
+    ----------
+    image : (H, W) array
+        Row 0 is the top; zero where there is no cell.
+    inside : (H, W) bool array
+        Pixels that are cells.
+    size : float, mm
+        Side of a pixel.
+    origin : (2,) array, mm
+        Lower left corner of the image.
+    """
+
+    image: FloatArray
+    inside: BoolArray
+    size: float
+    origin: FloatArray
+
+
+def raster_image(mesh: PlaneMesh, values: FloatArray) -> Raster:
+    """Values (m,) of the cells of a raster mesh as an image: `raster_mesh` backwards.
+
+    Raises
+    ------
+    InputError
+        When the cells are not squares of one size on one grid.
+    """
+    low, high = (mesh.points[mesh.cells].min(axis=1), mesh.points[mesh.cells].max(axis=1))
+    size = float((high - low)[0, 0])
+    place = (low - mesh.bounds[0]) / size
+    pixel = np.rint(place).astype(np.int64)
+    square = np.abs(high - low - size).max() <= 1e-6 * size
+    if mesh.cells.shape[1] != 4 or not square or np.abs(place - pixel).max() > 1e-6:
+        raise InputError("an image needs a mesh of equal squares on one grid: use raster_mesh")
+    width, height = pixel.max(axis=0) + 1
+    rows, columns = height - 1 - pixel[:, 1], pixel[:, 0]
+    image, inside = np.zeros((height, width)), np.zeros((height, width), dtype=bool)
+    image[rows, columns], inside[rows, columns] = values, True
+    return Raster(image, inside, size, np.array(mesh.bounds[0]))

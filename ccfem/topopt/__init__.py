@@ -4,7 +4,7 @@ from ccfem.topopt.compliance import compliance_of
 from ccfem.topopt.criteria import optimality_criteria
 from ccfem.topopt.design import Design
 from ccfem.topopt.filters import ConeFilter
-from ccfem.topopt.outline import outline
+from ccfem.topopt.outline import outline, solid
 from ccfem.topopt.simp import FILTERS, simp, simp_factor
 from ccfem.topopt.somp import ORIENTATIONS, somp
 from ccfem.topopt.three_point_bending import BendingBeam, three_point_bending
@@ -20,6 +20,7 @@ __all__ = [
     "outline",
     "simp",
     "simp_factor",
+    "solid",
     "somp",
     "three_point_bending",
 ]

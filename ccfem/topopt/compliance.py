@@ -19,6 +19,9 @@ from ccfem.errors import InputError
 
 __all__ = ["Loaded", "PlaneCompliance", "TetCompliance", "compliance_of"]
 
+_TOLERANCE = 1e-6
+"""Relative residual of a solve; contrasts of 1e9 leave no less in double precision."""
+
 
 class Loaded(NamedTuple):
     """Answer of a part to its load cases.
@@ -56,7 +59,8 @@ class _Answer:
         for case, forces in self.system.forces.items():
             rhs = held.right_hand_side(matrix, forces)
             start = self._before.get(case)
-            solution = solver.solve(rhs, None if start is None else held.restrict(start))
+            start = None if start is None else held.restrict(start)
+            solution = solver.solve(rhs, start, _TOLERANCE)
             self._before[case] = held.expand(solution.values)
         return dict(self._before)
 

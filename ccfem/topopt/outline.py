@@ -7,10 +7,14 @@ import numpy as np
 import shapely
 
 from ccfem.arrays import BoolArray, FloatArray
+from ccfem.elasticity.plane_mesh import raster_image
+from ccfem.elasticity.plane_problem import PlaneProblem
+from ccfem.elasticity.problem import PointForce
 from ccfem.errors import InputError
 from ccfem.geometry.isocontours import isocontours
+from ccfem.topopt.design import Design
 
-__all__ = ["outline"]
+__all__ = ["outline", "solid"]
 
 _RINGS = 4
 """Rings of pixels that the density is carried on outside its domain before it falls to zero."""
@@ -218,3 +222,64 @@ def _with_area(region: Any, domain: Any, area: float) -> Any:
             break
         low, high = (middle, high) if excess > 0.0 else (low, middle)
     return found
+
+
+def _anchors(problem: PlaneProblem, density: FloatArray) -> FloatArray:
+    """Densest node of every loaded and held patch, and the points of point forces: (k, 2), mm."""
+    mesh = problem.mesh
+    dense = np.zeros(len(mesh.points))
+    np.maximum.at(dense, mesh.cells, density[:, None])
+    patches = {support.patch for support in problem.supports}
+    points = []
+    for load in (load for case in problem.loads.values() for load in case):
+        if isinstance(load, PointForce):
+            points.append(mesh.points[mesh.nearest_nodes(load.point[:2])[0]])
+        else:
+            patches.add(load.patch)
+    for name in sorted(patches):
+        nodes = np.unique(mesh.patch(name))
+        points.append(mesh.points[nodes[dense[nodes].argmax()]])
+    return np.array(points)
+
+
+def solid(
+    design: Design,
+    volume_fraction: float | None = None,
+    threshold: float | None = None,
+    domain: Any = None,
+) -> Any:
+    """Outline of a design of squares: the part that its densities stand for.
+
+    Parameters
+    ----------
+    design : Design
+        Of a plate on a raster.
+    volume_fraction, threshold, domain
+        As in `outline`; by default the outline holds the volume of the design.
+
+    Returns
+    -------
+    shapely Polygon, mm
+        The piece that joins all loads and supports.
+
+    Raises
+    ------
+    InputError
+        When no piece joins them, and for a mesh that is no raster.
+    """
+    if not isinstance(design.full, PlaneProblem):
+        raise InputError("an outline is that of a plate; this design is of tetrahedra")
+    raster = raster_image(design.full.mesh, design.density)
+    region = None
+    if domain is not None:
+        region = shapely.transform(domain, lambda points: points - raster.origin)
+    found = outline(
+        raster.image,
+        raster.size,
+        volume_fraction,
+        threshold,
+        region,
+        raster.inside,
+        _anchors(design.full, design.density) - raster.origin,
+    )
+    return shapely.transform(found, lambda points: points + raster.origin)

@@ -4,7 +4,7 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 from hypothesis.extra.numpy import arrays
 
-from ccfem.elasticity.plane_mesh import PlaneMesh, Sheet, raster_mesh
+from ccfem.elasticity.plane_mesh import PlaneMesh, Sheet, raster_image, raster_mesh
 from ccfem.errors import InputError
 
 MASKS = arrays(bool, st.tuples(st.integers(1, 6), st.integers(1, 6))).filter(lambda a: a.any())
@@ -33,6 +33,27 @@ def test_raster_cells_lie_on_their_pixels(mask, size):
         for s in (1, -1)
     )
     assert len(mesh.boundary) == perimeter
+
+
+@settings(max_examples=30, deadline=None)
+@given(mask=MASKS, size=st.floats(0.1, 4.0))
+def test_image_of_a_raster(mask, size):
+    rows, columns = np.flatnonzero(mask.any(axis=1)), np.flatnonzero(mask.any(axis=0))
+    cropped = mask[rows[0] : rows[-1] + 1, columns[0] : columns[-1] + 1]
+    mesh = raster_mesh(mask, size, (3.0, -2.0))
+    values = np.arange(1.0, 1.0 + mask.sum())
+    raster = raster_image(mesh, values)
+    np.testing.assert_array_equal(raster.inside, cropped)
+    np.testing.assert_array_equal(raster.image[raster.inside], values)
+    assert raster.size == pytest.approx(size)
+    left, low = columns[0] * size + 3.0, (len(mask) - 1 - rows[-1]) * size - 2.0
+    np.testing.assert_allclose(raster.origin, [left, low], atol=1e-9)
+
+
+def test_other_meshes_have_no_image():
+    mesh = PlaneMesh([[0, 0], [2, 0], [2, 1], [0, 1]], [[0, 1, 2, 3]])
+    with pytest.raises(InputError, match="equal squares"):
+        raster_image(mesh, np.ones(1))
 
 
 def test_top_row_of_the_image_is_the_upper_side():

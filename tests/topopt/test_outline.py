@@ -4,8 +4,10 @@ import shapely
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
+from ccfem.elasticity import PlaneProblem, PointForce, Support, raster_mesh
 from ccfem.errors import InputError
-from ccfem.topopt import outline
+from ccfem.materials import plane_stress
+from ccfem.topopt import outline, simp, solid
 
 
 def disc(shape, x, y, radius):
@@ -83,3 +85,35 @@ def test_bad_images_are_refused():
         outline(np.ones(5))
     with pytest.raises(InputError, match="outline is empty"):
         outline(np.zeros((5, 5)), threshold=0.5)
+
+
+def test_solid_of_a_design_on_part_of_a_raster():
+    mask = np.ones((20, 40), dtype=bool)
+    mask[:6, :6] = False
+    mesh = raster_mesh(mask, 0.5, (100.0, -50.0))
+    loads = {"tip": (PointForce((120.0, -45.0, 0.0), (0.0, -1.0, 0.0)),)}
+    stiffness = plane_stress(1.0, 1.0, 0.3, 1.0 / 2.6)
+    problem = PlaneProblem(mesh, stiffness, 1.0, (Support("x_min"),), loads)
+    design = simp(problem, 0.5, radius=0.8, iterations=60)
+    part = solid(design)
+    assert part.geom_type == "Polygon"
+    assert part.area == pytest.approx(0.5 * mesh.areas.sum(), rel=0.03)
+    x, y = mesh.centres.T
+    inside = shapely.contains_xy(part, x, y)
+    filled = design.filled()
+    assert (inside & filled).sum() > 0.9 * (inside | filled).sum()
+    assert part.distance(shapely.Point(120.0, -45.0)) < 0.75
+    assert part.bounds[0] == pytest.approx(100.0, abs=1e-6)
+    exact = shapely.box(100.0, -50.0, 120.0, -40.0) - shapely.box(100.0, -43.0, 103.0, -40.0)
+    assert solid(design, domain=exact).symmetric_difference(part).area < 0.01 * part.area
+
+
+def test_a_design_that_falls_apart_is_refused():
+    mesh = raster_mesh(np.ones((10, 40), dtype=bool))
+    loads = {"tip": (PointForce((40.0, 5.0, 0.0), (1.0, 0.0, 0.0)),)}
+    stiffness = plane_stress(1.0, 1.0, 0.3, 1.0 / 2.6)
+    problem = PlaneProblem(mesh, stiffness, 1.0, (Support("x_min"),), loads)
+    gap = np.abs(mesh.centres[:, 0] - 20.0) < 3.0
+    design = simp(problem, 0.5, radius=1.5, void=gap, iterations=3, least=1e-6)
+    with pytest.raises(InputError, match="falls apart"):
+        solid(design)
