@@ -4,7 +4,7 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
-from ccfem.arrays import FloatArray, read_only
+from ccfem.arrays import BoolArray, FloatArray, read_only
 from ccfem.elasticity.plane_problem import PlaneProblem
 from ccfem.elasticity.problem import Problem
 from ccfem.errors import InputError
@@ -81,9 +81,7 @@ class Design:
             return replace(self.full, stiffness=self.factor[:, None, None] * self.full.stiffness)
         return replace(self.full, density=self.factor)
 
-    def filled(
-        self, volume_fraction: float | None = None
-    ) -> "np.ndarray[tuple[int], np.dtype[np.bool_]]":
+    def filled(self, volume_fraction: float | None = None) -> BoolArray:
         """Densest cells that make up a share of the volume.
 
         Parameters

@@ -182,6 +182,8 @@ def somp(
     Design
         With `angle`, in (-pi/2, pi/2].
     """
+    if not isinstance(problem, PlaneProblem):
+        raise InputError("somp turns the material axis in a plane: give it a PlaneProblem")
     if orientation not in ORIENTATIONS:
         raise InputError(
             f"no orientation named '{orientation}'; there are: {', '.join(ORIENTATIONS)}"

@@ -161,6 +161,7 @@ def test_the_design_is_mirrored_with_the_load():
 @pytest.mark.parametrize(
     ("more", "message"),
     [
+        ({"problem": None}, "give it a PlaneProblem"),
         ({"orientation": "random"}, "there are: principal, gradient, fixed"),
         ({"relaxation": 0.0}, r"relaxation must lie in \(0, 1\]"),
         ({"angle": np.zeros(3)}, "one number or one a cell"),
@@ -168,4 +169,4 @@ def test_the_design_is_mirrored_with_the_load():
 )
 def test_bad_parameters_are_refused(more, message):
     with pytest.raises(InputError, match=message):
-        somp(cantilever(), FIBRE, 0.5, **more)
+        somp(**{"problem": cantilever(), "material": FIBRE, "volume_fraction": 0.5, **more})
