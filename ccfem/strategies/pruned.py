@@ -1,0 +1,105 @@
+"""Any strategy, planned with too much fibre and then relieved of what helps least.
+
+Beyond the papers: the part is tested virtually with the fibre in it, and the stretches that do the
+least work go, until the wanted length is left (`ccfem.fibre_aware.prune`).
+"""
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+from typing import ClassVar
+
+import numpy as np
+
+from ccfem.elasticity.stress_field import LayerStress, StressField
+from ccfem.equal_fibre import plan_to_length
+from ccfem.errors import InputError
+from ccfem.evaluate.virtual_test.strand import RHO, Strand
+from ccfem.fibre_aware.prune import prune
+from ccfem.layers.layer import Layer
+from ccfem.machine import Machine
+from ccfem.strategies.strategy import Amount, LayerStrategy, create
+from ccfem.toolpaths import Toolpaths
+
+__all__ = ["Pruned"]
+
+
+@dataclass(frozen=True)
+class Pruned:
+    """The fibre of another strategy that helps most.
+
+    The load is the one of the stress that the strategy is given; fibre is taken to carry tension
+    only.
+
+    Attributes
+    ----------
+    of : str, default "isocurve"
+        Name of the strategy that plans.
+    coverage : float, default 0.45
+        Fibre length times strand width over area of the layers, in (0, 1].
+    overfill : float, default 1.25
+        Fibre length that is planned over that kept, at least 1.
+    rounds : int, default 2
+        Virtual tests; each takes off half of the excess, the last one all of it.
+    rho : float, mm^2, default 4
+        Axial stiffness of a strand over Young's modulus of the matrix.
+    """
+
+    of: str = "isocurve"
+    coverage: float = 0.45
+    overfill: float = 1.25
+    rounds: int = 2
+    rho: float = RHO
+
+    amount: ClassVar[Amount] = Amount("coverage", most=0.9, least=0.1)
+
+    def __post_init__(self) -> None:
+        checks = {
+            "of": (self.of not in ("pruned", "stream_function"), "another strategy"),
+            "coverage": (0.0 < self.coverage <= 1.0, "a share in (0, 1]"),
+            "overfill": (1.0 <= self.overfill < np.inf, "a finite number >= 1"),
+            "rounds": (self.rounds >= 1, "at least 1"),
+            "rho": (0.0 < self.rho < np.inf, "a finite number > 0 mm^2"),
+        }
+        for name, (good, expected) in checks.items():
+            if not good:
+                raise InputError(f"pruned.{name} must be {expected}; got {getattr(self, name)!r}")
+
+    def for_part(
+        self, stress: StressField, layers: Sequence[Layer], machine: Machine
+    ) -> LayerStrategy:
+        """Plan and prune all layers of the part.
+
+        Raises
+        ------
+        InputError
+            Whatever the strategy that plans raises.
+        """
+        area = float(np.mean([layer.areas.sum() for layer in layers]))
+        wanted = self.coverage * area / machine.fibre_width
+        planned = plan_to_length(create(self.of), layers, stress, machine, self.overfill * wanted)
+        if not len(planned.toolpaths):
+            return _Planned(planned.toolpaths)
+        return _Planned(
+            prune(
+                planned.toolpaths,
+                stress,
+                wanted * len(layers),
+                machine,
+                Strand(self.rho),
+                self.rounds,
+            )
+        )
+
+    def __call__(self, layer: Layer, stress: LayerStress, machine: Machine) -> Toolpaths:
+        """Plan one layer by itself."""
+        return self.for_part(stress.part, [layer], machine)(layer, stress, machine)
+
+
+@dataclass(frozen=True)
+class _Planned:
+    """Paths of the whole part, handed out layer by layer."""
+
+    toolpaths: Toolpaths
+
+    def __call__(self, layer: Layer, stress: LayerStress, machine: Machine) -> Toolpaths:
+        return self.toolpaths.on_layer(layer.index)
