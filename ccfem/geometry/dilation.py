@@ -7,7 +7,7 @@ from typing import Any
 import numpy as np
 import shapely
 
-from ccfem.arrays import FloatArray
+from ccfem.arrays import FloatArray, IntArray
 from ccfem.geometry.shells import concentric
 
 __all__ = ["fill_rest", "grow", "lengthened", "open_lines", "parallels"]
@@ -106,9 +106,12 @@ def parallels(
     if not len(curves):
         return []
     strings = np.array([shapely.LineString(curve) for curve in curves])
+    pairs = [np.stack([curve[:-1], curve[1:]], axis=1) for curve in curves]
+    sides = shapely.STRtree(shapely.linestrings(np.concatenate(pairs)))
+    owners = np.repeat(np.arange(len(curves)), [len(pair) for pair in pairs])
     if whole:
         strings = np.array([shapely.multilinestrings(strings)])
-    shapely.prepare(strings)
+        owners = np.zeros_like(owners)
     half = 0.5 * closest * pitch
     lines: list[FloatArray] = []
     level = idle = 0
@@ -126,7 +129,9 @@ def parallels(
             shapely.LineString(line)
             for part in shapely.get_parts(covered)
             for ring in (part.exterior, *part.interiors)
-            for line in _own_pieces(shapely.get_coordinates(ring), strings, distance, _OFF * pitch)
+            for line in _own_pieces(
+                shapely.get_coordinates(ring), sides, owners, distance, _OFF * pitch
+            )
         ]
         inside = open_lines(shapely.intersection(found, region))
         idle = 0 if inside else idle + 1
@@ -135,16 +140,17 @@ def parallels(
 
 
 def _own_pieces(
-    ring: FloatArray, strings: Any, distance: float, tolerance: float
+    ring: FloatArray, sides: Any, owners: IntArray, distance: float, tolerance: float
 ) -> list[FloatArray]:
     """Pieces of a ring that lie at a distance from their nearest curve, split where that changes.
+
+    `sides` holds the straight pieces of all curves, `owners` the curve of each.
 
     Straight ends of buffers and rounded cusps drop out.
     """
     middle = shapely.points(0.5 * (ring[1:] + ring[:-1]))
-    gaps = shapely.distance(strings[:, None], middle[None])
-    owner = np.argmin(gaps, axis=0)
-    owner[np.abs(gaps.min(axis=0) - distance) > tolerance] = -1
+    (_, side), gaps = sides.query_nearest(middle, return_distance=True, all_matches=False)
+    owner = np.where(np.abs(gaps - distance) > tolerance, -1, owners[side])
     change = np.flatnonzero(np.diff(owner)) + 1
     if not len(change):
         return [ring] if owner[0] >= 0 else []
@@ -174,14 +180,16 @@ def fill_rest(
     list of (k, 2) arrays, mm
         Strips narrower than 0.4 pitches and specks stay open.
     """
-    strips = shapely.buffer(
-        [_string(line) for line in lines],
-        0.5 * pitch,
-        cap_style="flat",
-        join_style="mitre",
-        mitre_limit=1.5,
-    )
-    rest = shapely.difference(region, shapely.union_all(strips))
+    rest = region
+    if len(lines):
+        strips = shapely.buffer(
+            shapely.multilinestrings([shapely.LineString(line) for line in lines]),
+            0.5 * pitch,
+            cap_style="flat",
+            join_style="mitre",
+            mitre_limit=1.5,
+        )
+        rest = shapely.difference(region, strips)
     rest = shapely.buffer(rest, -_SLIVER * pitch, join_style="mitre")
     rest = shapely.buffer(rest, _SLIVER * pitch, join_style="mitre")
     parts = shapely.get_parts(rest)
@@ -232,11 +240,6 @@ def lengthened(line: FloatArray, region: Any, near: float, length: float) -> Flo
 
 def _smooth(line: FloatArray, tolerance: float) -> FloatArray:
     return shapely.get_coordinates(shapely.simplify(shapely.LineString(line), tolerance))
-
-
-def _string(line: FloatArray) -> Any:
-    closed = len(line) > 3 and bool((line[0] == line[-1]).all())
-    return shapely.LinearRing(line) if closed else shapely.LineString(line)
 
 
 def _length(line: FloatArray) -> float:

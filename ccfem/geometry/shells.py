@@ -7,13 +7,15 @@ import shapely
 
 from ccfem.arrays import BoolArray, FloatArray
 from ccfem.geometry.medial_axis import MedialAxis, medial_axis
-from ccfem.geometry.offsets import inset, offset_rings
+from ccfem.geometry.offsets import inset, rings
 
 __all__ = ["concentric", "middle_lines", "shells"]
 
 _LEAST_GAP = 0.4
 """Narrowest strip, in pitches, that a strand is laid along, the rest of it on its neighbours: the
 overlap and the gaps of the plates of paper 004 are then about equal."""
+_SAME = 1e-4
+"""Neighbouring points of a ring nearer than this, in widths, are one."""
 _STRAIGHT = 0.03
 """Deviation, in pitches, up to which points of a middle line are left out."""
 
@@ -43,8 +45,11 @@ def shells(
         The rest of the section, half a pitch inside the innermost rings.
     """
     if count == 0:
-        return [], inset(section, 0.5 * (width - pitch)) if pitch > width else section
+        return [], section
     interior = inset(section, 0.5 * width + (count - 0.5) * pitch)
+    parts = shapely.get_parts(interior)  # without those of no width but for rounding
+    wide = ~shapely.is_empty(shapely.buffer(parts, -1e-3 * pitch, join_style="mitre"))
+    interior = interior if wide.all() else shapely.multipolygons(parts[wide])
     return concentric(section, pitch, closest, 0.5 * width, count), interior
 
 
@@ -85,12 +90,34 @@ def concentric(
     first = 0.5 * pitch if first is None else first
     if shapely.is_empty(section):
         return []
-    levels = offset_rings(section, first, pitch, closest * pitch, count)
-    rings = [ring for level in levels for ring in level]
+    lines: list[FloatArray] = []
+    level = 0
+    while count is None or level < count:
+        found = rings(_opened(section, first + level * pitch, closest * pitch))
+        if not found:
+            break
+        lines += found
+        level += 1
     if not middle or (count is not None and not _narrow(section, first, pitch, closest, count)):
-        return rings
+        return lines
     axis = medial_axis(section, 0.5 * min(pitch, 2.0 * first))
-    return rings + middle_lines(axis, rings, pitch, closest, first, count, walls)
+    return lines + middle_lines(axis, lines, pitch, closest, first, count, walls)
+
+
+def _opened(section: Any, distance: float, width: float) -> Any:
+    """Part of a section inside a distance, without channels narrower than a width.
+
+    As `inset`, but corners stay sharp: strands fill them at the price of lying closer there.
+    """
+    radius = 0.4995 * width
+    core = shapely.buffer(section, -(distance + radius), join_style="mitre")
+    if core.is_empty:
+        return core
+    core = shapely.buffer(core, radius, join_style="mitre")
+    core = shapely.intersection(core, shapely.buffer(section, -distance, join_style="mitre"))
+    parts = shapely.get_parts(core)  # without lines that a common border leaves
+    parts = parts[(shapely.get_dimensions(parts) == 2) & (shapely.area(parts) > 1e-6 * width**2)]
+    return shapely.remove_repeated_points(shapely.multipolygons(parts), _SAME * width)
 
 
 def _narrow(section: Any, first: float, pitch: float, closest: float, count: int) -> bool:
@@ -104,7 +131,7 @@ def _narrow(section: Any, first: float, pitch: float, closest: float, count: int
 
 def middle_lines(
     axis: MedialAxis,
-    rings: list[FloatArray],
+    laid: list[FloatArray],
     pitch: float,
     closest: float,
     first: float,
@@ -120,8 +147,8 @@ def middle_lines(
     ----------
     axis : MedialAxis
         Of the section.
-    rings : list of (k, 2) arrays, mm
-        Those of `offset_rings`.
+    laid : list of (k, 2) arrays, mm
+        The rings.
     pitch, closest, first, count, walls
         As in `concentric`. With a `count`, only where there is room for fewer rings.
 
@@ -143,7 +170,7 @@ def middle_lines(
         pieces += _runs(points, wanted)
     if not pieces:
         return []
-    pairs = [np.stack([ring[:-1], ring[1:]], axis=1) for ring in rings]
+    pairs = [np.stack([ring[:-1], ring[1:]], axis=1) for ring in laid]
     sides = np.concatenate([np.zeros((0, 2, 2)), *pairs])
     tree = shapely.STRtree(shapely.linestrings(sides))
     lines = []

@@ -135,7 +135,7 @@ class Mps:
 
 
 def _middles(interior: Any, pitch: float) -> FloatArray:
-    """Middle of each segment of the medial axis, the one of the largest clearance first.
+    """Middle of each segment or point of the medial axis, that of the largest clearance first.
 
     A closed one has four: its place of the largest clearance, and those a quarter of the way round
     from each to the next.
@@ -151,6 +151,9 @@ def _middles(interior: Any, pitch: float) -> FloatArray:
             places = (widest + np.array([0.0, 0.25, 0.5, 0.75]) * along[-1]) % along[-1]
         points = np.stack([np.interp(places, along, x) for x in segment.points.T], axis=1)
         found += zip(np.interp(places, along, segment.radius), points, strict=True)
+    ends = {end for segment in axis.segments for end in segment.ends}
+    lone = [k for k in range(len(axis.nodes)) if k not in ends]  # discs and squares
+    found += zip(axis.radius[lone], axis.nodes[lone], strict=True)
     # Equal ones of a symmetric part keep the order of the axis, which puts the longest first.
     found.sort(key=lambda item: -round(item[0] / (0.01 * pitch)))
     return np.array([point for _, point in found], dtype=np.float64).reshape(-1, 2)
