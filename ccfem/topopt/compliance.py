@@ -8,7 +8,7 @@ from typing import NamedTuple
 import numpy as np
 import scipy.sparse as sp
 
-from ccfem.arrays import FloatArray
+from ccfem.arrays import FloatArray, IntArray
 from ccfem.elasticity.assembly import assemble
 from ccfem.elasticity.plane import PlaneSystem, prepare_plane
 from ccfem.elasticity.plane_problem import PlaneProblem
@@ -17,7 +17,7 @@ from ccfem.elasticity.recovery import cell_strain
 from ccfem.elasticity.solve import System, prepare
 from ccfem.errors import InputError
 
-__all__ = ["Loaded", "PlaneCompliance", "TetCompliance", "compliance_of"]
+__all__ = ["GroupedCompliance", "Loaded", "PlaneCompliance", "TetCompliance", "compliance_of"]
 
 _TOLERANCE = 1e-6
 """Relative residual of a solve; contrasts of 1e9 leave no less in double precision."""
@@ -162,6 +162,29 @@ class TetCompliance:
                 strain,
             )
         return self._answer.loaded(energies)
+
+
+class GroupedCompliance:
+    """Compliance of a part with one density for each group of its cells, such as a column.
+
+    Parameters
+    ----------
+    model : PlaneCompliance or TetCompliance
+    groups : (m,) int array
+        Group of each cell, 0 to g - 1, none empty.
+    """
+
+    def __init__(self, model: PlaneCompliance | TetCompliance, groups: IntArray) -> None:
+        self.model, self.groups = model, groups
+        self.volumes: FloatArray = np.bincount(groups, model.volumes).astype(np.float64)
+        sums = [np.bincount(groups, model.volumes * x) for x in model.centres.T]
+        self.centres = np.stack(sums, axis=1) / self.volumes[:, None]
+
+    def __call__(self, factor: FloatArray) -> Loaded:
+        """Answer with a factor (g,) on the stiffness of each group; its energy is per group."""
+        answer = self.model(factor[self.groups])
+        energy = np.bincount(self.groups, answer.energy, len(self.volumes))
+        return answer._replace(energy=energy.astype(np.float64))
 
 
 def compliance_of(

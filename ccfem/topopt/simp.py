@@ -1,17 +1,22 @@
 """SIMP: densities of least compliance for a given volume, by optimality criteria."""
 
 from collections.abc import Mapping
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import Any
 
 import numpy as np
 
-from ccfem.arrays import BoolArray, FloatArray
+from ccfem.arrays import BoolArray, FloatArray, IntArray
 from ccfem.elasticity.plane_problem import PlaneProblem
 from ccfem.elasticity.problem import Problem
 from ccfem.errors import InputError
 from ccfem.progress import Progress, silent
-from ccfem.topopt.compliance import PlaneCompliance, TetCompliance, compliance_of
+from ccfem.topopt.compliance import (
+    GroupedCompliance,
+    PlaneCompliance,
+    TetCompliance,
+    compliance_of,
+)
 from ccfem.topopt.criteria import optimality_criteria
 from ccfem.topopt.design import Design
 from ccfem.topopt.filters import ConeFilter
@@ -98,6 +103,7 @@ def simp(
     solid: BoolArray | None = None,
     void: BoolArray | None = None,
     start: FloatArray | None = None,
+    groups: IntArray | None = None,
     least: float = 1e-9,
     move: float = 0.2,
     tolerance: float = 0.01,
@@ -128,6 +134,8 @@ def simp(
         Cells that stay full or empty.
     start : (m,) array in [0, 1], optional
         Variables to start from (`Design.variables` to go on with a run); default uniform.
+    groups : (m,) int array, optional
+        Cells with the same number share one density: the columns of a plate of tetrahedra.
     least : float, default 1e-9
         Share of the stiffness that an empty cell keeps.
     move : float, default 0.2
@@ -154,10 +162,34 @@ def simp(
     SolveError
         When a solve misses its tolerance.
     """
-    model = compliance_of(problem, weights, backend)
-    space = parametrise(model, volume_fraction, penalty, radius, filter, solid, void, least)
+    model: Any = compliance_of(problem, weights, backend)
     limits = Limits(volume_fraction, move, tolerance, objective_tolerance, iterations)
-    return iterate(problem, model, space, limits, start, progress)
+    settings = (volume_fraction, penalty, radius, filter)
+    if groups is None:
+        space = parametrise(model, *settings, solid, void, least)
+        return iterate(problem, model, space, limits, start, progress)
+    member, first = _grouped(groups, len(model.volumes))
+    solid = None if solid is None else np.asarray(solid)[first]
+    void = None if void is None else np.asarray(void)[first]
+    model = GroupedCompliance(model, member)
+    space = parametrise(model, *settings, solid, void, least)
+    start = None if start is None else np.asarray(start)[first]
+    design = iterate(problem, model, space, limits, start, progress)
+    return replace(
+        design,
+        density=design.density[member],
+        variables=design.variables[member],
+        factor=design.factor[member],
+    )
+
+
+def _grouped(groups: IntArray, m: int) -> tuple[IntArray, IntArray]:
+    """Give groups numbers from 0 without gaps: that of each cell, and a cell of each group."""
+    given = np.asarray(groups)
+    if given.shape != (m,) or not np.issubdtype(given.dtype, np.integer):
+        raise InputError(f"groups must be {m} integers, one a cell; got shape {given.shape}")
+    _, first, member = np.unique(given, return_index=True, return_inverse=True)
+    return member.reshape(-1), first
 
 
 @dataclass(frozen=True)
@@ -179,7 +211,7 @@ class Limits:
 
 
 def parametrise(
-    model: PlaneCompliance | TetCompliance,
+    model: PlaneCompliance | TetCompliance | GroupedCompliance,
     volume_fraction: float,
     penalty: float,
     radius: float,

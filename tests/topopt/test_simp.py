@@ -183,6 +183,53 @@ def test_tetrahedra_get_stiffer_too():
     assert total == pytest.approx(design.compliance[-1], rel=1e-6)
 
 
+def plate_of_tets(nx, ny):
+    """Beam of `mbb` in one layer of tetrahedra in plane stress, and the pixel of each cell."""
+    mesh = box_mesh((float(nx), float(ny), 1.0), (nx, ny, 1))
+    centre = mesh.points[mesh.cells].mean(axis=1)
+    column = np.floor(centre[:, 0]) + nx * (ny - 1 - np.floor(centre[:, 1]))
+    # The roller is the edge at the corner, given as a facet that is flat.
+    edge = np.flatnonzero((mesh.points[:, 0] == nx) & (mesh.points[:, 1] == 0.0))
+    mesh = mesh.with_patches({"roller": np.array([[edge[0], edge[1], edge[0]]])})
+    stiffness = np.diag([0.0, 0.0, 1.0, 1.0, 1.0, 0.0])
+    for i, a in enumerate((0, 1, 5)):
+        for j, b in enumerate((0, 1, 5)):
+            stiffness[a, b] = UNIT[i, j]
+    supports = (
+        Support("x_min", "x"),
+        Support("roller", "y"),
+        Support("z_min", "z"),
+        Support("z_max", "z"),
+    )
+    loads = tuple(PointForce((0.0, ny, z), (0.0, -0.5, 0.0)) for z in (0.0, 1.0))
+    cells = np.broadcast_to(stiffness, (len(mesh.cells), 6, 6))
+    part = Problem(mesh, isotropic(1.0, 0.3), supports, {"load": loads}, stiffness=cells)
+    return part, column.astype(int)
+
+
+def test_a_plate_of_tetrahedra_by_columns_is_the_plate_of_quadrilaterals():
+    part, column = plate_of_tets(30, 10)
+    solid = simp(part, 0.5, radius=1.5, groups=column, backend="superlu", iterations=60)
+    plane = simp(mbb(30, 10), 0.5, radius=1.5, iterations=60)
+    assert np.ptp([solid.density[column == k] for k in range(300)], axis=1).max() == 0.0
+    density = np.array([solid.density[column == k][0] for k in range(300)])
+    # Linear tetrahedra are stiffer than quadrilaterals, here with ten of them through the depth.
+    assert 0.95 < solid.compliance[-1] / plane.compliance[-1] < 1.0
+    overlap = np.minimum(density, plane.density).sum() / np.maximum(density, plane.density).sum()
+    assert overlap > 0.9
+    assert solid.volume_fraction == pytest.approx(0.5, abs=1e-6)
+
+
+def test_groups_of_one_cell_change_nothing():
+    problem = mbb(20, 10)
+    alone = simp(problem, 0.5, radius=1.5, iterations=10)
+    order = np.random.default_rng(0).permutation(200)
+    grouped = simp(problem, 0.5, radius=1.5, iterations=10, groups=7 * order)
+    np.testing.assert_allclose(grouped.density, alone.density, atol=1e-9)
+    pairs = simp(problem, 0.5, radius=1.5, iterations=10, groups=np.arange(200) // 2)
+    np.testing.assert_array_equal(pairs.density[::2], pairs.density[1::2])
+
+
 def test_filled_cells_have_the_volume():
     design = simp(mbb(30, 10), 0.5, radius=1.5, iterations=20)
     filled = design.filled(0.4)
@@ -204,6 +251,7 @@ def test_filled_cells_have_the_volume():
         ({"void": np.ones(5, dtype=bool)}, r"shape \(60,\)"),
         ({"start": np.full(60, 2.0)}, r"densities in \[0, 1\]"),
         ({"iterations": 0}, "at least one iteration"),
+        ({"groups": np.zeros(3, dtype=int)}, "groups must be 60 integers"),
         ({"move": 0.0}, "0 < move"),
         (
             {"problem": replace(mbb(10, 6), supports=(Support("x_min", "xy", (1.0, 0.0, 0.0)),))},
