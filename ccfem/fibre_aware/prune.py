@@ -152,27 +152,25 @@ def _best_stretches(gain, least, cost, keep):  # type: ignore[no-untyped-def]  #
     for i in range(n):
         total[i + 1] = total[i] + gain[i]
     free = np.zeros(n + 1)
-    ends_here = np.zeros(n + 1, np.bool_)
     held = np.full(n + 1, -np.inf)
-    start = np.zeros(n + 1, np.int64)
+    start = np.zeros(n + 1, np.int64)  # of the stretch that ends with piece i
+    alone = np.zeros(n + 1, np.bool_)  # whether nothing is kept before that stretch
     for i in range(least, n + 1):
         held[i] = held[i - 1] + gain[i - 1]
-        start[i] = start[i - 1]
-        before = free[i - least]
-        opened = total[i] - total[i - least] + (before - cost if before > 0.0 else 0.0)
+        start[i], alone[i] = start[i - 1], alone[i - 1]
+        before = max(free[i - least] - cost, 0.0)
+        opened = total[i] - total[i - least] + before
         if opened >= held[i]:
-            held[i], start[i] = opened, i - least
-        free[i] = free[i - 1]
-        if held[i] > free[i]:
-            free[i], ends_here[i] = held[i], True
+            held[i], start[i], alone[i] = opened, i - least, before == 0.0
+        free[i] = max(free[i - 1], held[i])
     keep[:] = False
     i = n
-    while i > 0:
-        if ends_here[i]:
-            keep[start[i] : i] = True
-            i = start[i]
-        else:
+    while i > 0 and free[i] > 0.0:
+        if free[i] == free[i - 1]:
             i -= 1
+            continue
+        keep[start[i] : i] = True
+        i = 0 if alone[i] else start[i]
     return free[n]
 
 

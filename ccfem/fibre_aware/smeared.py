@@ -115,6 +115,11 @@ class SmearedPart:
         return self.specimen.modulus
 
     @cached_property
+    def centroids(self) -> FloatArray:
+        """Centroids of the cells, (m, 3), mm."""
+        return read_only(self.mesh.points[self.mesh.corners].mean(axis=1))
+
+    @cached_property
     def unreinforced(self) -> SmearedSolution:
         """Solution without fibre."""
         field = self.specimen.unreinforced

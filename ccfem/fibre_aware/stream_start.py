@@ -5,7 +5,7 @@ from collections.abc import Sequence
 import numpy as np
 import scipy.sparse as sp
 
-from ccfem.arrays import FloatArray, IntArray
+from ccfem.arrays import FloatArray
 from ccfem.elasticity.stress_field import StressField
 from ccfem.fibre_aware.smeared import SmearedPart
 from ccfem.fibre_aware.stream_design import StreamProblem
@@ -14,9 +14,8 @@ from ccfem.fields.layer_tension import SampledTension, layer_tension
 from ccfem.fields.orientation import orient
 from ccfem.fields.surface import Surface, positive_definite
 from ccfem.layers.layer import Layer
-from ccfem.tensor import in_plane
 
-__all__ = ["alike_layers", "groups_by_height", "plane_axes", "start_field"]
+__all__ = ["plane_axes", "start_field"]
 
 _SPACING_WEIGHT = 0.1
 """Weight of the wanted density against the direction, as in `fields.scalar.fit_weighted`."""
@@ -45,40 +44,13 @@ def plane_axes(part: SmearedPart, energy: FloatArray) -> tuple[FloatArray, Float
         Strain energy of each cell, in any unit.
     """
     mesh = part.mesh
-    place = mesh.points[mesh.corners].mean(axis=1) @ part.frame[:2].T
+    place = part.centroids @ part.frame[:2].T
     weight = mesh.volumes / mesh.volumes.sum() + energy / energy.sum()
     centre = weight @ place / weight.sum()
     away = place - centre
     _, vectors = np.linalg.eigh((away * weight[:, None]).T @ away)
     first = vectors[:, 1] * (1.0 if vectors[np.abs(vectors[:, 1]).argmax(), 1] > 0.0 else -1.0)
     return centre, np.stack([first, [-first[1], first[0]]])
-
-
-def alike_layers(part: SmearedPart, stress: FloatArray, place: FloatArray, size: float) -> float:
-    """How much of the stress in the plane is the same at all heights, in [0, 1].
-
-    Parameters
-    ----------
-    part : SmearedPart
-    stress : (m, 3, 3) array, MPa
-    place : (m, 2) array, mm
-        Of the cells in the plane.
-    size : float, mm
-        Side of the squares above which the stress is averaged over the height.
-
-    Returns
-    -------
-    float
-        1 for a plate loaded in its plane, about 0 for a plate that is bent.
-    """
-    volume = part.mesh.volumes
-    plane = in_plane(stress, part.frame) * np.array([1.0, 1.0, np.sqrt(2.0)])
-    square = np.floor((place - place.min(axis=0)) / size).astype(np.int64)
-    _, column = np.unique(square, axis=0, return_inverse=True)
-    total = np.bincount(column, volume)
-    mean = np.stack([np.bincount(column, volume * s) / total for s in plane.T], axis=1)
-    whole = float(volume @ (plane**2).sum(axis=1))
-    return float(total @ (mean**2).sum(axis=1)) / whole if whole > 0.0 else 1.0
 
 
 def start_field(
@@ -155,31 +127,3 @@ def _to_budget(problem: StreamProblem, field: FloatArray) -> FloatArray:
         length = problem.room @ np.minimum(middle * size, problem.densest)
         low, high = (middle, high) if length < min(problem.budget, most) else (low, middle)
     return low * field
-
-
-def groups_by_height(
-    part: SmearedPart, layers: Sequence[Layer], groups: int
-) -> tuple[IntArray, IntArray]:
-    """Nearest layer of each cell, and group of each layer.
-
-    Parameters
-    ----------
-    part : SmearedPart
-    layers : sequence of Layer
-    groups : int
-        At most the number of layers.
-
-    Returns
-    -------
-    layer : (m,) int array
-        Position in `layers`.
-    group : (n,) int array
-        Of each layer, ascending from the bottom.
-    """
-    heights = np.array([layer.height for layer in layers])
-    order = np.argsort(heights, kind="stable")
-    bounds = 0.5 * (heights[order][1:] + heights[order][:-1])
-    level = part.mesh.points[part.mesh.corners].mean(axis=1) @ part.frame[2]
-    group = np.empty(len(layers), dtype=np.int64)
-    group[order] = np.arange(len(layers)) * groups // len(layers)
-    return order[np.searchsorted(bounds, level)], group

@@ -32,7 +32,8 @@ __all__ = ["UpperBound", "certificate", "upper_bound"]
 
 _ANGLES = 12
 _LEAST_PROGRESS = 2e-4
-"""Share by which an iteration has to lower the bound, or it is the last one."""
+_PATIENCE = 3
+"""It ends when so many iterations have not lowered the bound by this share."""
 
 _BISECTIONS = 60
 
@@ -53,7 +54,7 @@ class UpperBound:
     angles : (k,) array, radians
         Of the directions to the first axis of the layers' frame.
     bounds : tuple of float
-        Bound after every iteration.
+        Bound of the part without fibre, and of every iteration.
     """
 
     ratio: float
@@ -129,7 +130,8 @@ def upper_bound(
     share = length / float(volume @ most)
     density = np.repeat((share * most / _ANGLES)[:, None], _ANGLES, axis=1)
     solution: SmearedSolution | None = None
-    best, reached, bounds = density, 0.0, []
+    best, reached = density, 0.0
+    bounds = [certificate(part, part.unreinforced, axial, most, length, mode)]
     for _ in range(iterations):
 
         def fibre(strain: FloatArray, density: FloatArray = density) -> FloatArray:
@@ -143,7 +145,9 @@ def upper_bound(
         ratio = part.ratio(solution.work)
         if ratio > reached:
             best, reached = density, ratio
-        if len(bounds) > 1 and bounds[-1] > (1.0 - _LEAST_PROGRESS) * bounds[-2]:
+        if min(bounds[-_PATIENCE:]) > (1.0 - _LEAST_PROGRESS) * min(
+            bounds[:-_PATIENCE], default=np.inf
+        ):
             break
         strain = solution.strain @ along.T
         stretch = np.maximum(strain, 0.0) if mode == TENSION else np.abs(strain)

@@ -17,16 +17,17 @@ from ccfem.errors import InputError
 from ccfem.evaluate.virtual_test.bars import strain_operator
 from ccfem.evaluate.virtual_test.strand import RHO
 from ccfem.evaluate.virtual_test.strands import cut_strands
+from ccfem.fibre_aware.heights import (
+    alike_share,
+    fibre_capacity,
+    group_layers,
+    nearest_layer,
+)
 from ccfem.fibre_aware.prune import Profile, least_price, profiles, shorten
 from ccfem.fibre_aware.smeared import SmearedPart, on_linear_cells
 from ccfem.fibre_aware.spline_grid import SplineGrid
 from ccfem.fibre_aware.stream_design import StreamDesign, StreamProblem, design
-from ccfem.fibre_aware.stream_start import (
-    alike_layers,
-    groups_by_height,
-    plane_axes,
-    start_field,
-)
+from ccfem.fibre_aware.stream_start import plane_axes, start_field
 from ccfem.fields.layer_tension import layer_tension
 from ccfem.geometry.clearance import trim_to_clearance
 from ccfem.geometry.isocontours import isocontours
@@ -149,23 +150,22 @@ class StreamFunction:
         linear = on_linear_cells(stress)
         part = SmearedPart.of(linear, layers[0].frame)
         mesh = part.mesh
-        centres = mesh.points[mesh.corners].mean(axis=1) @ part.frame[:2].T
+        centres = part.centroids @ part.frame[:2].T
         size = max(self.grid * machine.fibre_width, float(np.cbrt(6.0 * mesh.volumes.mean())))
         groups = self.groups
         if not groups:
-            alike = alike_layers(part, linear.stress, centres, size)
+            alike = alike_share(part, linear.stress, size)
             groups = 1 if alike > _ALIKE else _MOST_GROUPS
-        nearest, group = groups_by_height(part, layers, min(groups, len(layers)))
+        group = group_layers(layers, groups)
         corners = mesh.points[np.unique(mesh.corners)] @ part.frame[:2].T
         points = [corners, centres, *(_refined(layer)[0] for layer in layers)]
         energy = mesh.volumes * np.einsum("cij,cij->c", linear.stress, linear.stress)
         grid = SplineGrid.over(np.concatenate(points), *plane_axes(part, energy), size)
-        thickness = np.array([layer.thickness for layer in layers])[nearest]
-        capacity = 1.0 / (machine.fibre_width * thickness)
+        capacity = fibre_capacity(part, layers, machine)
         problem = StreamProblem(
             part=part,
             grid=grid,
-            group=group[nearest],
+            group=group[nearest_layer(part, layers)],
             centres=centres,
             capacity=capacity,
             width=machine.fibre_width,

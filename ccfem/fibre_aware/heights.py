@@ -1,0 +1,68 @@
+"""The height of a part: which cells belong to which layer, and how much the layers differ."""
+
+from collections.abc import Sequence
+
+import numpy as np
+
+from ccfem.arrays import FloatArray, IntArray
+from ccfem.fibre_aware.smeared import SmearedPart
+from ccfem.layers.layer import Layer
+from ccfem.machine import Machine
+from ccfem.tensor import in_plane
+
+__all__ = ["alike_share", "fibre_capacity", "group_layers", "nearest_layer"]
+
+
+def nearest_layer(part: SmearedPart, layers: Sequence[Layer]) -> IntArray:
+    """Position in `layers` of the one nearest in height to each cell, (m,)."""
+    heights = np.array([layer.height for layer in layers])
+    order = np.argsort(heights, kind="stable")
+    bounds = 0.5 * (heights[order][1:] + heights[order][:-1])
+    level = part.centroids @ part.frame[2]
+    return np.asarray(order[np.searchsorted(bounds, level)])
+
+
+def fibre_capacity(part: SmearedPart, layers: Sequence[Layer], machine: Machine) -> FloatArray:
+    """Density of fibre (m,), mm/mm^3, at one strand a width in the layer nearest to each cell."""
+    thickness = np.array([layer.thickness for layer in layers])
+    return 1.0 / (machine.fibre_width * thickness[nearest_layer(part, layers)])
+
+
+def group_layers(layers: Sequence[Layer], groups: int) -> IntArray:
+    """Divide layers into groups of about the same number, from the bottom to the top.
+
+    Returns
+    -------
+    (n,) int array
+        Group of each layer; every group has a layer.
+    """
+    order = np.argsort([layer.height for layer in layers], kind="stable")
+    group = np.empty(len(layers), dtype=np.int64)
+    group[order] = np.arange(len(layers)) * min(groups, len(layers)) // len(layers)
+    return group
+
+
+def alike_share(part: SmearedPart, stress: FloatArray, size: float) -> float:
+    """How much of the stress in the plane is the same at all heights, in [0, 1].
+
+    Parameters
+    ----------
+    part : SmearedPart
+    stress : (m, 3, 3) array, MPa
+    size : float, mm
+        Side of the squares above which the stress is averaged over the height.
+
+    Returns
+    -------
+    float
+        1 for a plate loaded in its plane, about 0 for a plate that is bent.
+    """
+    volume = part.mesh.volumes
+    place = part.centroids @ part.frame[:2].T
+    plane = in_plane(stress, part.frame) * np.array([1.0, 1.0, np.sqrt(2.0)])
+    square = np.floor((place - place.min(axis=0)) / size).astype(np.int64)
+    _, column = np.unique(square, axis=0, return_inverse=True)
+    total = np.bincount(column, volume)
+    mean = np.stack([np.bincount(column, volume * s) / total for s in plane.T], axis=1)
+    whole = float(volume @ (plane**2).sum(axis=1))
+    return float(total @ (mean**2).sum(axis=1)) / whole if whole > 0.0 else 1.0
