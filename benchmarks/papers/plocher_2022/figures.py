@@ -10,12 +10,15 @@ from matplotlib.collections import LineCollection
 from matplotlib.figure import Figure
 
 from benchmarks.papers.plocher_2022.study import MATERIALS, CaseStudy, PatternStudy
+from benchmarks.papers.plocher_2022.variants import pixel_chains
 from ccfem.arrays import FloatArray
 from ccfem.cases.plates import Plate
 from ccfem.evaluate.plane_paths import PlanePaths
 from ccfem.evaluate.sensitivity import OffAxis
 from ccfem.evaluate.sinuosity import LONG
 from ccfem.evaluate.stiffness_alignment import agreement
+from ccfem.geometry.medial_axis import medial_axis
+from ccfem.geometry.shells import shells
 from ccfem.materials import named_material
 from ccfem.plot.canvas import save
 from ccfem.plot.colours import INK, OUTLINE, SECTION, scale
@@ -51,6 +54,8 @@ def draw_all(study: Mapping[str, CaseStudy], folder: Path) -> list[str]:
     made: dict[str, Figure] = {}
     if tension:
         made |= {
+            "figure_02_medial_axis": _medial_axis(list(tension.values())[-1]),
+            "figure_03_simplification": _simplification(list(tension.values())[-1]),
             "figure_04_long_and_short": _long_and_short(study),
             "figure_06_patterns": _patterns(tension),
             "figure_06_bars": _bars(tension, ("C",)),
@@ -129,6 +134,45 @@ def _patterns(study: Mapping[str, CaseStudy], trajectories: bool = False) -> Fig
                 f"{name}: agreement {found.values['agreement']:.1f} %, "
                 f"energy {found.values['ratio_C']:.2f} x benchmark (C-FRAM)",
             )
+    return figure
+
+
+def _medial_axis(case: CaseStudy) -> Figure:
+    """Shells and what they leave, its medial axis, and the paths round it."""
+    figure, axes = _grid_of(3, 1, [case.plate])
+    width = case.plate.bead
+    rings, interior = shells(case.plate.polygon, width, width, 3, 0.6)
+    panels = (
+        ("three shells", rings),
+        (
+            "medial axis of the rest",
+            [s.points for s in medial_axis(interior, 0.5 * width).segments],
+        ),
+        ("paths of mat", _lines(case.patterns["mat"].paths[0])),
+    )
+    for one, (heading, lines) in zip(axes[:, 0], panels, strict=True):
+        _section(one, case.plate)
+        one.add_collection(LineCollection(list(lines), colors=COLOURS["mat"], linewidths=0.6))
+        _title(one, f"case {case.plate.name}: {heading}")
+    return figure
+
+
+def _simplification(case: CaseStudy) -> Figure:
+    """One corner of the concentric paths: chains of pixels, polylines, and where they start."""
+    figure, axes = _plain(1, 5.0, 4.2)
+    paths, bead = case.patterns["concentric"].paths[0], case.plate.bead
+    one = axes[0]
+    chains = pixel_chains(paths, bead)
+    one.add_collection(LineCollection(chains, colors=OUTLINE, linewidths=1.0, alpha=0.7))
+    one.add_collection(LineCollection(_lines(paths), colors=COLOURS["concentric"], linewidths=1.2))
+    starts = paths.points[paths.offsets[:-1]]
+    one.plot(*starts.T, "o", color=INK, ms=3.5)
+    one.set_xlim(0.0, 40.0 * bead)
+    one.set_ylim(0.0, 0.5 * bead * case.plate.mask.shape[0] + 4.0 * bead)
+    one.set_aspect("equal")
+    one.set_title(
+        "concentric: pixels (grey), polylines, starts (dots)", size=8, loc="left", color=INK
+    )
     return figure
 
 
