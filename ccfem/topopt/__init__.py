@@ -5,7 +5,8 @@ from ccfem.topopt.criteria import optimality_criteria
 from ccfem.topopt.design import Design
 from ccfem.topopt.filters import ConeFilter
 from ccfem.topopt.outline import outline, solid
-from ccfem.topopt.simp import FILTERS, simp, simp_factor
+from ccfem.topopt.parametrisation import FILTERS, simp_factor
+from ccfem.topopt.simp import simp
 from ccfem.topopt.somp import ORIENTATIONS, somp
 from ccfem.topopt.three_point_bending import BendingBeam, three_point_bending
 

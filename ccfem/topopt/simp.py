@@ -1,7 +1,7 @@
 """SIMP: densities of least compliance for a given volume, by optimality criteria."""
 
 from collections.abc import Mapping
-from dataclasses import dataclass, replace
+from dataclasses import replace
 from typing import Any
 
 import numpy as np
@@ -11,85 +11,12 @@ from ccfem.elasticity.plane_problem import PlaneProblem
 from ccfem.elasticity.problem import Problem
 from ccfem.errors import InputError
 from ccfem.progress import Progress, silent
-from ccfem.topopt.compliance import (
-    GroupedCompliance,
-    PlaneCompliance,
-    TetCompliance,
-    compliance_of,
-)
-from ccfem.topopt.criteria import optimality_criteria
+from ccfem.topopt.compliance import GroupedCompliance, compliance_of
 from ccfem.topopt.design import Design
-from ccfem.topopt.filters import ConeFilter
+from ccfem.topopt.iteration import Limits, iterate
+from ccfem.topopt.parametrisation import parametrise
 
-__all__ = ["FILTERS", "Parametrisation", "simp", "simp_factor"]
-
-FILTERS = ("sensitivity", "density")
-
-_WINDOW = 10
-"""Iterations over which the objective must stand still (addendum of the prototype, A6)."""
-
-
-def simp_factor(
-    density: FloatArray, penalty: float = 3.0, least: float = 1e-9
-) -> tuple[FloatArray, FloatArray]:
-    """Factor (m,) on the stiffness, and its derivative by the density (m,).
-
-    ``least + density**penalty * (1 - least)`` (Sigmund, Struct. Multidisc. Optim. 33 (2007) 401).
-    """
-    factor = least + density**penalty * (1.0 - least)
-    return factor, penalty * density ** (penalty - 1.0) * (1.0 - least)
-
-
-@dataclass(frozen=True)
-class Parametrisation:
-    """How variables become densities and stiffness, with the gradients back.
-
-    Attributes
-    ----------
-    cone : ConeFilter
-    filter : str
-        One of `FILTERS`.
-    penalty, least : float
-        Of `simp_factor`.
-    solid, void : (m,) bool arrays
-        Cells whose density stays 1 or 0.
-    """
-
-    cone: ConeFilter
-    filter: str
-    penalty: float
-    least: float
-    solid: BoolArray
-    void: BoolArray
-
-    @property
-    def free(self) -> BoolArray:
-        """Cells whose density is to be found, (m,)."""
-        return ~(self.solid | self.void)
-
-    def density(self, variables: FloatArray) -> FloatArray:
-        """Densities (m,) of the variables (m,)."""
-        density = self.cone.average(variables) if self.filter == "density" else variables.copy()
-        density[self.solid], density[self.void] = 1.0, 0.0
-        return density
-
-    def gradient(self, density: FloatArray, energy: FloatArray) -> FloatArray:
-        """Differentiate the compliance by the variables, exactly: (m,) array.
-
-        Parameters
-        ----------
-        density : (m,) array
-        energy : (m,) array, N mm
-            ``u^T k u`` of each cell at full density.
-        """
-        _, slope = simp_factor(density, self.penalty, self.least)
-        own = np.where(self.free, -slope * energy, 0.0)
-        return self.cone.transposed(own) if self.filter == "density" else own
-
-    def volume_gradient(self) -> FloatArray:
-        """Differentiate the volume by the variables: (m,) array, mm^3."""
-        own = np.where(self.free, self.cone.volumes, 0.0)
-        return self.cone.transposed(own) if self.filter == "density" else own
+__all__ = ["simp"]
 
 
 def simp(
@@ -169,6 +96,11 @@ def simp(
         space = parametrise(model, *settings, solid, void, least)
         return iterate(problem, model, space, limits, start, progress)
     member, first = _grouped(groups, len(model.volumes))
+    for name, value in (("solid", solid), ("void", void), ("start", start)):
+        if value is not None and np.shape(value) != member.shape:
+            raise InputError(
+                f"{name} must have one entry a cell ({len(member)}); got shape {np.shape(value)}"
+            )
     solid = None if solid is None else np.asarray(solid)[first]
     void = None if void is None else np.asarray(void)[first]
     model = GroupedCompliance(model, member)
@@ -190,138 +122,3 @@ def _grouped(groups: IntArray, m: int) -> tuple[IntArray, IntArray]:
         raise InputError(f"groups must be {m} integers, one a cell; got shape {given.shape}")
     _, first, member = np.unique(given, return_index=True, return_inverse=True)
     return member.reshape(-1), first
-
-
-@dataclass(frozen=True)
-class Limits:
-    """When to stop, and how far to go in an iteration: see `simp`."""
-
-    volume_fraction: float
-    move: float
-    tolerance: float
-    objective_tolerance: float
-    iterations: int
-
-    def __post_init__(self) -> None:
-        if not 0.0 < self.move <= 1.0 or self.iterations < 1:
-            raise InputError(
-                f"expected 0 < move <= 1 and at least one iteration; got {self.move} and "
-                f"{self.iterations}"
-            )
-
-
-def parametrise(
-    model: PlaneCompliance | TetCompliance | GroupedCompliance,
-    volume_fraction: float,
-    penalty: float,
-    radius: float,
-    filter: str,
-    solid: BoolArray | None,
-    void: BoolArray | None,
-    least: float,
-) -> Parametrisation:
-    """Check the parameters of an optimisation and make its filter."""
-    m = len(model.volumes)
-    if not 0.0 < volume_fraction < 1.0 or not penalty >= 1.0 or not 0.0 < least < 1.0:
-        raise InputError(
-            f"expected 0 < volume fraction < 1, penalty >= 1 and 0 < least < 1; got "
-            f"{volume_fraction}, {penalty} and {least}"
-        )
-    if filter not in FILTERS:
-        raise InputError(f"no filter named '{filter}'; there are: {', '.join(FILTERS)}")
-    passive = []
-    for name, chosen in (("solid", solid), ("void", void)):
-        mask = np.zeros(m, dtype=bool) if chosen is None else np.asarray(chosen)
-        if mask.shape != (m,) or mask.dtype != np.bool_:
-            raise InputError(f"{name} must be a bool array of shape ({m},); got {mask.shape}")
-        passive.append(mask)
-    if (passive[0] & passive[1]).any():
-        raise InputError("a cell cannot be both solid and void: correct the masks")
-    filled, empty = (float(model.volumes[mask].sum()) for mask in passive)
-    total = float(model.volumes.sum())
-    if not filled < volume_fraction * total < total - empty:
-        raise InputError(
-            f"volume fraction {volume_fraction} cannot be met: solid cells fill "
-            f"{filled / total:.3g} and void cells {empty / total:.3g} of the volume"
-        )
-    cone = ConeFilter.of_cells(model.centres, model.volumes, radius)
-    return Parametrisation(cone, filter, penalty, least, *passive)
-
-
-def _start(
-    start: FloatArray | None, space: Parametrisation, volumes: FloatArray, share: float
-) -> FloatArray:
-    """Variables to begin with: given, or uniform where they are free."""
-    if start is not None:
-        variables = np.array(start, dtype=np.float64)
-        if variables.shape != volumes.shape or not ((variables >= 0) & (variables <= 1)).all():
-            raise InputError(
-                f"start must be {len(volumes)} densities in [0, 1]; got shape {variables.shape}"
-            )
-    else:
-        rest = share * volumes.sum() - volumes[space.solid].sum()
-        variables = np.full(len(volumes), rest / volumes[space.free].sum())
-    variables[space.solid], variables[space.void] = 1.0, 0.0
-    return variables
-
-
-def iterate(
-    problem: PlaneProblem | Problem,
-    model: Any,
-    space: Parametrisation,
-    limits: Limits,
-    start: FloatArray | None,
-    progress: Progress,
-) -> Design:
-    """Iterate to convergence; `model` answers to factors as `PlaneCompliance` does."""
-    volumes, free = model.volumes, space.free
-    variables = _start(start, space, volumes, limits.volume_fraction)
-    per_volume = space.volume_gradient()[free]
-    fixed = float(space.density(np.where(free, 0.0, variables)) @ volumes)
-    target = limits.volume_fraction * float(volumes.sum()) - fixed
-    compliance: list[float] = []
-    changes: list[float] = []
-    converged = ""
-    while True:
-        density = space.density(variables)
-        factor, _ = simp_factor(density, space.penalty, space.least)
-        answer = model(factor)
-        compliance.append(answer.compliance)
-        converged = _converged(compliance, changes, limits)
-        if converged or len(changes) == limits.iterations:
-            break
-        gradient = space.gradient(density, answer.energy)
-        if space.filter == "sensitivity":
-            gradient = space.cone.sensitivities(variables, gradient)
-        found = variables.copy()
-        found[free] = optimality_criteria(
-            variables[free], gradient[free], per_volume, target, limits.move
-        )
-        changes.append(float(np.abs(found - variables).max()))
-        variables = found
-        share = float(volumes @ density / volumes.sum())
-        progress(
-            f"iteration {len(changes)}: compliance {compliance[-1]:.5g}, volume {share:.4f}, "
-            f"change {changes[-1]:.3f}",
-            len(changes) / limits.iterations,
-        )
-    return Design(
-        full=problem,
-        density=density,
-        variables=variables,
-        factor=factor,
-        compliance=np.array(compliance),
-        change=np.array(changes),
-        converged=converged,
-    )
-
-
-def _converged(compliance: list[float], changes: list[float], limits: Limits) -> str:
-    """Name what has converged, if anything."""
-    if changes and changes[-1] < limits.tolerance:
-        return "change"
-    if len(compliance) > _WINDOW:
-        recent = np.array(compliance[-_WINDOW - 1 :])
-        if np.abs(recent - recent[-1]).max() < limits.objective_tolerance * recent[-1]:
-            return "objective"
-    return ""

@@ -14,7 +14,8 @@ from ccfem.tensor import largest_in_plane
 from ccfem.topopt.compliance import Loaded, PlaneCompliance, compliance_of
 from ccfem.topopt.design import Design
 from ccfem.topopt.filters import ConeFilter
-from ccfem.topopt.simp import Limits, iterate, parametrise
+from ccfem.topopt.iteration import Limits, iterate
+from ccfem.topopt.parametrisation import parametrise
 
 __all__ = ["ORIENTATIONS", "OrientedCompliance", "somp"]
 

@@ -19,7 +19,7 @@ from ccfem.errors import InputError
 from ccfem.materials import isotropic, plane_stress
 from ccfem.structured import box_mesh
 from ccfem.topopt import compliance_of, simp, simp_factor
-from ccfem.topopt.simp import parametrise
+from ccfem.topopt.parametrisation import parametrise
 
 UNIT = plane_stress(1.0, 1.0, 0.3, 1.0 / 2.6)
 
@@ -252,6 +252,7 @@ def test_filled_cells_have_the_volume():
         ({"start": np.full(60, 2.0)}, r"densities in \[0, 1\]"),
         ({"iterations": 0}, "at least one iteration"),
         ({"groups": np.zeros(3, dtype=int)}, "groups must be 60 integers"),
+        ({"groups": np.arange(60), "start": np.full(5, 0.5)}, "start must have one entry a cell"),
         ({"move": 0.0}, "0 < move"),
         (
             {"problem": replace(mbb(10, 6), supports=(Support("x_min", "xy", (1.0, 0.0, 0.0)),))},
