@@ -14,19 +14,20 @@ from ccfem.strategies import create, plan
 from ccfem.strategies.pruned import Pruned
 
 
-def test_pruned_zigzag_beats_zigzag_of_the_same_length() -> None:
-    case = create_case("open_hole", element_size=4.0)
+@pytest.mark.parametrize("name", ["concentric", "contour_zigzag", "isocurve"])
+def test_pruned_fibre_beats_the_same_length_planned_outright(name: str) -> None:
+    case = create_case("loop", element_size=4.0)
     field = solve(case.problem)["pull"]
     layers = slice_planar(field.mesh, case.build, count=3)
     specimen = Specimen.of(field)
-    strategy = Pruned(of="zigzag", coverage=0.3, overfill=2.0)
+    strategy = Pruned(of=name, coverage=0.3, overfill=1.5)
     pruned = plan(strategy, layers, field, case.machine)
     area = sum(float(layer.areas.sum()) for layer in layers)
     length = float(pruned.lengths.sum())
     assert 0.95 * 0.3 * area <= length * case.machine.fibre_width <= 0.3 * area
     assert pruned.lengths.min() >= case.machine.minimum_length
     outright = plan_to_length(
-        create("zigzag"), layers, field, case.machine, length / len(layers)
+        create(name), layers, field, case.machine, length / len(layers)
     ).toolpaths
     ratios = [virtual_test(paths, specimen, span=()).ratio for paths in (outright, pruned)]
     assert ratios[1] > ratios[0] > 1.0
