@@ -133,7 +133,8 @@ def parallels(
                 shapely.get_coordinates(ring), sides, owners, distance, _OFF * pitch
             )
         ]
-        inside = open_lines(shapely.intersection(found, region))
+        smooth = shapely.simplify(np.array(found, dtype=object), _TOLERANCE * pitch)
+        inside = open_lines(shapely.intersection(smooth, region))
         idle = 0 if inside else idle + 1
         lines += inside
     return lines
