@@ -63,7 +63,7 @@ assert abs(drop["s_fram"] - 42.0) < 1.0
 patterns = {
     "grid 45": create("grid", {"angle": 45.0}),
     "grid 0": create("grid", {"angle": 0.0}),
-    "concentric": create("concentric", {"joined": False}),
+    "concentric": create("concentric", {"joined": False, "filled": True}),
     "mat": create("mat"),
     "mps": create("mps"),
 }

@@ -8,7 +8,13 @@ import pytest
 from benchmarks.papers.plocher_2022.claims import EXPECTED, claim_table, quantities, verdicts
 from benchmarks.papers.plocher_2022.figures import draw_all
 from benchmarks.papers.plocher_2022.study import run_case
-from benchmarks.papers.plocher_2022.tables import ROWS, case_table, index_table, result_table
+from benchmarks.papers.plocher_2022.tables import (
+    ROWS,
+    case_table,
+    index_table,
+    rank_table,
+    result_table,
+)
 from ccfem.cases.plates import five_holes
 
 
@@ -65,4 +71,5 @@ def test_figures_and_tables(case, tmp_path):
     assert all((tmp_path / name).stat().st_size > 5000 for name in names)
     assert result_table(case).count("\n") == len(ROWS) + 2
     assert "| II |" in case_table({"II": case})
+    assert rank_table(quantities({"II": case})).count("FRAM") == 12
     assert "stiffness_alignment" in index_table()

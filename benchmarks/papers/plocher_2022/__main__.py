@@ -15,6 +15,7 @@ from benchmarks.papers.plocher_2022.tables import (
     case_table,
     index_table,
     material_table,
+    rank_table,
     result_table,
 )
 from benchmarks.papers.plocher_2022.variants import try_variants, variant_quantities, variant_table
@@ -25,15 +26,16 @@ def main(folder: Path) -> None:
     begun = perf_counter()
     study = run_study()
     tried = try_variants()
-    checks = verdicts(quantities(study) | variant_quantities(tried, study))
+    found = quantities(study) | variant_quantities(tried, study)
+    checks = verdicts(found)
     computed = perf_counter() - begun
     drawn = draw_all(study, folder)
     with (folder / "results.csv").open("w", newline="") as file:
         writer = csv.writer(file)
         writer.writerow(["case", "pattern", "index", "value"])
         for name, case in study.items():
-            for pattern, found in case.patterns.items():
-                writer.writerows([name, pattern, k, f"{v:.8g}"] for k, v in found.values.items())
+            for pattern, one in case.patterns.items():
+                writer.writerows([name, pattern, k, f"{v:.8g}"] for k, v in one.values.items())
     parts = [
         "# Infill patterns of Plocher, Wioland and Panesar (2022): ours beside theirs\n",
         "Written by `python -m benchmarks.papers.plocher_2022`.\n",
@@ -41,6 +43,7 @@ def main(folder: Path) -> None:
         "## Claims\n",
         claim_table(checks),
         *(f"## Case {name}\n\n{result_table(case)}" for name, case in study.items()),
+        f"## Ranks of PI\n\n{rank_table(found)}",
         f"## Variants tried\n\n{variant_table(tried)}",
         f"## Table 2: indices\n\n{index_table()}",
         f"## Table 3: cases\n\n{case_table(study)}",

@@ -132,6 +132,9 @@ def _ranks(case: CaseStudy, name: str, have: set[str]) -> dict[str, float]:
                 stiff = [1.0 / case.value(p, f"energy_{key}") for p in sorted(patterns)]
                 rank = float(spearmanr(index, stiff).statistic)
                 found[f"rank of {label} {key} {name}{suffix}"] = rank
+                far = [1.0 / case.value(p, f"ratio_off_peaks_{key}") for p in sorted(patterns)]
+                rank = float(spearmanr(index, far).statistic)
+                found[f"rank of {label} {key} {name}{suffix}, off peaks"] = rank
     return found
 
 

@@ -317,7 +317,7 @@ def _mixed_bars(study: Mapping[str, CaseStudy]) -> Figure:
 
 def _moduli() -> Figure:
     """Modulus over the angle to the fibre, as in a polar diagram."""
-    figure = Figure(figsize=(6.0, 3.2), dpi=130.0, facecolor="white")
+    figure = Figure(figsize=(7.2, 4.0), dpi=130.0, facecolor="white")
     FigureCanvasAgg(figure)
     angle = np.linspace(0.0, 2.0 * np.pi, 361)
     for k, (key, name) in enumerate(MATERIALS.items()):
@@ -325,7 +325,7 @@ def _moduli() -> Figure:
         axes.plot(angle, 1e-3 / OffAxis(named_material(name)).compliance(angle), color=INK, lw=1.2)
         axes.set_title(f"{key}-FRAM: modulus, GPa", size=8, pad=12.0)
         axes.tick_params(labelsize=6)
-    figure.subplots_adjust(0.03, 0.05, 0.97, 0.86)
+    figure.subplots_adjust(0.08, 0.1, 0.92, 0.82, 0.35)
     return figure
 
 

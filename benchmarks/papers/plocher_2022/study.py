@@ -48,7 +48,7 @@ MATERIALS = {"C": "c_fram", "S": "s_fram"}
 PATTERNS: dict[str, tuple[str, dict[str, Any]]] = {
     "grid 45": ("grid", {"angle": 45.0}),
     "grid 0": ("grid", {"angle": 0.0}),
-    "concentric": ("concentric", {"joined": False}),
+    "concentric": ("concentric", {"joined": False, "filled": True}),
     "mat": ("mat", {}),
     "mps": ("mps", {}),
 }

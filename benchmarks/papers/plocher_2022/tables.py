@@ -7,7 +7,7 @@ from ccfem.evaluate import COLUMNS
 from ccfem.evaluate.plane_study import reduced_stiffness
 from ccfem.materials import named_material
 
-__all__ = ["case_table", "index_table", "material_table", "result_table"]
+__all__ = ["case_table", "index_table", "material_table", "rank_table", "result_table"]
 
 ROWS = {
     "agreement": ("agreement, %", "{:.1f}"),
@@ -51,6 +51,21 @@ def result_table(case: CaseStudy) -> str:
         for index, (title, form) in ROWS.items()
     ]
     return _table(["index", *case.patterns], rows)
+
+
+def rank_table(found: Mapping[str, float]) -> str:
+    """Rank correlation (Spearman) of PI with the stiffness of the patterns, by reading."""
+    head = ["reading of PI", "material", "patterns"]
+    cases = [name for name in ("I", "II", "III") if f"rank of PI C {name}" in found]
+    rows = []
+    for reading in ("PI", "PI literal", "PI harmonic"):
+        for key in MATERIALS:
+            for suffix in ("", " without 0/90"):
+                ranks = [found[f"rank of {reading} {key} {name}{suffix}"] for name in cases]
+                about = [reading if reading != "PI" else "PI weighted", f"{key}-FRAM"]
+                patterns = "all five" if not suffix else suffix.strip()
+                rows.append([*about, patterns, *(f"{rank:.2f}" for rank in ranks)])
+    return _table([*head, *(f"case {name}" for name in cases)], rows)
 
 
 def index_table() -> str:
