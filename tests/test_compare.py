@@ -184,7 +184,7 @@ def test_parameters_of_the_case_come_before_defaults_and_after_given_ones():
 def test_no_run_exceeds_the_bound(compared):
     ratios = [run.tested.bracket.tension.ratio for run in compared.runs]
     assert 1.0 < max(ratios) <= compared.bound.ratio
-    # a strip under uniform pull: straight fibre, and rho of 4 mm^2 a strand, by the rule of mixtures
+    # uniform pull and straight fibre of rho 4 mm^2: the rule of mixtures
     length = max(float(run.toolpaths.lengths.sum()) for run in compared.runs)
     area = SIZE[1] * SIZE[2]
     assert compared.bound.ratio == pytest.approx(1.0 + 4.0 * length / SIZE[0] / area, rel=2e-2)
