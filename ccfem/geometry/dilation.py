@@ -159,7 +159,14 @@ def _own_pieces(
     ring = np.concatenate([ring[change[0] : -1], ring[: change[0] + 1]])
     owner = np.roll(owner, -change[0])
     cuts = [0, *(np.flatnonzero(np.diff(owner)) + 1).tolist(), len(owner)]
-    return [ring[a : b + 1] for a, b in pairwise(cuts) if owner[a] >= 0]
+    pieces = [ring[a : b + 1] for a, b in pairwise(cuts) if owner[a] >= 0]
+    return [_without_hooks(piece, 3.0 * tolerance) for piece in pieces]
+
+
+def _without_hooks(line: FloatArray, least: float) -> FloatArray:
+    """Line without steps shorter than `least` at its ends: corners of buffers turn off there."""
+    long = np.flatnonzero(np.linalg.norm(np.diff(line, axis=0), axis=1) >= least)
+    return line[long[0] : long[-1] + 2] if len(long) else line
 
 
 def fill_rest(
