@@ -31,6 +31,9 @@ _WINDOW = 10
 
 _BISECTIONS = 50
 
+_LOWER_PRICES = (0.999, 0.99, 0.97, 0.93, 0.85)
+"""Shares of the price at which room that is left is used: a path may be worth all or nothing."""
+
 
 def prune(
     toolpaths: Toolpaths,
@@ -232,10 +235,19 @@ def shorten(
     Returns
     -------
     Toolpaths
-        The price of fibre, the same for all paths, is the smallest that keeps to the length.
+        The price of fibre is the same for all paths, and the smallest that keeps to the length;
+        what room it leaves is used path by path at slightly lower prices.
     """
     price = least_price(along, length, minimum, cut_cost)
     chosen = {one.path: one.kept(price, minimum, cut_cost)[0] for one in along}
+    room = length - sum(one.step * float(chosen[one.path].sum()) for one in along)
+    for factor in _LOWER_PRICES if price > 0.0 else ():
+        for one in along:
+            longer = one.kept(factor * price, minimum, cut_cost)[0]
+            more = one.step * float(longer.sum() - chosen[one.path].sum())
+            if 0.0 < more <= room:
+                chosen[one.path] = longer
+                room -= more
     return _cut(toolpaths, along, chosen)
 
 

@@ -6,7 +6,7 @@ optimised for the compliance of the part with the fibre that its isocurves lay.
 """
 
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import ClassVar
 
 import numpy as np
@@ -207,23 +207,27 @@ class _Extraction:
         fields = [self.field(k) for k in range(self.problem.groups)]
         shifts = (np.arange(s.phases) + 0.5) / s.phases
         variants = [
-            [self.layer_paths(layer, fields[k], shift) for shift in shifts]
+            self.layer_paths(layer, fields[k], shift)
             for layer, k in zip(layers, group, strict=True)
+            for shift in shifts
         ]
-        length = s.coverage * sum(float(layer.areas.sum()) for layer in layers)
-        length /= self.machine.fibre_width
-        worth = [[self.profiles(paths) for paths in row] for row in variants]
-        middle = [one for row in worth for one in row[s.phases // 2]]
-        price = least_price(middle, length, minimum, _CUT_COST) if middle else 0.0
-
-        def gain(along: list[Profile]) -> float:
-            return sum(one.kept(price, minimum, _CUT_COST)[1] for one in along)
-
-        best = [max(range(s.phases), key=lambda k: gain(row[k])) for row in worth]
-        toolpaths = Toolpaths.concatenate(row[k] for row, k in zip(variants, best, strict=True))
+        toolpaths = Toolpaths.concatenate(variants)
         if not len(toolpaths):
             return toolpaths
-        return shorten(toolpaths, self.profiles(toolpaths), length, minimum, _CUT_COST)
+        along = self.profiles(toolpaths)
+        length = s.coverage * sum(float(layer.areas.sum()) for layer in layers)
+        length /= self.machine.fibre_width
+        variant = np.repeat(np.arange(len(variants)), [len(paths) for paths in variants])
+        middle = [one for one in along if variant[one.path] % s.phases == s.phases // 2]
+        price = least_price(middle, length, minimum, _CUT_COST) if middle else 0.0
+        gain = np.zeros(len(variants))
+        for one in along:
+            gain[variant[one.path]] += one.kept(price, minimum, _CUT_COST)[1]
+        best = np.argmax(gain.reshape(-1, s.phases), axis=1) + s.phases * np.arange(len(layers))
+        wanted = np.isin(variant, best)
+        number = np.cumsum(wanted) - 1
+        kept = [replace(one, path=int(number[one.path])) for one in along if wanted[one.path]]
+        return shorten(toolpaths.select(wanted), kept, length, minimum, _CUT_COST)
 
     def field(self, group: int) -> FloatArray:
         """Coefficients of one field, with the sign that does not depend on the axes."""
@@ -249,8 +253,6 @@ class _Extraction:
 
     def profiles(self, toolpaths: Toolpaths) -> list[Profile]:
         """Value of the paths at the strains of the designed part."""
-        if not len(toolpaths):
-            return []
         mesh = self.problem.part.mesh
         strands = cut_strands(toolpaths, mesh)
         displacement = self.design.objective.solution.displacement
