@@ -1,0 +1,43 @@
+"""The authors' Loop with their length of fibre: what pruning and field design reach."""
+
+import os
+
+import pytest
+
+pytestmark = pytest.mark.skipif("CCFEM_CHEN2021" not in os.environ, reason="needs authors' data")
+
+
+@pytest.fixture(scope="module")
+def fibre_aware():
+    from benchmarks.papers.chen_2021 import fibre_aware as module
+
+    return module
+
+
+@pytest.fixture(scope="module")
+def most(fibre_aware):
+    return fibre_aware.bound()
+
+
+def test_bound(fibre_aware, most):
+    # An independent implementation found 3.143, and 2.77, 3.35, 3.59 with 8, 16 and 24 layers.
+    assert most == pytest.approx(3.143, abs=0.005)
+    assert fibre_aware.bound(count=24) == pytest.approx(3.59, abs=0.02)
+
+
+def test_pruned_isocurves(fibre_aware, most):
+    found = fibre_aware.tested(fibre_aware.pruned())
+    assert found.length <= fibre_aware.LENGTH
+    assert 2.73 <= found.tension <= most
+    assert found.bearing >= 2.73
+
+
+def test_designed_field(fibre_aware, most):
+    # Half the evaluations of the default.
+    found = fibre_aware.tested(fibre_aware.stream_function(evaluations=25))
+    assert 0.995 * fibre_aware.LENGTH < found.length <= fibre_aware.LENGTH
+    assert 2.85 <= found.tension <= most
+    assert found.bearing >= 2.85
+    assert found.bonded >= found.tension
+    authors = fibre_aware.tested(fibre_aware.authors_paths("ours"))
+    assert found.failure > authors.failure
