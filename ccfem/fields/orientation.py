@@ -44,7 +44,7 @@ def orient(
     return direction * _signs(len(direction), pairs[order], product[order] < 0.0)[:, None]
 
 
-@njit(cache=True)
+@njit(cache=True, nogil=True)
 def _signs(count, pairs, opposite):  # type: ignore[no-untyped-def]
     parent = np.arange(count)
     parity = np.zeros(count, np.bool_)  # relative to the parent

@@ -58,7 +58,7 @@ def trim_to_clearance(
     return [line for line, size in zip(kept, sizes, strict=True) if size >= least_length]
 
 
-@njit(cache=True)
+@njit(cache=True, nogil=True)
 def _lay(points, offsets, clearance, least_length):  # type: ignore[no-untyped-def]
     count = len(points)
     keep = np.ones(count, np.bool_)
@@ -108,7 +108,7 @@ def _lay(points, offsets, clearance, least_length):  # type: ignore[no-untyped-d
     return keep
 
 
-@njit(cache=True)
+@njit(cache=True, nogil=True)
 def _add(points, keep, p, head, following, x0, y0, size, ny):  # type: ignore[no-untyped-def]
     if keep[p]:
         cell = int((points[p, 0] - x0) / size) * ny + int((points[p, 1] - y0) / size)
@@ -116,7 +116,7 @@ def _add(points, keep, p, head, following, x0, y0, size, ny):  # type: ignore[no
         head[cell] = p
 
 
-@njit(cache=True)
+@njit(cache=True, nogil=True)
 def _drop_short(keep, along, first, last, least_length, closed):  # type: ignore[no-untyped-def]
     start = -1
     for p in range(first, last + 1):

@@ -103,7 +103,7 @@ def triangle_edges(triangles: IntArray, n: int) -> tuple[IntArray, IntArray]:
     return np.stack(np.divmod(unique, n), axis=1), inverse.reshape(3, -1).T
 
 
-@njit(cache=True)
+@njit(cache=True, nogil=True)
 def _crossings(scaled, edges, low, start):  # type: ignore[no-untyped-def]
     edge = np.empty(start[-1], np.int64)
     level = np.empty(start[-1], np.int64)
@@ -117,7 +117,7 @@ def _crossings(scaled, edges, low, start):  # type: ignore[no-untyped-def]
     return edge, level, weights
 
 
-@njit(cache=True)
+@njit(cache=True, nogil=True)
 def _chain(of_triangle, low, high, start):  # type: ignore[no-untyped-def]
     """Curves as crossing numbers with offsets; open ones first end to end, then the closed."""
     count = start[-1]
@@ -162,7 +162,7 @@ def _chain(of_triangle, low, high, start):  # type: ignore[no-untyped-def]
     return line[:size], offsets[: found + 1]
 
 
-@njit(cache=True)
+@njit(cache=True, nogil=True)
 def steepest_spacing(areas, gradient, triangles, values, first, step):  # type: ignore[no-untyped-def]
     """Smallest distance of two neighbouring isocurves that cross the same triangle, mm.
 
@@ -192,7 +192,7 @@ def steepest_spacing(areas, gradient, triangles, values, first, step):  # type: 
     return least
 
 
-@njit(cache=True)
+@njit(cache=True, nogil=True)
 def least_distance(points, offsets, level, reach, enough):  # type: ignore[no-untyped-def]
     """Smallest distance between isocurves of neighbouring levels, mm, as far as `reach`.
 

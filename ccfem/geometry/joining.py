@@ -163,6 +163,8 @@ def _accept(
         if accepted and shapely.dwithin(path, np.array(accepted), clearance).any():
             continue
         cut = {owner: _cut_back(lines[owner], link, owner) for owner in owners[k].tolist()}
+        if min(len(line) for line in cut.values()) < 2:
+            continue
         shortened = shapely.linestrings(_shorten(link.path))
         if shapely.intersects(shortened, _strings(list(cut.values()))).any():
             continue

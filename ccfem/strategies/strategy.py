@@ -2,8 +2,10 @@
 
 import dataclasses
 import importlib
+import os
 import pkgutil
 from collections.abc import Mapping, Sequence
+from concurrent.futures import ThreadPoolExecutor
 from dataclasses import dataclass
 from importlib.metadata import entry_points
 from typing import Any, ClassVar, Protocol, runtime_checkable
@@ -16,6 +18,10 @@ from ccfem.tables import from_table
 from ccfem.toolpaths import Toolpaths
 
 __all__ = ["Amount", "LayerStrategy", "Strategy", "create", "named", "plan"]
+
+
+_MOST_THREADS = 4
+"""Layers that are planned at a time; much of the work waits for the interpreter's lock."""
 
 
 @dataclass(frozen=True)
@@ -107,11 +113,12 @@ def plan(
     stress: StressField,
     machine: Machine,
 ) -> Toolpaths:
-    """Plan the paths of a whole part.
+    """Plan the paths of a whole part, several layers at a time.
 
     Parameters
     ----------
     strategy : Strategy
+        Called from several threads at once, each with a layer of its own.
     layers : sequence of Layer
     stress : StressField
     machine : Machine
@@ -123,4 +130,9 @@ def plan(
     """
     for_part = getattr(strategy, "for_part", None)
     planner: LayerStrategy = for_part(stress, layers, machine) if for_part else strategy
-    return Toolpaths.concatenate(planner(layer, stress.on(layer), machine) for layer in layers)
+
+    def planned(layer: Layer) -> Toolpaths:
+        return planner(layer, stress.on(layer), machine)
+
+    with ThreadPoolExecutor(min(os.cpu_count() or 1, _MOST_THREADS)) as pool:
+        return Toolpaths.concatenate(pool.map(planned, layers))
