@@ -7,9 +7,10 @@ optimised for the compliance of the part with the fibre that its isocurves lay.
 
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
-from typing import ClassVar
+from typing import Any, ClassVar
 
 import numpy as np
+import shapely
 
 from ccfem.arrays import FloatArray, IntArray
 from ccfem.elasticity.stress_field import LayerStress, StressField
@@ -86,6 +87,10 @@ class StreamFunction:
         Positions of the levels of which the best is taken, layer by layer.
     link_limit : float, default 7
         Longest link between two ends, in strand widths.
+    inset : float, default 0
+        Least distance of strands from the boundary, in strand widths. At 0, as in the other
+        strategies of isocurves, strands may run along the boundary with half of their width
+        outside; 0.45 keeps them in, and their ends still meet the links along the boundary.
     """
 
     coverage: float = 0.45
@@ -97,6 +102,7 @@ class StreamFunction:
     cap: float = 90.0
     phases: int = 5
     link_limit: float = 7.0
+    inset: float = 0.0
 
     amount: ClassVar[Amount] = Amount("coverage", most=0.85, least=0.1)
 
@@ -111,6 +117,7 @@ class StreamFunction:
             "cap": (0.0 < self.cap <= 100.0, "a percentile in (0, 100]"),
             "phases": (self.phases >= 1, "at least 1"),
             "link_limit": (0.0 <= self.link_limit < np.inf, "a finite number >= 0"),
+            "inset": (0.0 <= self.inset < np.inf, "a finite number >= 0"),
         }
         for name, (good, expected) in checks.items():
             if not good:
@@ -245,7 +252,8 @@ class _Extraction:
         points, triangles = _refined(layer)
         values = self.problem.grid.values(points) @ field
         curves = isocontours(points, triangles, values, float(values.min()) + shift, 1.0)
-        lines = trim_to_clearance(curves.lines(), _CLEARANCE * width, _SHORTEST * width)
+        lines = _inside(curves.lines(), section, self.strategy.inset * width)
+        lines = trim_to_clearance(lines, _CLEARANCE * width, _SHORTEST * width)
         lines = link_ends(lines, section, self.strategy.link_limit * width, width)
         lines = [close_short_ring(line, self.machine.minimum_length) for line in lines]
         long = [line for line in lines if _length(line) >= self.machine.minimum_length]
@@ -271,6 +279,27 @@ def _refined(layer: Layer) -> tuple[FloatArray, IntArray]:
     four = [np.stack(three, axis=1) for three in ((a, z, y), (z, b, x), (y, x, c), (x, y, z))]
     middle = 0.5 * (points[first] + points[second])
     return np.concatenate([points, middle]), np.concatenate(four)
+
+
+def _inside(lines: Sequence[FloatArray], section: Any, inset: float) -> list[FloatArray]:
+    """Parts of lines that keep a distance, mm, from the boundary of the section."""
+    if inset == 0.0:
+        return list(lines)
+    room = shapely.buffer(section, -inset)
+    shapely.prepare(room)
+    kept = []
+    for line in lines:
+        string = shapely.linestrings(line)
+        if shapely.covers(room, string):
+            kept.append(line)
+            continue
+        inside = shapely.intersection(string, room)
+        if inside.geom_type == "MultiLineString":
+            inside = shapely.line_merge(inside)
+        parts = shapely.get_parts(inside)
+        strings = parts[shapely.get_type_id(parts) == 1]
+        kept += [shapely.get_coordinates(part) for part in strings if part.length > 0.0]
+    return kept
 
 
 def _length(line: FloatArray) -> float:

@@ -134,3 +134,13 @@ def test_load_that_only_presses_is_refused(pulled_bar):
 def test_impossible_parameters_are_refused(name, value):
     with pytest.raises(InputError, match=f"stream_function.{name} must be"):
         StreamFunction(**{name: value})
+
+
+def test_strands_keep_off_the_boundary(bent_beam):
+    stress, layers = bent_beam
+    for inset in (0.45, 1.0):
+        strategy = StreamFunction(evaluations=3, inset=inset, link_limit=0.0)
+        paths = plan(strategy, layers, stress, MACHINE)
+        across = np.array([80.0, 30.0])
+        edge = np.minimum(paths.points[:, :2], across - paths.points[:, :2]).min()
+        assert inset - 1e-9 <= edge < inset + 0.5
