@@ -64,7 +64,7 @@ class Isocurve:
     cap : float, default 86
         Percentile (by area of the layer) of the stress that the density is measured by: were it
         the largest, one hot spot would set the spacing of the whole layer.
-    floor : float, default 0.5
+    floor : float, default 0.4
         Ends of isocurves are cut back to where the stress is at least this share of the cap.
     density : float > 0, default 1
         The knob for how much fibre a layer gets: density of strands where the stress is at the
@@ -112,7 +112,7 @@ class Isocurve:
     """
 
     cap: float = 86.0
-    floor: float = 0.5
+    floor: float = 0.4
     density: float = 1.0
     power: float = 1.0
     spacing_weight: float = 0.1
