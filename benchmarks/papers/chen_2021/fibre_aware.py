@@ -81,7 +81,7 @@ def pruned(count: int = LAYERS_TABLE_2) -> Toolpaths:
     return prune(paths, specimens["pull"], LENGTH, case.machine)
 
 
-def stream_function(load: str = "pull", count: int = LAYERS_TABLE_2, **options: int) -> Toolpaths:
+def stream_function(load: str = "pull", count: int = LAYERS_TABLE_2, **options: float) -> Toolpaths:
     """Isocurves of the field designed under a load."""
     case, fields, _ = loop()
     layers = sliced(count)
@@ -143,6 +143,7 @@ def designs() -> dict[str, Callable[[], Toolpaths]]:
         "isocurve, pruned": pruned,
         "stream_function": stream_function,
         "stream_function, planned for bearing": partial(stream_function, "bearing"),
+        "stream_function, off the boundary": partial(stream_function, inset=0.45),
     }
 
 
