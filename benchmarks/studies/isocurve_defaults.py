@@ -29,6 +29,7 @@ FIBRE_PER_LAYER = {"loop": 2600.0, "bar": 380.0, "open_hole": 4500.0}
 """Fibre, mm a layer: somewhat less than the defaults lay of their own accord."""
 
 SWEEP: dict[str, tuple[Any, ...]] = {
+    "cap": (80.0, 92.0),
     "floor": (0.0, 0.2, 0.4, 0.5, 0.7, 0.8),
     "power": (0.0, 0.5, 0.7, 1.5),
     "spacing_weight": (0.03, 0.2, 0.4, 1.0),
