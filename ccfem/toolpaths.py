@@ -33,6 +33,9 @@ class Toolpaths:
         FIBRE, MATRIX, SUPPORT or TRAVEL (index into `KINDS`).
     closed : (K,) bool array
         Whether the path is a closed curve.
+    link : (P,) bool array, optional
+        Whether the step from each point to the next one of its path is a link: fibre that is there
+        to join two strands, not to carry load. False at the last point of a path. Default: none is.
     """
 
     points: FloatArray
@@ -41,8 +44,11 @@ class Toolpaths:
     layer: IntArray
     kind: IntArray
     closed: BoolArray
+    link: BoolArray = None  # type: ignore[assignment]
 
     def __post_init__(self) -> None:
+        if self.link is None:
+            object.__setattr__(self, "link", np.zeros(len(self.points), dtype=np.bool_))
         for name, dtype in (
             ("points", np.float64),
             ("normals", np.float64),
@@ -50,6 +56,7 @@ class Toolpaths:
             ("layer", np.int64),
             ("kind", np.int64),
             ("closed", np.bool_),
+            ("link", np.bool_),
         ):
             object.__setattr__(self, name, read_only(getattr(self, name), dtype))
         count = len(self.layer)
@@ -60,6 +67,8 @@ class Toolpaths:
             )
         if self.offsets.shape != (count + 1,) or self.offsets[-1] != len(self.points):
             raise ValueError("offsets must have one entry more than there are paths and end at P")
+        if self.link.shape != (len(self.points),) or self.link[self.offsets[1:] - 1].any():
+            raise ValueError("link must have shape (P,), and be false at the end of every path")
         if not np.isfinite(self.points).all():
             raise ValueError("points must be finite; got NaN or infinity")
 
@@ -77,6 +86,7 @@ class Toolpaths:
         layer: Layer,
         closed: Sequence[bool] | None = None,
         kind: int = FIBRE,
+        link: Sequence[BoolArray] | None = None,
     ) -> "Toolpaths":
         """Paths on one flat layer from polylines in its plane coordinates.
 
@@ -89,6 +99,8 @@ class Toolpaths:
         closed : sequence of bool, optional
             By default a line is closed when its last point equals its first.
         kind : int, default FIBRE
+        link : sequence of (n_i,) bool arrays, optional
+            Which steps of each line are links; by default none.
         """
         keep = [k for k, line in enumerate(lines) if len(line) >= 2]
         if not keep:
@@ -104,6 +116,9 @@ class Toolpaths:
             layer=np.full(len(keep), layer.index),
             kind=np.full(len(keep), kind),
             closed=np.array([closed[k] for k in keep]),
+            link=np.zeros(len(points), dtype=bool)
+            if link is None
+            else np.concatenate([link[k] for k in keep]),
         )
 
     @classmethod
@@ -124,6 +139,7 @@ class Toolpaths:
             joined("layer"),
             joined("kind"),
             joined("closed"),
+            joined("link"),
         )
 
     def __len__(self) -> int:
@@ -146,6 +162,7 @@ class Toolpaths:
             layer=self.layer[wanted],
             kind=self.kind[wanted],
             closed=self.closed[wanted],
+            link=self.link[mask],
         )
 
     def on_layer(self, index: int) -> "Toolpaths":
