@@ -37,7 +37,9 @@ _MOST = 2e6
 Size = Callable[[FloatArray], FloatArray]
 
 
-def triangulate(polygon: Any, edge_length: float) -> tuple[FloatArray, IntArray]:
+def triangulate(
+    polygon: Any, edge_length: float, keep: FloatArray | None = None
+) -> tuple[FloatArray, IntArray]:
     """Triangulate a planform.
 
     Parameters
@@ -47,6 +49,9 @@ def triangulate(polygon: Any, edge_length: float) -> tuple[FloatArray, IntArray]
     edge_length : float, mm
         Edge length aimed at. A full turn of the outline (a hole) has at least 24 segments unless
         that takes edges shorter than a quarter of this length; it grows from there inward.
+    keep : (k, 2) array, mm, optional
+        Points on the outline that become points of the mesh, such as the ends of a patch; those
+        elsewhere, or within a quarter of the edge length of a corner, are passed over.
 
     Returns
     -------
@@ -63,7 +68,8 @@ def triangulate(polygon: Any, edge_length: float) -> tuple[FloatArray, IntArray]
     _check(polygon, edge_length)
     rings = [np.asarray(r.coords)[:-1, :2] for r in (polygon.exterior, *polygon.interiors)]
     size = _size_function(rings, edge_length)
-    outline = [_along(ring, size) for ring in rings]
+    marked = [_with_points(ring, keep, 0.25 * edge_length) for ring in rings]
+    outline = [_along(ring, corners, size) for ring, corners in marked]
     inner = _grid(polygon, edge_length, size, np.concatenate(outline))
     outline, inner = _conforming(outline, inner)
     fixed = sum(map(len, outline))
@@ -136,13 +142,35 @@ def _size_function(rings: list[FloatArray], edge_length: float) -> Size:
     return size
 
 
-def _along(ring: FloatArray, size: Size) -> FloatArray:
+def _with_points(
+    ring: FloatArray, keep: FloatArray | None, least: float
+) -> tuple[FloatArray, IntArray]:
+    """Ring with the points of `keep` (k, 2) that lie on it, and its corners, these among them."""
+    corners = np.flatnonzero(_turns(ring)[0] >= _CORNER)
+    if keep is None or not len(keep):
+        return ring, corners
+    line = shapely.LinearRing(ring)
+    along = shapely.line_locate_point(line, shapely.points(ring))
+    stops, chosen = along[corners], []
+    for point in np.asarray(keep, dtype=np.float64):
+        at = float(shapely.line_locate_point(line, shapely.Point(point)))
+        gap = np.abs(stops - at)
+        clear = np.minimum(gap, line.length - gap).min(initial=np.inf) >= least
+        if clear and line.distance(shapely.Point(point)) <= 1e-6 * line.length:
+            stops = np.append(stops, at)
+            chosen.append((at, *point))
+    where, x, y = np.array(sorted(chosen)).reshape(-1, 3).T
+    place = np.searchsorted(along, where)
+    is_corner = np.isin(np.arange(len(ring)), corners)
+    ring = np.insert(ring, place, np.stack([x, y], axis=1), axis=0)
+    return ring, np.flatnonzero(np.insert(is_corner, place, True))
+
+
+def _along(ring: FloatArray, corners: IntArray, size: Size) -> FloatArray:
     """Points (k, 2) along a ring at the wanted distances.
 
     Its corners are among them, or its outermost points in x and y where it has none.
     """
-    turn, _ = _turns(ring)
-    corners = np.flatnonzero(turn >= _CORNER)
     least = 1
     if not len(corners):
         ends = [ring[:, 0].argmin(), ring[:, 0].argmax(), ring[:, 1].argmin(), ring[:, 1].argmax()]

@@ -17,7 +17,13 @@ _SPLIT = np.array([[0, 1, 2, 5], [0, 1, 4, 5], [0, 3, 4, 5]])
 """Tetrahedra of a prism (bottom 0 1 2, top 3 4 5): side diagonals rise with the order."""
 
 
-def extrude(polygon: Any, height: float, edge_length: float, layers: int | None = None) -> TetMesh:
+def extrude(
+    polygon: Any,
+    height: float,
+    edge_length: float,
+    layers: int | None = None,
+    keep: FloatArray | None = None,
+) -> TetMesh:
     """Mesh a prism on a planform in the x-y plane.
 
     Parameters
@@ -30,6 +36,8 @@ def extrude(polygon: Any, height: float, edge_length: float, layers: int | None 
         Edge length aimed at; shorter where the outline turns sharply (`triangulate`).
     layers : int, optional
         Layers of prisms over the height; by default as many as make them `edge_length` high.
+    keep : (k, 2) array, mm, optional
+        Points on the outline that become points of the mesh.
 
     Returns
     -------
@@ -42,7 +50,7 @@ def extrude(polygon: Any, height: float, edge_length: float, layers: int | None 
         raise InputError(f"height must be a finite number above 0 mm; got {height}: correct it")
     if layers is not None and layers < 1:
         raise InputError(f"layers of cells must be at least 1; got {layers}: correct it")
-    plane, triangles = triangulate(polygon, edge_length)
+    plane, triangles = triangulate(polygon, edge_length, keep)
     plane, triangles = _numbered_along(plane, triangles)
     count = layers or max(1, round(height / edge_length))
     levels = count + 1

@@ -121,6 +121,23 @@ def test_any_star_shape_is_filled(seed, corners, size):
     assert len(points) - len(edges) + len(triangles) == 1
 
 
+def test_points_to_keep_are_points_of_the_mesh():
+    polygon = shapely.box(0, 0, 30, 12).difference(shapely.Point(9, 6).buffer(3.0, quad_segs=32))
+    ring = polygon.interiors[0]
+    keep = np.array([[7.3, 0.0], [12.9, 0.0], [30.0, 5.1], ring.interpolate(2.2).coords[0]])
+    passed_over = np.array([[15.0, 6.0], [0.2, 12.0]])
+    points, triangles = triangulate(polygon, 1.6, np.concatenate([keep, passed_over]))
+    for point in keep:
+        assert np.abs(points - point).max(axis=1).min() < 1e-12
+    for point in passed_over:
+        assert np.linalg.norm(points - point, axis=1).min() > 0.1
+    corner = points[triangles]
+    u, v = corner[:, 1] - corner[:, 0], corner[:, 2] - corner[:, 0]
+    area = 0.5 * (u[:, 0] * v[:, 1] - u[:, 1] * v[:, 0])
+    assert area.min() > 0.0
+    assert area.sum() == pytest.approx(polygon.area, rel=2e-3)
+
+
 @pytest.mark.parametrize("layers", [None, 1, 3])
 def test_extruded_prisms(layers):
     polygon = shapes()["two holes"]
