@@ -1,0 +1,196 @@
+"""Shortest curves between two poses that turn no tighter than a radius (Dubins).
+
+L. E. Dubins, On curves of minimal length with a constraint on average curvature, and with
+prescribed initial and terminal positions and tangents, American Journal of Mathematics 79 (1957)
+497. The shortest curve is one of six words of three pieces, each an arc of the radius to the left
+or right, or a straight line: LSL, RSR, LSR, RSL, LRL, RLR.
+
+A pose is (x, y, heading), mm and radians.
+"""
+
+import numpy as np
+from numba import njit
+
+from ccfem.arrays import FloatArray, IntArray
+from ccfem.errors import InputError
+
+__all__ = ["WORDS", "curve_points", "dubins", "dubins_curve", "word_sizes"]
+
+WORDS: IntArray = np.array(
+    [[1, 0, 1], [-1, 0, -1], [1, 0, -1], [-1, 0, 1], [1, -1, 1], [-1, 1, -1]], dtype=np.int64
+)
+"""Turns of the three pieces of each word, (6, 3): 1 to the left, -1 to the right, 0 straight."""
+
+_NO_TURN = 1e-6
+"""Angle, radians, up to which an arc may turn the other way instead of almost all the way round."""
+_TOUCHING = 1e-10
+"""Distance in radii below which circles coincide, or touch."""
+
+
+def dubins(starts: FloatArray, ends: FloatArray, radius: float) -> tuple[IntArray, FloatArray]:
+    """Shortest curve of bounded curvature from each start to its end.
+
+    Parameters
+    ----------
+    starts, ends : (n, 3) arrays
+        Poses: x, y in mm and the heading in radians.
+    radius : float, mm
+        Tightest turn, > 0.
+
+    Returns
+    -------
+    turns : (n, 3) int array
+        Of the three pieces: 1 an arc to the left, -1 to the right, 0 a straight line.
+    sizes : (n, 3) array, mm
+        Length of each piece; their sum is the length of the curve.
+
+    Raises
+    ------
+    InputError
+        For a radius that is not positive, or poses of another shape.
+    """
+    starts, ends = (np.ascontiguousarray(poses, dtype=np.float64) for poses in (starts, ends))
+    if not 0.0 < radius < np.inf:
+        raise InputError(f"radius of Dubins curves must be above 0 mm; got {radius}")
+    if starts.ndim != 2 or starts.shape[1] != 3 or starts.shape != ends.shape:
+        raise InputError(
+            f"poses must be two arrays of shape (n, 3); got {starts.shape} and {ends.shape}: give "
+            "x, y and heading of each"
+        )
+    word, sizes = _shortest(starts, ends, float(radius))
+    return WORDS[word] * np.where(sizes < 0.0, -1, 1), np.abs(sizes)
+
+
+def dubins_curve(start: FloatArray, end: FloatArray, radius: float, step: float) -> FloatArray:
+    """Points of the shortest curve of bounded curvature between two poses.
+
+    Parameters
+    ----------
+    start, end : (3,) arrays
+        Poses: x, y in mm and the heading in radians.
+    radius : float, mm
+        Tightest turn, > 0.
+    step : float, mm
+        Longest distance along the curve between neighbouring points, > 0.
+
+    Returns
+    -------
+    (k, 2) array, mm
+        The first and the last point are those given, exactly; both ends of every piece are among
+        the points. k = 1 where the poses are the same.
+    """
+    if not 0.0 < step < np.inf:
+        raise InputError(f"step of Dubins curves must be above 0 mm; got {step}")
+    turns, sizes = dubins(np.reshape(start, (1, 3)), np.reshape(end, (1, 3)), radius)
+    return curve_points(np.asarray(start), np.asarray(end), turns[0], sizes[0], radius, step)
+
+
+def curve_points(
+    start: FloatArray,
+    end: FloatArray,
+    turns: IntArray,
+    sizes: FloatArray,
+    radius: float,
+    step: float,
+) -> FloatArray:
+    """Points (k, 2), mm, of a curve given by turns (3,) and sizes (3,), as `dubins_curve`."""
+    # Pieces shorter than this would only be repeated points.
+    parts = np.where(sizes > 1e-9, np.ceil(sizes / step - 1e-9), 0).astype(np.int64)
+    line = _sample(np.asarray(start, dtype=np.float64), turns, sizes, parts, float(radius))
+    if len(line) > 1:
+        line[-1] = end[:2]
+    return line
+
+
+@njit(cache=True, nogil=True)
+def _sample(pose, turns, sizes, parts, radius):  # type: ignore[no-untyped-def]
+    line = np.empty((parts.sum() + 1, 2))
+    x, y, heading = pose
+    line[0, 0], line[0, 1] = x, y
+    count = 1
+    for piece in range(3):
+        for part in range(parts[piece]):
+            size = sizes[piece] * (part + 1) / parts[piece]
+            px, py, _ = _advance(x, y, heading, turns[piece], size, radius)
+            line[count, 0], line[count, 1] = px, py
+            count += 1
+        x, y, heading = _advance(x, y, heading, turns[piece], sizes[piece], radius)
+    return line
+
+
+@njit(cache=True, nogil=True)
+def _advance(x, y, heading, turn, size, radius):  # type: ignore[no-untyped-def]
+    """Pose after a piece: an arc by the chord and its direction, which no cancellation spoils."""
+    half = 0.5 * turn * size / radius
+    chord = size if turn == 0 else 2.0 * radius * np.sin(abs(half)) * np.sign(size)
+    return (
+        x + chord * np.cos(heading + half),
+        y + chord * np.sin(heading + half),
+        heading + 2 * half,
+    )
+
+
+@njit(cache=True, nogil=True)
+def _round(angle):  # type: ignore[no-untyped-def]
+    """Angle in [0, 2 pi), or one that is almost a full turn as a small negative one."""
+    turn = 2.0 * np.pi
+    angle -= turn * np.floor(angle / turn)
+    return angle - turn if angle > turn - _NO_TURN else angle
+
+
+@njit(cache=True, nogil=True)
+def word_sizes(start, end, radius, sizes):  # type: ignore[no-untyped-def]
+    """Fill `sizes` (6, 3), mm, with the pieces of each of `WORDS`; inf where it cannot be.
+
+    An arc that would turn almost all the way round is a tiny negative one instead.
+    """
+    for word in range(6):
+        first, middle, last = WORDS[word]
+        # Centres of the circles at both ends in units of the radius, from one to the other.
+        dx = (end[0] - start[0]) / radius - last * np.sin(end[2]) + first * np.sin(start[2])
+        dy = (end[1] - start[1]) / radius + last * np.cos(end[2]) - first * np.cos(start[2])
+        apart, way = np.hypot(dx, dy), np.arctan2(dy, dx)
+        sizes[word] = np.inf
+        if middle == 0 and first == last:
+            if apart < _TOUCHING:
+                way = start[2]
+            sizes[word, 0] = _round(first * (way - start[2]))
+            sizes[word, 1] = apart
+            sizes[word, 2] = _round(last * (end[2] - way))
+        elif middle == 0:
+            if apart < 2.0 - _TOUCHING:
+                continue
+            straight = np.sqrt(max((apart - 2.0) * (apart + 2.0), 0.0))
+            way += first * np.arctan2(2.0, straight)
+            sizes[word, 0] = _round(first * (way - start[2]))
+            sizes[word, 1] = straight
+            sizes[word, 2] = _round(last * (end[2] - way))
+        else:
+            if apart > 4.0 + _TOUCHING or apart < _TOUCHING:
+                continue
+            # Headings where the circle between the two touches the first and the last one.
+            lean = np.arccos(min(0.25 * apart, 1.0))
+            one = way + first * (lean + 0.5 * np.pi)
+            other = way + np.pi - first * (lean - 0.5 * np.pi)
+            sizes[word, 0] = _round(first * (one - start[2]))
+            sizes[word, 1] = _round(middle * (other - one))
+            sizes[word, 2] = _round(last * (end[2] - other))
+        sizes[word] *= radius
+
+
+@njit(cache=True, nogil=True)
+def _shortest(starts, ends, radius):  # type: ignore[no-untyped-def]
+    count = len(starts)
+    words, best = np.zeros(count, np.int64), np.empty((count, 3))
+    sizes = np.empty((6, 3))
+    for k in range(count):
+        word_sizes(starts[k], ends[k], radius, sizes)
+        least = np.inf
+        for word in range(6):
+            length = np.abs(sizes[word]).sum()
+            # Words that agree to rounding: the first, so that the answer does not flicker.
+            if length < least - 1e-9 * radius:
+                least = length
+                words[k] = word
+        best[k] = sizes[words[k]]
+    return words, best
