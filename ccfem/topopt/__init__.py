@@ -1,5 +1,6 @@
 """Topology optimisation: density filter, optimality criteria, SIMP and SOMP."""
 
+from ccfem.topopt.as_problem import as_problem
 from ccfem.topopt.compliance import compliance_of
 from ccfem.topopt.criteria import optimality_criteria
 from ccfem.topopt.design import Design
@@ -16,6 +17,7 @@ __all__ = [
     "BendingBeam",
     "ConeFilter",
     "Design",
+    "as_problem",
     "compliance_of",
     "optimality_criteria",
     "outline",
