@@ -181,16 +181,23 @@ def subdivide(
 
 def merge_repeated(
     points: FloatArray, offsets: IntArray, tolerance: float = 0.0
-) -> tuple[FloatArray, IntArray]:
+) -> tuple[FloatArray, IntArray, IntArray]:
     """Drop every point that lies within `tolerance` of the one before it.
 
     First points always stay, so a polyline of no length keeps one point.
+
+    Returns
+    -------
+    points, offsets
+        The polylines without those points.
+    kept : (P',) int array
+        Index of each point among those given.
     """
     keep = _steps(points, offsets) > tolerance
     starts = offsets[:-1][np.diff(offsets) > 0]
     keep[starts] = True
     kept = np.concatenate([[0], np.cumsum(keep)])
-    return points[keep], kept[offsets]
+    return points[keep], kept[offsets], np.flatnonzero(keep)
 
 
 def turning_angles(points: FloatArray, offsets: IntArray, closed: BoolArray) -> FloatArray:

@@ -25,13 +25,27 @@ class Part:
     def __repr__(self) -> str:
         return f"Part of {len(self.stress.mesh.cells)} cells"
 
-    def paths(self, *lines: Sequence[Sequence[float]], layer: int = 0) -> Toolpaths:
-        """Toolpaths on a layer from lists of plane points."""
-        return Toolpaths.from_plane([np.array(x, dtype=float) for x in lines], self.layers[layer])
+    def paths(
+        self,
+        *lines: Sequence[Sequence[float]],
+        layer: int = 0,
+        links: Sequence[Sequence[int]] | None = None,
+    ) -> Toolpaths:
+        """Toolpaths on a layer from lists of plane points; `links`: which steps of each are."""
+        marks = None
+        if links is not None:
+            marks = [np.isin(np.arange(len(x)), y) for x, y in zip(lines, links, strict=True)]
+        points = [np.array(x, dtype=float) for x in lines]
+        return Toolpaths.from_plane(points, self.layers[layer], link=marks)
 
-    def plane(self, *lines: Sequence[Sequence[float]], layer: int = 0) -> PlanePaths:
+    def plane(
+        self,
+        *lines: Sequence[Sequence[float]],
+        layer: int = 0,
+        links: Sequence[Sequence[int]] | None = None,
+    ) -> PlanePaths:
         """Paths of a layer as the indices take them."""
-        return plane_paths(self.paths(*lines, layer=layer), self.layers[layer])
+        return plane_paths(self.paths(*lines, layer=layer, links=links), self.layers[layer])
 
 
 def make_part(
@@ -65,6 +79,15 @@ def make_part_fixture() -> Callable[..., Part]:
 @pytest.fixture(name="uniform", scope="session")
 def uniform_fixture() -> Callable[..., Callable[[np.ndarray], np.ndarray]]:
     return uniform
+
+
+@pytest.fixture(scope="session")
+def framed() -> Part:
+    """That plate with a window of 20 x 10 mm round (30, 20)."""
+    mesh = box_mesh((60.0, 40.0, 2.0), (12, 8, 1))
+    x, y, _ = mesh.points[mesh.corners].mean(axis=1).T
+    window = (np.abs(x - 30.0) < 10.0) & (np.abs(y - 20.0) < 5.0)
+    return make_part(uniform(10.0), mesh=type(mesh)(mesh.points, mesh.cells[~window]))
 
 
 @pytest.fixture(scope="session")

@@ -4,7 +4,6 @@ import numpy as np
 import pytest
 
 from ccfem.evaluate.containment import containment_indices, sample_containment
-from ccfem.structured import box_mesh
 
 
 def indices(paths):
@@ -30,15 +29,6 @@ def test_a_strand_all_outside(pulled):
     length, depth = indices(pulled.plane([[0, -3], [60, -3]], [[5, 5], [9, 9]]))
     assert length == pytest.approx(60.0)
     assert depth == pytest.approx(3.0)
-
-
-@pytest.fixture
-def framed(make_part, uniform):
-    """A plate of 60 x 40 mm with a window of 20 x 10 mm round (30, 20)."""
-    mesh = box_mesh((60.0, 40.0, 2.0), (12, 8, 1))
-    x, y, _ = mesh.points[mesh.corners].mean(axis=1).T
-    window = (np.abs(x - 30.0) < 10.0) & (np.abs(y - 20.0) < 5.0)
-    return make_part(uniform(10.0), mesh=type(mesh)(mesh.points, mesh.cells[~window]))
 
 
 def test_the_depth_in_a_hole_is_that_of_the_worst_place_between_the_points(framed):

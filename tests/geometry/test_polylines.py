@@ -134,9 +134,10 @@ def test_a_hairpin_turns_by_half_a_turn() -> None:
 
 def test_repeated_points_are_merged() -> None:
     a = np.array([[0.0, 0.0], [0.0, 0.0], [1.0, 0.0], [1.0, 1e-9], [2.0, 0.0]])
-    points, offsets = merge_repeated(*pack([a, a[:2]]), tolerance=1e-6)
+    points, offsets, kept = merge_repeated(*pack([a, a[:2]]), tolerance=1e-6)
     assert points.tolist() == [[0, 0], [1, 0], [2, 0], [0, 0]]
     assert offsets.tolist() == [0, 3, 4]
+    assert kept.tolist() == [0, 2, 4, 5]
 
 
 def test_subdividing_keeps_points_and_lengths() -> None:
