@@ -3,6 +3,7 @@
 from dataclasses import dataclass
 
 from ccfem.errors import InputError
+from ccfem.speeds import SpeedTable
 
 __all__ = ["Machine"]
 
@@ -11,7 +12,8 @@ __all__ = ["Machine"]
 class Machine:
     """A printer of continuous fibre.
 
-    The defaults are the machine of Chen et al. 2021 (paper 000, section 5).
+    The defaults are the machine of Chen et al. 2021 (paper 000, section 5 and table 3). What the
+    paper does not give is marked "our choice".
 
     Attributes
     ----------
@@ -30,7 +32,21 @@ class Machine:
     minimum_radius : float, mm
         Tightest turn that a strand follows without folding; 0.26 1/mm in curvature.
     fibre_speed, matrix_speed, travel_speed : float, mm/s
+        Travel: our choice.
     fibre_temperature, matrix_temperature : float, degrees Celsius
+    speeds : SpeedTable, optional
+        Speed of the fibre by curvature, length and angle of a path's pieces, in place of
+        `fibre_speed`. Default: none.
+    cutter_distance : float, mm
+        From the cutter to the tip of the fibre nozzle: fibre that is still to be laid after a cut.
+    cut_wait : float, s
+        Standstill after a cut. Our choice.
+    matrix_width : float, mm
+        Width of a line of matrix.
+    matrix_diameter : float, mm
+        Of the matrix filament.
+    bed_temperature : float, degrees Celsius
+        Our choice, usual for PLA.
     """
 
     fibre_width: float = 1.0
@@ -45,12 +61,21 @@ class Machine:
     travel_speed: float = 80.0
     fibre_temperature: float = 250.0
     matrix_temperature: float = 200.0
+    speeds: SpeedTable | None = None
+    cutter_distance: float = 42.0
+    cut_wait: float = 1.0
+    matrix_width: float = 0.8
+    matrix_diameter: float = 1.75
+    bed_temperature: float = 60.0
 
     def __post_init__(self) -> None:
         for name, value in vars(self).items():
+            if name == "speeds":
+                continue
             if not value >= 0.0 or value == float("inf"):
                 raise InputError(
                     f"machine.{name} must be a finite number >= 0; got {value!r}: correct it"
                 )
-        if self.fibre_width == 0.0:
-            raise InputError("machine.fibre_width must be above 0; got 0: give the strand width")
+        for name in ("fibre_width", "matrix_width", "matrix_diameter"):
+            if getattr(self, name) == 0.0:
+                raise InputError(f"machine.{name} must be above 0; got 0: give the width in mm")

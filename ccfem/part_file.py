@@ -90,6 +90,12 @@ them with a minus ("-z"), or three numbers.
     [machine]                         # what differs from ccfem.machine.Machine
     minimum_length = 45.0
 
+    [machine.speeds]                  # fibre speed by curvature, length and angle of a path's
+    speed = [7, 15, 35]               # pieces (ccfem.speeds.SpeedTable) in place of fibre_speed;
+    curvature = [0.2, 0.05]           # what is left out is that of paper 001, table 2
+    length = [15, 25]
+    angle = [90, 135]
+
     [strategies.isocurve]             # parameters of a strategy on this part
     cap = 90.0
 """

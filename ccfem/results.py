@@ -1,5 +1,6 @@
 """Results on disk: tables, record, paths and pictures, written whole or not at all."""
 
+import dataclasses
 import json
 import os
 import platform
@@ -142,7 +143,7 @@ def record(comparison: Comparison, command: str, seconds: Mapping[str, float]) -
                 "cells": len(mesh.cells),
                 "order": mesh.order,
             },
-            "machine": vars(case.machine),
+            "machine": dataclasses.asdict(case.machine),
             "solver": vars(stress.record),
             "strain_energy": stress.strain_energy,
             "fibre_per_layer": comparison.fibre_per_layer,

@@ -1,5 +1,6 @@
 """Tables of a TOML file to values: keys by name, types by annotation, nothing else accepted."""
 
+import dataclasses
 import inspect
 import math
 import types
@@ -29,7 +30,8 @@ def from_table(make: Callable[..., T], table: object, where: str, infinite: bool
     ----------
     make : dataclass or function
         Its parameters name the keys, their annotations the types: numbers, strings, booleans,
-        literals, tuples (written as lists), dictionaries (written as tables) and unions of these.
+        literals, tuples (written as lists), dictionaries and dataclasses (written as tables) and
+        unions of these.
     table : object
         What stands in the file.
     where : str
@@ -66,10 +68,17 @@ def from_table(make: Callable[..., T], table: object, where: str, infinite: bool
 
 def _converted(value: object, hint: Any, where: str, infinite: bool) -> Any:
     """Value as the annotation wants it, or an error that says what it wants."""
+    for option in (hint, *get_args(hint)):
+        if isinstance(value, Mapping) and _is_dataclass(option):
+            return from_table(option, value, where, infinite)
     found = _fitted(value, hint, infinite)
     if found is _UNFIT:
         raise InputError(f"{where} must be {_described(hint)}; got {value!r}: correct it")
     return found
+
+
+def _is_dataclass(hint: Any) -> bool:
+    return isinstance(hint, type) and dataclasses.is_dataclass(hint)
 
 
 _UNFIT = object()
@@ -122,6 +131,6 @@ def _described(hint: Any) -> str:
         return f"a list, each item {_described(arguments[0])}"
     if origin is tuple:
         return f"a list of {len(arguments)}, each {_described(arguments[0])}"
-    if origin is dict:
+    if origin is dict or _is_dataclass(hint):
         return "a table"
     return _WORDS.get(hint, str(hint))

@@ -7,8 +7,10 @@ import numpy as np
 from ccfem.arrays import FloatArray
 from ccfem.evaluate.column import Column
 from ccfem.evaluate.plane_paths import PlanePaths
+from ccfem.geometry.polylines import arc_lengths
 from ccfem.machine import Machine
-from ccfem.toolpaths import TRAVEL, Toolpaths
+from ccfem.speeds import step_speeds
+from ccfem.toolpaths import FIBRE, TRAVEL, Toolpaths
 
 __all__ = ["COLUMNS", "ManufactureSamples", "manufacture_indices", "sample_manufacture"]
 
@@ -37,10 +39,17 @@ COLUMNS = (
     Column(
         "print_time",
         "s",
-        "Length of each path over the speed of its kind, plus the straight way from the end of "
-        "each path to the start of the next one of its layer over the travel speed. Cutting, "
-        "acceleration and what is not among the paths given (such as matrix) cost nothing.",
+        "Length of each step of the paths over its speed (by the machine's speed table for fibre, "
+        "else the speed of its kind), plus the straight way from the end of each path to the start "
+        "of the next one of its layer over the travel speed. Cutting, acceleration and what is not "
+        "among the paths given (such as matrix) cost nothing.",
         ">= 0",
+    ),
+    Column(
+        "mean_speed",
+        "mm/s",
+        "Length of the fibre paths over the time that they take, ways between them left out.",
+        ">= 0; NaN without fibre",
     ),
 )
 
@@ -50,10 +59,11 @@ _ROUNDING = 1e-6
 
 @dataclass(frozen=True)
 class ManufactureSamples:
-    """Lengths (k,), mm, of the fibre paths, and print time (1,), s, a layer."""
+    """Lengths (k,), mm, of the fibre paths; time (1,), s, of all and of the fibre, a layer."""
 
     length: FloatArray
     seconds: FloatArray
+    fibre_seconds: FloatArray
 
 
 def sample_manufacture(
@@ -68,15 +78,24 @@ def sample_manufacture(
         Every path of the same layer, of all kinds, in the order of printing.
     machine : Machine
     """
-    speeds = np.array([machine.fibre_speed, *[machine.matrix_speed] * 2, machine.travel_speed])
     drawn = toolpaths.select(toolpaths.kind != TRAVEL)
     starts, ends = drawn.points[drawn.offsets[:-1]], drawn.points[drawn.offsets[1:] - 1]
     ways = float(np.linalg.norm(starts[1:] - ends[:-1], axis=1).sum())
     # Travel that the paths spell out replaces the straight ways.
     travel = toolpaths.of_kind(TRAVEL)
     ways = float(travel.lengths.sum()) if len(travel) else ways
-    seconds = _duration(drawn.lengths, speeds[drawn.kind]) + _duration(ways, speeds[TRAVEL])
-    return ManufactureSamples(paths.lengths, np.array([seconds]))
+    fibre, others = (drawn.select(wanted) for wanted in (drawn.kind == FIBRE, drawn.kind != FIBRE))
+    along = _duration(*_steps(fibre, machine))
+    seconds = along + _duration(*_steps(others, machine)) + _duration(ways, machine.travel_speed)
+    return ManufactureSamples(paths.lengths, np.array([seconds]), np.array([along]))
+
+
+def _steps(toolpaths: Toolpaths, machine: Machine) -> tuple[FloatArray, FloatArray]:
+    """Length, mm, and speed, mm/s, of the step that ends at each point."""
+    speed = step_speeds(toolpaths, machine)
+    length = np.diff(arc_lengths(toolpaths.points, toolpaths.offsets), prepend=0.0)
+    length[toolpaths.offsets[:-1]] = 0.0
+    return length, np.roll(speed, 1)
 
 
 def _duration(length: FloatArray | float, speed: FloatArray | float) -> float:
@@ -104,4 +123,5 @@ def manufacture_indices(samples: ManufactureSamples, machine: Machine) -> dict[s
         "long_enough_count": float(enough.mean()) if len(length) else np.nan,
         "long_enough_length": float(length[enough].sum()) / total if len(length) else np.nan,
         "print_time": float(samples.seconds.sum()),
+        "mean_speed": total / float(samples.fibre_seconds.sum()) if total else np.nan,
     }

@@ -269,7 +269,9 @@ def _parameters(comparison: Comparison) -> str:
         )
         rows.append(f'<tr><td>{escape(run.name)}</td><td class="text">{text}</td></tr>')
     machine = ", ".join(
-        f"{key} = {value:g}" for key, value in vars(comparison.case.machine).items()
+        f"{key} = {_short(value)}"
+        for key, value in vars(comparison.case.machine).items()
+        if value is not None
     )
     rows.append(f'<tr><td>machine</td><td class="text">{escape(machine)}</td></tr>')
     return (
