@@ -29,6 +29,7 @@ def box_mesh(
     size: tuple[float, float, float],
     divisions: tuple[int, int, int],
     origin: tuple[float, float, float] = (0.0, 0.0, 0.0),
+    alternating: bool = False,
 ) -> TetMesh:
     """Mesh of a box: every brick of a regular grid in six tetrahedra round its diagonal (Kuhn).
 
@@ -41,11 +42,14 @@ def box_mesh(
         Bricks along x, y, z.
     origin : tuple of 3 floats, mm
         The corner of smallest coordinates.
+    alternating : bool, default False
+        Mirror every other brick along each axis, so that no diagonal is preferred: with an even
+        number of bricks the mesh is its own mirror image.
 
     Returns
     -------
     TetMesh
-        Linear; nodes numbered along x first; patches x_min, x_max, y_min, y_max, z_min, z_max.
+        Linear; cells brick by brick, six each, and nodes numbered along x first; patches x_min, x_max, y_min, y_max, z_min, z_max.
 
     Raises
     ------
@@ -65,7 +69,14 @@ def box_mesh(
     corner = numbers[:-1, :-1, :-1].reshape(-1)
     step = np.array([0, 1, nx + 1, nx + 2])
     offsets = np.concatenate([step, step + (nx + 1) * (ny + 1)])
-    cells = (corner[:, None, None] + offsets[_kuhn_cells()]).reshape(-1, 4)
+    local = np.broadcast_to(_kuhn_cells(), (len(corner), 6, 4))
+    if alternating:
+        z, y, x = np.meshgrid(*(np.arange(d) % 2 for d in divisions[::-1]), indexing="ij")
+        mirrored = (x + 2 * y + 4 * z).reshape(-1, 1, 1)
+        odd = ((x + y + z) % 2 == 1).reshape(-1)
+        local = local ^ mirrored
+        local[odd] = local[odd][:, :, [0, 2, 1, 3]]
+    cells = (corner[:, None, None] + offsets[local]).reshape(-1, 4)
     mesh = TetMesh(points, cells)
     place = np.stack(np.unravel_index(np.arange(len(points)), numbers.shape)[::-1], axis=1)
     facets = place[mesh.boundary]
