@@ -104,23 +104,42 @@ class PlaneCompliance:
         matrices = self.system.matrices
         return matrices[:1] if (matrices == matrices[:1]).all() else matrices
 
-    def __call__(self, factor: FloatArray, full: FloatArray | None = None) -> Loaded:
+    def _matrices(self, stiffness: FloatArray) -> FloatArray:
+        """Element matrices (m, 2q, 2q), N/mm, of a stiffness (m, 3, 3)."""
+        thickness = np.asarray(self.system.problem.thickness)[:, None, None]
+        return thickness * self.system.elements.matrices(stiffness)
+
+    def _energy(self, displacement: FloatArray, matrices: FloatArray) -> FloatArray:
+        own = self.system.elements.cell_displacement(displacement)
+        one = len(matrices) == 1
+        image = own @ matrices[0] if one else np.einsum("mij,mj->mi", matrices, own)
+        return np.einsum("mi,mi->m", own, image)
+
+    def __call__(self, factor: FloatArray, stiffness: FloatArray | None = None) -> Loaded:
         """Answer with a factor (m,) on the stiffness of each cell.
 
         Parameters
         ----------
         factor : (m,) array in (0, 1]
-        full : (m, 2q, 2q) array, N/mm, optional
-            Other element matrices of full density than the problem's.
+        stiffness : (m, 3, 3) array, MPa, optional
+            Of full density, where it is not the problem's.
         """
-        full = self._full if full is None else full
+        full = self._full if stiffness is None else self._matrices(stiffness)
         matrix = self.system.assemble(factor[:, None, None] * full)
-        energies = {}
-        for case, displacement in self._answer.solved(matrix).items():
-            own = self.system.elements.cell_displacement(displacement)
-            image = own @ full[0] if len(full) == 1 else np.einsum("mij,mj->mi", full, own)
-            energies[case] = np.einsum("mi,mi->m", own, image)
+        energies = {
+            case: self._energy(displacement, full)
+            for case, displacement in self._answer.solved(matrix).items()
+        }
         return self._answer.loaded(energies)
+
+    def energy(self, displacement: FloatArray, stiffness: FloatArray) -> FloatArray:
+        """Energy ``u^T k u`` (m,), N mm, of a displacement (n, 2) and a stiffness (m, 3, 3)."""
+        return self._energy(displacement, self._matrices(stiffness))
+
+    def stress(self, displacement: FloatArray, stiffness: FloatArray) -> FloatArray:
+        """Stress (m, 3), MPa, [s11, s22, s12] at the centre of each cell."""
+        strain = self.system.elements.centre_strain(displacement)
+        return np.einsum("mij,mj->mi", stiffness, strain)
 
 
 class TetCompliance:
@@ -144,24 +163,44 @@ class TetCompliance:
                 "the problem has a density already: give it as `start`, or fold it into stiffness"
             )
         self.system = prepare(problem)
+        self.weights = weights
         self._answer = _Answer(self.system, weights, backend)
         self.centres = problem.mesh.points[problem.mesh.cells].mean(axis=1)
         self.volumes = problem.mesh.volumes
 
-    def __call__(self, factor: FloatArray) -> Loaded:
-        """Answer with a factor (m,) on the stiffness of each cell."""
-        mesh, stiffness = self.system.problem.mesh, self.system.stiffness
-        matrix = assemble(mesh, stiffness, factor, self.system.where)
-        energies = {}
-        for case, displacement in self._answer.solved(matrix).items():
-            strain = cell_strain(mesh, displacement)
-            energies[case] = self.volumes * np.einsum(
-                "mi,...ij,mj->m" if stiffness.ndim == 2 else "mi,mij,mj->m",
-                strain,
-                stiffness,
-                strain,
-            )
+    def __call__(self, factor: FloatArray, stiffness: FloatArray | None = None) -> Loaded:
+        """Answer with a factor (m,) on the stiffness of each cell.
+
+        Parameters
+        ----------
+        factor : (m,) array in (0, 1]
+        stiffness : (m, 6, 6) array, MPa, optional
+            Of full density, where it is not the problem's.
+        """
+        full = self.system.stiffness if stiffness is None else stiffness
+        matrix = assemble(self.system.problem.mesh, full, factor, self.system.where)
+        energies = {
+            case: self.energy(displacement, full)
+            for case, displacement in self._answer.solved(matrix).items()
+        }
         return self._answer.loaded(energies)
+
+    def energy(self, displacement: FloatArray, stiffness: FloatArray) -> FloatArray:
+        """Energy ``u^T k u`` (m,), N mm, of a displacement (n, 3) and a stiffness (m, 6, 6)."""
+        strain = cell_strain(self.system.problem.mesh, displacement)
+        return self.volumes * np.einsum("mi,mi->m", strain, _times(stiffness, strain))
+
+    def stress(self, displacement: FloatArray, stiffness: FloatArray) -> FloatArray:
+        """Stress (m, 3), MPa, [s11, s22, s12] of each cell in the x-y plane."""
+        strain = cell_strain(self.system.problem.mesh, displacement)
+        return _times(stiffness[..., [0, 1, 5], :], strain)
+
+
+def _times(stiffness: FloatArray, strain: FloatArray) -> FloatArray:
+    """Stress (m, k) of strain (m, 6) with one stiffness (k, 6), or one a cell (m, k, 6)."""
+    if stiffness.ndim == 2:
+        return strain @ stiffness.T
+    return np.einsum("mki,mi->mk", stiffness, strain)
 
 
 class GroupedCompliance:
@@ -175,16 +214,33 @@ class GroupedCompliance:
     """
 
     def __init__(self, model: PlaneCompliance | TetCompliance, groups: IntArray) -> None:
-        self.model, self.groups = model, groups
+        self.model, self.groups, self.weights = model, groups, model.weights
         self.volumes: FloatArray = np.bincount(groups, model.volumes).astype(np.float64)
         sums = [np.bincount(groups, model.volumes * x) for x in model.centres.T]
         self.centres = np.stack(sums, axis=1) / self.volumes[:, None]
 
-    def __call__(self, factor: FloatArray) -> Loaded:
-        """Answer with a factor (g,) on the stiffness of each group; its energy is per group."""
-        answer = self.model(factor[self.groups])
-        energy = np.bincount(self.groups, answer.energy, len(self.volumes))
-        return answer._replace(energy=energy.astype(np.float64))
+    def _sum(self, values: FloatArray) -> FloatArray:
+        """Sum values (m,) over each group, (g,)."""
+        return np.bincount(self.groups, values, len(self.volumes)).astype(np.float64)
+
+    def __call__(self, factor: FloatArray, stiffness: FloatArray | None = None) -> Loaded:
+        """Answer with a factor (g,), and where given a stiffness (g, k, k), of each group.
+
+        The energy of the answer is per group.
+        """
+        own = None if stiffness is None else stiffness[self.groups]
+        answer = self.model(factor[self.groups], own)
+        return answer._replace(energy=self._sum(answer.energy))
+
+    def energy(self, displacement: FloatArray, stiffness: FloatArray) -> FloatArray:
+        """Energy (g,), N mm, of a displacement and a stiffness (g, k, k)."""
+        return self._sum(self.model.energy(displacement, stiffness[self.groups]))
+
+    def stress(self, displacement: FloatArray, stiffness: FloatArray) -> FloatArray:
+        """Mean stress (g, 3), MPa, in the x-y plane of each group."""
+        own = self.model.stress(displacement, stiffness[self.groups])
+        sums = [self._sum(self.model.volumes * part) for part in own.T]
+        return np.stack(sums, axis=1) / self.volumes[:, None]
 
 
 def compliance_of(

@@ -1,18 +1,15 @@
 """SIMP: densities of least compliance for a given volume, by optimality criteria."""
 
 from collections.abc import Mapping
-from dataclasses import replace
 from typing import Any
-
-import numpy as np
 
 from ccfem.arrays import BoolArray, FloatArray, IntArray
 from ccfem.elasticity.plane_problem import PlaneProblem
 from ccfem.elasticity.problem import Problem
-from ccfem.errors import InputError
 from ccfem.progress import Progress, silent
 from ccfem.topopt.compliance import GroupedCompliance, compliance_of
 from ccfem.topopt.design import Design
+from ccfem.topopt.groups import CellGroups
 from ccfem.topopt.iteration import Limits, iterate
 from ccfem.topopt.parametrisation import parametrise
 
@@ -91,34 +88,11 @@ def simp(
     """
     model: Any = compliance_of(problem, weights, backend)
     limits = Limits(volume_fraction, move, tolerance, objective_tolerance, iterations)
-    settings = (volume_fraction, penalty, radius, filter)
-    if groups is None:
-        space = parametrise(model, *settings, solid, void, least)
-        return iterate(problem, model, space, limits, start, progress)
-    member, first = _grouped(groups, len(model.volumes))
-    for name, value in (("solid", solid), ("void", void), ("start", start)):
-        if value is not None and np.shape(value) != member.shape:
-            raise InputError(
-                f"{name} must have one entry a cell ({len(member)}); got shape {np.shape(value)}"
-            )
-    solid = None if solid is None else np.asarray(solid)[first]
-    void = None if void is None else np.asarray(void)[first]
-    model = GroupedCompliance(model, member)
-    space = parametrise(model, *settings, solid, void, least)
-    start = None if start is None else np.asarray(start)[first]
+    cells = None if groups is None else CellGroups.of_cells(groups, len(model.volumes))
+    if cells is not None:
+        model = GroupedCompliance(model, cells.member)
+        solid, void = cells.reduced("solid", solid), cells.reduced("void", void)
+        start = cells.reduced("start", start)
+    space = parametrise(model, volume_fraction, penalty, radius, filter, solid, void, least)
     design = iterate(problem, model, space, limits, start, progress)
-    return replace(
-        design,
-        density=design.density[member],
-        variables=design.variables[member],
-        factor=design.factor[member],
-    )
-
-
-def _grouped(groups: IntArray, m: int) -> tuple[IntArray, IntArray]:
-    """Give groups numbers from 0 without gaps: that of each cell, and a cell of each group."""
-    given = np.asarray(groups)
-    if given.shape != (m,) or not np.issubdtype(given.dtype, np.integer):
-        raise InputError(f"groups must be {m} integers, one a cell; got shape {given.shape}")
-    _, first, member = np.unique(given, return_index=True, return_inverse=True)
-    return member.reshape(-1), first
+    return design if cells is None else cells.expanded(design)

@@ -15,7 +15,7 @@ from ccfem.elasticity import (
 from ccfem.errors import InputError
 from ccfem.materials import plane_stress
 from ccfem.topopt import compliance_of, simp, somp
-from ccfem.topopt.somp import OrientedCompliance
+from ccfem.topopt.orientation import OrientedCompliance
 
 FIBRE = plane_stress(50000.0, 4000.0, 0.3, 2500.0)
 WANG = plane_stress(18300.0, 19800.0, 0.17, 5150.0)
@@ -161,7 +161,7 @@ def test_the_design_is_mirrored_with_the_load():
 @pytest.mark.parametrize(
     ("more", "message"),
     [
-        ({"problem": None}, "give it a PlaneProblem"),
+        ({"material": np.eye(6)}, r"of shape \(3, 3\) here; got \(6, 6\)"),
         ({"orientation": "random"}, "there are: principal, gradient, fixed"),
         ({"relaxation": 0.0}, r"relaxation must lie in \(0, 1\]"),
         ({"angle": np.zeros(3)}, "one number or one a cell"),
