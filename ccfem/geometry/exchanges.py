@@ -1,0 +1,241 @@
+"""Order of many clusters by exchanges of stretches of it (2-opt, Or-opt).
+
+Every order is judged by its best terminals, found by dynamic programming along it; only what an
+exchange changes is computed anew. See `ordering` for what a cluster is.
+"""
+
+import time
+
+import numpy as np
+from numba import njit
+
+from ccfem.arrays import FloatArray, IntArray
+from ccfem.errors import InputError
+
+__all__ = ["searched_order"]
+
+_BLOCK = 3
+"""Most clusters that Or-opt moves at once."""
+_MANY = 50
+"""Clusters above which fewer rounds are made."""
+
+
+def searched_order(
+    links: FloatArray,
+    visit: FloatArray,
+    offsets: IntArray,
+    first: int,
+    last: int,
+    rounds: int,
+    time_limit: float,
+) -> IntArray:
+    """Order of the clusters by exchanges, from a greedy one and from disturbances of the best.
+
+    Parameters are those of `ordering.order_clusters`, with -1 for no first or last terminal.
+
+    Returns
+    -------
+    (p, 2) int array
+        Terminals entered and left, in order.
+    """
+    begun = time.monotonic()
+    count = len(offsets) - 1
+    best = _greedy(links, visit, offsets, first, last)
+    least = _exchange(best, links, visit, offsets, first, last)
+    random = np.random.default_rng(0)
+    fixed, free = int(first >= 0), count - int(last >= 0)
+    # A round costs about the cube of the count.
+    for _ in range(round(rounds * min(1.0, (_MANY / count) ** 2))):
+        if time.monotonic() - begun > time_limit:
+            break
+        # Two neighbouring stretches change places: what exchanges of one do not undo.
+        i, j, k = np.sort(random.integers(fixed, free + 1, 3))
+        order = np.concatenate([best[:i], best[j:k], best[i:j], best[k:]])
+        cost = _exchange(order, links, visit, offsets, first, last)
+        if cost < least - 1e-9 * abs(least):
+            best, least = order, cost
+    if not np.isfinite(least):
+        raise InputError("there is no way through all clusters: some visit must be possible")
+    return _along(best, links, visit, offsets, first, last)
+
+
+def _greedy(
+    links: FloatArray, visit: FloatArray, offsets: IntArray, first: int, last: int
+) -> IntArray:
+    """Order in which the next cluster is always the one that is cheapest to reach."""
+    cluster = np.repeat(np.arange(len(offsets) - 1), np.diff(offsets))
+    free = np.ones(len(links), dtype=bool)
+    final = cluster[last] if last >= 0 else -1
+    free[cluster == final] = False
+    value = np.where(cluster == (cluster[first] if first >= 0 else cluster[free][0]), 0.0, np.inf)
+    order: list[int] = []
+    while free.any():
+        chosen = int(cluster[np.flatnonzero(free)[np.argmin(value[free])]])
+        order.append(chosen)
+        own = cluster == chosen
+        free[own] = False
+        leave = (value[own][:, None] + visit[np.ix_(own, own)]).min(axis=0)
+        value = (leave[:, None] + links[own]).min(axis=0)
+    return np.array([*order, final] if last >= 0 else order, dtype=np.int64)
+
+
+@njit(cache=True, nogil=True)
+def _step(value, c, d, links, visit, offsets, entry, out):  # type: ignore[no-untyped-def]
+    """Costs of leaving cluster d into `out`, from those of leaving c in `value`; the least."""
+    least = np.inf
+    for a in range(offsets[d], offsets[d + 1]):
+        entry[a] = np.inf
+        for t in range(offsets[c], offsets[c + 1]):
+            entry[a] = min(entry[a], value[t] + links[t, a])
+    for b in range(offsets[d], offsets[d + 1]):
+        cost = np.inf
+        for a in range(offsets[d], offsets[d + 1]):
+            cost = min(cost, entry[a] + visit[a, b])
+        out[b] = cost
+        least = min(least, cost)
+    return least
+
+
+@njit(cache=True, nogil=True)
+def _begin(c, visit, offsets, first, out):  # type: ignore[no-untyped-def]
+    """Costs of leaving the first cluster c of a way into `out`; the least."""
+    least = np.inf
+    for b in range(offsets[c], offsets[c + 1]):
+        out[b] = np.inf
+        for a in range(offsets[c], offsets[c + 1]):
+            if first < 0 or first == a:
+                out[b] = min(out[b], visit[a, b])
+        least = min(least, out[b])
+    return least
+
+
+@njit(cache=True, nogil=True)
+def _table(order, links, visit, offsets, first, last, ahead, behind):  # type: ignore[no-untyped-def]
+    """Fill costs of leaving each cluster from the start, and from entering it to the end."""
+    entry = np.empty(len(links))
+    _begin(order[0], visit, offsets, first, ahead)
+    for k in range(1, len(order)):
+        _step(ahead, order[k - 1], order[k], links, visit, offsets, entry, ahead)
+    for k in range(len(order) - 1, -1, -1):
+        c = order[k]
+        for b in range(offsets[c], offsets[c + 1]):
+            entry[b] = 0.0 if last < 0 or last == b else np.inf
+            if k < len(order) - 1:
+                entry[b] = np.inf
+                d = order[k + 1]
+                for a in range(offsets[d], offsets[d + 1]):
+                    entry[b] = min(entry[b], links[b, a] + behind[a])
+        for a in range(offsets[c], offsets[c + 1]):
+            behind[a] = np.inf
+            for b in range(offsets[c], offsets[c + 1]):
+                behind[a] = min(behind[a], visit[a, b] + entry[b])
+    c = order[0]
+    least = np.inf
+    for a in range(offsets[c], offsets[c + 1]):
+        if first < 0 or first == a:
+            least = min(least, behind[a])
+    return least
+
+
+@njit(cache=True, nogil=True)
+def _rearranged(window, variant, out):  # type: ignore[no-untyped-def]
+    """Fill `out` with the window reversed, or with a block moved from one of its ends to the other.
+
+    Variant 0 reverses; then, for 1 to 3 clusters: from the front, from the back, each as it is or
+    reversed. Returns whether the variant is a new one for a window of this size.
+    """
+    size = len(window)
+    if variant == 0:
+        out[:] = window[::-1]
+        return True
+    block, way = (variant - 1) // 4 + 1, (variant - 1) % 4
+    if block >= size or (block == 1 and way > 1):
+        return False
+    if way % 2 == 0:
+        out[: size - block] = window[block:]
+        moved = window[:block]
+        out[size - block :] = moved if way < 2 else moved[::-1]
+    else:
+        out[block:] = window[: size - block]
+        moved = window[size - block :]
+        out[:block] = moved if way < 2 else moved[::-1]
+    return True
+
+
+@njit(cache=True, nogil=True)
+def _exchange(order, links, visit, offsets, first, last):  # type: ignore[no-untyped-def]
+    """Rearrange windows of `order`, in place, until no rearrangement helps; the cost."""
+    ahead, behind = np.empty(len(links)), np.empty(len(links))
+    value, entry = np.empty(len(links)), np.empty(len(links))
+    least = _table(order, links, visit, offsets, first, last, ahead, behind)
+    trial = np.empty_like(order)
+    lowest, highest = int(first >= 0), len(order) - int(last >= 0)
+    helped = True
+    while helped:
+        helped = False
+        for i in range(lowest, highest):
+            for j in range(i + 2, highest + 1):
+                for variant in range(1 + 4 * _BLOCK):
+                    part = trial[: j - i]
+                    if not _rearranged(order[i:j], variant, part):
+                        continue
+                    limit = least * (1.0 - 1e-9)
+                    cost = _cost_with(
+                        part, i, order, links, visit, offsets, ahead, behind, value, entry, limit
+                    )
+                    if cost < limit:
+                        order[i:j] = part
+                        least = _table(order, links, visit, offsets, first, last, ahead, behind)
+                        helped = True
+    return least
+
+
+@njit(cache=True, nogil=True)
+def _cost_with(part, i, order, links, visit, offsets, ahead, behind, value, entry, limit):  # type: ignore[no-untyped-def]
+    """Cost of the way with `part` from position i on; inf once it cannot be below the limit."""
+    j = i + len(part)
+    rest = 0.0
+    if j < len(order):
+        rest = behind[offsets[order[j]] : offsets[order[j] + 1]].min()
+    if i == 0:
+        cost = _begin(part[0], visit, offsets, -1, value)
+    else:
+        cost = _step(ahead, order[i - 1], part[0], links, visit, offsets, entry, value)
+    for k in range(1, len(part)):
+        if cost + rest >= limit:
+            return np.inf
+        cost = _step(value, part[k - 1], part[k], links, visit, offsets, entry, value)
+    if j == len(order):
+        return cost
+    c, d = part[-1], order[j]
+    cost = np.inf
+    for t in range(offsets[c], offsets[c + 1]):
+        for a in range(offsets[d], offsets[d + 1]):
+            cost = min(cost, value[t] + links[t, a] + behind[a])
+    return cost
+
+
+def _along(
+    order: IntArray,
+    links: FloatArray,
+    visit: FloatArray,
+    offsets: IntArray,
+    first: int,
+    last: int,
+) -> IntArray:
+    """Terminals entered and left on the best way through clusters in a given order."""
+    ahead, behind = np.full(len(links), np.inf), np.empty(len(links))
+    _table(order, links, visit, offsets, first, last, ahead, behind)
+    way: list[tuple[int, int]] = []
+    value = np.where(np.arange(len(links)) == first, 0.0, np.inf if first >= 0 else 0.0)
+    for k, c in enumerate(order):
+        own = slice(offsets[c], offsets[c + 1])
+        entered = int(offsets[c] + np.argmin(value[own] + behind[own]))
+        rest = np.where(np.arange(len(links)) == last, 0.0, np.inf if last >= 0 else 0.0)
+        if k + 1 < len(order):
+            following = slice(offsets[order[k + 1]], offsets[order[k + 1] + 1])
+            rest = (links[:, following] + behind[following]).min(axis=1)
+        left = int(offsets[c] + np.argmin(visit[entered, own] + rest[own]))
+        way.append((entered, left))
+        value = links[left]
+    return np.array(way)
