@@ -100,7 +100,7 @@ class AlignmentSamples:
 
 
 def sample_alignment(paths: PlanePaths, stress: LayerStress, step: float) -> AlignmentSamples:
-    """Stress along the paths of a layer.
+    """Stress along the paths of a layer, links in the part included.
 
     Parameters
     ----------
@@ -113,7 +113,8 @@ def sample_alignment(paths: PlanePaths, stress: LayerStress, step: float) -> Ali
         files) meet no stress and are left out.
     """
     layer = paths.layer
-    points, tangents, length, _ = sample_midpoints(paths.points, paths.offsets, step)
+    lines = paths.in_part
+    points, tangents, length, _ = sample_midpoints(lines.points, lines.offsets, step)
     triangle, weights = locate(layer.plane_points, layer.triangles, points, _ROUNDING)
     inside = triangle >= 0
     corners = in_plane(stress.nodal, layer.frame)[layer.triangles[triangle[inside]]]

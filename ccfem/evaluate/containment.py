@@ -9,24 +9,23 @@ import shapely
 from ccfem.arrays import FloatArray
 from ccfem.evaluate.column import Column
 from ccfem.evaluate.plane_paths import PlanePaths
+from ccfem.geometry.places import TOLERANCE
 
 __all__ = ["COLUMNS", "ContainmentSamples", "containment_indices", "sample_containment"]
-
-_TOLERANCE = 1e-4
-"""Fibre no further than this, mm, outside the section counts as inside: rounding of coordinates."""
 
 COLUMNS = (
     Column(
         "outside_length",
         "mm",
-        f"Length of fibre axis more than {_TOLERANCE:g} mm outside the section of its layer.",
+        f"Length of fibre axis more than {TOLERANCE:g} mm outside the section of its layer, links "
+        "left out: see link_outside and link_over_void.",
         ">= 0, 0 is best",
     ),
     Column(
         "outside_depth",
         "mm",
-        "Largest distance of a point of the fibre's axis from the section of its layer, to 0.0001 "
-        "mm; 0 where outside_length is 0.",
+        "Largest distance of a point of the fibre's axis, links left out, from the section of its "
+        "layer, to 0.0001 mm; 0 where outside_length is 0.",
         ">= 0, 0 is best",
     ),
 )
@@ -41,11 +40,12 @@ class ContainmentSamples:
 
 
 def sample_containment(paths: PlanePaths) -> ContainmentSamples:
-    """Fibre of a layer that lies outside its polygon (the axis of it, without its width)."""
+    """Fibre of a layer, but links, that lies outside its polygon (the axis, without its width)."""
+    paths = paths.strands
     if not len(paths):
         return ContainmentSamples(np.zeros(1), np.zeros(1))
     section = paths.layer.polygon
-    grown = section.buffer(_TOLERANCE, quad_segs=2)
+    grown = section.buffer(TOLERANCE, quad_segs=2)
     shapely.prepare(grown)
     index = np.repeat(np.arange(len(paths)), np.diff(paths.offsets))
     lines = shapely.linestrings(paths.points, indices=index)
@@ -77,7 +77,7 @@ def _depth(lines: Any, section: Any) -> float:
         near, far = start[edge], end[edge]
         best = max(best, float(_to_edges(middle, near, far).max()))
         bound = np.maximum(_to_edges(a, near, far), _to_edges(b, near, far))
-        left = bound > best + _TOLERANCE
+        left = bound > best + TOLERANCE
         a, b = (
             np.concatenate([a[left], middle[left]]),
             np.concatenate([middle[left], b[left]]),

@@ -16,13 +16,21 @@ __all__ = ["COLUMNS", "CoverageSamples", "coverage_indices", "sample_coverage"]
 
 _SAMPLES = (
     "the section, sampled on a square grid of a fifth of a fibre width, that lies within half a "
-    "fibre width of a fibre path"
+    "fibre width of a fibre path (without links outside the section or over a void)"
 )
 _RANGE = "0 to 1; NaN for an empty section"
 _STRESS = "with S1+ = max(S1, 0), S1 the larger in-plane principal value of the nodal stress"
 
 COLUMNS = (
     Column("coverage", "1", f"Share of the area of {_SAMPLES}.", _RANGE),
+    Column(
+        "overfill",
+        "1",
+        "Length of the fibre, without links outside the section or over a void, times the fibre "
+        "width, over the area of the section: what coverage would be, did no strands overlap or "
+        "lie over the border.",
+        ">= 0; NaN for an empty section",
+    ),
     Column(
         "coverage_stress",
         "1",
@@ -60,10 +68,23 @@ _SHIFT = (0.381966, 0.276393)
 
 @dataclass(frozen=True)
 class CoverageSamples:
-    """Samples of equal area inside the section, (s,) each: S1+, MPa, and whether covered."""
+    """Samples of equal area inside the section, and whole areas of a layer.
+
+    Attributes
+    ----------
+    tension : (s,) array, MPa
+        S1+.
+    covered : (s,) bool array
+    laid : (1,) array, mm^2
+        Length of the fibre times its width.
+    area : (1,) array, mm^2
+        Of the section.
+    """
 
     tension: FloatArray
     covered: BoolArray
+    laid: FloatArray
+    area: FloatArray
 
 
 def sample_coverage(paths: PlanePaths, stress: LayerStress, width: float) -> CoverageSamples:
@@ -78,7 +99,7 @@ def sample_coverage(paths: PlanePaths, stress: LayerStress, width: float) -> Cov
         Fibre width W: the band that a path covers. Grid points lie 0.2 W apart, so that a
         straight strand along an axis of the layer counts with its exact width.
     """
-    layer = paths.layer
+    layer, paths = paths.layer, paths.in_part
     step = 0.2 * width
     plane = layer.plane_points
     low, high = plane.min(axis=0), plane.max(axis=0)
@@ -95,7 +116,12 @@ def sample_coverage(paths: PlanePaths, stress: LayerStress, width: float) -> Cov
     first = np.flatnonzero(start)
     _paint_paths(covered, origin, step, pieces[first], pieces[first + 1], 0.5 * width)
     inside = tension >= 0.0
-    return CoverageSamples(tension[inside], covered[inside])
+    return CoverageSamples(
+        tension[inside],
+        covered[inside],
+        np.array([width * paths.lengths.sum()]),
+        np.array([layer.areas.sum()]),
+    )
 
 
 @njit(cache=True)
@@ -174,6 +200,7 @@ def coverage_indices(samples: CoverageSamples) -> dict[str, float]:
 
     values = {
         "coverage": float(covered.mean()),
+        "overfill": float(samples.laid.sum() / samples.area.sum()),
         "coverage_stress": float(tension[covered].sum()) / total if total > 0.0 else float("nan"),
     }
     quartiles = [*limits[:4], limits[-1]]

@@ -3,19 +3,25 @@
 from dataclasses import dataclass
 
 import numpy as np
+import shapely
 
 from ccfem.arrays import FloatArray
 from ccfem.evaluate.column import Column
 from ccfem.evaluate.plane_paths import PlanePaths
-from ccfem.geometry.polylines import resample, turning_angles
+from ccfem.geometry.polylines import arc_lengths, resample, turning_angles
 from ccfem.machine import Machine
 
 __all__ = ["COLUMNS", "CurvatureSamples", "curvature_indices", "sample_curvature"]
 
+_SIMPLIFY = 0.02
+"""Tolerance, over the step of the resampling, of the simplification before vertices are counted:
+points that lie straight between others are not the planner's turns (specification, H1)."""
+
 _FORMULA = (
     "of the curvature over the fibre's length: every path is resampled in equal steps h of about "
     "one fibre width of arc length, and the curvature at a resampled point is the angle between "
-    "the chords before and behind it, over h."
+    "the chords before and behind it, over h. Links outside the section or over a void are left "
+    "out."
 )
 _RANGE = ">= 0, at most pi / h; NaN where no path has three resampled points"
 
@@ -32,10 +38,20 @@ COLUMNS = (
         "0 to 1, 1 is best; NaN where no path has three resampled points",
     ),
     Column(
+        "curvature_ok_native",
+        "1",
+        "Share of the vertices of the paths as planned, simplified by Douglas and Peucker to a "
+        "fiftieth of a fibre width, at which the curvature is below 1 / the machine's minimum "
+        "radius: 2 sin(a / 2) over the mean length of the two steps between which the path turns "
+        "by a. Links outside the section or over a void are left out. It weighs tight turns more "
+        "than curvature_ok, for they have more vertices (Wang et al. 2021 count points).",
+        "0 to 1, 1 is best; NaN where no path has an inner vertex",
+    ),
+    Column(
         "turns_45",
         "1/m",
         "Points of the paths as planned, not resampled, at which they turn by more than 45 "
-        "degrees, per metre of fibre.",
+        "degrees, per metre of fibre, links included.",
         ">= 0; NaN without fibre",
     ),
     Column(
@@ -49,9 +65,22 @@ COLUMNS = (
 
 @dataclass(frozen=True)
 class CurvatureSamples:
-    """Curvature (s,), 1/mm, native turning angles (v,), radians, and fibre length (1,), mm."""
+    """Curvature along the fibre of a layer.
+
+    Attributes
+    ----------
+    curvature : (s,) array, 1/mm
+        At points equally far apart.
+    native : (n,) array, 1/mm
+        At the vertices of the simplified paths.
+    turns : (v,) array, radians
+        Turning angles at the vertices as planned.
+    length : (1,) array, mm
+        Of the fibre.
+    """
 
     curvature: FloatArray
+    native: FloatArray
     turns: FloatArray
     length: FloatArray
 
@@ -65,25 +94,52 @@ def sample_curvature(paths: PlanePaths, step: float) -> CurvatureSamples:
     step : float, mm
         Wanted step h of the resampling; a path of length L gets ``max(1, round(L / h))`` equal
         steps. On a circle of radius R the samples are 1 / R. Closed paths are also sampled where
-        they close; the ends of open paths have no curvature.
+        they close; the ends of open paths have no curvature. The vertices as planned are first
+        simplified to a fiftieth of this.
 
     Notes
     -----
     Curvature from the planned points themselves would depend on how densely they lie.
     """
-    points, offsets = resample(paths.points, paths.offsets, step)
-    angle = turning_angles(points, offsets, paths.closed)
+    lines = paths.in_part
+    points, offsets = resample(lines.points, lines.offsets, step)
+    angle = turning_angles(points, offsets, lines.closed)
     inner = np.ones(len(points), dtype=bool)
-    inner[offsets[:-1]] = paths.closed
+    inner[offsets[:-1]] = lines.closed
     inner[offsets[1:] - 1] = False
-    size = np.repeat(paths.lengths, np.diff(offsets)) / np.repeat(
+    size = np.repeat(lines.lengths, np.diff(offsets)) / np.repeat(
         np.maximum(np.diff(offsets) - 1, 1), np.diff(offsets)
     )
     return CurvatureSamples(
         (angle / size)[inner],
+        _native(lines, _SIMPLIFY * step),
         turning_angles(paths.points, paths.offsets, paths.closed),
         np.array([paths.lengths.sum()]),
     )
+
+
+def _native(paths: PlanePaths, tolerance: float) -> FloatArray:
+    """Curvature at the inner vertices of simplified paths, 1/mm.
+
+    ``2 sin(a / 2) / h`` (Wang et al. 2021) is the curvature of the circle through three vertices
+    that lie equally far apart.
+    """
+    if not len(paths):
+        return np.zeros(0)
+    index = np.repeat(np.arange(len(paths)), np.diff(paths.offsets))
+    lines = shapely.linestrings(paths.points, indices=index)
+    simple = shapely.simplify(lines, tolerance, preserve_topology=False)
+    points = shapely.get_coordinates(simple)
+    offsets = np.concatenate([[0], np.cumsum(shapely.get_num_coordinates(simple))])
+    along = np.append(arc_lengths(points, offsets), 0.0)
+    before, after = along[:-1] - np.roll(along[:-1], 1), along[1:] - along[:-1]
+    first, last = offsets[:-1], offsets[1:] - 1
+    before[first] = before[last]
+    inner = np.ones(len(points), dtype=bool)
+    inner[first], inner[last] = paths.closed, False
+    step = 0.5 * (before + after)[inner]
+    angle = turning_angles(points, offsets, paths.closed)[inner]
+    return 2.0 * np.sin(0.5 * angle[step > 0.0]) / step[step > 0.0]
 
 
 def curvature_indices(samples: CurvatureSamples, machine: Machine) -> dict[str, float]:
@@ -92,12 +148,13 @@ def curvature_indices(samples: CurvatureSamples, machine: Machine) -> dict[str, 
     none = not len(curvature)
     shares = [0.5, 0.8, 0.95, 1.0]
     quantiles = [np.nan] * 4 if none else np.quantile(curvature, shares, method="inverted_cdf")
-    ok = np.nan if none else float((curvature * machine.minimum_radius < 1.0).mean())
     values = {
         f"curvature_{name}": float(value)
         for name, value in zip(("50", "80", "95", "max"), quantiles, strict=True)
     }
-    values["curvature_ok"] = ok
+    for name, found in (("", curvature), ("_native", samples.native)):
+        ok = found * machine.minimum_radius < 1.0
+        values[f"curvature_ok{name}"] = float(ok.mean()) if len(ok) else np.nan
     for degrees in (45, 90):
         count = float((samples.turns > np.radians(degrees) + 1e-9).sum())
         values[f"turns_{degrees}"] = count / metres if metres > 0.0 else np.nan

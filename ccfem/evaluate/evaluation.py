@@ -16,6 +16,7 @@ from ccfem.evaluate import (
     coverage,
     crossings,
     curvature,
+    links,
     manufacture,
     sinuosity,
     spacing,
@@ -41,6 +42,7 @@ COLUMNS: tuple[Column, ...] = (
     *spacing.COLUMNS,
     *coverage.COLUMNS,
     *containment.COLUMNS,
+    *links.COLUMNS,
     *crossings.COLUMNS,
 )
 """Every index in the order of the tables."""
@@ -175,12 +177,13 @@ def _sample(toolpaths: Toolpaths, layer: Layer, stress: StressField, machine: Ma
         spacing.sample_spacing(paths, width),
         coverage.sample_coverage(paths, on_layer, width),
         containment.sample_containment(paths),
+        links.sample_links(paths),
         crossings.sample_crossings(paths),
     ]
 
 
 def _indices(samples: Sequence[Any], machine: Machine) -> dict[str, float]:
-    make, wind, turn, align, space, cover, contain, cross = samples
+    make, wind, turn, align, space, cover, contain, link, cross = samples
     return {
         **manufacture.manufacture_indices(make, machine),
         **sinuosity.sinuosity_indices(wind),
@@ -190,5 +193,6 @@ def _indices(samples: Sequence[Any], machine: Machine) -> dict[str, float]:
         **spacing.spacing_indices(space, machine),
         **coverage.coverage_indices(cover),
         **containment.containment_indices(contain),
+        **links.link_indices(link),
         **crossings.crossing_indices(cross),
     }

@@ -15,7 +15,8 @@ from ccfem.machine import Machine
 __all__ = ["COLUMNS", "SpacingSamples", "sample_spacing", "spacing_indices"]
 
 _FORMULA = (
-    "of the distance from the fibre, sampled every fifth of a fibre width, to the nearest point "
+    "of the distance from the fibre (without links outside the section or over a void), sampled "
+    "every fifth of a fibre width, to the nearest point "
     "(exactly, not only to sampled points) of another path of the layer, or of the same path at "
     "an arc distance of at least five fibre widths. Distances above five fibre widths count as "
     "that."
@@ -58,6 +59,7 @@ def sample_spacing(paths: PlanePaths, width: float) -> SpacingSamples:
         closed path the shorter way); the search ends at 5 W, so that a strand on its own, and a
         straight one, whose own points are that far away, have the spacing 5 W.
     """
+    paths = paths.in_part
     if not len(paths):
         return SpacingSamples(np.zeros(0), np.zeros(0))
     reach = 5.0 * width

@@ -7,7 +7,7 @@ import shapely
 
 from ccfem.arrays import FloatArray, IntArray
 
-__all__ = ["INSIDE", "OUTSIDE", "VOID", "Pieces", "cut_at_section", "section_places"]
+__all__ = ["INSIDE", "OUTSIDE", "TOLERANCE", "VOID", "Pieces", "cut_at_section", "section_places"]
 
 INSIDE, VOID, OUTSIDE = range(3)
 """In the section; in a hole of it, or anywhere else within its outer rings; beyond those."""

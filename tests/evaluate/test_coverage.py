@@ -79,13 +79,19 @@ def test_without_tension_only_the_area_counts(make_part, uniform):
     for stress in (uniform(0.0), uniform(-3.0, -1.0)):
         values = indices(make_part(stress), [[0, 20], [60, 20]])
         assert np.isnan(values.pop("coverage_stress"))
-        assert list(values.values()) == pytest.approx([1.0 / 40.0] * 7, abs=0.001)
+        assert list(values.values()) == pytest.approx([1.0 / 40.0] * 8, abs=0.001)
 
 
 def test_fibre_outside_the_section_covers_nothing(pulled):
     assert indices(pulled, [[0, -20], [60, -20]], [[-50, 90], [-20, 90]])["coverage"] == 0.0
     # Half of a strand on the edge lies inside.
     assert indices(pulled, [[0, 0], [60, 0]])["coverage"] == pytest.approx(0.5 / 40.0, abs=0.003)
+
+
+def test_overfill_counts_overlapping_strands_twice(pulled):
+    values = indices(pulled, *[[[0, y], [60, y]] for y in (10, 10, 10.4, 20)], width=2.0)
+    assert values["overfill"] == pytest.approx(4 * 2.0 / 40.0)
+    assert values["coverage"] == pytest.approx((2.4 + 2.0) / 40.0, abs=0.001)
 
 
 def test_no_path_covers_nothing(pulled):

@@ -90,6 +90,32 @@ def test_more_points_on_the_same_curve_change_nothing(pulled):
     assert many == pytest.approx(few, rel=1e-6, abs=1e-6)
 
 
+@pytest.mark.parametrize("closed", [True, False])
+def test_vertices_of_a_polygon_have_the_curvature_of_its_circle(pulled, closed):
+    # 40 chords of a circle of 10 mm lie 0.03 mm inside it: none is simplified away.
+    line = arc(10.0, end=2.0 * np.pi if closed else np.pi, points=41 if closed else 21)
+    samples = sample_curvature(pulled.plane(line), 1.0)
+    assert len(samples.native) == (40 if closed else 19)
+    assert samples.native == pytest.approx(0.1, rel=1e-9)
+
+
+def test_vertices_count_one_by_one_once_straight_ones_are_gone(pulled):
+    # Half a circle of 2 mm at the end of two strands; points straight between others do not count.
+    turn = arc(2.0, -0.5 * np.pi, 0.5 * np.pi, 10, (40.0, 20.0))
+    leg = np.linspace(5.0, 40.0, 30, endpoint=False)
+    lower, upper = np.stack([leg, 0 * leg + 18.0], 1), np.stack([leg[::-1], 0 * leg + 22.0], 1)
+    wave = np.array([[5.0, 5.0], [20.0, 6.0], [35.0, 5.0], [50.0, 6.0]])
+    values = indices(pulled.plane(np.concatenate([lower, turn, upper]), wave))
+    # The two where the turn meets the strands have a long step at their side: they bend little.
+    assert values["curvature_ok_native"] == pytest.approx((2.0 + 2.0) / (10.0 + 2.0))
+    assert values["curvature_ok"] > 0.9
+
+
+def test_a_hairpin_is_as_sharp_as_two_steps_allow(pulled):
+    native = sample_curvature(pulled.plane([[5, 5], [25, 5], [15, 5.0]]), 1.0).native
+    assert native == pytest.approx(2.0 / 15.0)
+
+
 def test_no_path(pulled):
     values = indices(pulled.plane())
     assert np.isnan(list(values.values())).all()

@@ -195,7 +195,9 @@ def generic_lines(draw):
     spread = draw(st.sampled_from([1.0, 10.0, 64.0]))
     start = rng.random((len(sizes), 1, 2)) * [60.0, 40.0]
     ends = [a + spread * (rng.random((n, 2)) - 0.5) for a, n in zip(start, sizes, strict=True)]
-    return [np.clip(line, -2.0, [62.0, 42.0]) for line in ends]
+    # Folded back at 2 mm outside the plate: cut off there, lines would double back on its edge.
+    size = np.array([64.0, 44.0])
+    return [size - np.abs(size - (line + 2.0) % (2.0 * size)) - 2.0 for line in ends]
 
 
 @settings(max_examples=25, deadline=None)
