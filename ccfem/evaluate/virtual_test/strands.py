@@ -39,7 +39,7 @@ class Strands:
         Arc length of the path at the middle of the piece.
     middle : (s, 3) array, mm
     outside : float, mm
-        Length of fibre that lies outside the mesh and carries nothing.
+        Length of fibre, links left out, that lies outside the mesh and carries nothing.
     """
 
     cell: IntArray
@@ -71,11 +71,12 @@ def cut_strands(toolpaths: Toolpaths, mesh: TetMesh, most_outside: float = 0.01)
     Parameters
     ----------
     toolpaths : Toolpaths
-        Paths of other kinds than fibre are left out.
+        Paths of other kinds than fibre are left out, and so is what of their links lies outside the
+        mesh: beyond the part they are cut off, and over a void nothing embeds them.
     mesh : TetMesh
         Quadratic cells are taken as straight-sided.
     most_outside : float in [0, 1], default 0.01
-        Share of the fibre length that may lie outside the mesh.
+        Share of the fibre length, links left out, that may lie outside the mesh.
 
     Returns
     -------
@@ -86,7 +87,8 @@ def cut_strands(toolpaths: Toolpaths, mesh: TetMesh, most_outside: float = 0.01)
     Raises
     ------
     InputError
-        When there is no fibre, or when more of it than allowed lies outside the mesh.
+        When there is no fibre, or none but links outside the mesh; or when more of it than allowed
+        lies outside.
     """
     follows = np.repeat(toolpaths.kind == FIBRE, np.diff(toolpaths.offsets))
     follows[toolpaths.offsets[1:] - 1] = False
@@ -112,11 +114,17 @@ def cut_strands(toolpaths: Toolpaths, mesh: TetMesh, most_outside: float = 0.01)
     segment, cell = whole[:count].T
     begin, end, share = real[:count].T
     piece = (end - begin) * length[segment]
-    inside = float((piece * share).sum())
-    outside = max(float(length.sum()) - inside, 0.0)
-    if outside > most_outside * length.sum():
+    own = np.where(toolpaths.link[first_point], 0.0, length)
+    if not count and not own.any():
         raise InputError(
-            f"fibre must lie inside the mesh; {outside:.4g} mm of {length.sum():.4g} mm lie "
+            f"the virtual test needs fibre inside the mesh; got {length.sum():.4g} mm of links "
+            "outside it: lay strands, or mark as links only what joins them"
+        )
+    inside = float(((end - begin) * own[segment] * share).sum())
+    outside = max(float(own.sum()) - inside, 0.0)
+    if outside > most_outside * own.sum():
+        raise InputError(
+            f"fibre must lie inside the mesh; {outside:.4g} mm of {own.sum():.4g} mm lie "
             f"outside ({100 * outside / length.sum():.2g} %, allowed {100 * most_outside:g} %): "
             "give paths and mesh in the same frame and unit"
         )

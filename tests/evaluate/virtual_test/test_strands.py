@@ -1,6 +1,7 @@
 """Strands: nothing lost, nothing counted twice, wherever the path runs."""
 
 import itertools
+from dataclasses import replace
 
 import numpy as np
 import pytest
@@ -154,6 +155,27 @@ def test_the_part_outside_is_reported_and_above_one_percent_refused():
         cut_strands(toolpaths(np.array([[0.5, 1.0, 1.1], [3.2, 1.0, 1.1]])), kuhn())
     with pytest.raises(InputError, match=r"1 mm of 1 mm lie outside .*same frame"):
         cut_strands(toolpaths(np.array([[0.5, 1.0, 50.0], [0.5, 2.0, 50.0]])), kuhn())
+
+
+def test_links_carry_where_they_are_in_the_mesh_and_may_leave_it():
+    # 2 mm to the face, out and back over 3 mm that are links, and 1.5 mm on.
+    line = np.array([[1, 0.4, 1.1], [3, 0.4, 1.1], [4, 0.4, 1.1], [4, 1.4, 1.1], [1.5, 1.4, 1.1]])
+    paths = toolpaths(line)
+    marked = replace(paths, link=np.array([False, True, True, True, False]))
+    strands = cut_strands(marked, kuhn())
+    assert strands.total == pytest.approx(2.0 + 1.5)
+    assert strands.outside == 0.0
+    # Arc length runs on over the link, so places along the path are those of the toolpaths.
+    assert strands.arc[strands.middle[:, 1] > 1.0].min() > 2.0 + 3.0
+    bare = cut_strands(toolpaths(line[:2], np.array([[3.0, 1.4, 1.1], [1.5, 1.4, 1.1]])), kuhn())
+    assert np.sort(strands.cell).tolist() == np.sort(bare.cell).tolist()
+    assert np.sort(strands.length) == pytest.approx(np.sort(bare.length))
+    # What is no link must stay inside.
+    with pytest.raises(InputError, match=r"2 mm of 5.5 mm lie outside"):
+        cut_strands(replace(paths, link=np.array([False, False, True, False, False])), kuhn())
+    beyond = toolpaths(line[2:4])
+    with pytest.raises(InputError, match=r"1 mm of links outside"):
+        cut_strands(replace(beyond, link=np.array([True, False])), kuhn())
 
 
 def test_a_gap_in_the_part_is_outside():
