@@ -5,7 +5,8 @@ parameter that sets how much it lays (`Strategy.amount`), and `plan_to_length` s
 """
 
 from collections.abc import Callable, Mapping, Sequence
-from dataclasses import dataclass, replace
+from dataclasses import dataclass, field, replace
+from functools import cached_property
 from typing import Any
 
 import numpy as np
@@ -21,14 +22,19 @@ __all__ = ["TOLERANCE", "Planned", "check_wanted", "length_per_layer", "plan_to_
 
 TOLERANCE = 0.01
 """Share by which the length may fall short before the search stops."""
-_GUESSES = 2
+_GUESSES = 3
 """Plans of the whole stack from a known one, before anything is searched."""
+_CLOSE = 0.1
+"""Difference of two plans on either side of the wanted length, as a share of it, up to which some
+layers may take the one and some the other without a further search."""
 _ROUNDS = 3
 """Plans of the whole stack."""
 _STEPS = 8
 """Plans of the few layers that stand for the stack, in each round."""
 _FINEST = 1e-5
 """Share of the parameter's range below which a step in length is taken for what it is."""
+_POWERS = (0.5, 3.0)
+"""Bounds of the power of the parameter that the length is taken to go with."""
 _FEW = 4
 """Stacks of at most this many layers are searched as they are."""
 
@@ -76,12 +82,14 @@ def plan_to_length(
 ) -> Planned:
     """Plan with the value of the amount parameter that lays at most the wanted fibre.
 
-    Where a plan of the whole stack is known, two guesses are made from it. After that the value is
-    searched on the bottom, middle and top layer, then checked on the whole stack; the
-    ratio of the two lengths corrects the next search. Of the values tried on the whole stack, the
-    one that lays most without laying too much is kept. Where the length changes in steps (one
-    contour more or less) and that leaves too much missing, some layers, evenly spread, take the
-    next value that lays more; where even the least is too much, some layers stay without fibre.
+    Where a plan of the whole stack is known, a few guesses are made from it. As soon as two plans
+    lie close on either side of the wanted length, some layers, evenly spread, take the one that
+    lays more. Otherwise the value is searched on the bottom, middle and top layer, then checked on
+    the whole stack; the ratio of the two lengths corrects the next search. Of the values tried on
+    the whole stack, the one that lays most without laying too much is kept. Where the length
+    changes in steps (one contour more or less) and that leaves too much missing, again some layers
+    take the next value that lays more; where even the least is too much, some layers stay without
+    fibre.
 
     Parameters
     ----------
@@ -108,57 +116,118 @@ def plan_to_length(
         When `wanted` is not a positive number, or whatever the strategy raises.
     """
     check_wanted(wanted)
-    few = layers if len(layers) <= _FEW else [layers[0], layers[len(layers) // 2], layers[-1]]
-    amount = strategy.amount
-    sampled: dict[float, float] = {}
-    tried: dict[float, Planned] = {}
+    trials = _Trials(strategy, layers, stress, machine, wanted, tolerance)
+    own = getattr(strategy, strategy.amount.parameter)
+    if start is not None and own is not None:
+        trials.tried[float(own)] = start
+        near = trials.guess()
+        if near is not None:
+            return near
+    return trials.search()
 
-    def planned(value: float, on: Sequence[Layer]) -> Planned:
-        changed = _with_value(strategy, amount, value)
-        toolpaths = plan(changed, on, stress, machine)
+
+@dataclass
+class _Trials:
+    """Plans of one strategy with several values of its parameter, on the way to a length."""
+
+    strategy: Strategy
+    layers: Sequence[Layer]
+    stress: StressField
+    machine: Machine
+    wanted: float
+    tolerance: float
+    tried: dict[float, Planned] = field(default_factory=dict)
+    sampled: dict[float, float] = field(default_factory=dict)
+
+    @cached_property
+    def few(self) -> Sequence[Layer]:
+        """Layers that stand for the stack."""
+        layers = self.layers
+        return layers if len(layers) <= _FEW else [layers[0], layers[len(layers) // 2], layers[-1]]
+
+    def planned(self, value: float, on: Sequence[Layer]) -> Planned:
+        changed = _with_value(self.strategy, self.strategy.amount, value)
+        toolpaths = plan(changed, on, self.stress, self.machine)
         return Planned(changed, toolpaths, length_per_layer(toolpaths, on))
 
-    def sample(value: float) -> float:
-        if value not in sampled:
-            result = planned(value, few)
-            if few is layers:
-                tried[value] = result
-            sampled[value] = result.length_per_layer
-        return sampled[value]
+    def sample(self, value: float) -> float:
+        """Length per layer on the few layers, mm."""
+        if value not in self.sampled:
+            result = self.tried.get(value) or self.planned(value, self.few)
+            if self.few is self.layers:
+                self.tried[value] = result
+            known = [result.toolpaths.on_layer(layer.index) for layer in self.few]
+            self.sampled[value] = length_per_layer(Toolpaths.concatenate(known), self.few)
+        return self.sampled[value]
 
-    own = getattr(strategy, amount.parameter)
-    if start is not None and own is not None:
-        tried[float(own)] = start
+    def meets(self, length: float) -> bool:
+        return (1.0 - self.tolerance) * self.wanted <= length <= self.wanted
+
+    def guess(self) -> Planned | None:
+        """Plan from one known plan of the stack, a few times at most; None where that fails."""
+        target = self.wanted * (1.0 - 0.5 * self.tolerance)
         for _ in range(_GUESSES):
-            lengths = {value: one.length_per_layer for value, one in tried.items()}
-            guess = _by_power(lengths, amount, wanted * (1.0 - 0.5 * tolerance))
-            if guess in tried:
+            lengths = {value: one.length_per_layer for value, one in self.tried.items()}
+            value = _by_power(lengths, self.strategy.amount, target)
+            if value in self.tried:
                 break
-            tried[guess] = planned(guess, layers)
-            if (1.0 - tolerance) * wanted <= tried[guess].length_per_layer <= wanted:
-                return tried[guess]
-    value, ratio, margin = amount.most if own is None else float(own), 1.0, 0.0
-    for _ in range(1 if few is layers else _ROUNDS):
-        target = wanted * (1.0 - margin) / ratio
-        value = _search(sample, sampled, value, amount, target, tolerance)
-        if value in tried:
-            break
-        tried[value] = planned(value, layers)
-        length = tried[value].length_per_layer
-        if (1.0 - tolerance) * wanted <= length <= wanted or not sampled[value] > 0.0:
-            break
-        ratio, margin = length / sampled[value], 0.3 * tolerance
-    best = _best(list(tried.values()), wanted)
-    if best.length_per_layer > wanted * (1.0 + 1e-9):
-        best = _mixed(replace(best, toolpaths=Toolpaths.empty()), best, layers, wanted)
-    elif best.length_per_layer < (1.0 - tolerance) * wanted:
-        above = [one for one in tried.values() if one.length_per_layer > wanted]
+            self.tried[value] = self.planned(value, self.layers)
+            reached = _between(list(self.tried.values()), self.layers, self.wanted)
+            if self.meets(reached.length_per_layer):
+                return reached
+        return None
+
+    def search(self) -> Planned:
+        """Search on the few layers, check on the stack, and again with the ratio of the two."""
+        amount, wanted, tried = self.strategy.amount, self.wanted, self.tried
+        own = getattr(self.strategy, amount.parameter)
+        value, margin = amount.most if own is None else float(own), 0.0
+        ratio = self._ratio()
+        for _ in range(1 if self.few is self.layers else _ROUNDS):
+            target = wanted * (1.0 - margin) / ratio
+            value = _search(self.sample, self.sampled, value, amount, target, self.tolerance)
+            if value in tried:
+                break
+            tried[value] = self.planned(value, self.layers)
+            length = tried[value].length_per_layer
+            if self.meets(length) or not self.sampled[value] > 0.0:
+                break
+            ratio, margin = length / self.sampled[value], 0.3 * self.tolerance
+        best = _best(list(tried.values()), wanted)
+        if best.length_per_layer > wanted * (1.0 + 1e-9):
+            best = _mixed(replace(best, toolpaths=Toolpaths.empty()), best, self.layers, wanted)
+        elif best.length_per_layer < (1.0 - self.tolerance) * wanted:
+            best = self._raised(best, ratio)
+        return replace(best, note=_note(best, amount, wanted, self.tolerance))
+
+    def _ratio(self) -> float:
+        """Length on the stack over that on the few layers, where a plan is known."""
+        lengths = {value: self.sample(value) for value in self.tried}
+        if not any(lengths.values()):
+            return 1.0
+        off = {v: abs(self.tried[v].length_per_layer - self.wanted) for v in lengths if lengths[v]}
+        nearest = min(off, key=off.__getitem__)
+        return self.tried[nearest].length_per_layer / lengths[nearest]
+
+    def _raised(self, best: Planned, ratio: float) -> Planned:
+        """Plan that is too short, with layers of one that lays more where there is one."""
+        above = [one for one in self.tried.values() if one.length_per_layer > self.wanted]
         if not above:
-            values = [value for value in sampled if sampled[value] * ratio > wanted]
-            above = [planned(min(values, key=sampled.__getitem__), layers)] if values else []
-        mixed = [best, *(_mixed(best, more, layers, wanted) for more in above)]
-        best = max(mixed, key=lambda one: one.length_per_layer)
-    return replace(best, note=_note(best, amount, wanted, tolerance))
+            values = [v for v in self.sampled if self.sampled[v] * ratio > self.wanted]
+            nearest = min(values, key=self.sampled.__getitem__, default=None)
+            above = [] if nearest is None else [self.planned(nearest, self.layers)]
+        mixed = [best, *(_mixed(best, more, self.layers, self.wanted) for more in above)]
+        return max(mixed, key=lambda one: one.length_per_layer)
+
+
+def _between(tried: list[Planned], layers: Sequence[Layer], wanted: float) -> Planned:
+    """Longest plan that is not too long, with layers of one that is where the two are close."""
+    best = _best(tried, wanted)
+    above = [one for one in tried if one.length_per_layer > wanted]
+    more = min(above, key=lambda one: one.length_per_layer, default=best)
+    if 0.0 < more.length_per_layer - best.length_per_layer <= _CLOSE * wanted:
+        return _mixed(best, more, layers, wanted)
+    return best
 
 
 def _mixed(less: Planned, more: Planned, layers: Sequence[Layer], wanted: float) -> Planned:
@@ -256,7 +325,9 @@ def _by_power(lengths: Mapping[float, float], amount: Amount, target: float) -> 
     power = 1.0 if amount.most > amount.least else -1.0
     if len(nearest) == 2:
         (p, q), (a, b) = nearest, (lengths[value] for value in nearest)
-        power = np.log(a / b) / np.log(p / q) if a != b else power
+        found = power * np.log(a / b) / np.log(p / q)
+        # Where the length changes in steps two values say little about the next.
+        power *= float(np.clip(found, *_POWERS))
     guess = nearest[0] * (target / lengths[nearest[0]]) ** (1.0 / power)
     return float(np.clip(guess, *ends))
 

@@ -143,6 +143,33 @@ def test_a_known_plan_saves_the_search(plate):
     assert len(Counted.planned) == len(layers)
 
 
+@dataclass(frozen=True)
+class Ragged:
+    """One line that jumps in length between 41 and 43 % of the plate, whatever the parameter."""
+
+    share: float = 50.0
+    amount: ClassVar[Amount] = Amount("share", most=100.0, least=1.0)
+    planned: ClassVar[list[int]] = []
+
+    def __call__(self, layer, stress, machine):
+        self.planned.append(layer.index)
+        share = self.share if abs(self.share - 42.0) > 1.0 else np.where(self.share < 42, 41, 43)
+        return Toolpaths.from_plane([np.array([[0.0, 1.0], [0.01 * share * LENGTH, 1.0]])], layer)
+
+
+def test_close_plans_on_either_side_are_shared_out_without_a_search(plate):
+    """A length that no parameter gives: three plans of the stack, the first one counted."""
+    stress, layers = plate
+    Ragged.planned.clear()
+    toolpaths = plan(Ragged(43.2), layers, stress, MACHINE)
+    natural = Planned(Ragged(43.2), toolpaths, length_per_layer(toolpaths, layers))
+    wanted = 0.425 * LENGTH
+    result = plan_to_length(Ragged(43.2), layers, stress, MACHINE, wanted, start=natural)
+    assert 0.99 * wanted <= result.length_per_layer <= wanted
+    assert re.match(r"share = \S+ on [1-7] of 8 layers$", result.note)
+    assert len(Ragged.planned) <= 3 * len(layers)
+
+
 @pytest.mark.parametrize("wanted", [0.0, -5.0, float("nan"), float("inf")])
 def test_no_length_is_refused(plate, wanted):
     stress, layers = plate
