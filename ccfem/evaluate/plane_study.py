@@ -7,7 +7,7 @@ from functools import cached_property
 import numpy as np
 import shapely
 
-from ccfem.arrays import BoolArray, FloatArray, IntArray, read_only
+from ccfem.arrays import FloatArray, read_only
 from ccfem.elasticity.plane import (
     PlaneField,
     PlaneProblem,
@@ -21,6 +21,7 @@ from ccfem.evaluate.plane_paths import PlanePaths
 from ccfem.evaluate.sensitivity import ANGLES, Sensitivity, plane_compliance
 from ccfem.evaluate.sinuosity import LONG
 from ccfem.evaluate.stiffness_alignment import Reading, agreement, performance_index, strongest
+from ccfem.geometry.order import nearest_end_order
 from ccfem.materials import Material
 from ccfem.tensor import largest_in_plane
 
@@ -33,7 +34,6 @@ __all__ = [
     "benchmark",
     "laid_plate",
     "mixed_stiffness",
-    "nearest_end_order",
     "print_seconds",
     "reduced_stiffness",
     "turned_energies",
@@ -225,38 +225,6 @@ def mixed_stiffness(
         is_long = np.append(laid.lengths > limit, False)[found.path]
         layers.append(np.where(is_long[:, None, None], long, short))
     return np.stack(layers)
-
-
-def nearest_end_order(starts: FloatArray, ends: FloatArray) -> tuple[IntArray, BoolArray, float]:
-    """Order of printing: always on to the path with the nearest end.
-
-    Parameters
-    ----------
-    starts, ends : (k, 2) arrays, mm
-        Ends of the paths; of a closed one the same point twice. The first path comes first.
-
-    Returns
-    -------
-    order : (k,) int array
-    reversed : (k,) bool array
-        Whether the path at that place of the order is walked from its end.
-    travel : float, mm
-        Sum of the straight ways between them.
-    """
-    count = len(starts)
-    order, backward = np.zeros(count, dtype=np.int64), np.zeros(count, dtype=bool)
-    left = np.ones(count, dtype=bool)
-    travel = 0.0
-    for k in range(count):
-        if k:
-            here = starts[order[k - 1]] if backward[k - 1] else ends[order[k - 1]]
-            off = np.stack([np.linalg.norm(p - here, axis=1) for p in (starts, ends)])
-            off[:, ~left] = np.inf
-            side, best = divmod(int(off.argmin()), count)
-            order[k], backward[k] = best, bool(side)
-            travel += float(off[side, best])
-        left[order[k]] = False
-    return order, backward, travel
 
 
 def print_seconds(paths: PlanePaths) -> float:

@@ -13,12 +13,12 @@ from ccfem.evaluate.plane_study import (
     benchmark,
     laid_plate,
     mixed_stiffness,
-    nearest_end_order,
     print_seconds,
     reduced_stiffness,
     turned_energies,
 )
 from ccfem.evaluate.sensitivity import ANGLES, OffAxis
+from ccfem.geometry.order import nearest_end_order
 from ccfem.geometry.polylines import pack
 from ccfem.materials import isotropic, named_material, plane_stress
 
