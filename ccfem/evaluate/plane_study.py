@@ -7,7 +7,7 @@ from functools import cached_property
 import numpy as np
 import shapely
 
-from ccfem.arrays import FloatArray, read_only
+from ccfem.arrays import BoolArray, FloatArray, read_only
 from ccfem.elasticity.plane import (
     PlaneField,
     PlaneProblem,
