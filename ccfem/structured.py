@@ -49,7 +49,8 @@ def box_mesh(
     Returns
     -------
     TetMesh
-        Linear; cells brick by brick, six each, and nodes numbered along x first; patches x_min, x_max, y_min, y_max, z_min, z_max.
+        Linear; cells brick by brick, six each, bricks and nodes numbered along x first; patches
+        x_min, x_max, y_min, y_max, z_min, z_max.
 
     Raises
     ------
@@ -71,9 +72,9 @@ def box_mesh(
     offsets = np.concatenate([step, step + (nx + 1) * (ny + 1)])
     local = np.broadcast_to(_kuhn_cells(), (len(corner), 6, 4))
     if alternating:
-        z, y, x = np.meshgrid(*(np.arange(d) % 2 for d in divisions[::-1]), indexing="ij")
-        mirrored = (x + 2 * y + 4 * z).reshape(-1, 1, 1)
-        odd = ((x + y + z) % 2 == 1).reshape(-1)
+        k, j, i = np.meshgrid(*(np.arange(d) % 2 for d in divisions[::-1]), indexing="ij")
+        mirrored = (i + 2 * j + 4 * k).reshape(-1, 1, 1)
+        odd = ((i + j + k) % 2 == 1).reshape(-1)
         local = local ^ mirrored
         local[odd] = local[odd][:, :, [0, 2, 1, 3]]
     cells = (corner[:, None, None] + offsets[local]).reshape(-1, 4)
