@@ -72,9 +72,9 @@ def box_mesh(
     offsets = np.concatenate([step, step + (nx + 1) * (ny + 1)])
     local = np.broadcast_to(_kuhn_cells(), (len(corner), 6, 4))
     if alternating:
-        k, j, i = np.meshgrid(*(np.arange(d) % 2 for d in divisions[::-1]), indexing="ij")
-        mirrored = (i + 2 * j + 4 * k).reshape(-1, 1, 1)
-        odd = ((i + j + k) % 2 == 1).reshape(-1)
+        up, back, right = np.meshgrid(*(np.arange(d) % 2 for d in divisions[::-1]), indexing="ij")
+        mirrored = (right + 2 * back + 4 * up).reshape(-1, 1, 1)
+        odd = ((right + back + up) % 2 == 1).reshape(-1)
         local = local ^ mirrored
         local[odd] = local[odd][:, :, [0, 2, 1, 3]]
     cells = (corner[:, None, None] + offsets[local]).reshape(-1, 4)
