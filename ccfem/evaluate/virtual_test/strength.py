@@ -151,8 +151,10 @@ def matrix_peak(
     """
     mesh = stress.mesh
     centroid = mesh.points[mesh.corners].mean(axis=1)
-    distance, _ = cKDTree(_held_and_loaded(stress)).query(centroid)
-    judged = np.flatnonzero(distance > zone)
+    # Beyond the bound the distance is infinite, and the search short.
+    tree, bound = cKDTree(_held_and_loaded(stress)), np.nextafter(zone, np.inf)
+    distance, _ = tree.query(centroid, distance_upper_bound=bound)
+    judged = np.flatnonzero(np.isinf(distance))
     if not len(judged):
         raise InputError(
             f"no cell lies farther than {zone:g} mm from the patches of loads and supports, so "
