@@ -122,6 +122,7 @@ def test_zero_stress(make_part, uniform):
         "agreement",
         "stiffness_alignment",
         "stiffness_alignment_harmonic",
+        *(f"matching_{name}_{k}" for name in ("path", "energy") for k in (10, 30)),
     }
     assert total["no_tension"] == 1.0
     assert {c.name for c in COLUMNS if "NaN" in c.range} >= nothing
