@@ -1,4 +1,4 @@
-"""Make the stored meshes of the cases: ``python -m ccfem.cases.build_data``."""
+"""Make the stored meshes and outlines of the cases: ``python -m ccfem.cases.build_data``."""
 
 import hashlib
 import importlib
@@ -6,16 +6,19 @@ import sys
 from collections.abc import Sequence
 from pathlib import Path
 
-from ccfem.cases.stored import COMMAND, data_folder
+from ccfem.cases.stored import COMMAND, data_folder, write_outline
 from ccfem.io import whole_file, write_mesh
+from ccfem.mesh import TetMesh
 
-__all__ = ["build"]
+__all__ = ["CASES", "DESIGNED", "build"]
 
-_CASES = ("bar", "loop", "open_hole")
+CASES = ("bar", "loop", "open_hole")
+DESIGNED = ("bridge", "suspension", "cantilever", "m_shape", "l_shape")
+"""Cases of optimised plates: an outline and its mesh each."""
 
 
-def build(folder: Path, names: Sequence[str] = _CASES) -> Path:
-    """Make the stored meshes and their manifest.
+def build(folder: Path, names: Sequence[str] = (*CASES, *DESIGNED)) -> Path:
+    """Make the stored meshes and outlines, and their manifest.
 
     Parameters
     ----------
@@ -29,24 +32,58 @@ def build(folder: Path, names: Sequence[str] = _CASES) -> Path:
     Path
         The manifest.
     """
-    text = f"# Meshes of the cases at their default element size, mm. Made by: {COMMAND}\n"
+    text = (
+        "# Meshes of the cases at their default element size, mm, and outlines of the optimised\n"
+        f"# plates. Made by: {COMMAND}\n"
+    )
     for name in names:
-        module = importlib.import_module(f"ccfem.cases.{name}")
-        mesh = getattr(module, f"{name}_mesh")(module.ELEMENT_SIZE)
-        path = folder / f"{name}.npz"
-        write_mesh(mesh, path)
-        text += (
-            f"\n[{name}]\n"
-            f'file = "{path.name}"\n'
-            f'what = "{len(mesh.cells)} linear tetrahedra, {len(mesh.points)} nodes, patches '
-            f'{", ".join(sorted(mesh.patches))}"\n'
-            f'command = "{COMMAND}"\n'
-            f"element_size = {module.ELEMENT_SIZE}\n"
-            f'sha256 = "{hashlib.sha256(path.read_bytes()).hexdigest()}"\n'
-        )
+        text += _designed(folder, name) if name in DESIGNED else _meshed(folder, name)
     with whole_file(folder / "manifest.toml") as temporary:
         temporary.write_text(text, encoding="utf-8")
     return folder / "manifest.toml"
+
+
+def _meshed(folder: Path, name: str) -> str:
+    """Make the mesh of a case; its entry."""
+    module = importlib.import_module(f"ccfem.cases.{name}")
+    mesh = getattr(module, f"{name}_mesh")(module.ELEMENT_SIZE)
+    return _mesh_entry(folder, name, mesh, module.ELEMENT_SIZE)
+
+
+def _designed(folder: Path, name: str) -> str:
+    """Optimise a plate, make its outline and the mesh of the part; their entries."""
+    from ccfem.cases.designed import ELEMENT_SIZE, THICKNESS
+
+    plate = getattr(importlib.import_module(f"ccfem.cases.{name}"), f"{name}_plate")()
+    design = plate.design()
+    outline = plate.outline(design)
+    path = folder / f"{name}_outline.npz"
+    write_outline(outline, path)
+    points = len(outline.exterior.coords) + sum(len(ring.coords) for ring in outline.interiors)
+    return (
+        f"\n[{name}_outline]\n"
+        f'file = "{path.name}"\n'
+        f'what = "{points} points on {1 + len(outline.interiors)} rings; compliance '
+        f'{design.compliance[-1]:.4g} N mm after {design.iterations} iterations"\n'
+        f'command = "{COMMAND}"\n'
+        f"volume_fraction = {plate.volume_fraction}\n"
+        f'sha256 = "{hashlib.sha256(path.read_bytes()).hexdigest()}"\n'
+    ) + _mesh_entry(folder, name, plate.mesh(outline, ELEMENT_SIZE, THICKNESS), ELEMENT_SIZE)
+
+
+def _mesh_entry(folder: Path, name: str, mesh: TetMesh, element_size: float) -> str:
+    """Write a mesh; its entry."""
+    path = folder / f"{name}.npz"
+    write_mesh(mesh, path)
+    return (
+        f"\n[{name}]\n"
+        f'file = "{path.name}"\n'
+        f'what = "{len(mesh.cells)} linear tetrahedra, {len(mesh.points)} nodes, patches '
+        f'{", ".join(sorted(mesh.patches))}"\n'
+        f'command = "{COMMAND}"\n'
+        f"element_size = {element_size}\n"
+        f'sha256 = "{hashlib.sha256(path.read_bytes()).hexdigest()}"\n'
+    )
 
 
 if __name__ == "__main__":

@@ -1,4 +1,4 @@
-"""Meshes of the cases that come with ccfem, so that a first run does not wait for meshing.
+"""Meshes and outlines of the cases that come with ccfem, so that a first run does not wait.
 
 ``data/manifest.toml`` says what each file is, which command made it, and its SHA-256.
 """
@@ -9,11 +9,22 @@ from collections.abc import Callable
 from pathlib import Path
 from typing import Any
 
+import numpy as np
+import shapely
+
 from ccfem.errors import InputError
 from ccfem.io import read_mesh
 from ccfem.mesh import TetMesh
 
-__all__ = ["COMMAND", "data_folder", "manifest", "mesh_of_case", "stored_mesh"]
+__all__ = [
+    "COMMAND",
+    "data_folder",
+    "manifest",
+    "mesh_of_case",
+    "stored_mesh",
+    "stored_outline",
+    "write_outline",
+]
 
 COMMAND = "python -m ccfem.cases.build_data"
 """The command that makes the files."""
@@ -43,8 +54,40 @@ def stored_mesh(name: str, element_size: float) -> TetMesh | None:
     InputError
         When the file is not the one that the manifest names.
     """
+    path = _stored_file(name, "element_size", element_size)
+    return None if path is None else read_mesh(path, check=False)
+
+
+def stored_outline(name: str, volume_fraction: float) -> Any:
+    """Read the stored outline of an optimised plate, mm: a shapely Polygon.
+
+    None where there is none of this share of the plate's volume.
+
+    Raises
+    ------
+    InputError
+        When the file is not the one that the manifest names.
+    """
+    path = _stored_file(f"{name}_outline", "volume_fraction", volume_fraction)
+    if path is None:
+        return None
+    with np.load(path, allow_pickle=False) as archive:
+        border, *holes = [archive[ring] for ring in archive.files]
+    return shapely.Polygon(border, holes)
+
+
+def write_outline(polygon: Any, path: Path) -> None:
+    """Write a polygon to a compressed NumPy archive: its border, then its holes."""
+    rings = [polygon.exterior, *polygon.interiors]
+    arrays: dict[str, Any] = {f"ring_{k}": np.asarray(r.coords) for k, r in enumerate(rings)}
+    with path.open("wb") as file:
+        np.savez_compressed(file, **arrays)
+
+
+def _stored_file(name: str, key: str, value: float) -> Path | None:
+    """File of an entry of the manifest that has this value; None where there is none."""
     entry = manifest().get(name)
-    if entry is None or entry["element_size"] != element_size:
+    if entry is None or entry[key] != value:
         return None
     path = data_folder() / entry["file"]
     if not path.exists():
@@ -55,7 +98,7 @@ def stored_mesh(name: str, element_size: float) -> TetMesh | None:
             f"{path} is not the file that the manifest names (its SHA-256 differs): make it again "
             f"with '{COMMAND}'"
         )
-    return read_mesh(path, check=False)
+    return path
 
 
 def mesh_of_case(

@@ -47,7 +47,7 @@ def smallest_angle(corners):
 
 def test_names():
     assert set(NAMES) <= set(named_cases())
-    with pytest.raises(InputError, match="no case named 'lop'; there are: bar, loop, open_hole"):
+    with pytest.raises(InputError, match="no case named 'lop'; there are: bar, bridge, "):
         create_case("lop")
     with pytest.raises(InputError, match="no parameter 'size'; it has: element_size, order, force"):
         create_case("loop", size=3.0)
