@@ -1,16 +1,20 @@
 """Concentric strands: rings along the border, and lines along the middle of what they leave."""
 
+from functools import lru_cache
 from typing import Any
 
 import numpy as np
 import shapely
 
-from ccfem.arrays import BoolArray, FloatArray
+from ccfem.arrays import BoolArray, FloatArray, read_only
 from ccfem.geometry.medial_axis import MedialAxis, medial_axis
 from ccfem.geometry.offsets import inset, rings
+from ccfem.geometry.sections import corners_only
 
 __all__ = ["concentric", "middle_lines", "shells"]
 
+_SECTIONS = 32
+"""Sections whose shells are remembered."""
 _LEAST_GAP = 0.4
 """Narrowest strip, in pitches, that a strand is laid along, the rest of it on its neighbours: the
 overlap and the gaps of the plates of paper 004 are then about equal."""
@@ -24,6 +28,8 @@ def shells(
     section: Any, width: float, pitch: float, count: int, closest: float
 ) -> tuple[list[FloatArray], Any]:
     """Rings along every border of a section, and what they leave inside.
+
+    Remembered for equal sections, as the layers of a part often are.
 
     Parameters
     ----------
@@ -40,17 +46,27 @@ def shells(
     Returns
     -------
     lines : list of (k, 2) arrays, mm
-        Closed rings, and open lines along the middle of parts that the rings leave no room in.
+        Closed rings, and open lines along the middle of parts that the rings leave no room in;
+        read-only.
     interior : shapely (Multi)Polygon, mm
         The rest of the section, half a pitch inside the innermost rings.
     """
+    lines, interior = _shells(corners_only(section), width, pitch, count, closest)
+    return list(lines), interior
+
+
+@lru_cache(maxsize=_SECTIONS)
+def _shells(
+    section: Any, width: float, pitch: float, count: int, closest: float
+) -> tuple[tuple[FloatArray, ...], Any]:
     if count == 0:
-        return [], section
+        return (), section
     interior = inset(section, 0.5 * width + (count - 0.5) * pitch)
     parts = shapely.get_parts(interior)  # without those of no width but for rounding
     wide = ~shapely.is_empty(shapely.buffer(parts, -1e-3 * pitch, join_style="mitre"))
     interior = interior if wide.all() else shapely.multipolygons(parts[wide])
-    return concentric(section, pitch, closest, 0.5 * width, count), interior
+    lines = concentric(section, pitch, closest, 0.5 * width, count)
+    return tuple(read_only(line) for line in lines), interior
 
 
 def concentric(
@@ -88,6 +104,7 @@ def concentric(
         Closed rings from the border inward, then open lines.
     """
     first = 0.5 * pitch if first is None else first
+    section = corners_only(section)
     if shapely.is_empty(section):
         return []
     lines: list[FloatArray] = []
