@@ -15,6 +15,7 @@ from ccfem.elasticity.plane_problem import PlaneProblem
 from ccfem.elasticity.problem import Problem
 from ccfem.elasticity.recovery import cell_strain
 from ccfem.elasticity.solve import System, prepare
+from ccfem.elasticity.solvers import LARGEST_DIRECT, direct_backend
 from ccfem.errors import InputError
 
 __all__ = ["GroupedCompliance", "Loaded", "PlaneCompliance", "TetCompliance", "compliance_of"]
@@ -164,6 +165,8 @@ class TetCompliance:
             )
         self.system = prepare(problem)
         self.weights = weights
+        if backend == "auto":
+            backend = _quick(3 * len(self.system.held.nodes))
         self._answer = _Answer(self.system, weights, backend)
         self.centres = problem.mesh.points[problem.mesh.cells].mean(axis=1)
         self.volumes = problem.mesh.volumes
@@ -194,6 +197,12 @@ class TetCompliance:
         """Stress (m, 3), MPa, [s11, s22, s12] of each cell in the x-y plane."""
         strain = cell_strain(self.system.problem.mesh, displacement)
         return _times(stiffness[..., [0, 1, 5], :], strain)
+
+
+def _quick(unknowns: int) -> str:
+    """Name the backend for many solves of parts with voids, which a multigrid is slow on."""
+    backend = direct_backend()
+    return backend if backend != "superlu" and unknowns <= LARGEST_DIRECT else "auto"
 
 
 def _times(stiffness: FloatArray, strain: FloatArray) -> FloatArray:
