@@ -1,0 +1,178 @@
+"""Curves of several strategies on one pair of axes, and maps of the curvature of their paths."""
+
+from collections.abc import Mapping, Sequence
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+
+from ccfem.arrays import FloatArray
+from ccfem.errors import InputError
+from ccfem.layers.layer import Layer
+from ccfem.plot.canvas import colour_bar, extents_of, new_figure, scale_bar, title
+from ccfem.plot.colours import INK, OUTLINE, palette
+from ccfem.plot.on_paths import curvature_on_paths
+from ccfem.plot.paths import draw_section, draw_segments
+from ccfem.toolpaths import FIBRE, Toolpaths
+
+if TYPE_CHECKING:
+    from matplotlib.figure import Figure
+
+__all__ = ["curvature_curves", "curvature_maps", "matching_curves"]
+
+_LEAST, _MOST = 0.01, 10.0
+"""Ends, 1/mm, of the scale of curvature; what is straighter counts at its left end."""
+
+
+def matching_curves(
+    rates: Mapping[str, FloatArray],
+    thresholds: FloatArray,
+    heading: str = "",
+    colours: Mapping[str, str] | None = None,
+) -> "Figure":
+    """Draw matching rates over the angle, with the one that chance gives.
+
+    Parameters
+    ----------
+    rates : mapping of name to (k,) array
+        As from `evaluate.matching.matching_rate`; NaN is left out.
+    thresholds : (k,) array, degrees
+    heading : str
+    colours : mapping of name to colour, optional
+        Default `palette`.
+
+    Returns
+    -------
+    Figure
+        For `plot.canvas.png` or `plot.canvas.save`.
+    """
+    for name, rate in rates.items():
+        if len(rate) != len(thresholds):
+            raise InputError(
+                f"curve '{name}' has {len(rate)} values for {len(thresholds)} angles: give one each"
+            )
+    figure, axes = _axes(heading, "angle, degrees", "share within that angle, %")
+    axes.plot([0.0, 90.0], [0.0, 100.0], color=OUTLINE, lw=0.8, ls=(0, (4, 3)), zorder=1.0)
+    axes.text(67.0, 66.0, "chance", size=7, color=OUTLINE)
+    chosen = palette(rates) if colours is None else colours
+    for name, rate in rates.items():
+        axes.plot(thresholds, 100.0 * rate, color=chosen[name], lw=1.6, marker="o", ms=2.5)
+    axes.set_xlim(0.0, 90.0)
+    axes.set_xticks(np.arange(0, 91, 15))
+    _legend(axes, chosen, list(rates))
+    return figure
+
+
+def curvature_curves(
+    curvatures: Mapping[str, FloatArray],
+    limit: float,
+    heading: str = "",
+    colours: Mapping[str, str] | None = None,
+) -> "Figure":
+    """Draw the share of samples below each curvature.
+
+    Parameters
+    ----------
+    curvatures : mapping of name to (s,) array, 1/mm
+        Samples that count equally, as `evaluate.curvature.sample_curvature` takes them.
+    limit : float, 1/mm
+        Largest curvature that the machine allows, ``1 / Machine.minimum_radius``; it is marked.
+    heading : str
+    colours : mapping of name to colour, optional
+        Default `palette`.
+    """
+    if not limit > 0.0:
+        raise InputError(f"the largest curvature allowed must be above 0 1/mm; got {limit:g}")
+    figure, axes = _axes(heading, "curvature, 1/mm", "share below it, %")
+    axes.axvline(limit, color=OUTLINE, lw=0.8, ls=(0, (4, 3)), zorder=1.0)
+    axes.text(1.06 * limit, 2.0, f"radius {1.0 / limit:.3g} mm", size=7, color=OUTLINE)
+    chosen = palette(curvatures) if colours is None else colours
+    for name, samples in curvatures.items():
+        if not len(samples):
+            continue
+        order = np.clip(np.sort(samples), _LEAST, _MOST)
+        share = 100.0 * np.arange(1, len(order) + 1) / len(order)
+        axes.step(
+            np.concatenate([[_LEAST], order, [_MOST]]),
+            np.concatenate([[0.0], share, [100.0]]),
+            where="post",
+            color=chosen[name],
+            lw=1.6,
+        )
+    axes.set_xscale("log")
+    axes.set_xlim(_LEAST, _MOST)
+    axes.set_xticks([0.01, 0.1, 1.0, 10.0], ["≤ 0.01", "0.1", "1", "10"])
+    _legend(axes, chosen, list(curvatures))
+    return figure
+
+
+def curvature_maps(
+    layer: Layer,
+    paths: Mapping[str, Toolpaths],
+    width: float,
+    most: float,
+    captions: Mapping[str, str] | None = None,
+) -> "Figure":
+    """Draw the paths of several strategies on one layer side by side, coloured by curvature.
+
+    Parameters
+    ----------
+    layer : Layer
+    paths : mapping of name to Toolpaths
+        Links are drawn too, also where they lie beyond the part.
+    width : float, mm
+        Of a strand (`Machine.fibre_width`); the curvature is taken in steps of it.
+    most : float, 1/mm
+        End of the colour scale, such as ``1 / Machine.minimum_radius``.
+    captions : mapping of name to str, optional
+        Lines with key numbers.
+    """
+    points = [layer.plane_points]
+    for lines in paths.values():
+        wanted = lines.select((lines.layer == layer.index) & (lines.kind == FIBRE))
+        points.append(layer.to_plane(wanted.points))
+    figure, columns = new_figure(extents_of(np.concatenate(points)), columns=len(paths))
+    colours = palette(paths)
+    for axes, (name, lines) in zip(columns, paths.items(), strict=True):
+        draw_section(axes, layer)
+        coloured = curvature_on_paths(lines, layer, most, width)
+        scale = draw_segments(axes, coloured, width)
+        colour_bar(axes, scale, coloured.limits, coloured.label)
+        scale_bar(axes)
+        title(axes, name, (captions or {}).get(name, ""), colours[name])
+    return figure
+
+
+def _axes(heading: str, across: str, up: str) -> tuple["Figure", Any]:
+    """Figure with one pair of axes from 0 to 100 %."""
+    from matplotlib.backends.backend_agg import FigureCanvasAgg
+    from matplotlib.figure import Figure
+
+    figure = Figure(figsize=(4.6, 3.6), dpi=150.0, facecolor="white")
+    FigureCanvasAgg(figure)
+    axes = figure.add_axes((0.13, 0.24, 0.82, 0.65))
+    figure.text(0.03, 0.94, heading, size=10, weight="bold", color=INK)
+    axes.set_xlabel(across, size=8, color=INK)
+    axes.set_ylabel(up, size=8, color=INK)
+    axes.set_ylim(0.0, 101.0)
+    axes.grid(color=OUTLINE, alpha=0.2, lw=0.5)
+    axes.set_axisbelow(True)
+    axes.tick_params(labelsize=7.5, colors=INK, length=2.5)
+    for side, spine in axes.spines.items():
+        spine.set(visible=side in ("left", "bottom"), color=OUTLINE, linewidth=0.6)
+    return figure, axes
+
+
+def _legend(axes: Any, colours: Mapping[str, str], names: Sequence[str]) -> None:
+    """Names with a mark each below the axes."""
+    from matplotlib.lines import Line2D
+
+    marks = [Line2D([], [], color=colours[name], lw=1.6, label=name) for name in names]
+    axes.legend(
+        handles=marks,
+        loc="upper center",
+        bbox_to_anchor=(0.5, -0.17),
+        ncols=min(len(marks), 4) or 1,
+        frameon=False,
+        fontsize=7.5,
+        labelcolor=INK,
+    )

@@ -1,0 +1,61 @@
+import numpy as np
+import pytest
+
+from ccfem.errors import InputError
+from ccfem.layers.planar import slice_planar
+from ccfem.plot.canvas import png
+from ccfem.plot.colours import palette
+from ccfem.plot.curves import curvature_curves, curvature_maps, matching_curves
+from ccfem.structured import box_mesh
+from ccfem.toolpaths import Toolpaths
+
+LAYER = slice_planar(box_mesh((60.0, 30.0, 4.0), (6, 3, 1)), count=1)[0]
+
+
+def curve(figure, name):
+    """Points of the one line in the colour of a strategy."""
+    colour = palette(["isocurve", "zigzag"])[name]
+    (found,) = [line for line in figure.axes[0].lines if line.get_color() == colour]
+    return found.get_xdata(), found.get_ydata()
+
+
+def test_matching_rates_are_drawn_in_percent_beside_chance():
+    angles = np.array([30.0, 60.0, 90.0])
+    rates = {"isocurve": np.array([0.8, 0.9, 1.0]), "zigzag": np.array([0.2, np.nan, 1.0])}
+    figure = matching_curves(rates, angles, "bridge")
+    x, y = curve(figure, "isocurve")
+    assert x.tolist() == [30, 60, 90]
+    assert y == pytest.approx([80, 90, 100])
+    chance = figure.axes[0].lines[0]
+    assert chance.get_ydata() == pytest.approx(100.0 / 90.0 * np.asarray(chance.get_xdata()))
+    names = [text.get_text() for text in figure.axes[0].get_legend().get_texts()]
+    assert names == ["isocurve", "zigzag"]
+    assert png(figure).startswith(b"\x89PNG")
+    with pytest.raises(InputError, match="curve 'isocurve' has 3 values for 2 angles"):
+        matching_curves(rates, angles[:2])
+
+
+def test_the_curvature_curve_is_the_share_of_samples_below():
+    rng = np.random.default_rng(2)
+    samples = np.exp(rng.uniform(np.log(0.02), np.log(2.0), 500))
+    figure = curvature_curves({"isocurve": samples, "zigzag": np.zeros(0)}, 0.26)
+    x, y = curve(figure, "isocurve")
+    for at in (0.015, 0.1, 0.26, 1.0, 3.0):
+        drawn = y[np.searchsorted(x, at, side="right") - 1]
+        assert drawn == pytest.approx(100.0 * (samples <= at).mean())
+    assert png(figure).startswith(b"\x89PNG")
+    with pytest.raises(InputError, match="above 0 1/mm; got 0"):
+        curvature_curves({}, 0.0)
+
+
+def test_maps_of_curvature_show_links_beyond_the_part():
+    line = np.array([[10.0, 15.0], [50.0, 15.0], [75.0, 15.0]])
+    paths = Toolpaths.from_plane([line], LAYER, link=[np.array([False, True, False])])
+    figure = curvature_maps(LAYER, {"isocurve": paths, "zigzag": Toolpaths.empty()}, 1.0, 0.26)
+    pictures = [axes for axes in figure.axes if len(axes.collections)]
+    assert len(pictures) == 2
+    for axes in pictures:
+        left, right = axes.get_xlim()
+        assert left < 0.0
+        assert right > 75.0
+    assert png(figure).startswith(b"\x89PNG")
