@@ -1,7 +1,7 @@
 """Baseline: rings parallel to the border, from the outside in."""
 
 from dataclasses import dataclass
-from typing import ClassVar
+from typing import ClassVar, Literal
 
 import numpy as np
 
@@ -11,6 +11,9 @@ from ccfem.geometry.offsets import join_rings, offset_rings
 from ccfem.geometry.shells import concentric
 from ccfem.layers.layer import Layer
 from ccfem.machine import Machine
+from ccfem.raster.bitmap import bitmap
+from ccfem.raster.patterns import concentric_regions
+from ccfem.raster.plan import RasterPlan, raster_plan
 from ccfem.strategies.strategy import Amount
 from ccfem.toolpaths import Toolpaths
 
@@ -46,6 +49,8 @@ class Concentric:
         Not with `joined`.
     minimum_length : float, mm, optional
         Shorter paths are dropped; by default the shortest that the machine can cut.
+    mode : {"polyline", "raster"}, default "polyline"
+        Polylines; or paths of pixels a spacing wide, as in the paper: see `ccfem.raster`.
     """
 
     spacing: float = 1.0
@@ -54,13 +59,20 @@ class Concentric:
     start: tuple[float, float] | None = None
     filled: bool = False
     minimum_length: float | None = None
+    mode: Literal["polyline", "raster"] = "polyline"
 
     amount: ClassVar[Amount] = Amount("spacing", most=1.0, least=20.0)
 
     def __post_init__(self) -> None:
+        if self.mode not in ("polyline", "raster"):
+            raise InputError(f"concentric.mode must be polyline or raster; got {self.mode!r}")
         if not 1.0 <= self.spacing < float("inf"):
             raise InputError(
                 f"concentric.spacing must be at least 1 fibre width; got {self.spacing}"
+            )
+        if self.mode == "raster" and self.joined:
+            raise InputError(
+                "concentric.mode raster lays single rings: set concentric.joined to false"
             )
         if self.rings is not None and self.rings < 1:
             raise InputError(f"concentric.rings must be at least 1; got {self.rings}")
@@ -73,6 +85,9 @@ class Concentric:
 
     def __call__(self, layer: Layer, stress: LayerStress, machine: Machine) -> Toolpaths:
         """Plan the paths of one layer; none where the section is thinner than a fibre."""
+        if self.mode == "raster":
+            plan = self.raster(layer, stress, machine)
+            return plan.toolpaths(layer, machine, self.minimum_length)
         width = machine.fibre_width
         spacing = self.spacing * width
         if self.filled:
@@ -87,3 +102,8 @@ class Concentric:
         paths = Toolpaths.from_plane(lines, layer)
         least = machine.minimum_length if self.minimum_length is None else self.minimum_length
         return paths.select(paths.lengths >= least)
+
+    def raster(self, layer: Layer, stress: LayerStress, machine: Machine) -> RasterPlan:
+        """Plan one layer on a bitmap of pixels a spacing wide, whatever the mode."""
+        image = bitmap(layer.polygon, self.spacing * machine.fibre_width)
+        return raster_plan(image, concentric_regions(image.mask, rings=self.rings))

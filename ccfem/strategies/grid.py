@@ -16,6 +16,9 @@ from ccfem.geometry.hatch import hatch
 from ccfem.geometry.shells import shells
 from ccfem.layers.layer import Layer
 from ccfem.machine import Machine
+from ccfem.raster.bitmap import bitmap
+from ccfem.raster.patterns import grid_regions
+from ccfem.raster.plan import RasterPlan, raster_plan
 from ccfem.strategies.strategy import Amount
 from ccfem.toolpaths import Toolpaths
 
@@ -46,6 +49,8 @@ class Grid:
         As in `Mps`, for the shells of thin parts.
     minimum_length : float, mm, optional
         Shorter paths are dropped; by default the shortest that the machine can cut.
+    mode : {"polyline", "raster"}, default "polyline"
+        Polylines; or paths of pixels a spacing wide, as in the paper: see `ccfem.raster`.
     """
 
     spacing: float = 1.0
@@ -56,11 +61,14 @@ class Grid:
     lines: Literal["printable", "paper"] = "printable"
     closest: float = 0.6
     minimum_length: float | None = None
+    mode: Literal["polyline", "raster"] = "polyline"
 
     amount: ClassVar[Amount] = Amount("spacing", most=1.0, least=20.0)
     direction: ClassVar[str] = "angle"
 
     def __post_init__(self) -> None:
+        if self.mode not in ("polyline", "raster"):
+            raise InputError(f"grid.mode must be polyline or raster; got {self.mode!r}")
         if not 1.0 <= self.spacing < float("inf"):
             raise InputError(f"grid.spacing must be at least 1 fibre width; got {self.spacing}")
         if self.shells < 0:
@@ -71,6 +79,8 @@ class Grid:
             )
         if self.families not in ("alternate", "both"):
             raise InputError(f"grid.families must be alternate or both; got {self.families!r}")
+        if self.mode == "raster" and self.families == "both":
+            raise InputError("grid.mode raster lays one family a layer: set families to alternate")
         if self.lines not in ("printable", "paper"):
             raise InputError(f"grid.lines must be printable or paper; got {self.lines!r}")
         if not 0.5 <= self.closest <= 1.0:
@@ -82,6 +92,9 @@ class Grid:
 
     def __call__(self, layer: Layer, stress: LayerStress, machine: Machine) -> Toolpaths:
         """Plan the paths of one layer; none where the section is thinner than a fibre."""
+        if self.mode == "raster":
+            plan = self.raster(layer, stress, machine)
+            return plan.toolpaths(layer, machine, self.minimum_length)
         pitch = self.spacing * machine.fibre_width
         lines, interior = shells(
             layer.polygon, machine.fibre_width, pitch, self.shells, self.closest
@@ -96,3 +109,10 @@ class Grid:
         paths = Toolpaths.from_plane(lines, layer)
         least = machine.minimum_length if self.minimum_length is None else self.minimum_length
         return paths.select(paths.lengths >= least)
+
+    def raster(self, layer: Layer, stress: LayerStress, machine: Machine) -> RasterPlan:
+        """Plan one layer on a bitmap of pixels a spacing wide, whatever the mode."""
+        image = bitmap(layer.polygon, self.spacing * machine.fibre_width)
+        angle = np.radians(self.angle + self.turn * layer.index)
+        every = self.lines == "paper"
+        return raster_plan(image, grid_regions(image.mask, angle, self.shells, every))

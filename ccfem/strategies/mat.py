@@ -6,24 +6,21 @@ guidelines and investigation into the influence of infill patterns, Rapid Protot
 """
 
 from dataclasses import dataclass
-from typing import ClassVar
-
-import numpy as np
+from typing import ClassVar, Literal
 
 from ccfem.elasticity.stress_field import LayerStress
 from ccfem.errors import InputError
-from ccfem.geometry.dilation import grow
-from ccfem.geometry.medial_axis import medial_axis
-from ccfem.geometry.shells import concentric, shells
+from ccfem.geometry.medial_fill import medial_fill
+from ccfem.geometry.shells import shells
 from ccfem.layers.layer import Layer
 from ccfem.machine import Machine
+from ccfem.raster.bitmap import bitmap
+from ccfem.raster.patterns import medial_regions
+from ccfem.raster.plan import RasterPlan, raster_plan
 from ccfem.strategies.strategy import Amount
 from ccfem.toolpaths import Toolpaths
 
 __all__ = ["Mat"]
-
-_SHORTEST = 4.0
-"""Segments of the medial axis shorter than so many spacings are left out."""
 
 
 @dataclass(frozen=True)
@@ -44,16 +41,21 @@ class Mat:
         As in `Mps`.
     minimum_length : float, mm, optional
         Shorter paths are dropped; by default the shortest that the machine can cut.
+    mode : {"polyline", "raster"}, default "polyline"
+        Polylines; or paths of pixels a spacing wide, as in the paper: see `ccfem.raster`.
     """
 
     spacing: float = 1.0
     shells: int = 3
     closest: float = 0.6
     minimum_length: float | None = None
+    mode: Literal["polyline", "raster"] = "polyline"
 
     amount: ClassVar[Amount] = Amount("spacing", most=1.0, least=20.0)
 
     def __post_init__(self) -> None:
+        if self.mode not in ("polyline", "raster"):
+            raise InputError(f"mat.mode must be polyline or raster; got {self.mode!r}")
         if not 1.0 <= self.spacing < float("inf"):
             raise InputError(f"mat.spacing must be at least 1 fibre width; got {self.spacing}")
         if self.shells < 0:
@@ -67,19 +69,19 @@ class Mat:
 
     def __call__(self, layer: Layer, stress: LayerStress, machine: Machine) -> Toolpaths:
         """Plan the paths of one layer; none where the section is thinner than a fibre."""
+        if self.mode == "raster":
+            plan = self.raster(layer, stress, machine)
+            return plan.toolpaths(layer, machine, self.minimum_length)
         pitch = self.spacing * machine.fibre_width
         lines, interior = shells(
             layer.polygon, machine.fibre_width, pitch, self.shells, self.closest
         )
-        axis = medial_axis(interior, 0.5 * pitch)
-        segments = [s for s in axis.segments if s.length >= _SHORTEST * pitch]
-        if segments:
-            narrowest = min(float(s.radius.min()) for s in segments)
-            count = max(int(np.floor(narrowest / pitch - 0.5 + 1e-3)), 0)
-            curves = [s.points for s in segments]
-            lines += grow(curves, interior, pitch, self.closest, count, whole=True)
-        else:
-            lines += concentric(interior, pitch, self.closest, walls=False)
+        lines += medial_fill(interior, pitch, self.closest)
         paths = Toolpaths.from_plane(lines, layer)
         least = machine.minimum_length if self.minimum_length is None else self.minimum_length
         return paths.select(paths.lengths >= least)
+
+    def raster(self, layer: Layer, stress: LayerStress, machine: Machine) -> RasterPlan:
+        """Plan one layer on a bitmap of pixels a spacing wide, whatever the mode."""
+        image = bitmap(layer.polygon, self.spacing * machine.fibre_width)
+        return raster_plan(image, medial_regions(image.mask, self.shells))

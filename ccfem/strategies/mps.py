@@ -6,12 +6,13 @@ guidelines and investigation into the influence of infill patterns, Rapid Protot
 """
 
 from dataclasses import dataclass
+from functools import lru_cache
 from typing import Any, ClassVar, Literal
 
 import numpy as np
 import shapely
 
-from ccfem.arrays import FloatArray
+from ccfem.arrays import FloatArray, read_only
 from ccfem.elasticity.stress_field import LayerStress
 from ccfem.errors import InputError
 from ccfem.fields.streamlines import streamlines
@@ -21,6 +22,10 @@ from ccfem.geometry.medial_axis import medial_axis
 from ccfem.geometry.shells import shells
 from ccfem.layers.layer import Layer
 from ccfem.machine import Machine
+from ccfem.raster.bitmap import bitmap
+from ccfem.raster.guides import stress_guides
+from ccfem.raster.patterns import inside_shells, stress_regions
+from ccfem.raster.plan import RasterPlan, raster_plan
 from ccfem.strategies.strategy import Amount
 from ccfem.tensor import in_plane
 from ccfem.toolpaths import Toolpaths
@@ -60,6 +65,8 @@ class Mps:
         leaves smaller gaps. 1 for no overlap.
     minimum_length : float, mm, optional
         Shorter paths are dropped; by default the shortest that the machine can cut.
+    mode : {"polyline", "raster"}, default "polyline"
+        Polylines; or paths of pixels a spacing wide, as in the paper: see `ccfem.raster`.
     """
 
     spacing: float = 1.0
@@ -67,10 +74,13 @@ class Mps:
     seeds: Literal["segments", "ends"] | tuple[tuple[float, float], ...] = "segments"
     closest: float = 0.6
     minimum_length: float | None = None
+    mode: Literal["polyline", "raster"] = "polyline"
 
     amount: ClassVar[Amount] = Amount("spacing", most=1.0, least=20.0)
 
     def __post_init__(self) -> None:
+        if self.mode not in ("polyline", "raster"):
+            raise InputError(f"mps.mode must be polyline or raster; got {self.mode!r}")
         if not 1.0 <= self.spacing < float("inf"):
             raise InputError(f"mps.spacing must be at least 1 fibre width; got {self.spacing}")
         if self.shells < 0:
@@ -88,6 +98,9 @@ class Mps:
 
     def __call__(self, layer: Layer, stress: LayerStress, machine: Machine) -> Toolpaths:
         """Plan the paths of one layer; none where the section is thinner than a fibre."""
+        if self.mode == "raster":
+            plan = self.raster(layer, stress, machine)
+            return plan.toolpaths(layer, machine, self.minimum_length)
         pitch = self.spacing * machine.fibre_width
         rings, interior = shells(
             layer.polygon, machine.fibre_width, pitch, self.shells, self.closest
@@ -96,6 +109,18 @@ class Mps:
         paths = Toolpaths.from_plane(rings + grow(guides, interior, pitch, self.closest), layer)
         least = machine.minimum_length if self.minimum_length is None else self.minimum_length
         return paths.select(paths.lengths >= least)
+
+    def raster(self, layer: Layer, stress: LayerStress, machine: Machine) -> RasterPlan:
+        """Plan one layer on a bitmap of pixels a spacing wide, whatever the mode."""
+        image = bitmap(layer.polygon, self.spacing * machine.fibre_width)
+        inside = inside_shells(image.mask, self.shells)
+        points = None
+        if self.seeds == "ends":
+            points = _patch_middles(layer, stress.part.problem.loaded_patches)
+        elif self.seeds != "segments":
+            points = np.array(self.seeds, dtype=np.float64).reshape(-1, 2)
+        guides = stress_guides(image, inside, layer, stress, points)
+        return raster_plan(image, stress_regions(image.mask, guides, self.shells))
 
     def _guides(
         self, layer: Layer, stress: LayerStress, interior: Any, pitch: float
@@ -134,6 +159,7 @@ class Mps:
         )
 
 
+@lru_cache(maxsize=32)
 def _middles(interior: Any, pitch: float) -> FloatArray:
     """Middle of each segment or point of the medial axis, that of the largest clearance first.
 
@@ -156,7 +182,7 @@ def _middles(interior: Any, pitch: float) -> FloatArray:
     found += zip(axis.radius[lone], axis.nodes[lone], strict=True)
     # Equal ones of a symmetric part keep the order of the axis, which puts the longest first.
     found.sort(key=lambda item: -round(item[0] / (0.01 * pitch)))
-    return np.array([point for _, point in found], dtype=np.float64).reshape(-1, 2)
+    return read_only(np.reshape([point for _, point in found], (-1, 2)))
 
 
 def _patch_middles(layer: Layer, patches: tuple[str, ...]) -> FloatArray:

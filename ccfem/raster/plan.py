@@ -1,0 +1,82 @@
+"""A pattern of pixels as paths in the plane of a layer."""
+
+from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
+import shapely
+
+from ccfem.arrays import FloatArray
+from ccfem.layers.layer import Layer
+from ccfem.machine import Machine
+from ccfem.raster.bitmap import Bitmap
+from ccfem.raster.patterns import Regions
+from ccfem.raster.simplify import corners
+from ccfem.raster.tracing import PixelPaths, trace
+from ccfem.toolpaths import Toolpaths
+
+__all__ = ["RasterPlan", "raster_plan"]
+
+
+@dataclass(frozen=True)
+class RasterPlan:
+    """Paths planned on a bitmap.
+
+    Attributes
+    ----------
+    raster : Bitmap
+    regions : Regions
+        The pattern.
+    paths : PixelPaths
+    """
+
+    raster: Bitmap
+    regions: Regions
+    paths: PixelPaths
+
+    @property
+    def chains(self) -> list[FloatArray]:
+        """Centres (n_i, 2), mm, of the pixels of each path; closed ones repeat their first."""
+        points = self.raster.centres(self.paths.pixels)
+        chains = np.split(points, self.paths.offsets[1:-1]) if len(self.paths) else []
+        return [
+            np.concatenate([chain, chain[:1]]) if closed else chain
+            for chain, closed in zip(chains, self.paths.closed, strict=True)
+        ]
+
+    def lines(self, stairs: bool = True) -> list[FloatArray]:
+        """Polylines (n_i, 2), mm: staircases made straight, straight runs by their ends.
+
+        Parameters
+        ----------
+        stairs : bool, default True
+            Whether staircases are made straight, where the straight way is in the section.
+        """
+        chains = self.chains
+        if not chains:
+            return []
+        offsets = np.concatenate([[0], np.cumsum([len(chain) for chain in chains])])
+        pixels = self.raster.pixels(np.concatenate(chains))
+        found = self._kept(chains, corners(pixels, offsets, stairs))
+        if stairs:
+            shapely.prepare(self.raster.section)
+            inside = shapely.covers(self.raster.section, [shapely.LineString(x) for x in found])
+            if not inside.all():
+                plain = self._kept(chains, corners(pixels, offsets, stairs=False))
+                found = [a if k else b for a, b, k in zip(found, plain, inside, strict=True)]
+        return found
+
+    def _kept(self, chains: list[FloatArray], keep: Any) -> list[FloatArray]:
+        ends = np.cumsum([len(chain) for chain in chains])[:-1]
+        return [chain[k] for chain, k in zip(chains, np.split(keep, ends), strict=True)]
+
+    def toolpaths(self, layer: Layer, machine: Machine, minimum_length: float | None) -> Toolpaths:
+        """Paths on a layer without those below a length, mm; default: the least to be cut."""
+        paths = Toolpaths.from_plane(self.lines(), layer, self.paths.closed.tolist())
+        least = machine.minimum_length if minimum_length is None else minimum_length
+        return paths.select(paths.lengths >= least)
+
+
+def raster_plan(raster: Bitmap, regions: Regions) -> RasterPlan:
+    """Trace the paths of a pattern."""
+    return RasterPlan(raster, regions, trace(regions.number, raster.linked))
