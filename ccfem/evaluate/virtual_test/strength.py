@@ -12,12 +12,13 @@ from numba import njit
 from scipy.spatial import cKDTree
 
 from ccfem.arrays import FloatArray, IntArray
-from ccfem.elasticity.problem import PointForce
+from ccfem.elasticity.problem import PointForce, Support
 from ccfem.elasticity.stress_field import StressField
 from ccfem.errors import InputError
 from ccfem.evaluate.virtual_test.strand import Strand
 from ccfem.evaluate.virtual_test.virtual_test import VirtualTest
 from ccfem.mesh import TetMesh
+from ccfem.patches import facet_keys
 from ccfem.tensor import von_mises
 
 __all__ = [
@@ -142,7 +143,8 @@ def matrix_peak(
         Radius of the ball over which the von Mises stress of the cells is averaged by volume.
     zone : float, mm
         Cells whose centroid is closer to a patch with a load or a support are left out, though
-        they count in the averages of others.
+        they count in the averages of others. A whole flat face that slides in its plane, as a
+        plane of symmetry does, is no such patch: no stress peaks there.
 
     Raises
     ------
@@ -169,11 +171,25 @@ def _held_and_loaded(stress: StressField) -> FloatArray:
     """Points (k, 3) that cover the patches of the supports and of the load case."""
     problem = stress.problem
     loads = problem.loads[stress.case]
-    points = [np.array([load.point]) for load in loads if isinstance(load, PointForce)]
+    points = [np.zeros((0, 3))]
+    points += [np.array([load.point]) for load in loads if isinstance(load, PointForce)]
     names = {load.patch for load in loads if not isinstance(load, PointForce)}
-    for name in sorted(names | {support.patch for support in problem.supports}):
-        points.append(_cover(problem.mesh, name))
+    names |= {each.patch for each in problem.supports if not _slides(problem.mesh, each)}
+    points += [_cover(problem.mesh, name) for name in sorted(names)]
     return np.concatenate(points)
+
+
+def _slides(mesh: TetMesh, support: Support) -> bool:
+    """Whether a support holds a whole flat face across its plane and nothing else."""
+    if len(support.components) > 1:
+        return False
+    place = mesh.points[:, "xyz".index(support.components)]
+    patch = mesh.patch(support.patch)
+    level = place[patch[0, 0]]
+    flat = (np.abs(place[mesh.boundary] - level) <= 1e-9 * np.ptp(mesh.bounds)).all(axis=1)
+    return bool(np.isin(facet_keys(patch), facet_keys(mesh.boundary[flat])).all()) and (
+        len(patch) == np.count_nonzero(flat)
+    )
 
 
 def _cover(mesh: TetMesh, name: str) -> FloatArray:

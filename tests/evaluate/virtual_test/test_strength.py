@@ -138,3 +138,21 @@ def test_missing_strengths_are_refused():
     with pytest.raises(InputError, match="material 'isotropic' has none: give tensile_strength"):
         first_failure(test)
     assert first_failure(test, matrix_strength=30.0).load > 0.0
+
+
+def test_a_face_that_slides_in_its_plane_is_judged_too():
+    """Even tension in a bar 2 mm thick: F / A everywhere but at the load."""
+    mesh = box_mesh((20.0, 4.0, 2.0), (15, 3, 2))
+    pulled = {"load": (Force("x_max", (80.0, 0.0, 0.0)),)}
+    faces = (Support("x_min", "x"), Support("y_min", "y"), Support("z_min", "z"))
+    field = solve(Problem(mesh, isotropic(2000.0, 0.3), faces, pulled))["load"]
+    peak, place = matrix_peak(field)
+    assert peak == pytest.approx(10.0)
+    assert place[0] < 17.0
+    # Part of the face, or what holds it in its plane too, counts as a support.
+    bottom = mesh.patch("z_min")
+    part = mesh.with_patches({"z_min": bottom[:-1]})
+    for mesh_, last in ((part, Support("z_min", "z")), (mesh, Support("z_min", "xyz"))):
+        field = solve(Problem(mesh_, isotropic(2000.0, 0.3), (*faces[:2], last), pulled))["load"]
+        with pytest.raises(InputError, match="no cell lies farther than 3 mm"):
+            matrix_peak(field)
