@@ -14,7 +14,7 @@ from numba import njit
 from ccfem.arrays import FloatArray, IntArray
 from ccfem.errors import InputError
 
-__all__ = ["WORDS", "curve_points", "dubins", "dubins_curve", "word_sizes"]
+__all__ = ["WORDS", "advance", "curve_points", "dubins", "dubins_curve", "word_sizes"]
 
 WORDS: IntArray = np.array(
     [[1, 0, 1], [-1, 0, -1], [1, 0, -1], [-1, 0, 1], [1, -1, 1], [-1, 1, -1]], dtype=np.int64
@@ -111,15 +111,15 @@ def _sample(pose, turns, sizes, parts, radius):  # type: ignore[no-untyped-def]
     for piece in range(3):
         for part in range(parts[piece]):
             size = sizes[piece] * (part + 1) / parts[piece]
-            px, py, _ = _advance(x, y, heading, turns[piece], size, radius)
+            px, py, _ = advance(x, y, heading, turns[piece], size, radius)
             line[count, 0], line[count, 1] = px, py
             count += 1
-        x, y, heading = _advance(x, y, heading, turns[piece], sizes[piece], radius)
+        x, y, heading = advance(x, y, heading, turns[piece], sizes[piece], radius)
     return line
 
 
 @njit(cache=True, nogil=True)
-def _advance(x, y, heading, turn, size, radius):  # type: ignore[no-untyped-def]
+def advance(x, y, heading, turn, size, radius):  # type: ignore[no-untyped-def]
     """Pose after a piece: an arc by the chord and its direction, which no cancellation spoils."""
     half = 0.5 * turn * size / radius
     chord = size if turn == 0 else 2.0 * radius * np.sin(abs(half)) * np.sign(size)

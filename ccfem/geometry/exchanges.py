@@ -12,7 +12,7 @@ from numba import njit
 from ccfem.arrays import FloatArray, IntArray
 from ccfem.errors import InputError
 
-__all__ = ["searched_order"]
+__all__ = ["improved_order", "searched_order"]
 
 _BLOCK = 3
 """Most clusters that Or-opt moves at once."""
@@ -57,6 +57,15 @@ def searched_order(
     if not np.isfinite(least):
         raise InputError("there is no way through all clusters: some visit must be possible")
     return _along(best, links, visit, offsets, first, last)
+
+
+def improved_order(
+    order: IntArray, links: FloatArray, visit: FloatArray, offsets: IntArray
+) -> IntArray:
+    """Terminals (p, 2) entered and left after exchanges in an order (p,) until none helps."""
+    order = order.copy()
+    _exchange(order, links, visit, offsets, -1, -1)
+    return _along(order, links, visit, offsets, -1, -1)
 
 
 def _greedy(
