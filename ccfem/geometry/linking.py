@@ -232,27 +232,28 @@ def _end_poses(tracks: Sequence[FloatArray]) -> FloatArray:
 
 def _order(cost: FloatArray, offsets: IntArray) -> IntArray:
     """Find the ends (k, 2) at which each track is entered and left, in order."""
-    visit = np.full(cost.shape, np.inf)
+    cost = np.where(np.isfinite(cost), cost, 0.0)
     spans = [slice(2 * a, 2 * b) for a, b in pairwise(offsets)]
+    if len(spans) == 1:
+        return _within(cost, None, None)
+    visit = np.full(cost.shape, np.inf)
     for span in spans:
         visit[span, span] = costs_between_ends(cost[span, span])
-    links = np.where(np.isfinite(cost), cost, 0.0)
     found = []
-    for a, b in order_clusters(links, visit, 2 * offsets, exact=_EXACT_GROUPS):
+    for a, b in order_clusters(cost, visit, 2 * offsets, exact=_EXACT_GROUPS):
         span = next(span for span in spans if span.start <= a < span.stop)
-        count = (span.stop - span.start) // 2
-        own = order_clusters(
-            np.where(np.isfinite(cost[span, span]), cost[span, span], 0.0),
-            strand_visits(count),
-            2 * np.arange(count + 1),
-            int(a - span.start),
-            int(b - span.start),
-        )
-        found.append(own + span.start)
+        own = _within(cost[span, span], int(a - span.start), int(b - span.start))
+        found.append(own[:, 0] + span.start)
     count = len(cost) // 2
     return improved_order(
-        np.concatenate(found)[:, 0] // 2, links, strand_visits(count), 2 * np.arange(count + 1)
+        np.concatenate(found) // 2, cost, strand_visits(count), 2 * np.arange(count + 1)
     )
+
+
+def _within(cost: FloatArray, first: int | None, last: int | None) -> IntArray:
+    """Ends (k, 2) in the order of one group."""
+    count = len(cost) // 2
+    return order_clusters(cost, strand_visits(count), 2 * np.arange(count + 1), first, last)
 
 
 def _assembled(
