@@ -178,6 +178,10 @@ def plan(
     load_case: _LoadCase = None,
     calibration: _Calibration = None,
     backend: _Backend = "auto",
+    gcode: Annotated[
+        bool,
+        typer.Option("--gcode", help="Also write STRATEGY.gcode, matrix and fibre of the part."),
+    ] = False,
     out: _Out = None,
 ) -> None:
     """Plan a part by one strategy, by default with as much fibre as it lays of its own accord."""
@@ -185,7 +189,7 @@ def plan(
     options = _options(layers, heights, fibre_per_layer, virtual_test, load_case, backend)
     options["natural"] = fibre_per_layer is None
     load = partial(_load, case, set_case)
-    _run(load, f"-{strategy}", (strategy,), parameters, out, options, calibration)
+    _run(load, f"-{strategy}", (strategy,), parameters, out, options, calibration, gcode)
 
 
 @app.command()
@@ -277,6 +281,7 @@ def _run(
     out: Path | None,
     options: dict[str, Any],
     calibration: Path | None,
+    gcode: bool = False,
 ) -> None:
     """Compare and write; a failure leaves nothing behind."""
     from ccfem.compare import compare as run_comparison
@@ -287,6 +292,10 @@ def _run(
     imported = time.perf_counter()
     case = load()
     seconds = {"start": imported - _STARTED, "mesh": time.perf_counter() - imported}
+    if gcode:
+        from ccfem.export.print_plan import check_machine
+
+        check_machine(case.machine)
     if calibration is not None:
         from ccfem.calibrate import read_calibration
 
@@ -302,7 +311,7 @@ def _run(
             reasons = "; ".join(f"{run.name}: {run.failure}" for run in comparison.runs)
             raise InputError(f"no strategy could plan '{case.name}': {reasons}")
         command = shlex.join(["ccfem", *sys.argv[1:]])
-        write_results(comparison, folder, command, seconds, _part(progress, 0.75, 1.0))
+        write_results(comparison, folder, command, seconds, _part(progress, 0.75, 1.0), gcode)
     print_comparison(comparison, where, time.perf_counter() - _STARTED)
 
 

@@ -1,8 +1,9 @@
 """The printer: what a path has to respect, and what it costs."""
 
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 
 from ccfem.errors import InputError
+from ccfem.gcode_profile import GcodeProfile
 from ccfem.speeds import SpeedTable
 
 __all__ = ["Machine"]
@@ -47,6 +48,8 @@ class Machine:
         Of the matrix filament.
     bed_temperature : float, degrees Celsius
         Our choice, usual for PLA.
+    gcode : GcodeProfile
+        What its firmware wants to be told.
     """
 
     fibre_width: float = 1.0
@@ -67,10 +70,11 @@ class Machine:
     matrix_width: float = 0.8
     matrix_diameter: float = 1.75
     bed_temperature: float = 60.0
+    gcode: GcodeProfile = field(default_factory=GcodeProfile)
 
     def __post_init__(self) -> None:
         for name, value in vars(self).items():
-            if name == "speeds":
+            if name in ("speeds", "gcode"):
                 continue
             if not value >= 0.0 or value == float("inf"):
                 raise InputError(

@@ -96,6 +96,10 @@ them with a minus ("-z"), or three numbers.
     length = [15, 25]
     angle = [90, 135]
 
+    [machine.gcode]                   # what differs from ccfem.gcode_profile.GcodeProfile
+    cut = ["M42 P4 S255", "G4 P{wait}", "M42 P4 S0"]
+    bed = [250, 210, 200]             # mm
+
     [strategies.isocurve]             # parameters of a strategy on this part
     cap = 90.0
 """

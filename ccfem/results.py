@@ -197,6 +197,7 @@ def write_results(
     command: str = "",
     seconds: Mapping[str, float] | None = None,
     progress: Progress = silent,
+    gcode: bool = False,
 ) -> None:
     """Write ``results.csv``, ``results.json``, ``report.html``, pictures and paths.
 
@@ -213,6 +214,13 @@ def write_results(
     seconds : mapping of stage to float, optional
         Stages outside the comparison.
     progress : callable, optional
+    gcode : bool, default False
+        Also write ``STRATEGY.gcode``: the whole part, matrix and fibre.
+
+    Raises
+    ------
+    InputError
+        Where the part cannot be printed as it is planned.
     """
     from ccfem.export.vtk import write_paths
     from ccfem.export.waypoints import write_waypoints
@@ -233,6 +241,8 @@ def write_results(
     runs = comparison.succeeded
     for run in runs:
         write_waypoints(folder / f"{run.name}_waypoints.txt", run.toolpaths, comparison.layers)
+        if gcode:
+            _write_gcode(folder / f"{run.name}.gcode", run.toolpaths, comparison)
     every = Toolpaths.concatenate(run.toolpaths for run in runs)
     number = np.repeat(np.arange(float(len(runs))), [len(run.toolpaths) for run in runs])
     write_paths(every, folder / "paths.vtp", path_data={"strategy": number})
@@ -241,3 +251,12 @@ def write_results(
     (folder / "results.json").write_text(text + "\n", encoding="utf-8")
     page = report_html(comparison, about, pictures)
     (folder / "report.html").write_text(page, encoding="utf-8")
+
+
+def _write_gcode(path: Path, toolpaths: Toolpaths, comparison: Comparison) -> None:
+    from ccfem.export.gcode import write_gcode
+    from ccfem.export.print_plan import plan_print
+
+    case = comparison.case
+    plan = plan_print(toolpaths, comparison.layers, case.problem.mesh, case.machine)
+    write_gcode(path, plan, case.machine)

@@ -271,7 +271,7 @@ def _parameters(comparison: Comparison) -> str:
     machine = ", ".join(
         f"{key} = {_short(value)}"
         for key, value in vars(comparison.case.machine).items()
-        if value is not None
+        if value is not None and key != "gcode"
     )
     rows.append(f'<tr><td>machine</td><td class="text">{escape(machine)}</td></tr>')
     return (

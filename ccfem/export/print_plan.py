@@ -1,0 +1,243 @@
+"""A whole part as it is printed: layers of matrix below, between and above the layers of fibre."""
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+from itertools import pairwise
+from typing import Any
+
+import numpy as np
+
+from ccfem.arrays import FloatArray, read_only
+from ccfem.errors import InputError
+from ccfem.geometry.hatch import zigzag
+from ccfem.geometry.offsets import offset_rings
+from ccfem.geometry.order import nearest_end_order
+from ccfem.geometry.polylines import merge_repeated, pack
+from ccfem.layers import Layer, slice_planar
+from ccfem.machine import Machine
+from ccfem.mesh import TetMesh
+from ccfem.toolpaths import FIBRE, MATRIX, Toolpaths
+
+__all__ = ["COORDINATE_DIGITS", "PrintPlan", "check_machine", "plan_print"]
+
+COORDINATE_DIGITS = 3
+"""Decimals of coordinates, mm."""
+
+_SAME = 1e-6
+"""Heights nearer than this, mm, are one."""
+
+_OVERLAP = 0.25
+"""How far the ends of the zigzag reach into the contour, in line widths. Our choice: the lines
+then hold the volume of a section to 3 % (loop, plates; `tests/export/test_gcode_plan.py`)."""
+
+_SHORT = 1e-6
+"""A path short of the cutter's distance by no more than this share of it is long enough."""
+
+
+@dataclass(frozen=True)
+class PrintPlan:
+    """All layers of a part, from the bed to the top.
+
+    Attributes
+    ----------
+    paths : Toolpaths
+        Matrix and fibre in the order of printing, in the coordinates of the printer: X and Y on
+        its bed, Z the height of the nozzle, which is the top of a layer. `Toolpaths.layer` counts
+        the layers of this plan. Coordinates are rounded to 0.001 mm.
+    top, thickness : (S,) arrays, mm
+        Of each layer.
+    """
+
+    paths: Toolpaths
+    top: FloatArray
+    thickness: FloatArray
+
+    def __post_init__(self) -> None:
+        for name in ("top", "thickness"):
+            object.__setattr__(self, name, read_only(getattr(self, name)))
+
+
+@dataclass(frozen=True)
+class _Slab:
+    """A layer to print: its extent along the build direction, and the fibre layer that it is."""
+
+    lower: float
+    upper: float
+    fibre: int | None = None
+
+
+def check_machine(machine: Machine) -> None:
+    """Raise where a machine cannot print: a speed of 0, or strands that its cutter cannot lay.
+
+    Raises
+    ------
+    InputError
+    """
+    for name in ("fibre_speed", "matrix_speed", "travel_speed", "matrix_height"):
+        if getattr(machine, name) == 0.0:
+            raise InputError(f"machine.{name} must be above 0 to print; got 0: set it in [machine]")
+    if machine.minimum_length < machine.cutter_distance * (1.0 - _SHORT):
+        raise InputError(
+            f"machine.minimum_length is {machine.minimum_length:g} mm, but the cutter lies "
+            f"{machine.cutter_distance:g} mm before the nozzle, so that no shorter path can be "
+            "cut: raise minimum_length in [machine] to it, or set the printer's own cutter_distance"
+        )
+
+
+def plan_print(
+    toolpaths: Toolpaths, layers: Sequence[Layer], mesh: TetMesh, machine: Machine
+) -> PrintPlan:
+    """Plan the print of a whole part.
+
+    Fibre layers lie at the heights that they were planned at, with `Machine.fibre_height`. What is
+    below, between and above them is filled with matrix layers of equal height, as few as
+    `Machine.matrix_height` allows, so that the part gets its full height. A matrix layer is a
+    contour and a zigzag of the section at its middle, which turns from one matrix layer to the
+    next. Paths of a layer follow each other by their nearest ends. The part stands in the middle
+    of the bed.
+
+    Parameters
+    ----------
+    toolpaths : Toolpaths
+        Fibre; paths of other kinds are left out.
+    layers : sequence of Layer
+        Flat layers that the fibre lies on.
+    mesh : TetMesh
+        The part.
+    machine : Machine
+
+    Returns
+    -------
+    PrintPlan
+
+    Raises
+    ------
+    InputError
+        Where fibre lies on a layer that is not given, is shorter than the cutter allows, layers
+        are nearer to each other or to the part's ends than their height allows, or the part does
+        not fit on the bed.
+    """
+    fibre = toolpaths.of_kind(FIBRE)
+    _check_fibre(fibre, layers, machine)
+    frame = layers[0].frame
+    corners = mesh.points[np.unique(mesh.corners)] @ frame.T
+    lowest, highest = corners.min(axis=0), corners.max(axis=0)
+    slabs = _slabs(layers, float(lowest[2]), float(highest[2]), machine)
+    middles = [0.5 * (slab.lower + slab.upper) for slab in slabs if slab.fibre is None]
+    sections = {k.index: k for k in slice_planar(mesh, frame[2], heights=middles)}
+    profile = machine.gcode
+    origin = 0.5 * (lowest[:2] + highest[:2] - profile.bed[:2])
+    printed, count = [], 0
+    for number, slab in enumerate(slabs):
+        if slab.fibre is not None:
+            kind, lines = FIBRE, [path @ frame[:2].T for path in fibre.on_layer(slab.fibre)]
+        else:
+            kind, lines = MATRIX, []
+            if count in sections:
+                angle = np.radians(profile.matrix_angle + profile.matrix_turn * count)
+                found = _matrix(sections[count].polygon, machine.matrix_width, float(angle))
+                lines = [sections[count].to_space(line) @ frame[:2].T for line in found]
+            count += 1
+        height = slab.upper - float(lowest[2])
+        printed.append(_printed([line - origin for line in lines], height, number, kind))
+    plan = PrintPlan(
+        Toolpaths.concatenate(printed),
+        np.array([slab.upper - lowest[2] for slab in slabs]).round(COORDINATE_DIGITS),
+        np.array([slab.upper - slab.lower for slab in slabs]),
+    )
+    _check_bed(plan, machine)
+    return plan
+
+
+def _check_fibre(fibre: Toolpaths, layers: Sequence[Layer], machine: Machine) -> None:
+    """Every path lies on a layer given and is long enough for the cutter."""
+    missing = set(fibre.layer.tolist()) - {layer.index for layer in layers}
+    if missing or not layers:
+        raise InputError(
+            f"fibre lies on layer {min(missing, default=0)}, which is not among the layers given: "
+            "give those that it was planned on"
+        )
+    short = fibre.lengths < machine.cutter_distance * (1.0 - _SHORT)
+    if short.any():
+        raise InputError(
+            f"{int(short.sum())} fibre paths are shorter than the {machine.cutter_distance:g} mm "
+            f"from the cutter to the nozzle, the shortest {fibre.lengths.min():.4g} mm: plan with "
+            "machine.minimum_length of at least machine.cutter_distance"
+        )
+
+
+def _slabs(layers: Sequence[Layer], bottom: float, top: float, machine: Machine) -> list[_Slab]:
+    """All layers to print, from the bottom to the top."""
+    slabs: list[_Slab] = []
+    level = bottom
+    for layer in sorted(layers, key=lambda one: one.height):
+        lower = layer.height - 0.5 * machine.fibre_height
+        upper = layer.height + 0.5 * machine.fibre_height
+        if lower < level - _SAME or upper > top + _SAME:
+            raise InputError(
+                f"fibre layer {layer.index} at {layer.height:g} mm does not fit with a fibre "
+                f"height of {machine.fibre_height:g} mm between {level:g} and {top:g} mm: move it "
+                "with --heights, or take fewer layers"
+            )
+        slabs += _matrix_slabs(level, lower, machine)
+        slabs.append(_Slab(lower, upper, layer.index))
+        level = upper
+    return slabs + _matrix_slabs(level, top, machine)
+
+
+def _matrix_slabs(lower: float, upper: float, machine: Machine) -> list[_Slab]:
+    """Matrix layers of equal height that fill a gap; none where there is no gap."""
+    if upper - lower <= _SAME:
+        return []
+    count = int(np.ceil((upper - lower) / machine.matrix_height - _SAME))
+    edges = np.linspace(lower, upper, count + 1).tolist()
+    return [_Slab(a, b) for a, b in pairwise(edges)]
+
+
+def _matrix(section: Any, width: float, angle: float) -> list[FloatArray]:
+    """Lines (n, 2) of a matrix layer: contours, then the zigzag inside them."""
+    contours = offset_rings(section, 0.5 * width, width, width, 1)
+    inside = zigzag(section, (1.5 - _OVERLAP) * width, width, width, angle)
+    return [ring for level in contours for ring in level] + inside
+
+
+def _printed(lines: list[FloatArray], height: float, number: int, kind: int) -> Toolpaths:
+    """Paths of one layer in printer coordinates, rounded, in the order of printing."""
+    points, offsets = pack(lines)
+    points = points.round(COORDINATE_DIGITS) + 0.0
+    points, offsets, *_ = merge_repeated(points, offsets)
+    lines = [line for line in np.split(points, offsets[1:-1]) if len(line) > 1]
+    if not lines:
+        return Toolpaths.empty()
+    order, backward, _ = nearest_end_order(
+        np.array([line[0] for line in lines]), np.array([line[-1] for line in lines])
+    )
+    lines = [
+        lines[k][::-1] if back else lines[k]
+        for k, back in zip(order.tolist(), backward.tolist(), strict=True)
+    ]
+    points, offsets = pack(lines)
+    height = round(height, COORDINATE_DIGITS)
+    points = np.column_stack([points, np.full(len(points), height)])
+    return Toolpaths(
+        points=points,
+        normals=np.broadcast_to([0.0, 0.0, 1.0], points.shape),
+        offsets=offsets,
+        layer=np.full(len(lines), number),
+        kind=np.full(len(lines), kind),
+        closed=np.array([np.array_equal(line[0], line[-1]) for line in lines]),
+    )
+
+
+def _check_bed(plan: PrintPlan, machine: Machine) -> None:
+    """Everything lies in the space that the printer reaches."""
+    points, bed = plan.paths.points, np.array(machine.gcode.bed)
+    if not len(points):
+        raise InputError("there is nothing to print: the part is thinner than a line of matrix")
+    reach = np.append(points.max(axis=0)[:2], points[:, 2].max() + machine.gcode.lift)
+    if (points.min(axis=0) < 0.0).any() or (reach > bed).any():
+        size = np.append(np.ptp(points, axis=0)[:2], reach[2])
+        raise InputError(
+            f"the part needs {size[0]:.4g} x {size[1]:.4g} x {size[2]:.4g} mm, but the printer has "
+            f"{bed[0]:g} x {bed[1]:g} x {bed[2]:g} mm: turn it, or set bed in [machine.gcode]"
+        )
