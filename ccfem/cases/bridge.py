@@ -48,7 +48,7 @@ def bridge(
     force: float = 100.0,
     thickness: float = THICKNESS,
 ) -> Case:
-    """Bridge, 185 x 50 mm, on two supports and pressed down at the middle of its top.
+    """Bridge in three-point bending, 185 x 50 mm: optimised, or the full plate.
 
     Parameters
     ----------

@@ -42,7 +42,7 @@ def cantilever(
     force: float = 100.0,
     thickness: float = THICKNESS,
 ) -> Case:
-    """Cantilever, 120 x 60 mm, fixed on its left side and loaded in the middle of its right one.
+    """Cantilever beam, 120 x 60 mm: optimised, or the full plate.
 
     Parameters
     ----------

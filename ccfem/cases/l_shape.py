@@ -43,7 +43,7 @@ def l_shape(
     force: float = 100.0,
     thickness: float = THICKNESS,
 ) -> Case:
-    """L-shape, 100 x 100 mm, fixed at its top and loaded in the middle of its right side.
+    """L-shaped bracket, 100 x 100 mm: optimised, or the full plate.
 
     Parameters
     ----------

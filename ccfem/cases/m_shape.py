@@ -45,7 +45,7 @@ def m_shape(
     force: float = 100.0,
     thickness: float = THICKNESS,
 ) -> Case:
-    """M-shape, 120 x 60 mm, fixed at its lower corners and pressed down at the middle of its top.
+    """Plate on two corners, 120 x 60 mm, pressed down: optimised (M-shape), or full.
 
     Parameters
     ----------

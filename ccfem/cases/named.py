@@ -5,7 +5,7 @@ import inspect
 import pkgutil
 from collections.abc import Callable, Mapping
 from importlib.metadata import entry_points
-from typing import Any
+from typing import Any, get_type_hints
 
 from ccfem.cases.case import Case
 from ccfem.errors import InputError
@@ -17,15 +17,17 @@ __all__ = ["create_case", "named_cases"]
 def named_cases() -> Mapping[str, Callable[..., Case]]:
     """Every case by name: the modules of this package, and entry points ``ccfem.cases``.
 
-    A module that holds a function of its own name is a case; its parameters have defaults.
+    A module that holds a function of its own name that returns a `Case` is one; its parameters
+    have defaults.
     """
     import ccfem.cases as package
 
     found: dict[str, Callable[..., Case]] = {}
     for info in pkgutil.iter_modules(package.__path__):
         module = importlib.import_module(f"{package.__name__}.{info.name}")
-        if callable(getattr(module, info.name, None)):
-            found[info.name] = getattr(module, info.name)
+        make = getattr(module, info.name, None)
+        if callable(make) and get_type_hints(make).get("return") is Case:
+            found[info.name] = make
     for entry in entry_points(group="ccfem.cases"):
         found[entry.name] = entry.load()
     return found

@@ -50,7 +50,7 @@ def suspension(
     force: float = 100.0,
     thickness: float = THICKNESS,
 ) -> Case:
-    """Suspension, 175 x 126 mm, fixed at its bottom and pressed down at the end of its arm.
+    """Suspension arm with holes, 175 x 126 mm: optimised, or the full plate.
 
     Parameters
     ----------

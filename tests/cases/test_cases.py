@@ -47,6 +47,7 @@ def smallest_angle(corners):
 
 def test_names():
     assert set(NAMES) <= set(named_cases())
+    assert all(isinstance(make(), Case) for make in named_cases().values())
     with pytest.raises(InputError, match="no case named 'lop'; there are: bar, bridge, "):
         create_case("lop")
     with pytest.raises(InputError, match="no parameter 'size'; it has: element_size, order, force"):
