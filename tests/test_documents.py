@@ -5,13 +5,17 @@ import shutil
 import subprocess
 import sys
 import textwrap
+import tomllib
 from pathlib import Path
 
 import pytest
 
 from ccfem.errors import InputError
+from ccfem.machine import Machine
 from ccfem.part_file import read_part
+from ccfem.speeds import SpeedTable
 from ccfem.strategies import named
+from ccfem.tables import from_table
 
 ROOT = Path(__file__).parents[1]
 README = (ROOT / "README.md").read_text()
@@ -39,10 +43,12 @@ def test_python_of_the_readme_runs(capsys):
 
 
 def test_part_file_of_the_readme_lacks_nothing_but_its_mesh(tmp_path):
-    (block,) = blocks(README, "toml")
+    block, printer = blocks(README, "toml")
     (tmp_path / "hook.toml").write_text(block)
     with pytest.raises(InputError, match=r"hook.msh does not exist"):
         read_part(tmp_path / "hook.toml")
+    machine = from_table(Machine, tomllib.loads(printer)["machine"], "machine")
+    assert (machine.matrix_height, machine.speeds) == (0.4, SpeedTable())
 
 
 def test_every_strategy_is_in_the_readme():
