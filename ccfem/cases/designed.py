@@ -28,6 +28,7 @@ from ccfem.mesh import TetMesh
 from ccfem.meshing import extrude
 from ccfem.patches import Cylinder, Plane, patches_from_rules
 from ccfem.progress import Progress, silent
+from ccfem.speeds import SpeedTable
 from ccfem.topopt.design import Design
 from ccfem.topopt.outline import solid
 from ccfem.topopt.somp import somp
@@ -240,11 +241,18 @@ class DesignPlate:
 
 
 def prepreg_printer() -> Machine:
-    """Printer of the prepreg filament: strands 0.9 mm wide, turns of 1.5 mm radius.
+    """Printer of the prepreg filament, with the speeds of table 2 of the paper.
 
-    Both are assumed: the paper does not state them.
+    Strands 0.9 mm wide, no shorter than 10 mm, and turns of 1.5 mm radius are assumed: the paper
+    does not state them.
     """
-    return Machine(fibre_width=0.9, deposited_width=0.9, minimum_length=10.0, minimum_radius=1.5)
+    return Machine(
+        fibre_width=0.9,
+        deposited_width=0.9,
+        minimum_length=10.0,
+        minimum_radius=1.5,
+        speeds=SpeedTable(),
+    )
 
 
 def designed_mesh(plate: DesignPlate, element_size: float) -> TetMesh:

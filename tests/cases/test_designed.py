@@ -138,6 +138,7 @@ def test_cases(plate, optimised):
     np.testing.assert_allclose(field.reactions.sum(axis=0), [0.0, 50.0, 0.0], atol=1e-5)
     assert case.machine.fibre_width == 0.9
     assert case.machine.minimum_radius == 1.5
+    assert case.machine.speeds.speed == (7.0, 15.0, 35.0)
 
 
 def test_full_cantilever_bends_as_a_beam():
