@@ -43,8 +43,9 @@ COLUMNS = (
         "Share of the vertices of the paths as planned, simplified by Douglas and Peucker to a "
         "fiftieth of a fibre width, at which the curvature is below 1 / the machine's minimum "
         "radius: 2 sin(a / 2) over the mean length of the two steps between which the path turns "
-        "by a. Links outside the section or over a void are left out. It weighs tight turns more "
-        "than curvature_ok, for they have more vertices (Wang et al. 2021 count points).",
+        "by a, of each of which no more than a fibre width counts. Links outside the section or "
+        "over a void are left out. It weighs tight turns more than curvature_ok does, for they "
+        "have more vertices (Wang et al. 2021 count points).",
         "0 to 1, 1 is best; NaN where no path has an inner vertex",
     ),
     Column(
@@ -112,27 +113,29 @@ def sample_curvature(paths: PlanePaths, step: float) -> CurvatureSamples:
     )
     return CurvatureSamples(
         (angle / size)[inner],
-        _native(lines, _SIMPLIFY * step),
+        _native(lines, step),
         turning_angles(paths.points, paths.offsets, paths.closed),
         np.array([paths.lengths.sum()]),
     )
 
 
-def _native(paths: PlanePaths, tolerance: float) -> FloatArray:
+def _native(paths: PlanePaths, longest: float) -> FloatArray:
     """Curvature at the inner vertices of simplified paths, 1/mm.
 
     ``2 sin(a / 2) / h`` (Wang et al. 2021) is the curvature of the circle through three vertices
-    that lie equally far apart.
+    that lie equally far apart. Steps count up to `longest`, so that a corner between straight lines
+    is one however long they are; arcs of up to six times that radius have shorter steps.
     """
     if not len(paths):
         return np.zeros(0)
     index = np.repeat(np.arange(len(paths)), np.diff(paths.offsets))
     lines = shapely.linestrings(paths.points, indices=index)
-    simple = shapely.simplify(lines, tolerance, preserve_topology=False)
+    simple = shapely.simplify(lines, _SIMPLIFY * longest, preserve_topology=False)
     points = shapely.get_coordinates(simple)
     offsets = np.concatenate([[0], np.cumsum(shapely.get_num_coordinates(simple))])
-    along = np.append(arc_lengths(points, offsets), 0.0)
-    before, after = along[:-1] - np.roll(along[:-1], 1), along[1:] - along[:-1]
+    along = arc_lengths(points, offsets)
+    before = np.minimum(along - np.roll(along, 1), longest)
+    after = np.roll(before, -1)
     first, last = offsets[:-1], offsets[1:] - 1
     before[first] = before[last]
     inner = np.ones(len(points), dtype=bool)

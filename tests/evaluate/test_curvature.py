@@ -92,11 +92,17 @@ def test_more_points_on_the_same_curve_change_nothing(pulled):
 
 @pytest.mark.parametrize("closed", [True, False])
 def test_vertices_of_a_polygon_have_the_curvature_of_its_circle(pulled, closed):
-    # 40 chords of a circle of 10 mm lie 0.03 mm inside it: none is simplified away.
-    line = arc(10.0, end=2.0 * np.pi if closed else np.pi, points=41 if closed else 21)
+    # 33 chords of a circle of 5 mm lie 0.023 mm inside it: none is simplified away.
+    line = arc(5.0, end=2.0 * np.pi if closed else np.pi, points=34 if closed else 17)
     samples = sample_curvature(pulled.plane(line), 1.0)
-    assert len(samples.native) == (40 if closed else 19)
-    assert samples.native == pytest.approx(0.1, rel=1e-9)
+    assert len(samples.native) == (33 if closed else 15)
+    assert samples.native == pytest.approx(0.2, rel=1e-9)
+
+
+@pytest.mark.parametrize("radius", [2.0, 3.0, 4.5, 8.0, 15.0])
+def test_a_finely_drawn_circle_is_judged_by_its_radius(pulled, radius):
+    values = indices(pulled.plane(arc(radius)))
+    assert values["curvature_ok_native"] == (1.0 if radius > MACHINE.minimum_radius else 0.0)
 
 
 def test_vertices_count_one_by_one_once_straight_ones_are_gone(pulled):
@@ -111,9 +117,14 @@ def test_vertices_count_one_by_one_once_straight_ones_are_gone(pulled):
     assert values["curvature_ok"] > 0.9
 
 
-def test_a_hairpin_is_as_sharp_as_two_steps_allow(pulled):
-    native = sample_curvature(pulled.plane([[5, 5], [25, 5], [15, 5.0]]), 1.0).native
-    assert native == pytest.approx(2.0 / 15.0)
+def test_a_corner_is_sharp_however_long_its_sides(pulled):
+    corner = sample_curvature(pulled.plane([[5, 5], [25, 5], [25, 25]]), 1.0).native
+    assert corner == pytest.approx(np.sqrt(2.0))
+    hairpin = sample_curvature(pulled.plane([[5, 5], [25, 5], [15, 5]]), 1.0).native
+    assert hairpin == pytest.approx(2.0)
+    # Sides shorter than a fibre width count as they are.
+    small = sample_curvature(pulled.plane([[5, 5], [5.5, 5], [5.5, 5.25]]), 1.0).native
+    assert small == pytest.approx(np.sqrt(2.0) / 0.375)
 
 
 def test_no_path(pulled):
