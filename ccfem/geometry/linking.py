@@ -251,7 +251,7 @@ def _order(cost: FloatArray, offsets: IntArray) -> IntArray:
 
 
 def _within(cost: FloatArray, first: int | None, last: int | None) -> IntArray:
-    """Ends (k, 2) in the order of one group."""
+    """Order one group: the ends (k, 2) at which each track is entered and left."""
     count = len(cost) // 2
     return order_clusters(cost, strand_visits(count), 2 * np.arange(count + 1), first, last)
 
