@@ -5,10 +5,15 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
+from ccfem.arrays import FloatArray
 from ccfem.comparison import Comparison, Run
+from ccfem.evaluate.curvature import sample_curvature
+from ccfem.evaluate.matching import THRESHOLDS, matching_rate
+from ccfem.evaluate.plane_paths import plane_paths, pool
 from ccfem.layers import Layer
 from ccfem.plot.canvas import png
 from ccfem.plot.colours import palette
+from ccfem.plot.curves import curvature_curves, matching_curves
 from ccfem.plot.fields import tension_picture
 from ccfem.plot.on_paths import force_on_paths
 from ccfem.plot.paths import Coloured, compare_layer, layer_picture, mark_failure, tension_limit
@@ -30,6 +35,8 @@ class Pictures:
         Tension in the middle layer.
     overview : bytes
         All strategies side by side on the middle layer.
+    matching, curvature : bytes
+        Curves of all strategies over all layers.
     middle : int
         Index of the middle layer.
     """
@@ -38,13 +45,16 @@ class Pictures:
     forces: dict[str, bytes]
     tension: bytes
     overview: bytes
+    matching: bytes
+    curvature: bytes
     middle: int
 
 
 def draw_pictures(comparison: Comparison, progress: Progress = silent) -> Pictures:
     """Draw every layer of every strategy that did not fail, all on one colour scale."""
     layers, runs, stress = comparison.layers, comparison.succeeded, comparison.stress
-    width = comparison.case.machine.fibre_width
+    machine = comparison.case.machine
+    width = machine.fibre_width
     limit = max(tension_limit(stress.on(layer)) for layer in layers)
     colours = palette(run.name for run in comparison.runs)
     paths = {}
@@ -71,12 +81,15 @@ def draw_pictures(comparison: Comparison, progress: Progress = silent) -> Pictur
         {run.name: caption(run, middle) for run in runs},
         limit,
     )
+    rates, bends = _curves(comparison)
     heading = f"tension in layer {middle.index}, load case {stress.case}"
     return Pictures(
         paths,
         _forces(runs, middle, width, colours),
         png(tension_picture(stress.on(middle), heading, "size and direction", limit)),
         png(overview),
+        png(matching_curves(rates, THRESHOLDS, "fibre along the stress", colours)),
+        png(curvature_curves(bends, 1.0 / machine.minimum_radius, "curvature", colours)),
         middle.index,
     )
 
@@ -90,6 +103,18 @@ def caption(run: Run, layer: Layer) -> str:
         f"{values['fibre_length']:.0f} mm in {values['paths']:.0f} paths, "
         f"efficiency {values['efficiency']:.2f}"
     )
+
+
+def _curves(comparison: Comparison) -> tuple[dict[str, FloatArray], dict[str, FloatArray]]:
+    """Take matching rates, and samples of the curvature, 1/mm, of each run over all layers."""
+    step = comparison.case.machine.fibre_width
+    stresses = [comparison.stress.on(layer) for layer in comparison.layers]
+    rates, bends = {}, {}
+    for run in comparison.succeeded:
+        lines = [plane_paths(run.toolpaths, layer) for layer in comparison.layers]
+        rates[run.name] = matching_rate(run.toolpaths, stresses, step=step)
+        bends[run.name] = pool([sample_curvature(each, step) for each in lines]).curvature
+    return rates, bends
 
 
 def _forces(

@@ -213,6 +213,17 @@ def _pictures(comparison: Comparison, pictures: Pictures) -> str:
             f"{pictures.middle}; the mark is where the part first fails, on whatever layer.</p>\n"
             f"{_grid(figures)}\n"
         )
+    curves = [
+        _figure(pictures.matching, "share of the fibre within an angle of the stress"),
+        _figure(pictures.curvature, "share of the fibre below a curvature"),
+        "",
+    ]
+    parts.append(
+        "<h2>Direction and curvature</h2>\n"
+        '<p class="note">Share of the fibre\'s length within an angle of the in-plane principal '
+        "stress of the larger size, and share of it that is straighter than a curvature; all "
+        f"layers.</p>\n{_grid(curves)}\n"
+    )
     stress = _figure(pictures.tension, "tension in the middle layer")
     parts.append(f"<h2>Tension without fibres</h2>\n{_grid([stress, '', '', ''])}\n")
     return "".join(parts)
