@@ -7,7 +7,7 @@ from ccfem.arrays import FloatArray, IntArray
 from ccfem.errors import InputError
 from ccfem.geometry.locate import locate
 
-__all__ = ["streamlines"]
+__all__ = ["direction_at", "streamline_step", "streamlines", "triangle_neighbours"]
 
 _SHARPEST = 0.5
 """Cosine of the largest turn of the direction within one step: beyond 60 degrees two families of
@@ -63,7 +63,7 @@ def streamlines(
     field = np.stack([0.5 * (s11 + s22), 0.5 * (s11 - s22), s12], axis=1)
     size = float((np.abs(field[:, 0]) + np.hypot(field[:, 1], field[:, 2])).max())
     corners = np.ascontiguousarray(points[triangles])
-    beside = _neighbours(triangles, len(points))
+    beside = triangle_neighbours(triangles, len(points))
     if longest is None:
         longest = 10.0 * float(np.linalg.norm(points.max(axis=0) - points.min(axis=0)))
     steps = int(np.ceil(longest / step))
@@ -84,7 +84,7 @@ def streamlines(
     return lines
 
 
-def _neighbours(triangles: IntArray, count: int) -> IntArray:
+def triangle_neighbours(triangles: IntArray, count: int) -> IntArray:
     """Triangle beyond the side opposite to each corner, (t, 3), -1 at the border."""
     sides = np.sort(triangles[:, [[1, 2], [2, 0], [0, 1]]].reshape(-1, 2), axis=1)
     key = sides[:, 0] * count + sides[:, 1]
@@ -96,8 +96,8 @@ def _neighbours(triangles: IntArray, count: int) -> IntArray:
     return beside.reshape(-1, 3)
 
 
-@njit(cache=True)
-def _direction(corners, values, beside, cell, x, y, either, least, way):  # type: ignore[no-untyped-def]
+@njit(cache=True, nogil=True)
+def direction_at(corners, values, beside, cell, x, y, either, least, way):  # type: ignore[no-untyped-def]
     """Return the unit direction at (x, y), the triangle there, and whether there is one.
 
     The triangle is found by walking from `cell`; `way` is where the line came from, so that the
@@ -137,13 +137,41 @@ def _direction(corners, values, beside, cell, x, y, either, least, way):  # type
     return dx, dy, cell, either or along >= _SHARPEST
 
 
-@njit(cache=True)
+@njit(cache=True, nogil=True)
+def streamline_step(corners, values, beside, cell, x, y, step, least, way):  # type: ignore[no-untyped-def]
+    """Point one step on, the triangle there, and whether there is one; turns `way`."""
+    h = 0.5 * step
+    ax, ay, cell, fine = direction_at(corners, values, beside, cell, x, y, False, least, way)
+    if not fine:
+        return x, y, cell, False
+    way[0], way[1] = ax, ay
+    bx, by, near, fine = direction_at(
+        corners, values, beside, cell, x + h * ax, y + h * ay, False, least, way
+    )
+    if not fine:
+        return x, y, cell, False
+    cx, cy, near, fine = direction_at(
+        corners, values, beside, near, x + h * bx, y + h * by, False, least, way
+    )
+    if not fine:
+        return x, y, cell, False
+    ex, ey, near, fine = direction_at(
+        corners, values, beside, near, x + step * cx, y + step * cy, False, least, way
+    )
+    if not fine:
+        return x, y, cell, False
+    x += step * (ax + 2.0 * bx + 2.0 * cx + ex) / 6.0
+    y += step * (ay + 2.0 * by + 2.0 * cy + ey) / 6.0
+    return x, y, near, True
+
+
+@njit(cache=True, nogil=True)
 def _follow(corners, values, beside, start, cell, step, least, most, sense):  # type: ignore[no-untyped-def]
     """Points (m, 2) from `start` in one sense, and whether they come back to it."""
     line = np.empty((most + 1, 2))
     line[0] = start
     way = np.zeros(2)
-    dx, dy, cell, fine = _direction(
+    dx, dy, cell, fine = direction_at(
         corners, values, beside, cell, start[0], start[1], True, least, way
     )
     if not fine:
@@ -151,30 +179,10 @@ def _follow(corners, values, beside, start, cell, step, least, most, sense):  # 
     way[0], way[1] = sense * dx, sense * dy
     x, y = start
     count = 1
-    h = 0.5 * step
     while count <= most:
-        ax, ay, cell, fine = _direction(corners, values, beside, cell, x, y, False, least, way)
+        x, y, cell, fine = streamline_step(corners, values, beside, cell, x, y, step, least, way)
         if not fine:
             break
-        way[0], way[1] = ax, ay
-        bx, by, near, fine = _direction(
-            corners, values, beside, cell, x + h * ax, y + h * ay, False, least, way
-        )
-        if not fine:
-            break
-        cx, cy, near, fine = _direction(
-            corners, values, beside, near, x + h * bx, y + h * by, False, least, way
-        )
-        if not fine:
-            break
-        ex, ey, near, fine = _direction(
-            corners, values, beside, near, x + step * cx, y + step * cy, False, least, way
-        )
-        if not fine:
-            break
-        x += step * (ax + 2.0 * bx + 2.0 * cx + ex) / 6.0
-        y += step * (ay + 2.0 * by + 2.0 * cy + ey) / 6.0
-        cell = near
         line[count, 0], line[count, 1] = x, y
         count += 1
         gap = np.sqrt((x - start[0]) ** 2 + (y - start[1]) ** 2)
