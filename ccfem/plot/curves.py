@@ -64,7 +64,7 @@ def matching_curves(
 
 def curvature_curves(
     curvatures: Mapping[str, FloatArray],
-    limit: float,
+    radius: float,
     heading: str = "",
     colours: Mapping[str, str] | None = None,
 ) -> "Figure":
@@ -74,17 +74,21 @@ def curvature_curves(
     ----------
     curvatures : mapping of name to (s,) array, 1/mm
         Samples that count equally, as `evaluate.curvature.sample_curvature` takes them.
-    limit : float, 1/mm
-        Largest curvature that the machine allows, ``1 / Machine.minimum_radius``; it is marked.
+    radius : float, mm
+        Tightest that the machine allows (`Machine.minimum_radius`): its curvature is marked, unless
+        it is 0.
     heading : str
     colours : mapping of name to colour, optional
         Default `palette`.
     """
-    if not limit > 0.0:
-        raise InputError(f"the largest curvature allowed must be above 0 1/mm; got {limit:g}")
+    if not 0.0 <= radius < np.inf:
+        raise InputError(f"the tightest radius must be a finite number >= 0 mm; got {radius:g}")
     figure, axes = _axes(heading, "curvature, 1/mm", "share below it, %")
-    axes.axvline(limit, color=OUTLINE, lw=0.8, ls=(0, (4, 3)), zorder=1.0)
-    axes.text(1.06 * limit, 2.0, f"radius {1.0 / limit:.3g} mm", size=7, color=OUTLINE)
+    if radius > 0.0:
+        axes.axvline(1.0 / radius, color=OUTLINE, lw=0.8, ls=(0, (4, 3)), zorder=1.0)
+        axes.text(
+            1.06 / radius, 2.0, f"radius {radius:.3g} mm", size=7, color=OUTLINE, clip_on=True
+        )
     chosen = palette(curvatures) if colours is None else colours
     for name, samples in curvatures.items():
         if not len(samples):

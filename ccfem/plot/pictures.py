@@ -89,7 +89,7 @@ def draw_pictures(comparison: Comparison, progress: Progress = silent) -> Pictur
         png(tension_picture(stress.on(middle), heading, "size and direction", limit)),
         png(overview),
         png(matching_curves(rates, THRESHOLDS, "fibre along the stress", colours)),
-        png(curvature_curves(bends, 1.0 / machine.minimum_radius, "curvature", colours)),
+        png(curvature_curves(bends, machine.minimum_radius, "curvature", colours)),
         middle.index,
     )
 

@@ -38,14 +38,16 @@ def test_matching_rates_are_drawn_in_percent_beside_chance():
 def test_the_curvature_curve_is_the_share_of_samples_below():
     rng = np.random.default_rng(2)
     samples = np.exp(rng.uniform(np.log(0.02), np.log(2.0), 500))
-    figure = curvature_curves({"isocurve": samples, "zigzag": np.zeros(0)}, 0.26)
+    figure = curvature_curves({"isocurve": samples, "zigzag": np.zeros(0)}, 3.85)
     x, y = curve(figure, "isocurve")
     for at in (0.015, 0.1, 0.26, 1.0, 3.0):
         drawn = y[np.searchsorted(x, at, side="right") - 1]
         assert drawn == pytest.approx(100.0 * (samples <= at).mean())
     assert png(figure).startswith(b"\x89PNG")
-    with pytest.raises(InputError, match="above 0 1/mm; got 0"):
-        curvature_curves({}, 0.0)
+    assert list(figure.axes[0].lines[0].get_xdata()) == pytest.approx([1.0 / 3.85] * 2)
+    assert len(curvature_curves({}, 0.0).axes[0].lines) == 0
+    with pytest.raises(InputError, match=">= 0 mm; got -1"):
+        curvature_curves({}, -1.0)
 
 
 def test_maps_of_curvature_show_links_beyond_the_part():
