@@ -39,11 +39,14 @@ def ring(radius, count=120):
 
 LINES = [
     # One path on each side of the hole, a ring round it, and a short way between two of them.
-    [ring(11.0), np.array([[-18.0, 12.0], [60.0, 12.0], [60.0, 55.0], [30.0, 55.0]])],
+    [
+        ring(11.0),
+        np.array([[-18.0, 18.0], [-18.0, 12.0], [60.0, 12.0], [60.0, 55.0], [30.0, 55.0]]),
+    ],
     [ring(14.0)],
     [
         np.array([[-18.0, 58.0], [65.0, 58.0]]),
-        np.array([[-18.0, 14.0], [28.0, 14.0]]),
+        np.array([[-18.0, 14.0], [28.0, 14.0], [28.0, 20.0]]),
         np.array([[-18.0, 12.0], [65.0, 12.0]]),
     ],
 ]
@@ -215,8 +218,9 @@ def test_speeds_are_those_of_the_table(printed):
     *_, run = printed
     lines = [line + TO_BED for lines in LINES for line in lines]
     speeds = [{round(move.speed, 6) for move in strand.moves} for strand in match(lines, run)]
-    # Rings of radius 11 and 14 mm: 0.09 and 0.07 1/mm. Right angles: 15. Straight on: 35.
-    assert speeds == [{15.0}, {15.0}, {15.0}, {35.0}, {35.0}, {35.0}]
+    # Rings of radius 11 and 14 mm: 0.09 and 0.07 1/mm. Right angles: 15, short sides 7. Straight
+    # on: 35.
+    assert speeds == [{15.0}, {7.0, 15.0}, {15.0}, {35.0}, {7.0, 15.0}, {35.0}]
     assert {move.speed for line in run.lines(0) for move in line.moves} == {12.0}
     across = [m.speed for m in run.moves if m.rapid and m.start[2] == m.end[2]]
     up = [m.speed for m in run.moves if m.rapid and m.start[2] != m.end[2]]
@@ -260,6 +264,9 @@ def test_long_feeds_are_split(plate, follow):
     fed = sum(move.fed for move in run.moves if move.tool == 1)
     assert fed == pytest.approx(paths.lengths.sum(), abs=0.02)
     match([line + TO_BED for lines in LINES for line in lines], run)
+    once = follow(gcode(plan_print(paths, layers, mesh, MACHINE), MACHINE))
+    seconds = [sum(m.seconds for x in one.lines(1) for m in x.moves) for one in (run, once)]
+    assert seconds[0] == pytest.approx(seconds[1], rel=1e-6)
 
 
 def test_a_cutter_at_the_nozzle_and_a_path_of_just_the_tail(plate, follow):
