@@ -41,7 +41,8 @@ LINES = [
     # One path on each side of the hole, a ring round it, and a short way between two of them.
     [
         ring(11.0),
-        np.array([[-18.0, 18.0], [-18.0, 12.0], [60.0, 12.0], [60.0, 55.0], [30.0, 55.0]]),
+        # A short side at either end.
+        np.array([[-18, 18], [-18, 12], [60, 12], [60, 55], [40, 55], [40, 49]], dtype=float),
     ],
     [ring(14.0)],
     [
