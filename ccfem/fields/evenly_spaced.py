@@ -1,0 +1,284 @@
+"""Streamlines of the principal stress, evenly spaced.
+
+B. Jobard, W. Lefer, Creating evenly-spaced streamlines of arbitrary density, Visualization in
+Scientific Computing '97, Springer (1997) 43.
+"""
+
+from typing import Any, NamedTuple
+
+import numpy as np
+import shapely
+from numba import njit
+
+from ccfem.arrays import FloatArray, IntArray
+from ccfem.errors import InputError
+from ccfem.fields.streamlines import direction_at, streamline_step, triangle_neighbours
+from ccfem.geometry.section_grid import SectionGrid, contains, section_grid
+
+__all__ = ["evenly_spaced_streamlines"]
+
+_STEP = 0.1
+"""Step along a streamline, in separations."""
+_LEAST = 0.02
+"""As `least` of `streamlines`."""
+_SLACK = 1e-3
+"""By how much less than the separation a new line may be off, for rounding and finite steps."""
+_MOST_POINTS = 20_000_000
+
+
+def evenly_spaced_streamlines(
+    points: FloatArray,
+    triangles: IntArray,
+    plane_stress: FloatArray,
+    region: Any,
+    separation: float,
+    closest: float = 0.5,
+) -> list[FloatArray]:
+    """Lines along the principal stress of the largest size, a distance apart.
+
+    The first line goes through the most stressed triangle. Others begin beside the points of lines
+    that are there, `separation` away, in the order of the lines; a line ends where it comes nearer
+    than `closest` separations to another or to itself, where it leaves the region, and where the
+    stress has no direction. Where no line is left to begin beside, the most stressed triangle that
+    is a separation away from all lines begins the next one: so that separate parts of the region,
+    and of the field, are reached too; the paper is silent on these.
+
+    Parameters
+    ----------
+    points : (n, 2) array, mm
+    triangles : (t, 3) int array
+    plane_stress : (n, 3) array, MPa
+        s11, s22, s12 at the points.
+    region : shapely (Multi)Polygon, mm
+        Lines stay in it.
+    separation : float, mm
+        Distance at which lines begin beside each other (d_sep), > 0.
+    closest : float in (0, 1), default 0.5
+        Least distance of lines in separations (d_test / d_sep).
+
+    Returns
+    -------
+    list of (m, 2) arrays, mm
+        In the order in which they were found, in steps of a tenth of the separation; a line that
+        comes back to its start is closed: its last point is its first.
+    """
+    if not 0.0 < separation < np.inf or not 0.0 < closest < 1.0:
+        raise InputError(
+            "streamlines need a separation above 0 mm and closest between 0 and 1; got "
+            f"{separation} and {closest}"
+        )
+    if shapely.is_empty(region) or not len(triangles):
+        return []
+    s11, s22, s12 = plane_stress.T
+    field = np.stack([0.5 * (s11 + s22), 0.5 * (s11 - s22), s12], axis=1)
+    sizes = np.abs(field[:, 0]) + np.hypot(field[:, 1], field[:, 2])
+    middles = points[triangles].mean(axis=1)
+    seeds = np.argsort(-sizes[triangles].mean(axis=1), kind="stable")
+    seeds = seeds[shapely.contains_xy(region, middles[seeds])]
+    step = _STEP * separation
+    room = 8.0 * float(region.area) / (closest * separation * step) + 1e5
+    if room > _MOST_POINTS:
+        raise InputError(
+            f"a separation of {separation} mm gives too many streamlines on {region.area:.0f} "
+            "mm^2: choose a larger one"
+        )
+    grid = section_grid(region, 2.0 * separation)
+    found, spans, closed = _lay(
+        _Field(
+            np.ascontiguousarray(points[triangles]),
+            np.ascontiguousarray(field[triangles]),
+            triangle_neighbours(triangles, len(points)),
+            _LEAST * float(sizes.max()),
+        ),
+        grid,
+        _empty(grid, separation, int(room)),
+        middles[seeds],
+        seeds,
+        separation,
+        closest * separation,
+        step,
+    )
+    lines = []
+    for (start, turn, end), ring in zip(spans, closed, strict=True):
+        ahead, back = found[start:turn], found[turn:end]
+        lines.append(np.concatenate([ahead, ahead[:1]] if ring else [back[::-1], ahead]))
+    return lines
+
+
+class _Field(NamedTuple):
+    """Corners (t, 3, 2), values there, neighbours of the triangles, and the least stress."""
+
+    corners: FloatArray
+    values: FloatArray
+    beside: IntArray
+    least: float
+
+
+class _Laid(NamedTuple):
+    """Points of lines by cells of a grid.
+
+    Of each point: place, unit direction, triangle, arc length from the seed (negative behind it),
+    line, and the point that was put into its cell before.
+    """
+
+    spot: FloatArray
+    way: FloatArray
+    home: IntArray
+    along: FloatArray
+    line: IntArray
+    following: IntArray
+    head: IntArray
+    origin: FloatArray
+    cell: float
+
+
+def _empty(grid: SectionGrid, cell: float, room: int) -> _Laid:
+    extent = np.array(grid.room.shape) * grid.cell
+    nx, ny = (np.floor(extent / cell) + 1).astype(int)
+    return _Laid(
+        np.empty((room, 2)),
+        np.empty((room, 2)),
+        np.empty(room, np.int64),
+        np.empty(room),
+        np.empty(room, np.int64),
+        np.empty(room, np.int64),
+        np.full((nx, ny), -1),
+        grid.origin,
+        cell,
+    )
+
+
+@njit(cache=True, nogil=True)
+def _lay(field, grid, laid, seeds, homes, apart, test, step):  # type: ignore[no-untyped-def]
+    """Points of all lines, (start, turn, end) of each among them, and whether it is closed.
+
+    From start to turn the points run ahead from the seed, from turn to end back from it.
+    """
+    spans = np.empty((len(laid.line) // 4, 3), np.int64)
+    closed = np.zeros(len(spans), np.bool_)
+    lines = count = looked = tried = 0
+    while looked < 2 * count or tried < len(seeds):
+        if looked < 2 * count:
+            # Beside the points of lines, to both sides.
+            p, side = looked // 2, 1.0 - 2.0 * (looked % 2)
+            x = laid.spot[p, 0] - side * apart * laid.way[p, 1]
+            y = laid.spot[p, 1] + side * apart * laid.way[p, 0]
+            home = laid.home[p]
+            looked += 1
+        else:
+            x, y = seeds[tried]
+            home = homes[tried]
+            tried += 1
+        if not contains(grid, x, y) or _occupied(laid, x, y, apart * (1.0 - _SLACK)):
+            continue
+        turn, end, ring = _trace(field, grid, laid, count, lines, x, y, home, test, step)
+        if end - count < apart / step:
+            _take_back(laid, count, end)
+            continue
+        spans[lines, 0], spans[lines, 1], spans[lines, 2] = count, turn, end
+        closed[lines] = ring
+        lines += 1
+        count = end
+    return laid.spot[:count], spans[:lines], closed[:lines]
+
+
+@njit(cache=True, nogil=True)
+def _trace(field, grid, laid, first, number, x0, y0, home, test, step):  # type: ignore[no-untyped-def]
+    """Add points of a line from its seed ahead and back: end of either, and whether it is closed.
+
+    The numbers of the points start at `first`.
+    """
+    corners, values, beside, least = field
+    way = np.zeros(2)
+    dx, dy, home, fine = direction_at(corners, values, beside, home, x0, y0, True, least, way)
+    count = first
+    if not fine:
+        return count, count, False
+    _add(laid, count, x0, y0, dx, dy, home, 0.0, number)
+    count += 1
+    turn = count
+    for sense in (1.0, -1.0):
+        x, y, cell, along = x0, y0, home, 0.0
+        way[0], way[1] = sense * dx, sense * dy
+        while count < len(laid.line):
+            x, y, cell, fine = streamline_step(
+                corners, values, beside, cell, x, y, step, least, way
+            )
+            along += sense * step
+            if not fine or not contains(grid, x, y):
+                break
+            # Back at the seed, from behind: the same line again.
+            ahead = (x0 - x) * way[0] + (y0 - y) * way[1]
+            aside = abs((x0 - x) * way[1] - (y0 - y) * way[0])
+            homing = abs(along) > 4.0 * test and aside < 0.2 * test
+            homing = homing and -step < ahead < 2.0 * test
+            if homing and ahead <= 0.5 * step and sense > 0.0:
+                return count, count, True
+            if _crowded(laid, x, y, number, along, test, homing):
+                break
+            _add(laid, count, x, y, way[0], way[1], cell, along, number)
+            count += 1
+        if sense > 0.0:
+            turn = count
+    return turn, count, False
+
+
+@njit(cache=True, nogil=True)
+def _cell(laid, x, y):  # type: ignore[no-untyped-def]
+    return int((x - laid.origin[0]) / laid.cell), int((y - laid.origin[1]) / laid.cell)
+
+
+@njit(cache=True, nogil=True)
+def _add(laid, p, x, y, dx, dy, home, along, number):  # type: ignore[no-untyped-def]
+    laid.spot[p, 0], laid.spot[p, 1] = x, y
+    laid.way[p, 0], laid.way[p, 1] = dx, dy
+    laid.home[p], laid.along[p], laid.line[p] = home, along, number
+    i, j = _cell(laid, x, y)
+    laid.following[p] = laid.head[i, j]
+    laid.head[i, j] = p
+
+
+@njit(cache=True, nogil=True)
+def _take_back(laid, first, end):  # type: ignore[no-untyped-def]
+    """Forget points, the last ones that were added."""
+    for p in range(end - 1, first - 1, -1):
+        i, j = _cell(laid, laid.spot[p, 0], laid.spot[p, 1])
+        laid.head[i, j] = laid.following[p]
+
+
+@njit(cache=True, nogil=True)
+def _occupied(laid, x, y, limit):  # type: ignore[no-untyped-def]
+    """Whether a point of any line is nearer than a limit."""
+    i, j = _cell(laid, x, y)
+    nx, ny = laid.head.shape
+    for a in range(max(i - 1, 0), min(i + 2, nx)):
+        for b in range(max(j - 1, 0), min(j + 2, ny)):
+            q = laid.head[a, b]
+            while q >= 0:
+                if (laid.spot[q, 0] - x) ** 2 + (laid.spot[q, 1] - y) ** 2 < limit * limit:
+                    return True
+                q = laid.following[q]
+    return False
+
+
+@njit(cache=True, nogil=True)
+def _crowded(laid, x, y, number, along, limit, homing):  # type: ignore[no-untyped-def]
+    """Whether a point of another line, or of another stretch of this one, is nearer than a limit.
+
+    A line that comes home meets the stretch about its seed: that does not count.
+    """
+    i, j = _cell(laid, x, y)
+    nx, ny = laid.head.shape
+    for a in range(max(i - 1, 0), min(i + 2, nx)):
+        for b in range(max(j - 1, 0), min(j + 2, ny)):
+            q = laid.head[a, b]
+            while q >= 0:
+                own = laid.line[q] == number
+                beside = own and abs(laid.along[q] - along) < 2.0 * limit
+                begun = own and homing and abs(laid.along[q]) < 4.0 * limit
+                if not beside and not begun:
+                    dx, dy = laid.spot[q, 0] - x, laid.spot[q, 1] - y
+                    if dx * dx + dy * dy < limit * limit:
+                        return True
+                q = laid.following[q]
+    return False

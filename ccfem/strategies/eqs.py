@@ -1,0 +1,112 @@
+"""Lines equally spaced from one streamline of the principal stress: a strategy to compare with.
+
+One of the three ways that Wang et al. 2021 (paper 001) show beside their own, after V. S.
+Papapetrou, C. Patel, A. Y. Tamijani, Stiffness-based optimization framework for the topology and
+fiber paths of continuous fiber composites, Composites Part B 183 (2020) 107681 (EQS).
+"""
+
+from dataclasses import dataclass
+from typing import Any, ClassVar
+
+import numpy as np
+import shapely
+
+from ccfem.arrays import FloatArray
+from ccfem.elasticity.stress_field import LayerStress
+from ccfem.errors import InputError
+from ccfem.fields.streamlines import streamlines
+from ccfem.geometry.dilation import open_lines
+from ccfem.layers.layer import Layer
+from ccfem.machine import Machine
+from ccfem.strategies.strategy import Amount
+from ccfem.tensor import in_plane
+from ccfem.toolpaths import Toolpaths
+
+__all__ = ["Eqs"]
+
+_STEP = 0.25
+"""Step along the seed line, in fibre widths."""
+_CANDIDATES = 20
+"""Most stressed places whose streamlines are compared."""
+_OFF = 0.005
+"""Largest deviation from the distance, in fibre widths."""
+
+
+@dataclass(frozen=True)
+class Eqs:
+    """A seed line along the stress, and lines at whole multiples of the spacing from it.
+
+    The seed line is the longest of the streamlines through the twenty most stressed places of the
+    layer, or the one through a given point. The others are iso-lines of the Euclidean distance from
+    it, to its sides and round its ends: exactly parallel, whatever voids lie between. Distance
+    measured within the section would lay them across every member that leads away from the seed
+    line, and break them behind every hole, where two fronts meet. Away from the seed line the
+    stress has no say.
+
+    Attributes
+    ----------
+    spacing : float, default 1
+        Distance of neighbouring lines in fibre widths, at least 1.
+    seed : tuple of 2 floats, mm, optional
+        Point in the plane of the layer that the seed line goes through.
+    minimum_length : float, mm, optional
+        Shorter paths are dropped; by default the shortest that the machine can cut.
+    """
+
+    spacing: float = 1.0
+    seed: tuple[float, float] | None = None
+    minimum_length: float | None = None
+
+    amount: ClassVar[Amount] = Amount("spacing", most=1.0, least=20.0)
+
+    def __post_init__(self) -> None:
+        if not 1.0 <= self.spacing < float("inf"):
+            raise InputError(f"eqs.spacing must be at least 1 fibre width; got {self.spacing}")
+        if self.seed is not None and not np.isfinite(self.seed).all():
+            raise InputError(f"eqs.seed must be a point in mm; got {self.seed}")
+        if self.minimum_length is not None and not 0.0 <= self.minimum_length < float("inf"):
+            raise InputError(
+                f"eqs.minimum_length must be a finite number >= 0; got {self.minimum_length}"
+            )
+
+    def __call__(self, layer: Layer, stress: LayerStress, machine: Machine) -> Toolpaths:
+        """Plan the paths of one layer; none where the section is thinner than a fibre."""
+        width = machine.fibre_width
+        region = shapely.buffer(layer.polygon, -0.5 * width)
+        seed = self._seed_line(layer, stress, region, _STEP * width)
+        if len(seed) < 2:
+            return Toolpaths.empty()
+        lines = _iso_lines(seed, region, self.spacing * width, _OFF * width)
+        paths = Toolpaths.from_plane(lines, layer)
+        least = machine.minimum_length if self.minimum_length is None else self.minimum_length
+        return paths.select(paths.lengths >= least)
+
+    def _seed_line(self, layer: Layer, stress: LayerStress, region: Any, step: float) -> FloatArray:
+        """Longest candidate (n, 2); empty where no candidate lies in the region."""
+        plane = in_plane(stress.nodal, layer.frame)
+        if self.seed is None:
+            s11, s22, s12 = plane[layer.triangles].mean(axis=1).T
+            size = np.abs(0.5 * (s11 + s22)) + np.hypot(0.5 * (s11 - s22), s12)
+            middles = layer.plane_points[layer.triangles].mean(axis=1)
+            order = np.argsort(-size, kind="stable")
+            starts = middles[order[shapely.contains_xy(region, middles[order])]][:_CANDIDATES]
+        else:
+            starts = np.array([self.seed])
+        lines = streamlines(layer.plane_points, layer.triangles, plane, starts, step)
+        if not lines:
+            return np.zeros((0, 2))
+        return lines[int(np.argmax([len(line) for line in lines]))]
+
+
+def _iso_lines(seed: FloatArray, region: Any, pitch: float, off: float) -> list[FloatArray]:
+    """Lines (k, 2), mm, at whole multiples of a pitch from a seed line, clipped to a region."""
+    curve = shapely.simplify(shapely.LineString(seed), 0.5 * off)
+    lines = open_lines(shapely.intersection(curve, region))
+    farthest = shapely.hausdorff_distance(region, curve)
+    for level in range(1, int(farthest / pitch) + 1):
+        distance = level * pitch
+        # Of arcs by chords: as many that these are off by no more than half of what is allowed.
+        quarter = int(np.ceil(0.25 * np.pi / np.sqrt(off / distance)))
+        around = shapely.boundary(shapely.buffer(curve, distance, quad_segs=max(quarter, 4)))
+        lines += open_lines(shapely.intersection(around, region))
+    return lines

@@ -1,0 +1,73 @@
+"""Level sets of the distance to the border, as they are: a strategy to compare with.
+
+One of the three ways that Wang et al. 2021 (paper 001) show beside their own, after V. S.
+Papapetrou, C. Patel, A. Y. Tamijani, Stiffness-based optimization framework for the topology and
+fiber paths of continuous fiber composites, Composites Part B 183 (2020) 107681.
+"""
+
+from dataclasses import dataclass
+from typing import Any, ClassVar
+
+import shapely
+
+from ccfem.arrays import FloatArray
+from ccfem.elasticity.stress_field import LayerStress
+from ccfem.errors import InputError
+from ccfem.geometry.offsets import rings
+from ccfem.layers.layer import Layer
+from ccfem.machine import Machine
+from ccfem.strategies.strategy import Amount
+from ccfem.toolpaths import Toolpaths
+
+__all__ = ["Offset"]
+
+_QUARTER = 16
+"""Segments of a quarter turn round a re-entrant corner."""
+
+
+@dataclass(frozen=True)
+class Offset:
+    """Rings at half a fibre width from the border and at every spacing further in.
+
+    Each is a closed path. Unlike those of `concentric` the rings are not opened where the section
+    narrows, so that opposite sides may touch or break apart, and not joined; the middle of a member
+    stays open or is laid too densely, as its width has it.
+
+    Attributes
+    ----------
+    spacing : float, default 1
+        Distance of neighbouring rings in fibre widths, at least 1.
+    minimum_length : float, mm, optional
+        Shorter paths are dropped; by default the shortest that the machine can cut.
+    """
+
+    spacing: float = 1.0
+    minimum_length: float | None = None
+
+    amount: ClassVar[Amount] = Amount("spacing", most=1.0, least=20.0)
+
+    def __post_init__(self) -> None:
+        if not 1.0 <= self.spacing < float("inf"):
+            raise InputError(f"offset.spacing must be at least 1 fibre width; got {self.spacing}")
+        if self.minimum_length is not None and not 0.0 <= self.minimum_length < float("inf"):
+            raise InputError(
+                f"offset.minimum_length must be a finite number >= 0; got {self.minimum_length}"
+            )
+
+    def __call__(self, layer: Layer, stress: LayerStress, machine: Machine) -> Toolpaths:
+        """Plan the paths of one layer; none where the section is thinner than a fibre."""
+        width = machine.fibre_width
+        lines = _level_sets(layer.polygon, 0.5 * width, self.spacing * width)
+        paths = Toolpaths.from_plane(lines, layer)
+        least = machine.minimum_length if self.minimum_length is None else self.minimum_length
+        return paths.select(paths.lengths >= least)
+
+
+def _level_sets(section: Any, first: float, spacing: float) -> list[FloatArray]:
+    """Find the closed curves (k, 2), mm, at `first`, `first + spacing`, ... inside a section."""
+    found: list[FloatArray] = []
+    distance = first
+    while level := rings(shapely.buffer(section, -distance, quad_segs=_QUARTER)):
+        found += level
+        distance += spacing
+    return found

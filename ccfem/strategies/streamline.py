@@ -1,0 +1,81 @@
+"""Evenly spaced streamlines of the principal stress, as they are: a strategy to compare with.
+
+One of the three ways of following the stress that Wang et al. 2021 (paper 001) show beside their
+own, after V. S. Papapetrou, C. Patel, A. Y. Tamijani, Stiffness-based optimization framework for
+the topology and fiber paths of continuous fiber composites, Composites Part B 183 (2020) 107681.
+The lines are those of B. Jobard, W. Lefer, Creating evenly-spaced streamlines of arbitrary density,
+Visualization in Scientific Computing '97, Springer (1997) 43.
+"""
+
+from dataclasses import dataclass
+from typing import ClassVar
+
+import shapely
+
+from ccfem.elasticity.stress_field import LayerStress
+from ccfem.errors import InputError
+from ccfem.fields.evenly_spaced import evenly_spaced_streamlines
+from ccfem.layers.layer import Layer
+from ccfem.machine import Machine
+from ccfem.strategies.strategy import Amount
+from ccfem.tensor import in_plane
+from ccfem.toolpaths import Toolpaths
+
+__all__ = ["Streamline"]
+
+_TOLERANCE = 2e-3
+"""Deviation, in fibre widths, up to which points of a streamline are left out."""
+
+
+@dataclass(frozen=True)
+class Streamline:
+    """Streamlines of the principal stress of the largest size in the plane of the layer.
+
+    Where they converge lines end, where they diverge others begin; nothing joins them, and joints
+    where the direction jumps stay open. What is too short for the cutter is dropped.
+
+    Attributes
+    ----------
+    spacing : float, default 1
+        Distance at which lines begin beside each other in fibre widths, at least 1.
+    closest : float, default 0.5
+        Least distance of lines in spacings.
+    minimum_length : float, mm, optional
+        Shorter paths are dropped; by default the shortest that the machine can cut.
+    """
+
+    spacing: float = 1.0
+    closest: float = 0.5
+    minimum_length: float | None = None
+
+    amount: ClassVar[Amount] = Amount("spacing", most=1.0, least=20.0)
+
+    def __post_init__(self) -> None:
+        if not 1.0 <= self.spacing < float("inf"):
+            raise InputError(
+                f"streamline.spacing must be at least 1 fibre width; got {self.spacing}"
+            )
+        if not 0.1 <= self.closest <= 0.95:
+            raise InputError(
+                f"streamline.closest must lie between 0.1 and 0.95; got {self.closest}"
+            )
+        if self.minimum_length is not None and not 0.0 <= self.minimum_length < float("inf"):
+            raise InputError(
+                f"streamline.minimum_length must be a finite number >= 0; got {self.minimum_length}"
+            )
+
+    def __call__(self, layer: Layer, stress: LayerStress, machine: Machine) -> Toolpaths:
+        """Plan the paths of one layer; none where the section is thinner than a fibre."""
+        width = machine.fibre_width
+        lines = evenly_spaced_streamlines(
+            layer.plane_points,
+            layer.triangles,
+            in_plane(stress.nodal, layer.frame),
+            shapely.buffer(layer.polygon, -0.5 * width),
+            self.spacing * width,
+            self.closest,
+        )
+        smooth = shapely.simplify([shapely.LineString(line) for line in lines], _TOLERANCE * width)
+        paths = Toolpaths.from_plane([shapely.get_coordinates(line) for line in smooth], layer)
+        least = machine.minimum_length if self.minimum_length is None else self.minimum_length
+        return paths.select(paths.lengths >= least)

@@ -1,0 +1,114 @@
+"""Strategies of others to compare with: offset, streamline, eqs."""
+
+import numpy as np
+import pytest
+import shapely
+
+from ccfem.cases import create_case
+from ccfem.elasticity import Force, Problem, Support, solve
+from ccfem.errors import InputError
+from ccfem.evaluate import evaluate
+from ccfem.layers import slice_planar
+from ccfem.machine import Machine
+from ccfem.materials import isotropic
+from ccfem.strategies import create, plan
+from ccfem.strategies.offset import _level_sets
+from ccfem.structured import box_mesh
+
+MACHINE = Machine(fibre_width=1.0, minimum_length=5.0)
+
+
+@pytest.fixture(scope="module")
+def bar():
+    """Stress of a bar under uniform tension along x, and its one layer, 60 x 12 mm."""
+    mesh = box_mesh((60.0, 12.0, 2.0), (30, 6, 1))
+    problem = Problem(
+        mesh,
+        isotropic(3500.0, 0.0),
+        (Support("x_min"),),
+        {"pull": (Force("x_max", (100.0, 0.0, 0.0)),)},
+    )
+    return solve(problem)["pull"], slice_planar(mesh, count=1)
+
+
+@pytest.fixture(scope="module")
+def holed():
+    """Stress of a plate with a round hole, pulled along x, and its one layer."""
+    case = create_case("open_hole")
+    (stress,) = solve(case.problem).values()
+    return stress, slice_planar(case.problem.mesh, case.build, count=1)
+
+
+def test_offset_lays_all_distances_to_the_border(bar) -> None:
+    paths = plan(create("offset"), bar[1], bar[0], MACHINE)
+    # Rectangles at 0.5, 1.5, ..., 5.5 mm inside 60 x 12 mm.
+    expected = [2 * (60 - 2 * d) + 2 * (12 - 2 * d) for d in 0.5 + np.arange(6)]
+    np.testing.assert_allclose(paths.lengths, expected, atol=1e-6)
+    assert paths.closed.all()
+
+
+def test_offset_rings_break_apart_at_a_neck_and_are_round_at_a_notch() -> None:
+    bell = shapely.union_all(
+        [shapely.box(0, 0, 20, 20), shapely.box(20, 8, 40, 12), shapely.box(40, 0, 60, 20)]
+    )
+    lines = _level_sets(bell, 0.5, 1.0)
+    sizes = np.array([np.linalg.norm(np.diff(line, axis=0), axis=1).sum() for line in lines])
+    # One ring at 0.5 and one at 1.5 mm go through the neck of 4 mm, all others come in pairs.
+    assert len(lines) == 2 + 2 * 8
+    np.testing.assert_allclose(sizes[2::2], sizes[3::2])
+    border = shapely.boundary(bell)
+    levels = np.concatenate([[0.5, 1.5], np.repeat(np.arange(2.5, 10.0), 2)])
+    for line, level in zip(lines, levels, strict=True):
+        samples = shapely.get_coordinates(shapely.segmentize(shapely.LineString(line), 0.2))
+        distance = shapely.distance(border, shapely.points(samples))
+        np.testing.assert_allclose(distance, level, atol=0.002 * level)
+
+
+def test_streamlines_of_a_bar_run_along_the_pull(bar) -> None:
+    paths = plan(create("streamline"), bar[1], bar[0], MACHINE)
+    heights = np.sort([path[:, 1].mean() for path in paths])
+    assert len(heights) in (11, 12)
+    np.testing.assert_allclose(np.diff(heights), 1.0, atol=2e-3)
+    for path in paths:
+        assert np.ptp(path[:, 1]) < 1e-3
+        assert np.ptp(path[:, 0]) > 59.0 - 0.3
+
+
+def test_streamlines_follow_the_stress_and_keep_apart(holed) -> None:
+    stress, layers = holed
+    paths = plan(create("streamline"), layers, stress, MACHINE)
+    total = evaluate(paths, layers, stress, MACHINE).total
+    assert total["efficiency"] > 0.98
+    strings = [shapely.linestrings(path[:, :2]) for path in paths]
+    tree = shapely.STRtree(strings)
+    near, _ = tree.query(strings, predicate="dwithin", distance=0.49)
+    assert len(near) == len(strings)
+
+
+def test_eqs_lines_of_a_straight_seed_are_straight_and_equally_spaced(bar) -> None:
+    paths = plan(create("eqs", {"seed": (30.0, 4.3)}), bar[1], bar[0], MACHINE)
+    heights = np.sort([path[:, 1].mean() for path in paths])
+    np.testing.assert_allclose(heights, 4.3 + np.arange(-3, 8), atol=1e-3)
+    for path in paths:
+        assert np.ptp(path[:, 1]) < 1e-3
+        assert np.ptp(path[:, 0]) == pytest.approx(59.0, abs=0.01)
+
+
+def test_eqs_lines_lie_at_multiples_of_the_spacing_from_the_seed(holed) -> None:
+    stress, layers = holed
+    paths = plan(create("eqs", {"spacing": 2.0}), layers, stress, MACHINE)
+    lines = [shapely.linestrings(path[:, :2]) for path in paths]
+    seed = shapely.union_all(lines[:1])
+    for path in paths:
+        distance = shapely.distance(seed, shapely.points(path[:, :2]))
+        away = distance / 2.0 - np.round(distance / 2.0)
+        assert np.abs(away).max() < 0.02
+    assert max(float(line.distance(seed)) for line in lines) > 15.0
+
+
+@pytest.mark.parametrize("name", ["offset", "streamline", "eqs"])
+def test_bad_parameters_are_refused(name) -> None:
+    with pytest.raises(InputError, match="spacing"):
+        create(name, {"spacing": 0.5})
+    with pytest.raises(InputError, match="minimum_length"):
+        create(name, {"minimum_length": -1.0})
