@@ -5,22 +5,36 @@ import tomllib
 import numpy as np
 import pytest
 
-from benchmarks.papers.plocher_2022.claims import EXPECTED, claim_table, quantities, verdicts
+from benchmarks.papers.plocher_2022.claims import (
+    EXPECTED,
+    claim_table,
+    quantities,
+    raster_quantities,
+    verdicts,
+)
 from benchmarks.papers.plocher_2022.figures import draw_all
-from benchmarks.papers.plocher_2022.study import run_case
+from benchmarks.papers.plocher_2022.study import RASTER, run_case
 from benchmarks.papers.plocher_2022.tables import (
     ROWS,
     case_table,
     index_table,
+    prototype_table,
     rank_table,
     result_table,
 )
+from benchmarks.papers.plocher_2022.variants import metric_table
 from ccfem.cases.plates import five_holes
+from ccfem.raster.patterns import INFILL
 
 
 @pytest.fixture(scope="module")
 def case():
     return run_case(five_holes(bead=1.2))
+
+
+@pytest.fixture(scope="module")
+def raster(case):
+    return run_case(case.plate, RASTER, case.benchmarks)
 
 
 def test_order_of_the_patterns(case):
@@ -46,8 +60,36 @@ def test_sum_of_densities_is_the_energy_over_the_volume_of_a_cell(case):
         assert case.value(name, "density_sum_C") == pytest.approx(expected)
 
 
-def test_every_quantity_of_the_claims_is_computed(case):
+def test_pixels_and_polylines_agree(case, raster):
+    for name in case.patterns:
+        for index, near in (("agreement", 4.0), ("ratio_C", 0.35), ("gaps", 12.0)):
+            difference = raster.value(name, index) - case.value(name, index)
+            assert abs(difference) < near, (name, index)
+    energy = {name: raster.value(name, "ratio_C") for name in raster.patterns}
+    assert min(energy, key=energy.get) == "mps"
+    assert min(energy.values()) >= 1.0
+
+
+def test_what_pixels_do_to_length_and_sinuosity(case, raster):
+    # Inside the shells, rows step by a bead and diagonals by sqrt 2; the shells are the same.
+    shells = {}
+    for name, step in (("grid 0", 1.2), ("grid 45", 1.2 * np.sqrt(2.0))):
+        steps = []
+        for plan in raster.patterns[name].raster:
+            inside = plan.regions.domain == INFILL
+            begins = inside[tuple(plan.paths.pixels[plan.paths.offsets[:-1]].T)]
+            steps.append((inside & ~plan.paths.isolated).sum() - begins.sum())
+        shells[name] = raster.value(name, "length") - step * np.mean(steps)
+    assert shells["grid 45"] == pytest.approx(shells["grid 0"], rel=1e-6)
+    for name in raster.patterns:
+        assert raster.value(name, "si_raw") >= raster.value(name, "si") - 1e-9 >= 1.0 - 1e-9
+        assert raster.value(name, "isolated") < 0.05 * case.plate.mask.sum()
+        assert raster.value(name, "cpu_to_gcode") > raster.value(name, "cpu") > 0.0
+
+
+def test_every_quantity_of_the_claims_is_computed(case, raster):
     found = quantities(dict.fromkeys(("I", "II", "III"), case))
+    found |= raster_quantities(dict.fromkeys(("I", "II", "III"), raster))
     claims = tomllib.loads(EXPECTED.read_text())["claim"]
     named = {check["quantity"] for claim in claims for check in claim["checks"]}
     assert {name for name in named - set(found) if "variant" not in name} == {"printed tests"}
@@ -65,11 +107,15 @@ def test_verdicts_follow_the_ranges():
     assert "| agreement mps II | 85 to 92 % | 20 | differs |" in claim_table(list(checks.values()))
 
 
-def test_figures_and_tables(case, tmp_path):
-    names = draw_all({"II": case}, tmp_path)
+def test_figures_and_tables(case, raster, tmp_path):
+    names = draw_all({"II": case}, {"II": raster}, tmp_path)
     assert len(names) >= 8
     assert all((tmp_path / name).stat().st_size > 5000 for name in names)
-    assert result_table(case).count("\n") == len(ROWS) + 2
+    of_pixels = {"si_raw", "si_raw_mean", "isolated"}
+    assert result_table(case).count("\n") == len(set(ROWS) - of_pixels) + 2
+    assert result_table(raster).count("\n") == len(ROWS) + 2
+    assert prototype_table({"II": raster}).count("(") >= 5 * 9
+    assert metric_table({"II": raster}).count("| II |") == 3
     assert "| II |" in case_table({"II": case})
     assert rank_table(quantities({"II": case})).count("FRAM") == 12
     assert "stiffness_alignment" in index_table()

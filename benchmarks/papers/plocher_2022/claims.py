@@ -1,36 +1,19 @@
 """The claims of the paper beside ours: every quantity is computed from a run."""
 
-import tomllib
 from collections.abc import Mapping
-from dataclasses import dataclass
 from pathlib import Path
-from typing import Any
 
-import numpy as np
 from scipy.stats import spearmanr
 
 from benchmarks.papers.plocher_2022.study import CaseStudy
+from benchmarks.papers.verdicts import Check, claim_table, judged
 
-__all__ = ["Check", "claim_table", "quantities", "verdicts"]
+__all__ = ["Check", "claim_table", "quantities", "raster_quantities", "verdicts"]
 
 EXPECTED = Path(__file__).with_name("expected.toml")
 
 _STRAIGHT = 0.002
 """Sinuosities no further apart are equal."""
-
-
-@dataclass(frozen=True)
-class Check:
-    """One number of one claim; `verdict` is "reproduced", "differs" or "not tried"."""
-
-    claim: str
-    text: str
-    source: str
-    quantity: str
-    paper: str
-    ours: float
-    verdict: str
-    why: str
 
 
 def quantities(study: Mapping[str, CaseStudy]) -> dict[str, float]:
@@ -43,6 +26,16 @@ def quantities(study: Mapping[str, CaseStudy]) -> dict[str, float]:
         have = set(case.patterns)
         for rule in (_agreement, _energy, _printing, _sensitivity, _mixed, _ranks):
             found |= rule(case, name, have)
+    return found
+
+
+def raster_quantities(raster: Mapping[str, CaseStudy]) -> dict[str, float]:
+    """Quantities of paths of pixels: their names start with "raster"."""
+    found = {f"raster {name}": value for name, value in quantities(raster).items()}
+    for name, case in raster.items():
+        winding = [case.value(p, "si_raw_mean") for p in case.patterns]
+        spread = 100.0 * (max(winding) / min(winding) - 1.0)
+        found[f"raster range of sinuosity of raw pixels {name}, %"] = spread
     return found
 
 
@@ -138,36 +131,6 @@ def _ranks(case: CaseStudy, name: str, have: set[str]) -> dict[str, float]:
     return found
 
 
-def verdicts(found: Mapping[str, float], path: Path = EXPECTED) -> list[Check]:
+def verdicts(found: Mapping[str, float]) -> list[Check]:
     """Judge every check of `expected.toml` by the quantities found."""
-    with path.open("rb") as file:
-        claims: list[dict[str, Any]] = tomllib.load(file)["claim"]
-    checks = []
-    for claim in claims:
-        for check in claim["checks"]:
-            ours = found.get(check["quantity"], np.nan)
-            if np.isnan(ours):
-                verdict = "not tried"
-            else:
-                inside = check["low"] - 1e-9 <= ours <= check["high"] + 1e-9
-                verdict = "reproduced" if inside else "differs"
-            about = (claim["id"], claim["text"], claim["source"])
-            why = claim["why"] if verdict != "reproduced" else ""
-            checks.append(Check(*about, check["quantity"], check["paper"], ours, verdict, why))
-    return checks
-
-
-def claim_table(checks: list[Check]) -> str:
-    """Markdown table claim / paper / ours / verdict, and the reasons below it."""
-    lines = ["| claim | source | quantity | paper | ours | verdict |", "|---|---|---|---|---|---|"]
-    for k, c in enumerate(checks):
-        new = k == 0 or checks[k - 1].claim != c.claim
-        head = f"{c.claim} {c.text}" if new else ""
-        ours = "–" if np.isnan(c.ours) else f"{c.ours:.4g}"
-        lines.append(
-            f"| {head} | {c.source if new else ''} | {c.quantity} | {c.paper} | {ours} | "
-            f"{c.verdict} |"
-        )
-    reasons = {c.claim: c.why for c in checks if c.why}
-    lines += ["", *(f"- {claim}: {why}" for claim, why in reasons.items())]
-    return "\n".join(lines) + "\n"
+    return judged(found, EXPECTED)

@@ -10,19 +10,18 @@ from matplotlib.collections import LineCollection
 from matplotlib.figure import Figure
 
 from benchmarks.papers.plocher_2022.study import MATERIALS, CaseStudy, PatternStudy
-from benchmarks.papers.plocher_2022.variants import pixel_chains
 from ccfem.arrays import FloatArray
 from ccfem.cases.plates import Plate
 from ccfem.evaluate.plane_paths import PlanePaths
 from ccfem.evaluate.sensitivity import OffAxis
 from ccfem.evaluate.sinuosity import LONG
 from ccfem.evaluate.stiffness_alignment import agreement
-from ccfem.geometry.medial_axis import medial_axis
-from ccfem.geometry.shells import shells
 from ccfem.materials import named_material
 from ccfem.plot.canvas import save
 from ccfem.plot.colours import INK, OUTLINE, SECTION, scale
 from ccfem.plot.radar import draw_radar
+from ccfem.raster.patterns import inside_shells
+from ccfem.raster.skeleton import skeleton
 from ccfem.tensor import largest_in_plane
 
 __all__ = ["COLOURS", "draw_all"]
@@ -47,27 +46,36 @@ SPOKES = {
 }
 
 
-def draw_all(study: Mapping[str, CaseStudy], folder: Path) -> list[str]:
-    """Draw every figure that the cases run allow; the names of the files."""
+def draw_all(
+    study: Mapping[str, CaseStudy], raster: Mapping[str, CaseStudy], folder: Path
+) -> list[str]:
+    """Draw every figure that the cases run allow; the names of the files.
+
+    Polylines, but for what the paper shows of pixels: figures 2 to 4, and those named raster.
+    """
     tension = {name: case for name, case in study.items() if name != "III"}
     beam = {name: case for name, case in study.items() if name == "III"}
+    pixels = {name: case for name, case in raster.items() if name != "III"}
     made: dict[str, Figure] = {}
     if tension:
         made |= {
-            "figure_02_medial_axis": _medial_axis(list(tension.values())[-1]),
-            "figure_03_simplification": _simplification(list(tension.values())[-1]),
-            "figure_04_long_and_short": _long_and_short(study),
+            "figure_02_medial_axis": _medial_axis(next(iter(pixels.values()))),
+            "figure_03_simplification": _simplification(list(pixels.values())[-1]),
+            "figure_04_long_and_short": _long_and_short(raster),
             "figure_06_patterns": _patterns(tension),
+            "figure_06_patterns_raster": _patterns(pixels),
             "figure_06_bars": _bars(tension, ("C",)),
             "figure_07_agreement": _maps(tension, _agreement_of, (0.0, 100.0), "agreement, %"),
             "figure_07_moduli": _moduli(),
             "figure_08_sensitivity": _sensitivity(tension),
             "figure_09_energy": _energies(tension),
             "figure_10_radar": _radars(tension, "C"),
+            "figure_10_radar_raster": _radars(pixels, "C", {"SI": ("si_raw_mean", "low")}),
         }
     if beam:
         made |= {
-            "figure_11_patterns": _patterns(beam, trajectories=True),
+            "figure_11_patterns": _patterns(beam),
+            "figure_11_patterns_raster": _patterns({n: raster[n] for n in beam}),
             "figure_12_radar_C": _radars(beam, "C"),
             "figure_12_radar_S": _radars(beam, "S"),
             "figure_13_energy": _energies(beam),
@@ -114,7 +122,7 @@ def _title(axes: Any, text: str) -> None:
     axes.set_title(text, size=7.5, color=INK, loc="left", pad=2.0)
 
 
-def _patterns(study: Mapping[str, CaseStudy], trajectories: bool = False) -> Figure:
+def _patterns(study: Mapping[str, CaseStudy]) -> Figure:
     """Paths of every pattern, and the directions of the benchmark."""
     cases = list(study.values())
     names = list(cases[0].patterns)
@@ -138,40 +146,50 @@ def _patterns(study: Mapping[str, CaseStudy], trajectories: bool = False) -> Fig
 
 
 def _medial_axis(case: CaseStudy) -> Figure:
-    """Shells and what they leave, its medial axis, and the paths round it."""
+    """Pixels of the shells and of what they leave: its medial axis, rings round it, the rest."""
     figure, axes = _grid_of(3, 1, [case.plate])
-    width = case.plate.bead
-    rings, interior = shells(case.plate.polygon, width, width, 3, 0.6)
+    (made,) = case.patterns["mat"].raster
+    inside = inside_shells(made.raster.mask, 3)
+    axis = skeleton(inside)
+    first = np.where(made.raster.mask, np.where(inside, 1.0, 0.0), np.nan)
+    domain = np.where(made.raster.mask, made.regions.domain, np.nan)
     panels = (
-        ("three shells", rings),
-        (
-            "medial axis of the rest",
-            [s.points for s in medial_axis(interior, 0.5 * width).segments],
-        ),
-        ("paths of mat", _lines(case.patterns["mat"].paths[0])),
+        ("three shells, and the medial axis of the rest", np.where(axis, 2.0, first)),
+        ("shells, rings round the medial axis, concentric rest", domain),
     )
-    for one, (heading, lines) in zip(axes[:, 0], panels, strict=True):
-        _section(one, case.plate)
-        one.add_collection(LineCollection(list(lines), colors=COLOURS["mat"], linewidths=0.6))
+    for one, (heading, image) in zip(axes[:, 0], panels, strict=False):
+        height, width = (made.raster.pixel * n for n in image.shape)
+        x, y = made.raster.origin
+        one.imshow(image, cmap=scale("field"), extent=(x, x + width, y, y + height))
+        _section(one, case.plate, filled=False)
         _title(one, f"case {case.plate.name}: {heading}")
+    _section(axes[2, 0], case.plate)
+    axes[2, 0].add_collection(
+        LineCollection(_lines(case.patterns["mat"].paths[0]), colors=COLOURS["mat"], lw=0.6)
+    )
+    _title(axes[2, 0], f"case {case.plate.name}: paths of mat")
     return figure
 
 
 def _simplification(case: CaseStudy) -> Figure:
-    """One corner of the concentric paths: chains of pixels, polylines, and where they start."""
+    """One corner of the concentric paths: chains of pixels, what is printed, where they start."""
     figure, axes = _plain(1, 5.0, 4.2)
-    paths, bead = case.patterns["concentric"].paths[0], case.plate.bead
+    (made,) = case.patterns["concentric"].raster
+    bead = made.raster.pixel
     one = axes[0]
-    chains = pixel_chains(paths, bead)
-    one.add_collection(LineCollection(chains, colors=OUTLINE, linewidths=1.0, alpha=0.7))
-    one.add_collection(LineCollection(_lines(paths), colors=COLOURS["concentric"], linewidths=1.2))
-    starts = paths.points[paths.offsets[:-1]]
-    one.plot(*starts.T, "o", color=INK, ms=3.5)
+    lines = made.lines()
+    one.add_collection(LineCollection(made.chains, colors=OUTLINE, linewidths=1.0, alpha=0.7))
+    one.add_collection(LineCollection(lines, colors=COLOURS["concentric"], linewidths=1.2))
+    one.plot(*np.array([line[0] for line in lines]).T, "o", color=INK, ms=3.5)
+    one.plot(*made.raster.centres(np.argwhere(made.paths.isolated)).T, "x", color=INK, ms=3.5)
     one.set_xlim(0.0, 40.0 * bead)
     one.set_ylim(0.0, 0.5 * bead * case.plate.mask.shape[0] + 4.0 * bead)
     one.set_aspect("equal")
     one.set_title(
-        "concentric: pixels (grey), polylines, starts (dots)", size=8, loc="left", color=INK
+        "concentric: pixels (grey), made straight, starts (dots), isolated (x)",
+        size=8,
+        loc="left",
+        color=INK,
     )
     return figure
 
@@ -352,14 +370,18 @@ def _sensitivity(study: Mapping[str, CaseStudy]) -> Figure:
     return figure
 
 
-def _radars(study: Mapping[str, CaseStudy], key: str) -> Figure:
+def _radars(
+    study: Mapping[str, CaseStudy], key: str, instead: Mapping[str, tuple[str, str]] | None = None
+) -> Figure:
+    """Radar of all indices; `instead` names other values for some."""
+    chosen = SPOKES | dict(instead or {})
     figure = Figure(figsize=(5.0 * len(study), 4.4), dpi=130.0, facecolor="white")
     FigureCanvasAgg(figure)
-    spokes = {title: better for title, (_, better) in SPOKES.items()}
+    spokes = {title: better for title, (_, better) in chosen.items()}
     for k, (name, case) in enumerate(study.items()):
         axes = figure.add_axes(((k + 0.16) / len(study), 0.13, 0.68 / len(study), 0.74))
         series = {
-            pattern: [case.value(pattern, index.format(key)) for index, _ in SPOKES.values()]
+            pattern: [case.value(pattern, index.format(key)) for index, _ in chosen.values()]
             for pattern in case.patterns
         }
         draw_radar(axes, series, spokes, COLOURS)

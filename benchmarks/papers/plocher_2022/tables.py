@@ -1,13 +1,24 @@
 """Tables of a run, in Markdown."""
 
+import tomllib
 from collections.abc import Mapping
+from pathlib import Path
 
 from benchmarks.papers.plocher_2022.study import MATERIALS, CaseStudy
 from ccfem.evaluate import COLUMNS
 from ccfem.evaluate.plane_study import reduced_stiffness
 from ccfem.materials import named_material
 
-__all__ = ["case_table", "index_table", "material_table", "rank_table", "result_table"]
+__all__ = [
+    "case_table",
+    "index_table",
+    "material_table",
+    "prototype_table",
+    "rank_table",
+    "result_table",
+]
+
+PROTOTYPE = Path(__file__).with_name("prototype.toml")
 
 ROWS = {
     "agreement": ("agreement, %", "{:.1f}"),
@@ -24,6 +35,9 @@ ROWS = {
     "pi_harmonic_S": ("PI harmonic, S", "{:.3f}"),
     "si": ("SI by length", "{:.4f}"),
     "si_mean": ("SI mean of paths", "{:.4f}"),
+    "si_raw": ("SI of raw pixels by length", "{:.4f}"),
+    "si_raw_mean": ("SI of raw pixels, mean of paths", "{:.4f}"),
+    "isolated": ("isolated pixels a layer", "{:.0f}"),
     "paths": ("paths a layer", "{:.0f}"),
     "over_40": ("paths > 40 mm, % of number", "{:.0f}"),
     "over_40_length": ("paths > 40 mm, % of length", "{:.0f}"),
@@ -32,7 +46,8 @@ ROWS = {
     "gaps": ("gaps, % of area", "{:.2f}"),
     "print": ("print time a layer, s", "{:.0f}"),
     "cpu": ("CPU time of planning a layer, s", "{:.3f}"),
-    "cpu_with_fe": ("same with its plane-stress solve", "{:.3f}"),
+    "cpu_to_gcode": ("same, to the text of its G-code", "{:.3f}"),
+    "cpu_with_fe": ("same, with its plane-stress solve", "{:.3f}"),
     "mixed_over_S": ("both materials: energy / all S", "{:.3f}"),
     "stress_mixed": ("both materials: stress p99.9, MPa", "{:.3f}"),
     "raw_stress_mixed": ("both materials: stress raw, MPa", "{:.3f}"),
@@ -46,11 +61,29 @@ def _table(head: list[str], rows: list[list[str]]) -> str:
 
 def result_table(case: CaseStudy) -> str:
     """Every index of every pattern on one plate."""
+    known = set.intersection(*(set(one.values) for one in case.patterns.values()))
     rows = [
         [title, *(form.format(case.value(pattern, index)) for pattern in case.patterns)]
         for index, (title, form) in ROWS.items()
+        if index in known
     ]
     return _table(["index", *case.patterns], rows)
+
+
+def prototype_table(raster: Mapping[str, CaseStudy], path: Path = PROTOTYPE) -> str:
+    """Tabulate the indices of paths of pixels, and behind each that of a prototype."""
+    with path.open("rb") as file:
+        theirs = tomllib.load(file)
+    rows = []
+    for name, case in raster.items():
+        for index, values in theirs[name].items():
+            title, form = ROWS[index]
+            pairs = zip(case.patterns, values, strict=True)
+            cells = [
+                f"{form.format(case.value(pattern, index))} ({value:g})" for pattern, value in pairs
+            ]
+            rows.append([name, title, *cells])
+    return _table(["case", "index", *next(iter(raster.values())).patterns], rows)
 
 
 def rank_table(found: Mapping[str, float]) -> str:

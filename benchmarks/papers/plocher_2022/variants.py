@@ -1,29 +1,30 @@
 """What was tried where a number of the paper may hang on what it does not state."""
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Mapping
 from dataclasses import dataclass
 from typing import Any
 
 import numpy as np
 
-from benchmarks.papers.plocher_2022.study import CaseStudy, machine_of
-from ccfem.arrays import FloatArray
-from ccfem.cases.plates import Plate, five_holes, optimised_beam, single_hole
+from benchmarks.papers.plocher_2022.study import RASTER, CaseStudy, machine_of
+from ccfem.cases.plates import Plate, five_holes, single_hole
 from ccfem.elasticity.plane import PlaneField
 from ccfem.evaluate.fibre_map import fibre_map
-from ccfem.evaluate.plane_paths import PlanePaths, plane_paths
+from ccfem.evaluate.plane_paths import plane_paths
 from ccfem.evaluate.plane_study import laid_plate, print_seconds, reduced_stiffness
 from ccfem.evaluate.sinuosity import path_sinuosity, sample_sinuosity, sinuosity_indices
 from ccfem.evaluate.stiffness_alignment import agreement, strongest
-from ccfem.geometry.polylines import pack, sample_midpoints
+from ccfem.geometry.polylines import pack
 from ccfem.materials import named_material
+from ccfem.raster.patterns import concentric_regions, medial_regions
+from ccfem.raster.plan import raster_plan
 from ccfem.strategies import create, plan
 from ccfem.tensor import largest_in_plane
 
 __all__ = [
     "VARIANTS",
     "Tried",
-    "pixel_chains",
+    "metric_table",
     "try_variants",
     "variant_quantities",
     "variant_table",
@@ -32,7 +33,7 @@ __all__ = [
 _MPS: tuple[str, dict[str, Any]] = ("mps", {})
 _ENDS: tuple[str, dict[str, Any]] = ("mps", {"seeds": "ends"})
 _GRID: tuple[str, dict[str, Any]] = ("grid", {"angle": 45.0})
-_DIAGONALS: tuple[str, dict[str, Any]] = ("grid", {"angle": 45.0, "lines": "paper"})
+_PIXEL_ENDS: tuple[str, dict[str, Any]] = ("mps", {"seeds": "ends", "mode": "raster"})
 
 VARIANTS: tuple[tuple[str, Any, dict[str, float], tuple[str, dict[str, Any]]], ...] = (
     *(
@@ -40,13 +41,17 @@ VARIANTS: tuple[tuple[str, Any, dict[str, float], tuple[str, dict[str, Any]]], .
         for bead in (0.8, 1.0, 1.2)
         for label, strategy in (("grid 45", _GRID), ("mps", _MPS))
     ),
-    ("every diagonal of pixels a path, I, grid 45", single_hole, {}, _DIAGONALS),
-    ("every diagonal of pixels a path, II, grid 45", five_holes, {}, _DIAGONALS),
-    ("every diagonal of pixels a path, III, grid 45", optimised_beam, {}, _DIAGONALS),
+    *(
+        (f"raster, bead {bead:g} mm, I, {name}", single_hole, {"bead": bead}, RASTER[name])
+        for bead in (0.6, 1.0, 1.2)
+        for name in ("grid 45", "mps")
+    ),
     ("radius 6.46 mm, I, grid 45", single_hole, {"radius": 6.46}, _GRID),
     ("radius 6.46 mm, I, mps", single_hole, {"radius": 6.46}, _MPS),
     ("seeds at load and support, I, mps", single_hole, {}, _ENDS),
     ("seeds at load and support, II, mps", five_holes, {}, _ENDS),
+    ("raster, seeds at load and support, I, mps", single_hole, {}, _PIXEL_ENDS),
+    ("raster, seeds at load and support, II, mps", five_holes, {}, _PIXEL_ENDS),
 )
 """Name, plate, its parameters, and the strategy with its parameters."""
 
@@ -97,55 +102,31 @@ def try_variants() -> dict[str, Tried]:
     }
 
 
-def variant_quantities(
-    tried: Mapping[str, Tried], study: Mapping[str, CaseStudy]
-) -> dict[str, float]:
+def variant_quantities(tried: Mapping[str, Tried]) -> dict[str, float]:
     """Quantities of `expected.toml` that variants give; their names start with "variant"."""
-    found = {
+    return {
         f"variant agreement mps with seeds at the ends {name}": tried[
             f"seeds at load and support, {name}, mps"
         ].agreement
         for name in ("I", "II")
     }
-    for name, case in study.items():
-        slow = tried[f"every diagonal of pixels a path, {name}, grid 45"].print_seconds
-        longer = 100.0 * (slow / case.value("concentric", "print") - 1.0)
-        found[f"variant print time of every diagonal over concentric {name}, %"] = longer
-        means = [stairs_sinuosity(one.paths, case.plate.bead) for one in case.patterns.values()]
-        spread = 100.0 * (max(means) / min(means) - 1.0)
-        found[f"variant range of sinuosity of stairs {name}, %"] = spread
-    return found
 
 
-def pixel_chains(paths: PlanePaths, bead: float) -> list[FloatArray]:
-    """Paths as chains of raw pixels, (k, 2) arrays, mm, a square step at a time.
-
-    Each path is followed from the centre of one pixel to that of the next; where it goes to one
-    across a corner, by way of the pixel beside both.
-    """
-    points, _, _, line = sample_midpoints(paths.points, paths.offsets, 0.1 * bead)
-    pixels = np.floor(points / bead).astype(np.int64)
-    chains = []
-    for own in np.split(pixels, np.flatnonzero(np.diff(line)) + 1):
-        chain = _fresh(own)
-        full = np.empty((2 * len(chain) - 1, 2))
-        full[::2] = chain
-        full[1::2] = np.stack([chain[1:, 0], chain[:-1, 1]], axis=1)
-        full = _fresh(full)
-        if len(full) > 1:
-            chains.append(bead * (full + 0.5))
-    return chains
-
-
-def _fresh(points: Any) -> Any:
-    """Points that are not the one before them."""
-    return points[np.append(True, (np.diff(points, axis=0) != 0).any(axis=1))]
-
-
-def stairs_sinuosity(layers: Sequence[PlanePaths], bead: float) -> float:
-    """Mean sinuosity of paths as chains of raw pixels."""
-    found = [path_sinuosity(*pack(pixel_chains(paths, bead)), bead) for paths in layers]
-    return float(np.concatenate(found).mean())
+def metric_table(cases: Mapping[str, CaseStudy]) -> str:
+    """Markdown table: rings of pixels by three metrics, SI of their raw pixels, mean of paths."""
+    lines = ["| case | rings by | concentric | mat | paths, concentric | mat |", "|" + "---|" * 6]
+    for name, case in cases.items():
+        (made,) = case.patterns["concentric"].raster
+        for metric in ("euclid", "cross", "square"):
+            winding, count = [], []
+            for regions_of in (concentric_regions, medial_regions):
+                regions = regions_of(made.raster.mask, metric=metric)
+                traced = raster_plan(made.raster, regions)
+                found = path_sinuosity(*pack(traced.chains), made.raster.pixel)
+                winding.append(f"{found.mean():.3f}")
+                count.append(str(len(found)))
+            lines.append(f"| {' | '.join([name, metric, *winding, *count])} |")
+    return "\n".join(lines) + "\n"
 
 
 def variant_table(tried: Mapping[str, Tried]) -> str:
