@@ -26,9 +26,9 @@ from ccfem.fields.scalar import fit_cone, fit_constrained, fit_literal, fit_weig
 from ccfem.fields.surface import Surface
 from ccfem.geometry.clearance import trim_to_clearance
 from ccfem.geometry.conformal import lead_into, parallel_curve
+from ccfem.geometry.finishing import keep_off_border, linked_paths
 from ccfem.geometry.isocontours import Isocontours
-from ccfem.geometry.joining import link_ends
-from ccfem.geometry.rings import close_short_ring, holes_on
+from ccfem.geometry.rings import holes_on
 from ccfem.geometry.spiral import spiral
 from ccfem.layers.layer import Layer
 from ccfem.machine import Machine
@@ -109,6 +109,10 @@ class Isocurve:
         Links may follow the boundary; in the paper all are straight.
     trim : bool, default True
         Cut branches that come nearer than a strand's width to a longer one.
+    inset : float, default 0
+        Least distance of strands from the boundary, in strand widths. At 0 they may run along the
+        boundary with half of their width outside; 0.45 keeps them in, and their ends still meet
+        the links along the boundary.
     """
 
     cap: float = 86.0
@@ -131,6 +135,7 @@ class Isocurve:
     spiral: bool = True
     boundary_links: bool = True
     trim: bool = True
+    inset: float = 0.0
 
     amount: ClassVar[Amount] = Amount("density", most=4.0, least=0.05)
 
@@ -159,7 +164,7 @@ class Isocurve:
             raise InputError(f"isocurve.cap must be a percentile in (0, 100]; got {self.cap!r}")
         if not 0.0 < self.density < np.inf:
             raise InputError(f"isocurve.density must be a finite number > 0; got {self.density!r}")
-        for name in ("power", "spacing_weight", "fill_length", "link_limit"):
+        for name in ("power", "spacing_weight", "fill_length", "link_limit", "inset"):
             if not 0.0 <= getattr(self, name) < np.inf:
                 raise InputError(
                     f"isocurve.{name} must be a finite number >= 0; got {getattr(self, name)!r}"
@@ -308,6 +313,8 @@ class _Planner:
             for distance in s.rings[:-1]:
                 rings += parallel_curve(hole, distance * width, section)
             lines = lead_into(lines, hole, s.rings[-1] * width, section)
+        rings = keep_off_border(rings, section, s.inset * width)
+        lines = keep_off_border(lines, section, s.inset * width)
         if s.trim:
             lines = trim_to_clearance(
                 [*rings, *lines], _TRIM * width, 3.0 * width, first=len(rings)
@@ -316,11 +323,8 @@ class _Planner:
             lines = [*rings, *lines]
         if s.spiral:
             lines = spiral(lines, _SPIRAL_LIMIT * width, _nearest(layer, tension.stress), section)
-        lines = link_ends(
-            lines, section, s.link_limit * width, width, along_boundary=s.boundary_links
-        )
-        lines = [close_short_ring(line, machine.minimum_length) for line in lines]
-        return [line for line in lines if _length(line) >= machine.minimum_length]
+        limit, least = s.link_limit * width, machine.minimum_length
+        return linked_paths(lines, section, width, limit, least, s.boundary_links)
 
 
 def _nearest(layer: Layer, values: FloatArray) -> Callable[[FloatArray], FloatArray]:
@@ -336,10 +340,6 @@ def _longest_run(mask: BoolArray) -> int:
     starts, ends = edges[::2], edges[1::2]
     longest = int(np.argmax(ends - starts))
     return int(starts[longest] + ends[longest]) // 2 % len(mask)
-
-
-def _length(line: FloatArray) -> float:
-    return float(np.linalg.norm(np.diff(line, axis=0), axis=1).sum())
 
 
 def _percentile(values: FloatArray, weight: FloatArray, share: float) -> float:

@@ -7,10 +7,9 @@ optimised for the compliance of the part with the fibre that its isocurves lay.
 
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
-from typing import Any, ClassVar
+from typing import ClassVar
 
 import numpy as np
-import shapely
 
 from ccfem.arrays import FloatArray, IntArray
 from ccfem.elasticity.stress_field import LayerStress, StressField
@@ -31,9 +30,8 @@ from ccfem.fibre_aware.stream_design import StreamDesign, StreamProblem, design
 from ccfem.fibre_aware.stream_start import plane_axes, start_field
 from ccfem.fields.layer_tension import layer_tension
 from ccfem.geometry.clearance import trim_to_clearance
+from ccfem.geometry.finishing import keep_off_border, linked_paths
 from ccfem.geometry.isocontours import isocontours
-from ccfem.geometry.joining import link_ends
-from ccfem.geometry.rings import close_short_ring
 from ccfem.layers.layer import Layer
 from ccfem.machine import Machine
 from ccfem.strategies.strategy import Amount, LayerStrategy
@@ -252,12 +250,10 @@ class _Extraction:
         points, triangles = _refined(layer)
         values = self.problem.grid.values(points) @ field
         curves = isocontours(points, triangles, values, float(values.min()) + shift, 1.0)
-        lines = _inside(curves.lines(), section, self.strategy.inset * width)
+        lines = keep_off_border(curves.lines(), section, self.strategy.inset * width)
         lines = trim_to_clearance(lines, _CLEARANCE * width, _SHORTEST * width)
-        lines = link_ends(lines, section, self.strategy.link_limit * width, width)
-        lines = [close_short_ring(line, self.machine.minimum_length) for line in lines]
-        long = [line for line in lines if _length(line) >= self.machine.minimum_length]
-        return Toolpaths.from_plane(long, layer)
+        limit, least = self.strategy.link_limit * width, self.machine.minimum_length
+        return Toolpaths.from_plane(linked_paths(lines, section, width, limit, least), layer)
 
     def profiles(self, toolpaths: Toolpaths) -> list[Profile]:
         """Value of the paths at the strains of the designed part."""
@@ -279,28 +275,3 @@ def _refined(layer: Layer) -> tuple[FloatArray, IntArray]:
     four = [np.stack(three, axis=1) for three in ((a, z, y), (z, b, x), (y, x, c), (x, y, z))]
     middle = 0.5 * (points[first] + points[second])
     return np.concatenate([points, middle]), np.concatenate(four)
-
-
-def _inside(lines: Sequence[FloatArray], section: Any, inset: float) -> list[FloatArray]:
-    """Parts of lines that keep a distance, mm, from the boundary of the section."""
-    if inset == 0.0:
-        return list(lines)
-    room = shapely.buffer(section, -inset)
-    shapely.prepare(room)
-    kept = []
-    for line in lines:
-        string = shapely.linestrings(line)
-        if shapely.covers(room, string):
-            kept.append(line)
-            continue
-        inside = shapely.intersection(string, room)
-        if inside.geom_type == "MultiLineString":
-            inside = shapely.line_merge(inside)
-        parts = shapely.get_parts(inside)
-        strings = parts[shapely.get_type_id(parts) == 1]
-        kept += [shapely.get_coordinates(part) for part in strings if part.length > 0.0]
-    return kept
-
-
-def _length(line: FloatArray) -> float:
-    return float(np.linalg.norm(np.diff(line, axis=0), axis=1).sum())

@@ -118,6 +118,14 @@ def test_adaptive_density_follows_the_stress() -> None:
     np.testing.assert_allclose(gaps, gaps.mean(), rtol=0.05)
 
 
+def test_strands_keep_off_the_boundary() -> None:
+    field = field_of(box_mesh((60.0, 60.0, 2.0), (20, 20, 1)), uniform(0.4))
+    for inset in (0.45, 2.0):
+        paths, _ = planned(Isocurve(inset=inset, link_limit=0.0), field)
+        edge = np.minimum(paths.points[:, :2], 60.0 - paths.points[:, :2]).min()
+        assert inset - 1e-9 <= edge < inset + 0.1
+
+
 def test_half_the_width_gives_twice_the_length() -> None:
     field = field_of(box_mesh((60.0, 30.0, 2.0), (20, 10, 1)), uniform(0.3))
     layers = slice_planar(field.mesh, count=1)
