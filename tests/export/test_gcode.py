@@ -42,7 +42,7 @@ LINES = [
     [
         ring(11.0),
         # A short side at either end.
-        np.array([[-18, 18], [-18, 12], [60, 12], [60, 55], [40, 55], [40, 49]], dtype=float),
+        np.array([[-18, 18], [-18, 12], [60, 12], [60, 55], [30, 55], [30, 49]], dtype=float),
     ],
     [ring(14.0)],
     [
