@@ -1,6 +1,7 @@
 """Toolpaths as a VTK PolyData file (.vtp), for ParaView and PyVista."""
 
 import base64
+import zlib
 from collections.abc import Iterator, Mapping
 from pathlib import Path
 from typing import Any
@@ -15,6 +16,9 @@ from ccfem.toolpaths import Toolpaths
 
 __all__ = ["write_paths"]
 
+_EFFORT = 4
+"""Of zlib, 1 to 9; above it the files of the loop get no smaller."""
+
 _TYPES = {"f8": "Float64", "i8": "Int64", "u1": "UInt8"}
 
 
@@ -26,8 +30,9 @@ def write_paths(
 ) -> None:
     """Write toolpaths to a ``.vtp`` file, whole or not at all.
 
-    Every path is one polyline, in the frame of the mesh, mm. The file holds the normals and, for
-    each path, ``layer``, ``kind`` (index into `toolpaths.KINDS`), ``closed`` and ``length``.
+    Every path is one polyline, in the frame of the mesh, mm. The file holds the normals and, at
+    each point, ``link`` (1 where the step to the next point is one); for each path ``layer``,
+    ``kind`` (index into `toolpaths.KINDS`), ``closed`` and ``length``. Its arrays are compressed.
 
     Parameters
     ----------
@@ -43,7 +48,11 @@ def write_paths(
     InputError
         When the file cannot be written, or an array has the wrong length.
     """
-    points: dict[str, NDArray[Any]] = {"normals": toolpaths.normals, **(point_data or {})}
+    points: dict[str, NDArray[Any]] = {
+        "normals": toolpaths.normals,
+        "link": toolpaths.link.astype(np.uint8),
+        **(point_data or {}),
+    }
     paths: dict[str, NDArray[Any]] = {
         "layer": toolpaths.layer,
         "kind": toolpaths.kind,
@@ -70,7 +79,8 @@ def _lines(
     """Lines of the XML file (VTK file formats, "PolyData")."""
     yield '<?xml version="1.0"?>\n'
     yield (
-        '<VTKFile type="PolyData" version="1.0" byte_order="LittleEndian" header_type="UInt64">\n'
+        '<VTKFile type="PolyData" version="1.0" byte_order="LittleEndian" header_type="UInt64" '
+        'compressor="vtkZLibDataCompressor">\n'
     )
     yield (
         f'<PolyData><Piece NumberOfPoints="{len(toolpaths.points)}" NumberOfVerts="0" '
@@ -87,13 +97,17 @@ def _lines(
 
 
 def _array(name: str, values: NDArray[Any]) -> str:
-    """One DataArray, inline in base64 with its size in bytes before it."""
+    """One DataArray, inline in base64: one block of zlib with its sizes in bytes before it."""
     values = np.asarray(values)
     if values.dtype == np.bool_:
         values = values.astype(np.uint8)
     kind = "u1" if values.dtype == np.uint8 else "f8" if values.dtype.kind == "f" else "i8"
     data = np.ascontiguousarray(values, dtype=f"<{kind}").tobytes()
-    text = base64.b64encode(len(data).to_bytes(8, "little") + data).decode("ascii")
+    packed = zlib.compress(data, _EFFORT) if data else b""
+    # Number of blocks, size of a block, of a last one that is shorter, and of each when packed.
+    sizes = [1, len(data), 0, len(packed)] if data else [0, 0, 0]
+    header = np.array(sizes, dtype="<u8").tobytes()
+    text = (base64.b64encode(header) + base64.b64encode(packed)).decode("ascii")
     components = values.shape[1] if values.ndim == 2 else 1
     return (
         f'<DataArray type="{_TYPES[kind]}" Name="{_escaped(name)}" '

@@ -17,6 +17,7 @@ def toolpaths():
         layer=[0, 5],
         kind=[FIBRE, MATRIX],
         closed=[False, True],
+        link=[False, True, False, False, False, True, False],
     )
 
 
@@ -29,12 +30,30 @@ def test_pyvista_reads_the_paths_back(tmp_path):
     np.testing.assert_array_equal(data.lines, [3, 0, 1, 2, 4, 3, 4, 5, 6])
     np.testing.assert_array_equal(data.point_data["normals"], paths.normals)
     np.testing.assert_array_equal(data.point_data["force"], force)
+    np.testing.assert_array_equal(data.point_data["link"], paths.link)
     np.testing.assert_array_equal(data.cell_data["layer"], [0, 5])
     np.testing.assert_array_equal(data.cell_data["kind"], [FIBRE, MATRIX])
     np.testing.assert_array_equal(data.cell_data["closed"], [0, 1])
     np.testing.assert_array_equal(data.cell_data["cost"], [1, 2])
     assert data.cell_data["length"] == pytest.approx([6.0, 2.0 + np.sqrt(2.0)])
     assert data.compute_cell_sizes()["Length"] == pytest.approx(paths.lengths)
+
+
+def test_what_repeats_is_packed(tmp_path):
+    count = 20_000
+    points = np.column_stack([np.arange(count) % 100, np.zeros((count, 2))]).astype(float)
+    paths = Toolpaths(
+        points=points,
+        normals=np.broadcast_to([0.0, 0.0, 1.0], points.shape),
+        offsets=[0, count],
+        layer=[0],
+        kind=[FIBRE],
+        closed=[False],
+    )
+    write_paths(paths, tmp_path / "a.vtp")
+    np.testing.assert_array_equal(pyvista.read(tmp_path / "a.vtp").points, points)
+    # Three coordinates and three of the normal, 8 bytes each.
+    assert (tmp_path / "a.vtp").stat().st_size < 0.1 * 48 * count
 
 
 def test_no_paths(tmp_path):
