@@ -212,6 +212,8 @@ def remarks(comparison: Comparison) -> list[str]:
             about.append(f"no virtual test: {run.untested}")
         if run.tested is not None and run.tested.note:
             about.append(f"no first-failure load: {run.tested.note}")
+        if run.evaluation is not None:
+            about += _about_links(run.evaluation.total)
         if run.note:
             placed = ", so it is placed last" if _too_long(run, comparison) else ""
             about.append(f"{run.note}{placed}")
@@ -227,6 +229,19 @@ def remarks(comparison: Comparison) -> list[str]:
                 "fibres do not agree on an order"
             )
     return [*found, bound_remark(comparison)] if comparison.bound is not None else found
+
+
+def _about_links(total: Mapping[str, float]) -> list[str]:
+    """Say how much fibre joins strands where no part holds it, from a millimetre on."""
+    places = {
+        "link_outside": "lie outside the part, to be cut off",
+        "link_over_void": "hang over voids, where nothing holds the fibre",
+    }
+    return [
+        f"{total[name]:.0f} mm of links {where}"
+        for name, where in places.items()
+        if total[name] >= 1.0
+    ]
 
 
 def bound_remark(comparison: Comparison) -> str:

@@ -1,7 +1,7 @@
 """Comparison: equal fibre, nobody dropped, and the order by the virtual test."""
 
 import re
-from dataclasses import replace
+from dataclasses import dataclass, replace
 
 import numpy as np
 import pytest
@@ -16,6 +16,7 @@ from ccfem.machine import Machine
 from ccfem.materials import isotropic
 from ccfem.strategies import create, plan
 from ccfem.structured import box_mesh
+from ccfem.toolpaths import Toolpaths
 
 SIZE = (60.0, 24.0, 4.0)
 
@@ -147,6 +148,28 @@ def test_a_strategy_that_fails_stays_with_its_reason():
     assert not zigzag.failure
     assert ranking(result) == (zigzag, isocurve)
     assert any(line.startswith("isocurve: failed: expected tension") for line in remarks(result))
+
+
+@dataclass(frozen=True)
+class Joined:
+    """Two strands, and a link of 23 mm of which 20 mm lie outside the part."""
+
+    def __call__(self, layer, stress, machine):
+        line = np.array([[1.0, 9.0], [58, 9], [68, 9], [68, 5], [59, 5], [1, 5]])
+        return Toolpaths.from_plane([line], layer, link=[np.isin(np.arange(6), [1, 2, 3])])
+
+
+def test_links_outside_the_part_are_reported_and_carry_nothing():
+    result = compare(strip(), {"joined": Joined()}, natural=True)
+    (run,) = result.runs
+    assert not run.untested
+    total = run.evaluation.total
+    assert total["link_outside"] == pytest.approx(4 * 20.0, rel=1e-3)
+    assert total["outside_length"] == 0.0
+    inside = run.tested.bracket.tension.strands.total
+    assert inside == pytest.approx(total["fibre_length"] - total["link_outside"], rel=1e-4)
+    assert "joined: 80 mm of links lie outside the part, to be cut off" in remarks(result)
+    assert not any("voids" in line for line in remarks(result))
 
 
 def test_thin_fibre_is_reported_not_dropped():
