@@ -8,6 +8,9 @@ from ccfem.speeds import SpeedTable
 
 __all__ = ["Machine"]
 
+_CUTTER_DISTANCE = 42.0
+"""Paper 000, section 5.2, mm."""
+
 
 @dataclass(frozen=True)
 class Machine:
@@ -38,8 +41,9 @@ class Machine:
     speeds : SpeedTable, optional
         Speed of the fibre by curvature, length and angle of a path's pieces, in place of
         `fibre_speed`. Default: none.
-    cutter_distance : float, mm
-        From the cutter to the tip of the fibre nozzle: fibre that is still to be laid after a cut.
+    cutter_distance : float, mm, optional
+        From the cutter to the tip of the fibre nozzle. Default: 42 mm, or `minimum_length` where
+        that is shorter (paper 000, section 5.2: no shorter strand can be cut).
     cut_wait : float, s
         Standstill after a cut. Our choice.
     matrix_width : float, mm
@@ -65,7 +69,7 @@ class Machine:
     fibre_temperature: float = 250.0
     matrix_temperature: float = 200.0
     speeds: SpeedTable | None = None
-    cutter_distance: float = 42.0
+    cutter_distance: float | None = None
     cut_wait: float = 1.0
     matrix_width: float = 0.8
     matrix_diameter: float = 1.75
@@ -74,7 +78,7 @@ class Machine:
 
     def __post_init__(self) -> None:
         for name, value in vars(self).items():
-            if name in ("speeds", "gcode"):
+            if name in ("speeds", "gcode") or value is None:
                 continue
             if not value >= 0.0 or value == float("inf"):
                 raise InputError(
@@ -83,3 +87,10 @@ class Machine:
         for name in ("fibre_width", "matrix_width", "matrix_diameter"):
             if getattr(self, name) == 0.0:
                 raise InputError(f"machine.{name} must be above 0; got 0: give the width in mm")
+
+    @property
+    def tail(self) -> float:
+        """Fibre that is still to be laid after a cut, mm."""
+        if self.cutter_distance is None:
+            return min(_CUTTER_DISTANCE, self.minimum_length)
+        return self.cutter_distance

@@ -200,6 +200,12 @@ def test_a_part_file_sets_the_table(tmp_path):
     assert read_part(part).machine.speeds == table
 
 
+def test_the_cutter_allows_the_shortest_strand():
+    assert Machine().tail == Machine(minimum_length=50.0).tail == 42.0
+    assert Machine(minimum_length=20.0).tail == 20.0
+    assert Machine(minimum_length=20.0, cutter_distance=15.0).tail == 15.0
+
+
 @pytest.mark.parametrize(
     ("table", "message"),
     [

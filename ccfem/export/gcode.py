@@ -74,7 +74,7 @@ def gcode(plan: PrintPlan, machine: Machine) -> str:
         "; mm, mm/min; X Y Z absolute, E relative; T0 matrix, T1 fibre (E in mm of fibre)",
         f"; {len(plan.top)} layers, {plan.top.max():g} mm high",
         f"; {fibre.lengths.sum():.1f} mm of fibre in {len(fibre)} paths, each cut "
-        f"{machine.cutter_distance:g} mm before its end",
+        f"{machine.tail:g} mm before its end",
         f"; {program.seconds:.0f} s, without heating, tool changes and acceleration",
     ]
     return "\n".join([*head, *program.lines]) + "\n"
@@ -130,7 +130,7 @@ class _Program:
     def lay_fibre(self, line: FloatArray, speeds: FloatArray) -> None:
         """Feed, lay, cut and lay to its end a path (n, 2) of fibre."""
         total = _length(line)
-        line, speeds, cut = _with_point_at(line, speeds, total - self.machine.cutter_distance)
+        line, speeds, cut = _with_point_at(line, speeds, total - self.machine.tail)
         self._travel(line[0])
         self._extrude(_length(line[cut:]), self.profile.feed_speed)
         self._lay(line[: cut + 1], speeds[:cut], 1.0)

@@ -76,10 +76,10 @@ def check_machine(machine: Machine) -> None:
     for name in ("fibre_speed", "matrix_speed", "travel_speed", "matrix_height"):
         if getattr(machine, name) == 0.0:
             raise InputError(f"machine.{name} must be above 0 to print; got 0: set it in [machine]")
-    if machine.minimum_length < machine.cutter_distance * (1.0 - _SHORT):
+    if machine.minimum_length < machine.tail * (1.0 - _SHORT):
         raise InputError(
             f"machine.minimum_length is {machine.minimum_length:g} mm, but the cutter lies "
-            f"{machine.cutter_distance:g} mm before the nozzle, so that no shorter path can be "
+            f"{machine.tail:g} mm before the nozzle, so that no shorter path can be "
             "cut: raise minimum_length in [machine] to it, or set the printer's own cutter_distance"
         )
 
@@ -157,12 +157,12 @@ def _check_fibre(fibre: Toolpaths, layers: Sequence[Layer], machine: Machine) ->
             f"fibre lies on layer {min(missing, default=0)}, which is not among the layers given: "
             "give those that it was planned on"
         )
-    short = fibre.lengths < machine.cutter_distance * (1.0 - _SHORT)
+    short = fibre.lengths < machine.tail * (1.0 - _SHORT)
     if short.any():
         raise InputError(
-            f"{int(short.sum())} fibre paths are shorter than the {machine.cutter_distance:g} mm "
+            f"{int(short.sum())} fibre paths are shorter than the {machine.tail:g} mm "
             f"from the cutter to the nozzle, the shortest {fibre.lengths.min():.4g} mm: plan with "
-            "machine.minimum_length of at least machine.cutter_distance"
+            "machine.minimum_length of at least that"
         )
 
 

@@ -22,7 +22,7 @@ from ccfem.tables import from_table
 from ccfem.toolpaths import MATRIX, Toolpaths
 
 MACHINE = Machine(speeds=SpeedTable(), matrix_height=0.7, fibre_height=0.1)
-TAIL = MACHINE.cutter_distance
+TAIL = 42.0
 HOLE = 8.0
 # A plate of 90 x 50 x 4 mm with a hole; its lower corner lies at (-20, 10, 3).
 CORNER, SIZE = np.array([-20.0, 10.0, 3.0]), np.array([90.0, 50.0, 4.0])
@@ -340,7 +340,7 @@ def test_prints_that_cannot_be(plate, tmp_path):
     with pytest.raises(InputError, match=r"1 fibre paths are shorter than the 42 mm .* 41\.9 mm"):
         plan_print(short, layers, mesh, MACHINE)
     with pytest.raises(InputError, match=r"minimum_length is 20 mm, but the cutter lies 42 mm"):
-        check_machine(replace(MACHINE, minimum_length=20.0))
+        check_machine(replace(MACHINE, minimum_length=20.0, cutter_distance=42.0))
     with pytest.raises(InputError, match=r"machine\.matrix_height must be above 0 to print"):
         check_machine(replace(MACHINE, matrix_height=0.0))
     with pytest.raises(InputError, match="fibre lies on layer 1, which is not among"):
