@@ -8,11 +8,11 @@ import numpy as np
 from ccfem.arrays import FloatArray
 from ccfem.errors import InputError
 from ccfem.layers.layer import Layer
-from ccfem.plot.canvas import colour_bar, extents_of, new_figure, scale_bar, title
+from ccfem.plot.canvas import colour_bar, new_figure, scale_bar, title
 from ccfem.plot.colours import INK, OUTLINE, palette
 from ccfem.plot.on_paths import curvature_on_paths
-from ccfem.plot.paths import draw_section, draw_segments
-from ccfem.toolpaths import FIBRE, Toolpaths
+from ccfem.plot.paths import draw_section, draw_segments, picture_extents
+from ccfem.toolpaths import Toolpaths
 
 if TYPE_CHECKING:
     from matplotlib.figure import Figure
@@ -130,11 +130,7 @@ def curvature_maps(
     captions : mapping of name to str, optional
         Lines with key numbers.
     """
-    points = [layer.plane_points]
-    for lines in paths.values():
-        wanted = lines.select((lines.layer == layer.index) & (lines.kind == FIBRE))
-        points.append(layer.to_plane(wanted.points))
-    figure, columns = new_figure(extents_of(np.concatenate(points)), columns=len(paths))
+    figure, columns = new_figure(picture_extents(layer, paths.values()), columns=len(paths))
     colours = palette(paths)
     for axes, (name, lines) in zip(columns, paths.items(), strict=True):
         draw_section(axes, layer)

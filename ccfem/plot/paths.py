@@ -1,6 +1,6 @@
 """Pictures of one layer: its section, the tension in it, and the fibre paths."""
 
-from collections.abc import Mapping
+from collections.abc import Iterable, Mapping
 from dataclasses import dataclass
 from typing import TYPE_CHECKING, Any
 
@@ -27,6 +27,7 @@ __all__ = [
     "draw_stress",
     "layer_picture",
     "mark_failure",
+    "picture_extents",
     "tension_limit",
 ]
 
@@ -78,6 +79,17 @@ def _tension(stress: LayerStress) -> FloatArray:
     """Larger principal stress in the plane at the layer's points, (n,), MPa, 0 where negative."""
     largest, _, _ = largest_in_plane(in_plane(stress.nodal, stress.layer.frame))
     return np.maximum(largest, 0.0)
+
+
+def picture_extents(
+    layer: Layer, toolpaths: Iterable[Toolpaths]
+) -> tuple[float, float, float, float]:
+    """Extents, mm, of a layer with fibre paths on it, whose links may lie outside the section."""
+    points = [layer.plane_points]
+    for paths in toolpaths:
+        wanted = paths.select((paths.layer == layer.index) & (paths.kind == FIBRE))
+        points.append(layer.to_plane(wanted.points))
+    return extents_of(np.concatenate(points))
 
 
 def draw_section(axes: "Axes", layer: Layer, filled: bool = True) -> None:
@@ -223,7 +235,7 @@ def layer_picture(
     Figure
         For `plot.canvas.png` or `plot.canvas.save`.
     """
-    figure, (axes,) = new_figure(extents_of(layer.plane_points))
+    figure, (axes,) = new_figure(picture_extents(layer, [paths]))
     _draw(axes, layer, stress, paths, width, limit, coloured)
     title(axes, heading, caption, colour)
     return figure
@@ -253,7 +265,7 @@ def compare_layer(
     -------
     Figure
     """
-    figure, columns = new_figure(extents_of(layer.plane_points), columns=len(paths))
+    figure, columns = new_figure(picture_extents(layer, paths.values()), columns=len(paths))
     colours = palette(paths)
     for axes, (name, lines) in zip(columns, paths.items(), strict=True):
         own = (coloured or {}).get(name)

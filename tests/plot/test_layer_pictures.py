@@ -229,3 +229,16 @@ def test_pictures_that_cannot_be_written(tmp_path):
     with pytest.raises(InputError, match="change its suffix"):
         save(figure, tmp_path / "a.bmp2")
     assert list(tmp_path.iterdir()) == []
+
+
+def test_pictures_show_links_outside_the_section():
+    line = np.array([[10.0, 15.0], [50.0, 15.0], [80.0, 15.0]])
+    paths = Toolpaths.from_plane([line], LAYER, link=[np.array([False, True, False])])
+    inside = layer_picture(LAYER, None, straight(), 1.0).axes[0].get_xlim()
+    for figure in (
+        layer_picture(LAYER, None, paths, 1.0),
+        compare_layer(LAYER, None, {"isocurve": straight(), "zigzag": paths}, 1.0),
+    ):
+        left, right = figure.axes[0].get_xlim()
+        assert left < 0.0
+        assert right > 80.0 > inside[1]
