@@ -6,12 +6,21 @@ import numpy as np
 
 from ccfem.arrays import BoolArray, IntArray, read_only
 from ccfem.raster.thinning import thin
-from ccfem.raster.walking import absorb, chains, extend_ends, fill_corners, join_ends, walk
+from ccfem.raster.walking import (
+    absorb,
+    chains,
+    cut_spurs,
+    extend_ends,
+    fill_corners,
+    join_ends,
+    walk,
+)
 
 __all__ = ["PixelPaths", "trace"]
 
 _STUB = 4
-"""Paths of fewer pixels beside another path of their region are no paths: it takes them in."""
+"""Branches and paths of fewer pixels beside another path of their region are none: it takes them
+in."""
 _ROUNDS = 20
 
 
@@ -53,9 +62,9 @@ class PixelPaths:
 def trace(regions: IntArray, linked: BoolArray, seed: int = 0) -> PixelPaths:
     """Trace paths through regions of pixels.
 
-    Each region is thinned and its lines are followed, straight on where they fork. Pixels left
-    over come back as corners of diagonal steps, then as paths of their own; single ones stay
-    isolated. Paths of one region whose ends meet are joined.
+    Each region is thinned, and its lines are followed, without spurs and straight on where they
+    fork. Pixels left over come back as corners of diagonal steps, then as paths of their own;
+    single ones stay isolated. Paths of one region whose ends meet are joined.
 
     Parameters
     ----------
@@ -77,8 +86,10 @@ def trace(regions: IntArray, linked: BoolArray, seed: int = 0) -> PixelPaths:
         line = thin(left)
         if not line.any():
             break
+        cut_spurs(line, regions, linked, _STUB)
         if not walk(line, regions, linked, used, following, before, _STUB):
             break
+        join_ends(regions, linked, used, following, before)
         fill_corners(regions, linked, used, following, before)
         extend_ends(regions, linked, used, following, before)
     join_ends(regions, linked, used, following, before)

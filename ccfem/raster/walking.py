@@ -10,7 +10,7 @@ from numba import njit
 
 from ccfem.raster.bitmap import NEIGHBOURS
 
-__all__ = ["absorb", "chains", "extend_ends", "fill_corners", "join_ends", "walk"]
+__all__ = ["absorb", "chains", "cut_spurs", "extend_ends", "fill_corners", "join_ends", "walk"]
 
 _STEPS = NEIGHBOURS.copy()
 
@@ -63,14 +63,39 @@ def _follow(line, regions, linked, used, start, chain):  # type: ignore[no-untyp
 
 
 @njit(cache=True)
-def _is_end(line, regions, linked, i, j):  # type: ignore[no-untyped-def]
-    """Whether a pixel has at most one neighbour on its line."""
-    count = 0
+def _beside_on(line, regions, linked, i, j):  # type: ignore[no-untyped-def]
+    """Count the neighbours of a pixel on its line, and give the sense of the last of them."""
+    count, way = 0, -1
     for k in range(8):
         a, b = i + _STEPS[k, 0], j + _STEPS[k, 1]
         if linked[i, j, k] and line[a, b] and regions[a, b] == regions[i, j]:
+            count, way = count + 1, k
+    return count, way
+
+
+@njit(cache=True)
+def cut_spurs(line, regions, linked, least):  # type: ignore[no-untyped-def]
+    """Take branches of fewer pixels than `least`, from a free end to a fork, off the lines."""
+    width = regions.shape[1]
+    chain = np.empty(least, dtype=np.int64)
+    for start in range(regions.size):
+        i, j = start // width, start % width
+        if not line[i, j]:
+            continue
+        count, way = _beside_on(line, regions, linked, i, j)
+        if count != 1:
+            continue
+        size = 0
+        while size < least and count < 3 and way >= 0:
+            chain[size] = i * width + j
+            size += 1
+            line[i, j] = False  # so that the way back does not count
+            i, j = i + _STEPS[way, 0], j + _STEPS[way, 1]
+            count, way = _beside_on(line, regions, linked, i, j)
             count += 1
-    return count <= 1
+        if count < 3 or size == least:
+            for k in range(size):
+                line[chain[k] // width, chain[k] % width] = True
 
 
 @njit(cache=True)
@@ -88,7 +113,7 @@ def walk(line, regions, linked, used, following, before, stub):  # type: ignore[
             i, j = start // width, start % width
             if not line[i, j] or used[i, j]:
                 continue
-            if from_ends and not _is_end(line, regions, linked, i, j):
+            if from_ends and _beside_on(line, regions, linked, i, j)[0] > 1:
                 continue
             size = _follow(line, regions, linked, used, start, chain)
             short = size < stub and _beside(chain, size, regions, linked, already)

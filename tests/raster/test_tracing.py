@@ -55,6 +55,28 @@ def test_two_rows_make_a_closed_path():
     assert len(paths.pixels) == 18
 
 
+def test_spurs_do_not_open_a_ring():
+    regions = regions_of("000000000", "0.......0", "0..00...0", "0000.0000", ".....0...")
+    paths = trace(regions, free_links(regions >= 0))
+    check(paths, regions, free_links(regions >= 0))
+    assert paths.closed.tolist() == [True]
+    i, j = np.mgrid[:60, :60] - 30
+    ring = np.abs(np.hypot(i, j) - 20) < 0.8
+    rays = (np.abs(j) < 1) & (np.abs(np.abs(i) - 22) < 2)
+    regions = np.where(ring | rays, 0, -1)
+    paths = trace(regions, free_links(regions >= 0))
+    assert paths.closed.sum() == 1
+    assert np.diff(paths.offsets)[paths.closed] > 2.0 * np.pi * 20.0
+
+
+def test_limbs_are_no_spurs():
+    regions = regions_of("0000000000", *["....0....."] * 6)
+    paths = trace(regions, free_links(regions >= 0))
+    check(paths, regions, free_links(regions >= 0))
+    assert len(paths) == 2
+    assert not paths.isolated.any()
+
+
 def test_rows_of_different_regions_stay_apart():
     regions = regions_of("0000000", "1111111", "2......")
     paths = trace(regions, free_links(regions >= 0))
@@ -82,7 +104,7 @@ def test_every_pixel_of_rings_is_on_one_path_or_isolated(metric):
         regions, linked = bands(mask, metric), free_links(mask)
         paths = trace(regions, linked)
         check(paths, regions, linked)
-        assert paths.isolated.sum() < 0.05 * mask.sum()
+        assert paths.isolated.sum() < 0.06 * mask.sum()
         beside = ndimage.binary_dilation(paths.label >= 0, np.ones((3, 3)))
         assert (paths.label[paths.isolated & beside] >= 0).all()
 
