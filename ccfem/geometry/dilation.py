@@ -8,6 +8,7 @@ import numpy as np
 import shapely
 
 from ccfem.arrays import FloatArray, IntArray
+from ccfem.geometry.free_ends import lead_on, strips
 from ccfem.geometry.shells import concentric
 
 __all__ = ["fill_rest", "grow", "lengthened", "open_lines", "parallels"]
@@ -21,6 +22,8 @@ _SLIVER = 0.19
 _OFF = 0.02
 """Deviation of the distance to the nearest curve, in pitches, up to which a piece of a border
 counts as parallel to that curve."""
+_REACH = 2.0
+"""Longest way, in pitches, by which a strand is led on where it ends in the open."""
 _TOLERANCE = 2e-3
 """Deviation, in pitches, up to which points of a curve are left out."""
 
@@ -66,6 +69,7 @@ def grow(
         )
         if _length(line) >= pitch
     ]
+    lines = lead_on(lines, region, pitch, closest, _REACH * pitch)
     return lines + fill_rest(region, lines, pitch, closest)
 
 
@@ -186,18 +190,11 @@ def fill_rest(
     Returns
     -------
     list of (k, 2) arrays, mm
-        Strips narrower than 0.4 pitches and specks stay open.
+        Strips narrower than half a pitch and specks stay open.
     """
     rest = region
     if len(lines):
-        strips = shapely.buffer(
-            shapely.multilinestrings([shapely.LineString(line) for line in lines]),
-            0.5 * pitch,
-            cap_style="flat",
-            join_style="mitre",
-            mitre_limit=1.5,
-        )
-        rest = shapely.difference(region, strips)
+        rest = shapely.difference(region, strips(lines, pitch))
     rest = shapely.buffer(rest, -_SLIVER * pitch, join_style="mitre")
     rest = shapely.buffer(rest, _SLIVER * pitch, join_style="mitre")
     parts = shapely.get_parts(rest)

@@ -15,9 +15,9 @@ __all__ = ["concentric", "middle_lines", "shells"]
 
 _SECTIONS = 32
 """Sections whose shells are remembered."""
-_LEAST_GAP = 0.4
-"""Narrowest strip, in pitches, that a strand is laid along, the rest of it on its neighbours: the
-overlap and the gaps of the plates of paper 004 are then about equal."""
+_LEAST_GAP = 0.5
+"""Narrowest strip, in pitches, that a strand is laid along, the rest of it on its neighbours: gap
+and overlap together are then least."""
 _SAME = 1e-4
 """Neighbouring points of a ring nearer than this, in widths, are one."""
 _STRAIGHT = 0.03
@@ -158,7 +158,7 @@ def middle_lines(
     """Lines along the medial axis of a section where its rings leave a strip.
 
     Between the innermost rings at both sides of the axis there is a strip, at most two pitches
-    wide; a strand is laid along its middle where it is at least 0.4 pitches wide.
+    wide; a strand is laid along its middle where it is at least half a pitch wide.
 
     Parameters
     ----------

@@ -17,6 +17,7 @@ from ccfem.elasticity.stress_field import LayerStress
 from ccfem.errors import InputError
 from ccfem.fields.streamlines import streamlines
 from ccfem.geometry.dilation import grow, lengthened
+from ccfem.geometry.guide_fit import fitted_guides
 from ccfem.geometry.guides import spaced_guides
 from ccfem.geometry.medial_axis import medial_axis
 from ccfem.geometry.shells import shells
@@ -46,9 +47,10 @@ is then made longer, so that the strands parallel to it reach a slanted border t
 class Mps:
     """Shells along the border, and inside strands parallel to streamlines of the stress.
 
-    The streamlines follow the principal stress of the largest size in the plane of the layer.
-    Strands lie beside them at whole multiples of the spacing, each along the nearest streamline,
-    until they meet; concentric strands fill what stays open.
+    The streamlines follow the principal stress of the largest size in the plane of the layer, and
+    move aside by up to half a spacing, so that whole strands fit beside them. Strands lie at whole
+    multiples of the spacing from them, each along the nearest streamline, until they meet;
+    concentric strands fill what stays open.
 
     Attributes
     ----------
@@ -125,7 +127,7 @@ class Mps:
     def _guides(
         self, layer: Layer, stress: LayerStress, interior: Any, pitch: float
     ) -> list[FloatArray]:
-        """Streamlines inside the shells, made longer where they run into these."""
+        """Streamlines inside the shells, moved aside so that whole strands fit beside them."""
         if shapely.is_empty(interior):
             return []
         seeds = self._seeds(layer, stress, interior, pitch)
@@ -137,6 +139,7 @@ class Mps:
             _STEP * pitch,
         )
         guides = spaced_guides(curves, seeds, interior, _APART * pitch, _SHORTEST * pitch)
+        guides = fitted_guides(guides, interior, pitch)
         return [
             lengthened(guide, interior, _AT_BORDER * pitch, _BEYOND * pitch) for guide in guides
         ]

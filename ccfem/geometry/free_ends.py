@@ -1,0 +1,145 @@
+"""Strands that end in the open led on, straight, to the strand or the border ahead of them."""
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
+import shapely
+
+from ccfem.arrays import FloatArray, IntArray
+from ccfem.geometry.offsets import rings
+
+__all__ = ["lead_on", "strips"]
+
+_STEEPEST = 25.0
+"""Least angle, degrees, at which a strand led on may meet what is ahead: a strip between strands
+that run side by side takes another strand along its middle instead."""
+_LEAST = 0.3
+"""Shortest way, in pitches, by which an end is led on."""
+
+
+def strips(lines: Sequence[FloatArray], pitch: float) -> Any:
+    """Area that strands take, a pitch wide each, ends cut square: a (Multi)Polygon, mm."""
+    return shapely.buffer(
+        shapely.multilinestrings([shapely.LineString(line) for line in lines]),
+        0.5 * pitch,
+        cap_style="flat",
+        join_style="mitre",
+        mitre_limit=1.5,
+    )
+
+
+def lead_on(
+    lines: Sequence[FloatArray], region: Any, pitch: float, closest: float, reach: float
+) -> list[FloatArray]:
+    """Lead the free ends of strands on, straight, to what lies ahead where that is near.
+
+    The longer of two strands goes first where both would take the same place.
+
+    Parameters
+    ----------
+    lines : sequence of (k, 2) arrays, mm
+        Closed ones repeat their first point, and stay as they are.
+    region : shapely (Multi)Polygon, mm
+        Its border is the edge of other strands.
+    pitch : float, mm
+        Width that each strand takes.
+    closest : float
+        Least distance of the sides of strands, in pitches.
+    reach : float, mm
+        Longest way by which an end is led on.
+
+    Returns
+    -------
+    list of (k, 2) arrays, mm
+        In the order of `lines`.
+    """
+    led = list(lines)
+    ends = _free_ends(lines, pitch)
+    if not ends:
+        return led
+    here = np.array([lines[number][end] for number, end in ends])
+    along = here - np.array([lines[number][1 if end == 0 else -2] for number, end in ends])
+    along /= np.linalg.norm(along, axis=1)[:, None]
+    slack = (closest - 0.5) * pitch
+    rest = shapely.difference(region, strips(lines, pitch))
+    room = shapely.buffer(rest, -slack, join_style="mitre")
+    shapely.prepare(room)
+    start = here + 1.01 * slack * along
+    rays = shapely.linestrings(np.stack([start, here + reach * along], axis=1))
+    ahead = _Obstacles.of(lines, region, pitch)
+    ways: list[Any] = []
+    for k in np.flatnonzero(shapely.contains_xy(room, start)):
+        free, space = rest, room
+        rivals = [way for way in ways if way.distance(rays[k]) < (closest + 0.5) * pitch]
+        if rivals:
+            taken = shapely.buffer(shapely.union_all(rivals), 0.5 * pitch, cap_style="flat")
+            free = shapely.difference(shapely.intersection(rest, rays[k].buffer(2 * pitch)), taken)
+            space = shapely.buffer(free, -slack, join_style="mitre")
+        stop = _first_exit(rays[k], space)
+        if stop is not None:
+            # The sides of a strand keep their distance; its end may reach what is ahead.
+            tail = shapely.LineString([start[k], stop + 1.4 * slack * along[k]])
+            stop = _first_exit(tail, free)
+        if stop is None or np.linalg.norm(stop - here[k]) < _LEAST * pitch:
+            continue
+        number, end = ends[k]
+        if ahead.angle(stop, along[k], number) >= np.radians(_STEEPEST):
+            ways.append(shapely.LineString([here[k], stop]))
+            led[number] = np.insert(led[number], 0 if end == 0 else len(led[number]), stop, axis=0)
+    return led
+
+
+def _free_ends(lines: Sequence[FloatArray], pitch: float) -> list[tuple[int, int]]:
+    """Line and index (0 or -1) of every end of the open lines, the longest line first."""
+    size = np.array([np.linalg.norm(np.diff(line, axis=0), axis=1).sum() for line in lines])
+    order = np.argsort(-np.round(size / pitch, 3), kind="stable")
+    is_open = [not bool((line[0] == line[-1]).all()) for line in lines]
+    return [(int(number), end) for number in order if is_open[number] for end in (0, -1)]
+
+
+def _first_exit(ray: Any, space: Any) -> FloatArray | None:
+    """Place where a straight ray first leaves a space, None where it starts outside."""
+    start = shapely.get_point(ray, 0)
+    for part in shapely.get_parts(shapely.intersection(ray, space)):
+        if part.geom_type == "LineString" and part.distance(start) < 1e-9:
+            ends = shapely.get_coordinates(part)[[0, -1]]
+            gap = np.linalg.norm(ends - shapely.get_coordinates(start), axis=1)
+            return np.asarray(ends[np.argmax(gap)], dtype=np.float64)
+    return None
+
+
+@dataclass(frozen=True)
+class _Obstacles:
+    """Straight pieces of strands and of the border, with the strand of each, -1 for the border."""
+
+    tree: Any
+    along: FloatArray
+    owner: IntArray
+    half: float
+
+    @classmethod
+    def of(cls, lines: Sequence[FloatArray], region: Any, pitch: float) -> "_Obstacles":
+        border = rings(region)
+        curves = [*lines, *border]
+        pairs = np.concatenate([np.stack([c[:-1], c[1:]], axis=1) for c in curves])
+        owner = np.concatenate([np.arange(len(lines)), np.full(len(border), -1)])
+        along = pairs[:, 1] - pairs[:, 0]
+        along = along / np.maximum(np.linalg.norm(along, axis=1), 1e-300)[:, None]
+        sizes = [len(c) - 1 for c in curves]
+        tree = shapely.STRtree(shapely.linestrings(pairs))
+        return cls(tree, along, np.repeat(owner, sizes), 0.5 * pitch)
+
+    def angle(self, point: FloatArray, way: FloatArray, own: int) -> float:
+        """Acute angle, radians, between a way and the nearest piece ahead; 0 where none is near."""
+        here = shapely.Point(point)
+        found = self.tree.query(here, predicate="dwithin", distance=1.2 * self.half)
+        found = found[self.owner[found] != own]
+        if not len(found):
+            return 0.0
+        gap = shapely.distance(self.tree.geometries[found], here)
+        # The border is the edge of a strand, half a pitch before its middle.
+        gap = gap + np.where(self.owner[found] < 0, self.half, 0.0)
+        x, y = self.along[found[np.argmin(gap)]]
+        return float(abs(np.arcsin(np.clip(way[0] * y - way[1] * x, -1.0, 1.0))))

@@ -1,0 +1,146 @@
+"""Guides moved aside by a part of a pitch, so that whole strands fit beside them.
+
+Strands lie at whole multiples of the pitch from their guide. What is left between the last of them
+and the border, or the strands of the next guide, is a gap or an overlap of up to half a pitch along
+its whole length; where the guide lies decides how much of it there is.
+"""
+
+from collections.abc import Sequence
+from typing import Any
+
+import numpy as np
+import shapely
+
+from ccfem.arrays import FloatArray
+from ccfem.geometry.offsets import rings
+from ccfem.geometry.polylines import pack, sample_midpoints
+
+__all__ = ["fitted_guides"]
+
+_SHIFTS = np.array([0.0, 0.5, 0.25, -0.25, 0.125, -0.125, 0.375, -0.375])
+"""Ways aside that are tried, in pitches, the preferred ones first."""
+_BETTER = 0.01
+"""Mean misfit a side, in pitches, by which a shift must be better than one before it."""
+_STEP = 1.0
+_FAR = 60.0
+"""Distance of samples along a guide, and length of the rays to both sides of it, in pitches."""
+_ROUNDS = 3
+"""A guide is fitted between its neighbours, and these move too: times that all are fitted."""
+
+
+def fitted_guides(guides: Sequence[FloatArray], region: Any, pitch: float) -> list[FloatArray]:
+    """Guides moved aside by at most half a pitch, so that gaps and overlaps become least.
+
+    Parameters
+    ----------
+    guides : sequence of (k, 2) arrays, mm
+    region : shapely (Multi)Polygon, mm
+        Its border is the edge of other strands.
+    pitch : float, mm
+        Distance of the strands beside a guide.
+
+    Returns
+    -------
+    list of (k, 2) arrays, mm
+        Instead of a guide that moves by half a pitch there are two, half a pitch to either side:
+        the strands beside it are the same, and a symmetric part stays so.
+    """
+    border = _pieces(rings(region))
+    shifts = np.zeros(len(guides))
+    moved = list(guides)
+    rays = [_rays(guide, pitch) for guide in guides]
+    fixed = [_first_hits(*ray, border, pitch) for ray in rays]
+    for _ in range(_ROUNDS):
+        before = shifts.copy()
+        for k, (start, normal) in enumerate(rays):
+            others = _pieces([other for j, other in enumerate(moved) if j != k])
+            gap, parallel, to_guide = _nearer(fixed[k], _first_hits(start, normal, others, pitch))
+            shifts[k] = _best_shift(gap / pitch - np.where(to_guide, 0.0, 0.5), parallel)
+            moved[k] = _aside(guides[k], shifts[k] * pitch)
+        if (shifts == before).all():
+            break
+    found = []
+    for guide, shift in zip(guides, shifts, strict=True):
+        ways = (-0.5, 0.5) if shift == 0.5 else (shift,)
+        found += [_aside(guide, way * pitch) for way in ways]
+    return found
+
+
+def _best_shift(gap: FloatArray, weight: FloatArray) -> float:
+    """Shift, in pitches, of the least misfit; `gap` (2, n) in pitches, left and right."""
+    total = weight.sum()
+    if not total > 0.0:
+        return 0.0
+    best, least = 0.0, np.inf
+    for shift in _SHIFTS:
+        room = gap + shift * np.array([[-1.0], [1.0]])
+        misfit = float((weight * np.abs(room - np.round(room))).sum() / total)
+        if misfit < least - _BETTER:
+            best, least = float(shift), misfit
+    return best
+
+
+def _rays(guide: FloatArray, pitch: float) -> tuple[FloatArray, FloatArray]:
+    """Places (n, 2) along a guide, and its left normal (n, 2) there."""
+    points, offsets = pack([guide])
+    start, along, _, _ = sample_midpoints(points, offsets, _STEP * pitch)
+    return start, np.column_stack([-along[:, 1], along[:, 0]])
+
+
+def _pieces(curves: Sequence[FloatArray]) -> FloatArray:
+    """Straight pieces (m, 2, 2) of curves."""
+    pairs = [np.stack([curve[:-1], curve[1:]], axis=1) for curve in curves]
+    return np.concatenate([np.zeros((0, 2, 2)), *pairs])
+
+
+def _first_hits(
+    start: FloatArray, normal: FloatArray, pieces: FloatArray, pitch: float
+) -> tuple[FloatArray, FloatArray]:
+    """Distance (2, n) to the first piece at the left and at the right, and how parallel it is.
+
+    Infinite where there is none; the second value is the squared cosine of the angle between piece
+    and guide, 0 above 45 degrees.
+    """
+    n = len(start)
+    gap, parallel = np.full((2, n), np.inf), np.zeros((2, n))
+    if not len(pieces):
+        return gap, parallel
+    tree = shapely.STRtree(shapely.linestrings(pieces))
+    for side, sign in enumerate((1.0, -1.0)):
+        way = sign * normal
+        rays = shapely.linestrings(np.stack([start, start + _FAR * pitch * way], axis=1))
+        ray, piece = tree.query(rays, predicate="intersects")
+        side_way = pieces[piece, 1] - pieces[piece, 0]
+        size = np.linalg.norm(side_way, axis=1)
+        across = np.einsum("ij,ij->i", way[ray], side_way[:, ::-1] * [1.0, -1.0])
+        offset = pieces[piece, 0] - start[ray]
+        distance = np.einsum("ij,ij->i", offset, side_way[:, ::-1] * [1.0, -1.0])
+        whole = np.abs(across) > 1e-9 * size
+        ray, distance = ray[whole], (distance[whole] / across[whole])
+        cosine = np.abs(across[whole]) / size[whole]
+        order = np.lexsort((distance, ray))
+        _, first = np.unique(ray[order], return_index=True)
+        chosen = order[first]
+        gap[side, ray[chosen]] = distance[chosen]
+        square = cosine[chosen] ** 2
+        parallel[side, ray[chosen]] = np.where(square > 0.5, square, 0.0)
+    return gap, parallel
+
+
+def _nearer(
+    border: tuple[FloatArray, FloatArray], guides: tuple[FloatArray, FloatArray]
+) -> tuple[FloatArray, FloatArray, Any]:
+    """Nearer of two hits: distance, how parallel, and whether it is the second."""
+    second = guides[0] < border[0]
+    gap = np.where(second, guides[0], border[0])
+    parallel = np.where(second, guides[1], border[1])
+    return np.where(np.isfinite(gap), gap, 0.0), np.where(np.isfinite(gap), parallel, 0.0), second
+
+
+def _aside(guide: FloatArray, way: float) -> FloatArray:
+    """Curve parallel to a guide, to its left by `way`, mm."""
+    if way == 0.0:
+        return guide
+    curve = shapely.offset_curve(shapely.LineString(guide), way)
+    parts = shapely.get_parts(curve)
+    return shapely.get_coordinates(parts[np.argmax(shapely.length(parts))])
