@@ -114,9 +114,11 @@ def test_a_path_worked_out_by_hand():
 
 def test_points_a_hair_apart_do_not_make_a_line_bent():
     # The points of isocurves lie where they cross mesh edges: two of them may nearly coincide.
-    line = np.array([[0.0, 0.0], [30.0, 0.0], [30.001, 0.0005], [60.0, 0.0005]])
-    (found,) = speeds_of(line)
-    np.testing.assert_array_equal(found, 35.0)
+    before, after = np.arange(0.0, 31.0, 2.0), np.arange(32.0, 61.0, 2.0)
+    first, second = (np.column_stack([x, np.zeros(len(x))]) for x in (before, after))
+    line = np.concatenate([first, [[30.001, 0.0005]], second + [0.0, 0.0005]])
+    for way in (line, line[::-1]):
+        np.testing.assert_array_equal(speeds_of(way)[0], 35.0)
 
 
 def test_repeated_points_and_paths_without_length_change_nothing():
