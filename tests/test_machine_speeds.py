@@ -116,7 +116,7 @@ def test_points_a_hair_apart_do_not_make_a_line_bent():
     # The points of isocurves lie where they cross mesh edges: two of them may nearly coincide.
     before, after = np.arange(0.0, 31.0, 2.0), np.arange(32.0, 61.0, 2.0)
     first, second = (np.column_stack([x, np.zeros(len(x))]) for x in (before, after))
-    line = np.concatenate([first, [[30.001, 0.0005]], second + [0.0, 0.0005]])
+    line = np.concatenate([first, [[30.001, 0.0005]], np.add(second, [0.0, 0.0005])])
     for way in (line, line[::-1]):
         np.testing.assert_array_equal(speeds_of(way)[0], 35.0)
 
