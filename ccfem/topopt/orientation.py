@@ -11,7 +11,14 @@ from ccfem.tensor import largest_in_plane, rotate_stiffness
 from ccfem.topopt.compliance import GroupedCompliance, Loaded, PlaneCompliance, TetCompliance
 from ccfem.topopt.filters import ConeFilter
 
-__all__ = ["OrientedCompliance", "by_gradient", "by_principal_stress", "harmonics", "sheet"]
+__all__ = [
+    "OrientedCompliance",
+    "axes_about_z",
+    "by_gradient",
+    "by_principal_stress",
+    "harmonics",
+    "sheet",
+]
 
 _LARGEST_TURN = np.radians(5.0)
 """Of a gradient step."""
@@ -38,6 +45,14 @@ def sheet(plane: FloatArray) -> FloatArray:
     return solid
 
 
+def axes_about_z(angle: FloatArray) -> FloatArray:
+    """Axes (m, 3, 3) as columns, turned about z by angles (m,), radians."""
+    axes = np.zeros((len(angle), 3, 3))
+    axes[:, 0, 0] = axes[:, 1, 1] = np.cos(angle)
+    axes[:, 1, 0], axes[:, 0, 1], axes[:, 2, 2] = np.sin(angle), -np.sin(angle), 1.0
+    return axes
+
+
 def harmonics(material: FloatArray) -> FloatArray:
     """Five matrices (5, k, k) that give the stiffness turned about z, as `turned_by` combines them.
 
@@ -54,10 +69,7 @@ def harmonics(material: FloatArray) -> FloatArray:
         return plane_harmonics(material)
 
     def turned(angle: FloatArray) -> FloatArray:
-        axes = np.zeros((len(angle), 3, 3))
-        axes[:, 0, 0] = axes[:, 1, 1] = np.cos(angle)
-        axes[:, 1, 0], axes[:, 0, 1], axes[:, 2, 2] = np.sin(angle), -np.sin(angle), 1.0
-        return rotate_stiffness(material, axes)
+        return rotate_stiffness(material, axes_about_z(angle))
 
     angles = np.asarray(np.arange(5) * np.pi / 5.0, dtype=np.float64)
     found = np.tensordot(np.linalg.inv(turned_by(angles)), turned(angles), axes=1)

@@ -16,6 +16,7 @@ from ccfem.mesh import TetMesh
 from ccfem.meshing import extrude
 from ccfem.patches import facet_keys
 from ccfem.topopt.design import Design
+from ccfem.topopt.orientation import axes_about_z
 from ccfem.topopt.outline import solid
 
 __all__ = ["plate_part"]
@@ -189,8 +190,4 @@ def _axes(design: Design, mesh: TetMesh) -> FloatArray:
     assert design.angle is not None
     centres = mesh.points[mesh.corners].mean(axis=1)[:, :2]
     angle = design.angle[cKDTree(plate.mesh.centres).query(centres)[1]]
-    axes = np.zeros((len(angle), 3, 3))
-    axes[:, 0, 0] = axes[:, 1, 1] = np.cos(angle)
-    axes[:, 1, 0], axes[:, 0, 1] = np.sin(angle), -np.sin(angle)
-    axes[:, 2, 2] = 1.0
-    return axes
+    return axes_about_z(angle)

@@ -1,0 +1,166 @@
+"""The part that a design of tetrahedra stands for, cut out of its mesh, held and loaded."""
+
+from typing import NamedTuple
+
+import numpy as np
+import scipy.sparse as sp
+from scipy.sparse.csgraph import connected_components
+from scipy.spatial import cKDTree
+
+from ccfem.arrays import BoolArray, FloatArray, IntArray
+from ccfem.elasticity.problem import PointForce, Problem
+from ccfem.errors import InputError
+from ccfem.materials import Material
+from ccfem.mesh import TetMesh
+from ccfem.topopt.cut import cut_mesh, volume_above
+from ccfem.topopt.design import Design
+from ccfem.topopt.orientation import axes_about_z
+from ccfem.topopt.relaxation import relaxed
+
+__all__ = ["part_mesh", "tet_part"]
+
+_LEAST_VOID = 30.0
+"""Enclosed voids below this many cells are filled."""
+_FALLS_APART = (
+    "the design falls apart between its loads and supports: raise the volume fraction or the "
+    "filter radius"
+)
+
+
+class _Field(NamedTuple):
+    """Density at the nodes of a mesh, and what has to hang together.
+
+    Attributes
+    ----------
+    mesh : TetMesh
+    values : (n,) array
+    share : (n,) array
+        Volume of the cells round each node that is its own, in mean cells.
+    pairs : (e, 2) int array
+        Nodes joined by an edge.
+    anchors : list of int arrays
+        Nodes of every loaded and held patch, and of point forces.
+    """
+
+    mesh: TetMesh
+    values: FloatArray
+    share: FloatArray
+    pairs: IntArray
+    anchors: list[IntArray]
+
+
+def part_mesh(
+    design: Design, volume_fraction: float | None = None, threshold: float | None = None
+) -> TetMesh:
+    """Mesh of the part of a design of tetrahedra, with the patches of the whole.
+
+    Parameters
+    ----------
+    design : Design
+        Of tetrahedra.
+    volume_fraction : float in (0, 1], optional
+        Share of the volume that the part fills; default that of the design.
+    threshold : float in (0, 1), optional
+        Density at the surface, in place of the share.
+
+    Returns
+    -------
+    TetMesh
+        The piece that joins all loads and supports: cut where the density, averaged at the nodes,
+        passes the threshold; small enclosed voids filled; smoothed.
+
+    Raises
+    ------
+    InputError
+        When no piece joins them.
+    """
+    problem = design.full
+    assert isinstance(problem, Problem)
+    field = _field(problem, design.density)
+    if threshold is None:
+        share = design.volume_fraction if volume_fraction is None else volume_fraction
+        if not 0.0 < share <= 1.0:
+            raise InputError(f"a share of the volume must lie in (0, 1]; got {share}")
+        threshold = _level(field, share * float(problem.mesh.volumes.sum()))
+    cleaned = _cleaned(field, threshold)
+    if cleaned is None:
+        raise InputError(_FALLS_APART)
+    return relaxed(cut_mesh(problem.mesh, cleaned, threshold))
+
+
+def tet_part(design: Design, material: Material, volume_fraction: float | None) -> Problem:
+    """Make the part of a design of tetrahedra a problem: see `as_problem`."""
+    problem = design.full
+    assert isinstance(problem, Problem)
+    mesh = part_mesh(design, volume_fraction)
+    axes = None
+    if design.angle is not None:
+        whole = problem.mesh
+        centres = (part.points[part.corners].mean(axis=1) for part in (whole, mesh))
+        axes = axes_about_z(design.angle[cKDTree(next(centres)).query(next(centres))[1]])
+    return Problem(mesh, material, problem.supports, problem.loads, axes)
+
+
+def _field(problem: Problem, density: FloatArray) -> _Field:
+    mesh = problem.mesh
+    n, nodes = len(mesh.points), mesh.cells.reshape(-1)
+    weight = np.bincount(nodes, np.repeat(mesh.volumes, 4), n)
+    total = np.bincount(nodes, np.repeat(mesh.volumes * density, 4), n)
+    anchors = [np.unique(mesh.patch(name)) for name in problem.loaded_patches]
+    for load in (load for case in problem.loads.values() for load in case):
+        if isinstance(load, PointForce):
+            anchors.append(np.array([cKDTree(mesh.points).query(load.point)[1]]))
+    ends = np.sort(mesh.cells[:, mesh.edges].reshape(-1, 2), axis=1)
+    keys = np.unique(ends[:, 0] * n + ends[:, 1])
+    return _Field(
+        mesh=mesh,
+        values=total / np.maximum(weight, 1e-300),
+        share=0.25 * weight / mesh.volumes.mean(),
+        pairs=np.stack(np.divmod(keys, n), axis=1),
+        anchors=anchors,
+    )
+
+
+def _pieces(field: _Field, chosen: BoolArray) -> IntArray:
+    """Piece (n,) of each chosen node, by edges between chosen nodes; others by themselves."""
+    pairs, n = field.pairs[chosen[field.pairs].all(axis=1)], len(chosen)
+    links = sp.coo_array((np.ones(len(pairs), dtype=bool), pairs.T), shape=(n, n))
+    return np.asarray(connected_components(links, directed=False)[1])
+
+
+def _cleaned(field: _Field, level: float) -> FloatArray | None:
+    """Keep the piece above a level that joins all anchors, and fill small voids in it.
+
+    None where no piece joins them.
+    """
+    values = field.values.copy()
+    inside = values > level
+    piece = _pieces(field, inside)
+    joining = None
+    for nodes in field.anchors:
+        here = np.unique(piece[nodes[inside[nodes]]])
+        joining = here if joining is None else np.intersect1d(joining, here)
+    if joining is None or not len(joining):
+        return None
+    inside &= piece == joining[np.bincount(piece)[joining].argmax()]
+    piece = _pieces(field, ~inside)
+    enclosed = ~np.isin(piece, piece[np.unique(field.mesh.boundary)])
+    small = np.bincount(piece, field.share)[piece] < _LEAST_VOID
+    values[~inside] = np.minimum(values[~inside], level)
+    values[~inside & enclosed & small] = 1.0
+    return values
+
+
+def _level(field: _Field, volume: float) -> float:
+    """Level whose part has a wanted volume, by bisection."""
+    low, high, found, middle = 0.0, 1.0, 0.0, 0.5
+    for _ in range(20):
+        middle = 0.5 * (low + high)
+        cleaned = _cleaned(field, middle)
+        found = 0.0 if cleaned is None else volume_above(field.mesh, cleaned, middle)
+        if abs(found - volume) <= 1e-3 * volume:
+            return middle
+        low, high = (middle, high) if found > volume else (low, middle)
+    if abs(found - volume) > 0.02 * volume:
+        raise InputError(_FALLS_APART)
+    return middle
