@@ -67,6 +67,7 @@ class GcodeProfile:
         "M104 T0 S0",
         "M104 T1 S0",
         "M140 S0",
+        "G28 X Y ; out of the way",
         "M84 ; motors off",
     )
     bed: tuple[float, float, float] = (300.0, 300.0, 300.0)

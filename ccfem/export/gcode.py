@@ -50,7 +50,7 @@ def write_gcode(path: str | Path, plan: PrintPlan, machine: Machine) -> None:
         When the file cannot be written.
     """
     with whole_file(path) as temporary:
-        temporary.write_text(gcode(plan, machine), encoding="ascii", newline="\n")
+        temporary.write_text(gcode(plan, machine), encoding="utf-8", newline="\n")
 
 
 def gcode(plan: PrintPlan, machine: Machine) -> str:
@@ -135,6 +135,7 @@ class _Program:
         self._extrude(_length(line[cut:]), self.profile.feed_speed)
         self._lay(line[: cut + 1], speeds[:cut], 1.0)
         self.lines += self.profile.fill(self.profile.cut, self.values)
+        self._feed = ""
         self.seconds += self.machine.cut_wait
         self._lay(line[cut:], speeds[cut:], 0.0)
         self._rise_to(self._top + self.profile.lift)

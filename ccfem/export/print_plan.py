@@ -1,9 +1,8 @@
 """A whole part as it is printed: layers of matrix below, between and above the layers of fibre."""
 
-from collections.abc import Sequence
+from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
 from itertools import pairwise
-from typing import Any
 
 import numpy as np
 
@@ -28,7 +27,7 @@ _SAME = 1e-6
 
 _OVERLAP = 0.25
 """How far the ends of the zigzag reach into the contour, in line widths. Our choice: the lines
-then hold the volume of a section to 3 % (loop, plates; `tests/export/test_gcode_plan.py`)."""
+then hold the volume of a section to 3 % (`tests/export/test_gcode.py`)."""
 
 _SHORT = 1e-6
 """A path short of the cutter's distance by no more than this share of it is long enough."""
@@ -93,8 +92,8 @@ def plan_print(
     below, between and above them is filled with matrix layers of equal height, as few as
     `Machine.matrix_height` allows, so that the part gets its full height. A matrix layer is a
     contour and a zigzag of the section at its middle, which turns from one matrix layer to the
-    next. Paths of a layer follow each other by their nearest ends. The part stands in the middle
-    of the bed.
+    next. Beside the fibre of a layer nothing is laid; a layer without fibre is none. Paths of a
+    layer follow each other by their nearest ends. The part stands in the middle of the bed.
 
     Parameters
     ----------
@@ -122,22 +121,16 @@ def plan_print(
     frame = layers[0].frame
     corners = mesh.points[np.unique(mesh.corners)] @ frame.T
     lowest, highest = corners.min(axis=0), corners.max(axis=0)
-    slabs = _slabs(layers, float(lowest[2]), float(highest[2]), machine)
-    middles = [0.5 * (slab.lower + slab.upper) for slab in slabs if slab.fibre is None]
-    sections = {k.index: k for k in slice_planar(mesh, frame[2], heights=middles)}
-    profile = machine.gcode
-    origin = 0.5 * (lowest[:2] + highest[:2] - profile.bed[:2])
-    printed, count = [], 0
+    laid = [layer for layer in layers if layer.index in fibre.layer]
+    slabs = _slabs(laid, float(lowest[2]), float(highest[2]), machine)
+    matrix = _matrix_lines([slab for slab in slabs if slab.fibre is None], mesh, frame, machine)
+    origin = 0.5 * (lowest[:2] + highest[:2] - machine.gcode.bed[:2])
+    printed = []
     for number, slab in enumerate(slabs):
-        if slab.fibre is not None:
-            kind, lines = FIBRE, [path @ frame[:2].T for path in fibre.on_layer(slab.fibre)]
+        if slab.fibre is None:
+            kind, lines = MATRIX, next(matrix)
         else:
-            kind, lines = MATRIX, []
-            if count in sections:
-                angle = np.radians(profile.matrix_angle + profile.matrix_turn * count)
-                found = _matrix(sections[count].polygon, machine.matrix_width, float(angle))
-                lines = [sections[count].to_space(line) @ frame[:2].T for line in found]
-            count += 1
+            kind, lines = FIBRE, [path @ frame[:2].T for path in fibre.on_layer(slab.fibre)]
         height = slab.upper - float(lowest[2])
         printed.append(_printed([line - origin for line in lines], height, number, kind))
     plan = PrintPlan(
@@ -194,11 +187,24 @@ def _matrix_slabs(lower: float, upper: float, machine: Machine) -> list[_Slab]:
     return [_Slab(a, b) for a, b in pairwise(edges)]
 
 
-def _matrix(section: Any, width: float, angle: float) -> list[FloatArray]:
-    """Lines (n, 2) of a matrix layer: contours, then the zigzag inside them."""
-    contours = offset_rings(section, 0.5 * width, width, width, 1)
-    inside = zigzag(section, (1.5 - _OVERLAP) * width, width, width, angle)
-    return [ring for level in contours for ring in level] + inside
+def _matrix_lines(
+    slabs: Sequence[_Slab], mesh: TetMesh, frame: FloatArray, machine: Machine
+) -> Iterator[list[FloatArray]]:
+    """Lines (n, 2) of each matrix layer in the plane of `frame`: a contour, a zigzag inside it."""
+    width, profile = machine.matrix_width, machine.gcode
+    middles = [0.5 * (slab.lower + slab.upper) for slab in slabs]
+    found = slice_planar(mesh, frame[2], heights=middles) if middles else ()
+    sections = {layer.index: layer for layer in found}
+    for number in range(len(slabs)):
+        if number not in sections:
+            yield []
+            continue
+        section = sections[number]
+        angle = np.radians(profile.matrix_angle + profile.matrix_turn * number)
+        contours = offset_rings(section.polygon, 0.5 * width, width, width, 1)
+        inside = zigzag(section.polygon, (1.5 - _OVERLAP) * width, width, width, float(angle))
+        lines = [ring for level in contours for ring in level] + inside
+        yield [section.to_space(line) @ frame[:2].T for line in lines]
 
 
 def _printed(lines: list[FloatArray], height: float, number: int, kind: int) -> Toolpaths:

@@ -118,7 +118,8 @@ def follow(text: str) -> Run:
         elif word == ("G", 4):
             run.waited += given.get("P", 0.0) / 1000.0 + given.get("S", 0.0)
         elif word == ("G", 28):
-            place = np.zeros(3)
+            homed = [not given or axis in given for axis in "XYZ"]
+            place = np.where(homed, 0.0, place)
         elif word in (("G", 90), ("G", 91)):
             absolute = word[1] == 90
         elif word in (("M", 82), ("M", 83)):

@@ -349,7 +349,7 @@ def test_prints_that_cannot_be(plate, tmp_path):
         plan_print(paths, layers, mesh, replace(MACHINE, fibre_height=1.34))
     close = slice_planar(mesh, heights=[4.0, 4.09])
     with pytest.raises(InputError, match=r"fibre layer 1 at 4\.09 mm .* 4\.05 and 7 mm"):
-        plan_print(paths.on_layer(0), close, mesh, MACHINE)
+        plan_print(paths.select(paths.layer < 2), close, mesh, MACHINE)
     small = replace(MACHINE, gcode=GcodeProfile(bed=(100.0, 40.0, 100.0)))
     with pytest.raises(InputError, match=r"the part needs 89\.2 x 49\.2 x 5 mm, but the printer"):
         plan_print(paths, layers, mesh, small)
@@ -361,7 +361,18 @@ def test_prints_that_cannot_be(plate, tmp_path):
     assert [path.name for path in tmp_path.iterdir()] == ["a.gcode"]
 
 
-def test_other_kinds_of_paths_are_left_out(plate, follow):
+def test_layers_without_fibre_are_filled_with_matrix(plate, follow):
     mesh, layers, paths = plate
     other = replace(paths, kind=np.full(len(paths), MATRIX))
-    assert follow(gcode(plan_print(other, layers, mesh, MACHINE), MACHINE)).lines(1) == []
+    run = follow(gcode(plan_print(other, layers, mesh, MACHINE), MACHINE))
+    assert run.lines(1) == []
+    tops = sorted({line.points[0, 2] for line in run.lines(0)})
+    np.testing.assert_allclose(tops, np.linspace(0.0, 4.0, 7)[1:], atol=1e-3)
+    fed = sum(line.fed for line in run.lines(0))
+    assert fed * 0.25 * np.pi * 1.75**2 == pytest.approx(AREA * 4.0, rel=0.015)
+    # Fibre on the middle layer alone.
+    run = follow(gcode(plan_print(paths.on_layer(1), layers, mesh, MACHINE), MACHINE))
+    (strand,) = run.lines(1)
+    assert strand.points[0, 2] == pytest.approx(2.05)
+    tops = sorted({line.points[0, 2] for line in run.lines(0)})
+    np.testing.assert_allclose(tops, [0.65, 1.3, 1.95, 2.7, 3.35, 4.0], atol=1e-3)
