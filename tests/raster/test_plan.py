@@ -124,6 +124,14 @@ def test_same_input_gives_the_same_paths(name):
     np.testing.assert_array_equal(one.points, other.points)
 
 
+def test_size_of_the_load_does_not_matter():
+    layer = layer_of("plate")
+    stress = pulled(layer, 0.3)
+    strong = LayerStress(layer, stress.cell, 1e4 * stress.nodal, None)
+    one, other = (PATTERNS["mps"](layer, of, MACHINE) for of in (stress, strong))
+    np.testing.assert_array_equal(one.points, other.points)
+
+
 def test_sections_thinner_than_a_pixel_have_no_path():
     thin = replace(MACHINE, fibre_width=1.0)
     layer = layer_of("sliver")

@@ -34,13 +34,13 @@ from benchmarks.papers.plocher_2022.variants import (
 PROTOTYPE_NOTE = """\
 Both chains follow the same rules; they share no code. Where they differ:
 
-- The bitmap: here a pixel is solid where its centre lies in the section, with ties outside; the
-  round holes of I and II differ from the prototype's by a few pixels, and III is another beam. This
-  moves peak stress (0/90 of case I) and everything in III.
-- MAT: the medial axis is symmetric here (case II: the agreement of MAT is higher).
-- Paths over 40 mm and SI of raw pixels hang on the tracer. Rings of pixels open where the tips of
-  two rings meet without touching; there a ring is several arcs here (concentric). Corners of
-  thick places are rounded off by diagonal steps here, and what stays beside is isolated.
+- The bitmap: here a pixel is solid where its centre lies in the section, with ties outside. The
+  holes of I and II differ from the prototype's by a few pixels, which may be what moves the peak
+  stress of 0/90 on case I; the outline of III is smoothed here.
+- MAT: the medial axis is symmetric here; MAT of case II, which has most of it, agrees better.
+- Paths over 40 mm and SI of raw pixels hang on the tracer. Here a ring stays one path where it can,
+  so that concentric has more long paths; pixels at its sharp tips stay isolated, and diagonal steps
+  cut its corners, so that raw chains wind less.
 """
 
 
