@@ -38,10 +38,36 @@ def searched_order(
     (p, 2) int array
         Terminals entered and left, in order.
     """
-    begun = time.monotonic()
-    count = len(offsets) - 1
     best = _greedy(links, visit, offsets, first, last)
+    return _improved(best, links, visit, offsets, first, last, rounds, time_limit)
+
+
+def improved_order(
+    order: IntArray,
+    links: FloatArray,
+    visit: FloatArray,
+    offsets: IntArray,
+    rounds: int,
+    time_limit: float,
+) -> IntArray:
+    """Terminals (p, 2) entered and left in an order that is no worse than a given one (p,)."""
+    return _improved(order.copy(), links, visit, offsets, -1, -1, rounds, time_limit)
+
+
+def _improved(
+    best: IntArray,
+    links: FloatArray,
+    visit: FloatArray,
+    offsets: IntArray,
+    first: int,
+    last: int,
+    rounds: int,
+    time_limit: float,
+) -> IntArray:
+    count = len(offsets) - 1
     least = _exchange(best, links, visit, offsets, first, last)
+    # From here: what went before may have been compiled first.
+    begun = time.monotonic()
     random = np.random.default_rng(0)
     fixed, free = int(first >= 0), count - int(last >= 0)
     # A round costs about the cube of the count.
@@ -57,15 +83,6 @@ def searched_order(
     if not np.isfinite(least):
         raise InputError("there is no way through all clusters: some visit must be possible")
     return _along(best, links, visit, offsets, first, last)
-
-
-def improved_order(
-    order: IntArray, links: FloatArray, visit: FloatArray, offsets: IntArray
-) -> IntArray:
-    """Terminals (p, 2) entered and left after exchanges in an order (p,) until none helps."""
-    order = order.copy()
-    _exchange(order, links, visit, offsets, -1, -1)
-    return _along(order, links, visit, offsets, -1, -1)
 
 
 def _greedy(

@@ -29,7 +29,7 @@ class LinkCurves(NamedTuple):
     Attributes
     ----------
     cost : (t, t) array, mm
-        Symmetric; inf between the two ends of one strand.
+        Symmetric; inf between the two ends of one strand, and where no curve is below the bound.
     reach : (t, t) array, mm
         Straight extension at the first end; that at the second is ``reach[b, a]``.
     word : (t, t) int array
@@ -42,7 +42,12 @@ class LinkCurves(NamedTuple):
 
 
 def link_curves(
-    ends: FloatArray, reach: FloatArray, radius: float, grid: SectionGrid, weight: float
+    ends: FloatArray,
+    reach: FloatArray,
+    radius: float,
+    grid: SectionGrid,
+    weight: float,
+    bound: FloatArray,
 ) -> LinkCurves:
     """Cheapest curves between all ends.
 
@@ -56,8 +61,10 @@ def link_curves(
     grid : SectionGrid
     weight : float
         Extra cost of each mm inside the part.
+    bound : (t, t) array, mm
+        What the link costs otherwise: dearer curves are not looked for.
     """
-    return LinkCurves(*_link_curves(ends, reach, radius, grid, weight))
+    return LinkCurves(*_link_curves(ends, reach, radius, grid, weight, bound))
 
 
 def link_curve(
@@ -127,7 +134,7 @@ def curve_cost(start, turns, sizes, radius, grid, weight, limit):  # type: ignor
 
 
 @njit(cache=True, nogil=True)
-def _link_curves(ends, reach, radius, grid, weight):  # type: ignore[no-untyped-def]
+def _link_curves(ends, reach, radius, grid, weight, bound):  # type: ignore[no-untyped-def]
     count, variants = reach.shape
     cost = np.full((count, count), np.inf)
     chosen = np.zeros((count, count))
@@ -145,7 +152,7 @@ def _link_curves(ends, reach, radius, grid, weight):  # type: ignore[no-untyped-
             if a // 2 == b // 2:
                 continue
             apart = np.hypot(ends[a, 0] - ends[b, 0], ends[a, 1] - ends[b, 1])
-            best = np.inf
+            best = limit = min(bound[a, b], bound[b, a])
             for variant in range(variants * variants):
                 v, w = variant // variants, variant % variants
                 if variant and apart > _NEAR * radius + reach[a, v] + reach[b, w]:
@@ -164,5 +171,6 @@ def _link_curves(ends, reach, radius, grid, weight):  # type: ignore[no-untyped-
                         best = found
                         chosen[a, b], chosen[b, a] = reach[a, v], reach[b, w]
                         word[a, b] = k
-            cost[a, b] = cost[b, a] = best
+            if best < limit:
+                cost[a, b] = cost[b, a] = best
     return cost, chosen, word

@@ -30,6 +30,9 @@ __all__ = ["LinkedPath", "link_tracks"]
 _REACH = (1.0, 3.0, 6.0)
 """Straight extensions, mm, of tracks before a link turns."""
 _EXACT_GROUPS = 10
+"""Most groups of which the best order is found for sure."""
+_ROUNDS = 15
+"""Of the search among single tracks."""
 
 
 @dataclass(frozen=True)
@@ -65,13 +68,15 @@ def link_tracks(
     width: float,
     inside_weight: float = 8.0,
     step: float = 0.5,
+    time_limit: float = 30.0,
 ) -> LinkedPath:
     """Join the tracks of all groups to one path.
 
     First each group is laid in one go: the order of the tracks in a group, that of the groups, and
     the ends at which each is begun and left are those whose links cost least, exactly so for up to
     12 tracks in a group and 10 groups, else by a search that gives the same answer for the same
-    input. Then stretches of single tracks change places where that makes the links cheaper still.
+    input. Then stretches of single tracks change places where that makes the links cheaper still,
+    as found by a search too.
     A link is the cheapest of the Dubins curves between the ends, extended straight, and of the ways
     along a ring round the section.
 
@@ -91,6 +96,8 @@ def link_tracks(
         Extra cost of each mm of a link inside the section.
     step : float, mm, default 0.5
         Longest distance between neighbouring points of a link.
+    time_limit : float, s, default 30
+        For each of the searches, in which it ends sooner for up to some hundred tracks.
 
     Returns
     -------
@@ -119,7 +126,7 @@ def link_tracks(
     tracks = [track for group in opened for track in group]
     network = _Network.between(tracks, np.array(closed), section, radius, inside_weight)
     sizes = np.array([len(group) for group in opened])
-    visits = _order(network.cost, np.concatenate([[0], np.cumsum(sizes)]))
+    visits = _order(network.cost, np.concatenate([[0], np.cumsum(sizes)]), time_limit)
     return _assembled(tracks, visits, network, step)
 
 
@@ -203,15 +210,14 @@ class _Network:
         ends = _end_poses(tracks)
         grid = section_grid(section, 30.0)
         reach = np.repeat(np.where(closed, 0.0, 1.0), 2)[:, None] * np.array(_REACH)
-        curves = link_curves(ends, reach, radius, grid, weight)
         starts = ends.copy()
         starts[:, :2] += reach[:, :1] * np.stack([np.cos(ends[:, 2]), np.sin(ends[:, 2])], axis=1)
         routes = ring_routes(starts, section, radius, grid, weight)
         around, way = ring_cost(routes)
         around = around + reach[:, 0] + reach[:, :1]
-        by_ring = around < curves.cost - 1e-6
-        cost = np.where(by_ring & np.isfinite(curves.cost), around, curves.cost)
-        return cls(ends, np.minimum(cost, cost.T), curves, routes, by_ring, way)
+        curves = link_curves(ends, reach, radius, grid, weight, around)
+        cost = np.minimum(curves.cost, np.minimum(around, around.T))
+        return cls(ends, cost, curves, routes, ~np.isfinite(curves.cost), way)
 
     def link(self, a: int, b: int, step: float) -> FloatArray:
         """Points (n, 2), mm, from end a to end b."""
@@ -230,30 +236,37 @@ def _end_poses(tracks: Sequence[FloatArray]) -> FloatArray:
     return ends
 
 
-def _order(cost: FloatArray, offsets: IntArray) -> IntArray:
+def _order(cost: FloatArray, offsets: IntArray, time_limit: float) -> IntArray:
     """Find the ends (k, 2) at which each track is entered and left, in order."""
-    cost = np.where(np.isfinite(cost), cost, 0.0)
     spans = [slice(2 * a, 2 * b) for a, b in pairwise(offsets)]
     if len(spans) == 1:
-        return _within(cost, None, None)
+        return _within(cost, None, None, time_limit)
     visit = np.full(cost.shape, np.inf)
     for span in spans:
-        visit[span, span] = costs_between_ends(cost[span, span])
+        visit[span, span] = costs_between_ends(cost[span, span], time_limit=time_limit)
     found = []
-    for a, b in order_clusters(cost, visit, 2 * offsets, exact=_EXACT_GROUPS):
+    for a, b in order_clusters(
+        cost, visit, 2 * offsets, exact=_EXACT_GROUPS, time_limit=time_limit
+    ):
         span = next(span for span in spans if span.start <= a < span.stop)
-        own = _within(cost[span, span], int(a - span.start), int(b - span.start))
+        own = _within(cost[span, span], int(a - span.start), int(b - span.start), time_limit)
         found.append(own[:, 0] + span.start)
     count = len(cost) // 2
     return improved_order(
-        np.concatenate(found) // 2, cost, strand_visits(count), 2 * np.arange(count + 1)
+        np.concatenate(found) // 2,
+        cost,
+        strand_visits(count),
+        2 * np.arange(count + 1),
+        _ROUNDS,
+        time_limit,
     )
 
 
-def _within(cost: FloatArray, first: int | None, last: int | None) -> IntArray:
+def _within(cost: FloatArray, first: int | None, last: int | None, time_limit: float) -> IntArray:
     """Order one group: the ends (k, 2) at which each track is entered and left."""
     count = len(cost) // 2
-    return order_clusters(cost, strand_visits(count), 2 * np.arange(count + 1), first, last)
+    visit, offsets = strand_visits(count), 2 * np.arange(count + 1)
+    return order_clusters(cost, visit, offsets, first, last, time_limit=time_limit)
 
 
 def _assembled(

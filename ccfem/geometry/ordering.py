@@ -37,7 +37,7 @@ def order_clusters(
     last: int | None = None,
     exact: int = 12,
     rounds: int = 30,
-    time_limit: float = 10.0,
+    time_limit: float = 30.0,
 ) -> IntArray:
     """Order of clusters, and the terminals at which each is entered and left.
 
@@ -89,7 +89,9 @@ def order_clusters(
     return searched_order(links, visit, offsets, start, end, rounds, time_limit)
 
 
-def costs_between_ends(links: FloatArray, exact: int = 12) -> FloatArray:
+def costs_between_ends(
+    links: FloatArray, exact: int = 12, rounds: int = 5, time_limit: float = 30.0
+) -> FloatArray:
     """Least cost of laying all strands of a group from one of their ends to another.
 
     Parameters
@@ -99,6 +101,8 @@ def costs_between_ends(links: FloatArray, exact: int = 12) -> FloatArray:
         2i + 1.
     exact : int, default 12
         Above so many strands only the pairs of ends that a search finds to be good have a cost.
+    rounds, time_limit
+        Of that search, as in `order_clusters`.
 
     Returns
     -------
@@ -113,7 +117,7 @@ def costs_between_ends(links: FloatArray, exact: int = 12) -> FloatArray:
     table = np.full(links.shape, np.inf)
     starts: list[int | None] = [None]
     while starts:
-        ends = order_clusters(links, visit, offsets, starts.pop(0), exact=exact)
+        ends = order_clusters(links, visit, offsets, starts.pop(0), None, exact, rounds, time_limit)
         a, b = int(ends[0, 0]), int(ends[-1, 1])
         cost = float(links[ends[:-1, 1], ends[1:, 0]].sum())
         if not np.isfinite(table).any():
