@@ -14,7 +14,7 @@ import numpy as np
 import shapely
 from scipy.sparse import coo_array
 from scipy.sparse.csgraph import connected_components
-from scipy.spatial import QhullError, Voronoi
+from scipy.spatial import QhullError, Voronoi, cKDTree
 
 from ccfem.arrays import BoolArray, FloatArray, IntArray, read_only
 from ccfem.errors import InputError
@@ -24,6 +24,8 @@ __all__ = ["MedialAxis", "MedialSegment", "medial_axis"]
 
 _SAME = 1e-4
 """Points of the axis nearer than this share of the sampling step are one."""
+_NEARER = 1e-3
+"""Share by which another sample may be nearer to a Voronoi vertex than its own: rounding."""
 
 
 @dataclass(frozen=True)
@@ -219,10 +221,11 @@ class _Graph:
         sites = np.asarray(diagram.ridge_points, dtype=np.int64)
         shapely.prepare(section)
         inner = shapely.contains_xy(section, diagram.vertices)
-        if not inner.any():
-            return None
         nearest = np.zeros(len(inner) + 1, dtype=np.int64)  # the last one is at infinity
         nearest[edges] = sites[:, :1]
+        inner &= _equidistant(diagram.vertices, nearest[:-1], border.points, inner)
+        if not inner.any():
+            return None
         kept = (edges >= 0).all(axis=1) & inner[edges].all(axis=1)
         sites, edges = sites[kept], (np.cumsum(inner) - 1)[edges[kept]]
         points, nearest = diagram.vertices[inner], nearest[:-1][inner]
@@ -246,6 +249,20 @@ class _Graph:
         seen = np.abs(np.arctan2(cross, cosine))
         chord = np.linalg.norm(feet[:, 0] - feet[:, 1], axis=1)
         return cls(points, radius, edges, sites, feet, seen, chord)
+
+
+def _equidistant(
+    vertices: FloatArray, nearest: IntArray, sites: FloatArray, wanted: BoolArray
+) -> BoolArray:
+    """Which wanted Voronoi vertices have no site nearer than their own.
+
+    Qhull puts vertices that it cannot place, of sites in a row, at (-10.101, -10.101).
+    """
+    found = np.zeros(len(vertices), dtype=bool)
+    least, _ = cKDTree(sites).query(vertices[wanted])
+    own = np.linalg.norm(vertices[wanted] - sites[nearest[wanted]], axis=1)
+    found[wanted] = own <= (1.0 + _NEARER) * least
+    return found
 
 
 def _without_soft_ends(edges: IntArray, firm: BoolArray, count: int) -> BoolArray:

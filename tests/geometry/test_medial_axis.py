@@ -6,7 +6,7 @@ from hypothesis import strategies as st
 from shapely import affinity
 
 from ccfem.errors import InputError
-from ccfem.geometry.medial_axis import medial_axis
+from ccfem.geometry.medial_axis import _equidistant, medial_axis
 
 PLATE = shapely.box(-60, -18, 60, 18).difference(shapely.Point(0, 0).buffer(6, quad_segs=32))
 L_SHAPE = shapely.Polygon([(0, 0), (50, 0), (50, 10), (10, 10), (10, 40), (0, 40)])
@@ -62,6 +62,14 @@ def test_disc_and_square_have_a_point(part, radius):
     assert axis.segments == ()
     np.testing.assert_allclose(axis.nodes, [[3.0, 4.0]], atol=1e-3)
     np.testing.assert_allclose(axis.radius, radius, atol=2e-3)
+
+
+def test_misplaced_vertices_are_told():
+    """Qhull puts a vertex of samples in a row, which belongs far away, at (-10.101, -10.101)."""
+    sites = np.array([[x, y] for x in (-20.0, 20.0) for y in (-20.0, 20.0)])
+    vertices = np.array([[0.0, 0.0], [-10.101, -10.101]])
+    placed = _equidistant(vertices, np.array([3, 3]), sites, np.ones(2, dtype=bool))
+    assert placed.tolist() == [True, False]
 
 
 def test_ring_has_a_closed_curve():
