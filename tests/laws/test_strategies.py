@@ -64,8 +64,13 @@ def default_paths(name):
     return plan(create(name), layers, stress, MACHINE)
 
 
-def curves(paths):
-    return shapely.multilinestrings([shapely.linestrings(path[:, :2]) for path in paths])
+def strands(paths):
+    """Straight pieces of the paths that are no links: links may lie outside and cross."""
+    starts = np.ones(len(paths.points), dtype=bool)
+    starts[paths.offsets[1:] - 1] = False
+    starts = np.flatnonzero(starts & ~paths.link)
+    plane = paths.points[:, :2]
+    return shapely.linestrings(np.stack([plane[starts], plane[starts + 1]], axis=1))
 
 
 def pieces(paths, turn=0.0):
@@ -148,7 +153,8 @@ def test_paths_turn_with_the_part(name, turn):
 def test_paths_stay_inside_the_layer(name):
     for layer in planned_on()[1]:
         allowed = shapely.buffer(layer.polygon, 0.02)
-        assert allowed.covers(curves(default_paths(name).on_layer(layer.index)))
+        shapely.prepare(allowed)
+        assert shapely.covers(allowed, strands(default_paths(name).on_layer(layer.index))).all()
 
 
 @pytest.mark.parametrize("name", NAMES)
@@ -158,8 +164,11 @@ def test_no_path_is_too_short_for_the_cutter(name):
 
 @pytest.mark.parametrize("name", NAMES)
 def test_paths_cross_neither_each_other_nor_themselves(name):
+    """A strategy whose strands cross by intention, in the joints of a frame, has `crosses`."""
+    if getattr(named()[name], "crosses", False):
+        return
     for k in (0, 1):
-        segments = pieces(default_paths(name).on_layer(k))
+        segments = strands(default_paths(name).on_layer(k))
         crossing = shapely.STRtree(segments).query(segments, predicate="crosses")
         assert crossing.shape[1] == 0
 
