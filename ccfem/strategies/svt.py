@@ -1,0 +1,129 @@
+"""Stress vector tracing: members of parallel strands that cross in the joints, as one path.
+
+T. Wang, N. Li, G. Link, J. Jelonnek, J. Fleischer, J. Dittus, D. Kupzik, Load-dependent path
+planning method for 3D printing of continuous fiber reinforced plastics, Composites Part A 140
+(2021) 106181. The tracks and the links are reconstructed: the paper shows them and gives no rule.
+"""
+
+from dataclasses import dataclass
+from typing import Any, ClassVar, Literal
+
+import numpy as np
+import shapely
+
+from ccfem.arrays import BoolArray, FloatArray
+from ccfem.elasticity.stress_field import LayerStress
+from ccfem.errors import InputError
+from ccfem.geometry.linking import link_tracks
+from ccfem.geometry.offsets import join_rings, offset_rings, rings
+from ccfem.layers.layer import Layer
+from ccfem.machine import Machine
+from ccfem.strategies.strategy import Amount
+from ccfem.stress_tracing.band import band
+from ccfem.stress_tracing.criterion import Criterion
+from ccfem.stress_tracing.frame import frame
+from ccfem.stress_tracing.main_paths import main_paths
+from ccfem.stress_tracing.tracks import track_count, tracks
+from ccfem.toolpaths import Toolpaths
+
+__all__ = ["Svt"]
+
+_SAMPLING = 0.5
+"""Distance of the samples of the border for the medial axis, in fibre widths."""
+
+
+@dataclass(frozen=True)
+class Svt:
+    """Parallel strands along the main load paths of a frame, joined to one path.
+
+    Members of the section are those of its medial axis. In every joint two members at a time are
+    joined to a main load path, where turn, misalignment with the stress and sense of the stress
+    suit best. Strands fill each main path from side to side, their distance following its width;
+    they cross those of other main paths in the joints and leave the section there. Links outside
+    the section join them to one path for each piece of the section. A section without members (a
+    disc, a square) is filled by concentric rings.
+
+    Attributes
+    ----------
+    spacing : float, default 1
+        Distance of neighbouring strands in fibre widths, at least 1, where the main path is wide;
+        strands are closer where it is narrow.
+    links : "outside" or "none", default "outside"
+        Join all strands of a piece of the section to one path, or lay single strands.
+    crossings : bool, default True
+        Whether strands that end in a joint cross it and leave the section on the far side, as in
+        the paper; otherwise they stop in its middle.
+    turn : float, default 75
+        Largest turn, degrees, of a main path in a joint.
+    width_ratio : float, default 2
+        Most that the widest member of a main path has over its narrowest.
+    minimum_length : float, mm, optional
+        Shorter paths are dropped; by default the shortest that the machine can cut.
+    """
+
+    spacing: float = 1.0
+    links: Literal["outside", "none"] = "outside"
+    crossings: bool = True
+    turn: float = 75.0
+    width_ratio: float = 2.0
+    minimum_length: float | None = None
+
+    amount: ClassVar[Amount] = Amount("spacing", most=1.0, least=20.0)
+    crosses: ClassVar[bool] = True
+
+    def __post_init__(self) -> None:
+        if not 1.0 <= self.spacing < float("inf"):
+            raise InputError(f"svt.spacing must be at least 1 fibre width; got {self.spacing}")
+        if self.links not in ("outside", "none"):
+            raise InputError(f"svt.links must be 'outside' or 'none'; got {self.links!r}")
+        if not 0.0 < self.turn < 180.0:
+            raise InputError(f"svt.turn must lie between 0 and 180 degrees; got {self.turn}")
+        if not self.width_ratio >= 1.0:
+            raise InputError(f"svt.width_ratio must be at least 1; got {self.width_ratio}")
+        if self.minimum_length is not None and not 0.0 <= self.minimum_length < float("inf"):
+            raise InputError(
+                f"svt.minimum_length must be a finite number >= 0; got {self.minimum_length}"
+            )
+
+    def __call__(self, layer: Layer, stress: LayerStress, machine: Machine) -> Toolpaths:
+        """Plan the paths of one layer: one for each piece of its section, with links outside."""
+        lines: list[FloatArray] = []
+        link: list[BoolArray] = []
+        for piece in shapely.get_parts(layer.polygon):
+            for line, mask in self._piece(piece, stress, machine):
+                lines.append(line)
+                link.append(mask)
+        paths = Toolpaths.from_plane(lines, layer, link=link)
+        least = machine.minimum_length if self.minimum_length is None else self.minimum_length
+        return paths.select(paths.lengths >= least)
+
+    def groups(self, piece: Any, stress: LayerStress, machine: Machine) -> list[list[FloatArray]]:
+        """Strands (n_i, 2), mm, of each main path of one piece of the section, not yet joined."""
+        members = frame(piece, _SAMPLING * machine.fibre_width)
+        criterion = Criterion(turn=self.turn)
+        found = []
+        for path in main_paths(members, stress, criterion, self.width_ratio):
+            strip = band(path, members, self.crossings)
+            count = track_count(strip, self.spacing * machine.fibre_width)
+            found.append(tracks(strip, count, piece, machine.minimum_radius))
+        return found
+
+    def _piece(
+        self, piece: Any, stress: LayerStress, machine: Machine
+    ) -> list[tuple[FloatArray, BoolArray]]:
+        """Paths of one piece of the section, with the mask of their links."""
+        groups = self.groups(piece, stress, machine)
+        if not any(groups):
+            return [(line, np.zeros(len(line), dtype=bool)) for line in self._rings(piece, machine)]
+        if self.links == "none":
+            return [(line, np.zeros(len(line), bool)) for group in groups for line in group]
+        width = self.spacing * machine.fibre_width
+        path = link_tracks(groups, piece, machine.minimum_radius, width)
+        return [(path.points, path.link)]
+
+    def _rings(self, piece: Any, machine: Machine) -> list[FloatArray]:
+        """Concentric rings of a piece that has no members, joined by ramps."""
+        width = machine.fibre_width
+        levels = offset_rings(piece, 0.5 * width, self.spacing * width, width)
+        start = rings(piece)[0][:2].mean(axis=0)
+        return join_rings(levels, start, self.spacing * width, width) if levels else []

@@ -1,0 +1,220 @@
+"""The band of a main path: the strip between its rails, carried on through joints and free ends.
+
+The middle of both rails and half the vector between them describe the strip. Beside joints and
+free ends the rails belong to other members: there the strip is bridged by a cubic and extended
+straight.
+"""
+
+from dataclasses import dataclass
+
+import numpy as np
+import shapely
+from scipy.ndimage import gaussian_filter1d
+
+from ccfem.arrays import BoolArray, FloatArray, read_only
+from ccfem.stress_tracing.frame import FREE, Frame, Member
+from ccfem.stress_tracing.main_paths import MainPath
+
+__all__ = ["STEP", "Band", "band"]
+
+STEP = 0.5
+"""Distance of the points of a band, mm."""
+_CLEARING = 0.9
+"""Rails nearer to a joint than so many of its radii are not those of a member."""
+_TANGENT = (4.0, 6.0)
+"""Lengths, mm, over which the direction of a band is taken where it is bridged and extended."""
+_NORMAL = 2.0
+"""Length, mm, over which its width is taken where it is extended."""
+_SMOOTHING = 2.0
+"""Standard deviation, mm, of the Gaussian that smooths a band."""
+_PADDING = 10.0
+"""Length, mm, that is cut off at both ends after that."""
+_EXTENSION = 30.0
+"""Length, mm, by which a band is extended at both ends; its tracks are clipped afterwards."""
+
+
+@dataclass(frozen=True)
+class Band:
+    """Middle line of a main path with half the vector from its right to its left side.
+
+    Attributes
+    ----------
+    middle, half : (n, 2) arrays, mm
+        In nearly equal steps.
+    core : slice
+        Points that are not extended.
+    width : (k,) array, mm
+        Distance of the rails along the core, before smoothing.
+    closed : bool
+        Whether the last point leads to the first.
+    """
+
+    middle: FloatArray
+    half: FloatArray
+    core: slice
+    width: FloatArray
+    closed: bool = False
+
+    def __post_init__(self) -> None:
+        for name in ("middle", "half", "width"):
+            object.__setattr__(self, name, read_only(getattr(self, name)))
+
+
+def band(path: MainPath, frame: Frame, crossing: bool = True) -> Band:
+    """Band of a main path.
+
+    Parameters
+    ----------
+    path : MainPath
+    frame : Frame
+    crossing : bool, default True
+        Whether an end in a joint goes straight on beyond it; otherwise only to its middle.
+    """
+    own = np.concatenate([_own(member, frame) for member in path.members])
+    left = np.concatenate([member.left for member in path.members])[own]
+    right = np.concatenate([member.right for member in path.members])[own]
+    middle, half = 0.5 * (left + right), 0.5 * (left - right)
+    gap = np.diff(np.flatnonzero(own)) > 1
+    if path.closed:
+        middle, half, gap = _as_ring(middle, half, np.append(gap, not own[0] or not own[-1]))
+    middle, half = _even(*_bridged(middle, half, gap), path.closed)
+    width = 2.0 * np.linalg.norm(half, axis=1)
+    if path.closed:
+        middle, half = (_smoothed(x[:-1], "wrap") for x in (middle, half))
+        return Band(middle, half, slice(0, len(middle)), width, closed=True)
+    ends = (path.members[0].ends[0], path.members[-1].ends[1])
+    reach = [
+        _EXTENSION if crossing or end == FREE else float(np.linalg.norm(frame.joints[end] - place))
+        for end, place in zip(ends, middle[[0, -1]], strict=True)
+    ]
+    before, beside = _extension(middle[::-1], half[::-1], reach[0] + _PADDING)
+    after, along = _extension(middle, half, reach[1] + _PADDING)
+    padding = round(_PADDING / STEP)
+    first = len(before) - padding
+    core = slice(first, first + len(middle))
+    middle = np.concatenate([before[::-1], middle, after])
+    half = np.concatenate([beside[::-1], half, along])
+    middle, half = (_smoothed(x, "nearest")[padding:-padding] for x in (middle, half))
+    return Band(middle, half, core, width)
+
+
+def _own(member: Member, frame: Frame) -> BoolArray:
+    """Mask (m,) of the points whose rails are those of a member: away from joints and free ends.
+
+    A member that is too short for any has its points farthest from them.
+    """
+    points = member.points
+    share = np.full(len(points), np.inf)
+    if len(frame.joints):
+        away = np.linalg.norm(points[:, None] - frame.joints, axis=2)
+        share = (away / frame.radius).min(axis=1) / _CLEARING
+    if not member.closed:
+        for tip, end in ((0, member.ends[0]), (-1, member.ends[1])):
+            if end == FREE:
+                away = np.linalg.norm(points - points[tip], axis=1)
+                share = np.minimum(share, away / (0.5 * member.width[tip]))
+    return np.asarray(share >= min(1.0, 0.9 * float(share.max())))
+
+
+def _as_ring(
+    middle: FloatArray, half: FloatArray, gap: BoolArray
+) -> tuple[FloatArray, FloatArray, BoolArray]:
+    """Close a band, counter-clockwise: its first point is repeated.
+
+    It starts in the middle of its longest stretch without gaps.
+    """
+    count = len(middle)
+    x, y = middle.T
+    if x @ np.roll(y, -1) < y @ np.roll(x, -1):
+        middle, half, gap = middle[::-1], -half[::-1], np.roll(gap[::-1], -1)
+    gaps = np.flatnonzero(gap)
+    if len(gaps):
+        size = np.diff(np.append(gaps, gaps[0] + count))
+        longest = int(np.argmax(size))
+        start = (int(gaps[longest]) + 1 + int(size[longest]) // 2) % count
+        middle, half = (np.roll(x, -start, axis=0) for x in (middle, half))
+        gap = np.roll(gap, -start)
+    return np.concatenate([middle, middle[:1]]), np.concatenate([half, half[:1]]), gap
+
+
+def _arc_length(points: FloatArray) -> FloatArray:
+    steps = np.linalg.norm(np.diff(points, axis=0), axis=1)
+    return np.concatenate([[0.0], np.cumsum(steps)])
+
+
+def _bridged(middle: FloatArray, half: FloatArray, gap: BoolArray) -> tuple[FloatArray, FloatArray]:
+    """Fill gaps (n - 1,) by cubics that go on in the directions of the band at both sides."""
+    along = _arc_length(middle)
+    gaps = np.flatnonzero(gap & (np.diff(along) > STEP))
+    places, halves, start = [], [], 0
+    for k, here in enumerate(gaps):
+        a, b = middle[here], middle[here + 1]
+        size = float(np.linalg.norm(b - a))
+        first = max(start, int(np.searchsorted(along, along[here] - _TANGENT[0])))
+        end = int(gaps[k + 1]) if k + 1 < len(gaps) else len(middle) - 1
+        reached = int(np.searchsorted(along, along[here + 1] + _TANGENT[0], side="right")) - 1
+        into = _direction(a - middle[first], (b - a) / size)
+        out = _direction(middle[min(end, reached)] - b, (b - a) / size)
+        t = np.arange(1.0, round(size / STEP))[:, None] * (STEP / size)
+        place, slope = _cubic(a, b, size * into, size * out, t)
+        tangent = slope / np.maximum(np.linalg.norm(slope, axis=1), 1e-12)[:, None]
+        wide = np.linalg.norm(half[here : here + 2], axis=1)
+        normal = np.stack([-tangent[:, 1], tangent[:, 0]], axis=1)
+        places += [middle[start : here + 1], place]
+        halves += [half[start : here + 1], ((1.0 - t) * wide[0] + t * wide[1]) * normal]
+        start = int(here) + 1
+    return np.concatenate([*places, middle[start:]]), np.concatenate([*halves, half[start:]])
+
+
+def _direction(step: FloatArray, otherwise: FloatArray) -> FloatArray:
+    """Make a unit vector of a step, or take another one where the step is short."""
+    length = float(np.linalg.norm(step))
+    return step / length if length > STEP else otherwise
+
+
+def _cubic(
+    a: FloatArray, b: FloatArray, into: FloatArray, out: FloatArray, t: FloatArray
+) -> tuple[FloatArray, FloatArray]:
+    """Points and slopes at t (k, 1) of Hermite's cubic from a to b."""
+    place = (
+        (1.0 + 2.0 * t) * (1.0 - t) ** 2 * a
+        + t * (1.0 - t) ** 2 * into
+        + t**2 * (3.0 - 2.0 * t) * b
+        + t**2 * (t - 1.0) * out
+    )
+    slope = (
+        6.0 * t * (1.0 - t) * (b - a)
+        + (1.0 - t) * (1.0 - 3.0 * t) * into
+        + t * (3.0 * t - 2.0) * out
+    )
+    return place, slope
+
+
+def _even(middle: FloatArray, half: FloatArray, closed: bool) -> tuple[FloatArray, FloatArray]:
+    """Band in equal steps along its middle; a closed one from its point nearest to its centre."""
+    along = _arc_length(middle)
+    at = np.linspace(0.0, along[-1], max(4, round(along[-1] / STEP)) + 1)
+    if closed:
+        centre = shapely.centroid(shapely.Polygon(middle))
+        at = (at + shapely.line_locate_point(shapely.LineString(middle), centre)) % along[-1]
+    middle, half = (
+        np.stack([np.interp(at, along, x) for x in values.T], axis=1) for values in (middle, half)
+    )
+    return middle, half
+
+
+def _smoothed(values: FloatArray, mode: str) -> FloatArray:
+    """Smooth by a Gaussian, twice, so that arcs keep their radius."""
+    once = gaussian_filter1d(values, _SMOOTHING / STEP, axis=0, mode=mode)
+    rest = gaussian_filter1d(values - once, _SMOOTHING / STEP, axis=0, mode=mode)
+    return np.asarray(once + rest)
+
+
+def _extension(middle: FloatArray, half: FloatArray, reach: float) -> tuple[FloatArray, FloatArray]:
+    """Points and half vectors that go straight on for `reach`, mm, beyond the last point."""
+    tangent = middle[-1] - middle[max(len(middle) - 1 - round(_TANGENT[1] / STEP), 0)]
+    tangent = tangent / np.linalg.norm(tangent)
+    mean = half[-round(_NORMAL / STEP) :].mean(axis=0)
+    mean = mean - (mean @ tangent) * tangent
+    at = STEP * np.arange(1, int(reach / STEP) + 1)
+    return middle[-1] + at[:, None] * tangent, np.broadcast_to(mean, (len(at), 2))

@@ -1,0 +1,67 @@
+"""The stress that load paths follow: at any points of a flat layer, as lines with a sign."""
+
+from dataclasses import dataclass
+
+import numpy as np
+
+from ccfem.arrays import BoolArray, FloatArray
+from ccfem.elasticity.stress_field import LayerStress
+from ccfem.geometry.locate import locate
+from ccfem.tensor import in_plane, largest_in_plane
+
+__all__ = ["StressLines", "misalignment", "plane_stress_at", "stress_lines"]
+
+_EQUAL = 0.02
+"""Share by which the two principal values differ at least where there is a direction."""
+
+
+@dataclass(frozen=True)
+class StressLines:
+    """Principal stress of the largest size at k places.
+
+    Attributes
+    ----------
+    direction : (k, 2) array
+        Unit vectors; lines, so the sign means nothing.
+    value : (k,) array, MPa
+        Positive in tension.
+    defined : (k,) bool array
+        Whether there is a direction: not where both principal stresses are equal, or none.
+    """
+
+    direction: FloatArray
+    value: FloatArray
+    defined: BoolArray
+
+
+def plane_stress_at(stress: LayerStress, points: FloatArray, reach: float) -> FloatArray:
+    """Recovered plane stress [s11, s22, s12] (k, 3), MPa, at points (k, 2) of a layer.
+
+    Points outside the layer by no more than `reach`, mm, take the stress of its border; others 0.
+    """
+    layer = stress.layer
+    cell, weights = locate(layer.plane_points, layer.triangles, points, reach)
+    corner = in_plane(stress.nodal, layer.frame)[layer.triangles[cell]]
+    return np.where(cell[:, None] >= 0, np.einsum("kc,kci->ki", weights, corner), 0.0)
+
+
+def stress_lines(plane_stress: FloatArray) -> StressLines:
+    """Principal stress of the largest size of plane stress (k, 3), MPa."""
+    largest, smallest, angle = largest_in_plane(plane_stress)
+    push = -smallest > largest
+    angle = np.where(push, angle + 0.5 * np.pi, angle)
+    value = np.where(push, smallest, largest)
+    size = np.abs(np.stack([largest, smallest]))
+    defined = largest - smallest > _EQUAL * size.max(axis=0)
+    return StressLines(np.stack([np.cos(angle), np.sin(angle)], axis=-1), value, defined)
+
+
+def misalignment(direction: FloatArray, lines: StressLines, undefined: float) -> FloatArray:
+    """Angle beta (k,) between directions (k, 2) and the stress, degrees in [0, 90]: equation 3.
+
+    Where the stress has no direction it is `undefined`.
+    """
+    cosine = np.abs(np.einsum("ki,ki->k", direction, lines.direction))
+    norm = np.maximum(np.linalg.norm(direction, axis=1), 1e-300)
+    angle = np.degrees(np.arccos(np.clip(cosine / norm, 0.0, 1.0)))
+    return np.where(lines.defined, angle, undefined)

@@ -1,0 +1,154 @@
+"""Tracks of a main path: strands that share out the width of its band.
+
+The paper shows tracks whose distance follows the width of the member, and gives no formula.
+"""
+
+from typing import Any
+
+import numpy as np
+import shapely
+from scipy.ndimage import gaussian_filter1d, maximum_filter1d
+
+from ccfem.arrays import BoolArray, FloatArray
+from ccfem.geometry.offsets import ring_from
+from ccfem.geometry.polylines import subdivide, turning_angles
+from ccfem.stress_tracing.band import STEP, Band
+
+__all__ = ["clipped", "eased", "track_count", "tracks"]
+
+_PERCENTILE = 75.0
+"""Of the width of a band that its tracks are counted for: its wide members are to be filled."""
+_OUTSIDE = 1.5
+"""Way outside the section, mm, after which a track has left it for good."""
+_INSET = 0.1
+"""Distance from the border, mm, to which a track is pushed that comes to lie outside."""
+_SPREAD = 1.5
+"""Standard deviation, mm, of the Gaussian that spreads such a push to the points beside it."""
+_EASING = 1.0
+_ROUNDS = 60
+"""Standard deviation, mm, of the Gaussian that eases sharp turns, and how often at most."""
+
+
+def track_count(band: Band, pitch: float) -> int:
+    """Count the tracks of a band, a pitch, mm, apart where it is wide; at least 1."""
+    return max(1, round(float(np.percentile(band.width, _PERCENTILE)) / pitch))
+
+
+def tracks(band: Band, count: int, section: Any, radius: float = 0.0) -> list[FloatArray]:
+    """Tracks of a band, evenly over its width, clipped to a section.
+
+    Parameters
+    ----------
+    band : Band
+    count : int
+    section : shapely (Multi)Polygon, mm
+    radius : float, mm, default 0
+        Tighter turns are eased; where the border leaves no room for that they stay.
+
+    Returns
+    -------
+    list of (n, 2) arrays, mm
+        From left to right. Closed ones repeat their first point, the one nearest to the middle of
+        the section.
+    """
+    shapely.prepare(section)
+    inner = shapely.buffer(section, -_INSET)
+    seam = shapely.get_coordinates(shapely.centroid(section))[0]
+    share = 1.0 - (2.0 * np.arange(count) + 1.0) / count
+    found = []
+    for line in band.middle + share[:, None, None] * band.half:
+        line = eased(line, radius, band.closed)
+        if band.closed:
+            line = ring_from(np.concatenate([line, line[:1]]), seam)
+        else:
+            line = clipped(line, section, band.core)
+        if len(line) > 1:
+            found.append(_held(line, section, inner, band.closed))
+    return found
+
+
+def eased(line: FloatArray, radius: float, closed: bool = False) -> FloatArray:
+    """Smooth a line (n, 2) in even steps wherever it turns more tightly than a radius, mm."""
+    if radius <= 0.0:
+        return line
+    mode = "wrap" if closed else "nearest"
+    reach = round(4.0 * _EASING / STEP) + 1
+    for _ in range(_ROUNDS):
+        ring = np.concatenate([line[-1:], line, line[:1]]) if closed else line
+        offsets = np.array([0, len(ring)])
+        turn = turning_angles(ring, offsets, np.zeros(1, dtype=bool))
+        step = np.linalg.norm(np.diff(ring, axis=0), axis=1)
+        beside = 0.5 * (np.append(step, step[-1]) + np.append(step[0], step))
+        sharp = 2.0 * np.sin(0.5 * turn) * radius > beside
+        sharp = sharp[1:-1] if closed else sharp
+        if not sharp.any():
+            break
+        near = maximum_filter1d(sharp.astype(np.float64), reach, mode=mode)
+        weight = gaussian_filter1d(near, _EASING / STEP, mode=mode)[:, None]
+        smooth = gaussian_filter1d(line, _EASING / STEP, axis=0, mode=mode)
+        line = line + weight * (smooth - line)
+    return line
+
+
+def clipped(line: FloatArray, section: Any, core: slice) -> FloatArray:
+    """Part of a line round the middle of its core up to where it leaves a section for good.
+
+    Excursions shorter than 1.5 mm do not end it: they would cut a track that grazes the border
+    into pieces. Its ends lie on the border, or are those of the line.
+    """
+    inside = shapely.contains_xy(section, line)
+    own = np.flatnonzero(inside[core]) + core.start
+    if not len(own):
+        return line[:0]
+    middle = (core.start + core.stop) // 2
+    start = int(own[np.argmin(np.abs(own - middle))])
+    first = start - _last_inside(line[start::-1], inside[start::-1])
+    last = start + _last_inside(line[start:], inside[start:])
+    ahead = _way_out(line[last], line[last + 1], section) if last + 1 < len(line) else line[:0]
+    back = _way_out(line[first], line[first - 1], section) if first > 0 else line[:0]
+    return np.concatenate([back, line[first : last + 1], ahead])
+
+
+def _last_inside(line: FloatArray, inside: BoolArray) -> int:
+    """Index of the last point inside before a line is outside for more than a while."""
+    along = np.concatenate([[0.0], np.cumsum(np.linalg.norm(np.diff(line, axis=0), axis=1))])
+    within = np.flatnonzero(inside)
+    left = np.flatnonzero(np.diff(along[within]) > _OUTSIDE + STEP)
+    return int(within[left[0]] if len(left) else within[-1])
+
+
+def _way_out(inner: FloatArray, outer: FloatArray, section: Any) -> FloatArray:
+    """Point (1, 2) where a step out of a section first crosses its border; none at its start."""
+    step = shapely.LineString([inner, outer])
+    border = shapely.get_coordinates(shapely.intersection(step, section.boundary))
+    away = np.linalg.norm(border - inner, axis=1)
+    border = border[away > 1e-6]
+    return border[[np.argmin(away[away > 1e-6])]] if len(border) else border
+
+
+def _held(line: FloatArray, section: Any, inner: Any, closed: bool) -> FloatArray:
+    """Push a line back where it leaves a section between its ends, and what is beside that less."""
+    step = 0.2 * STEP
+    fine, _, _ = subdivide(line, np.array([0, len(line)]), step)
+    ends = round(STEP / step)
+    outside = ~shapely.contains_xy(section, fine)
+    if not closed:
+        outside[:ends] = outside[-ends:] = False
+    if not outside.any() or shapely.is_empty(inner):
+        return line
+    mode = "wrap" if closed else "nearest"
+    reach = 2 * round(2.0 * _SPREAD / step) + 1
+    beside = maximum_filter1d(outside.astype(np.float64), reach, mode=mode) > 0.0
+    if not closed:
+        beside[:ends] = beside[-ends:] = False
+    push = np.zeros_like(fine)
+    for _ in range(_ROUNDS):
+        out = np.flatnonzero(beside)[~shapely.contains_xy(inner, fine[beside])]
+        push[:] = 0.0
+        if not len(out):
+            break
+        ways = shapely.shortest_line(inner, shapely.points(fine[out]))
+        push[out] = shapely.get_coordinates(ways)[::2] - fine[out]
+        spread = gaussian_filter1d(push, _SPREAD / step, axis=0, mode=mode)
+        fine = fine + np.where(beside[:, None], 2.0 * spread, 0.0)
+    return fine + push

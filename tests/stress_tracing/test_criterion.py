@@ -1,0 +1,40 @@
+import numpy as np
+import pytest
+import shapely
+
+from ccfem.stress_tracing.criterion import Criterion, coefficient
+from ccfem.stress_tracing.stress_lines import misalignment, plane_stress_at, stress_lines
+
+
+def test_coefficient_by_hand():
+    """At 0 it is epsilon; eta = 1, epsilon = 0.1, k = 2 grow by 1 - 0.05 up to the limit."""
+    np.testing.assert_allclose(coefficient([0.0, 30.0, 60.0], 60.0, k=2.0), [0.1, 0.575, 1.05])
+
+
+def test_property_is_switched_off_by_its_amplification():
+    np.testing.assert_allclose(coefficient([0.0, 20.0, 60.0], 60.0, k=0.1), 0.1)
+
+
+def test_smoothness_is_the_product():
+    """A third of every limit: each factor is 0.9 / 3 + 0.1."""
+    assert Criterion(90.0, 45.0, 3.0)(30.0, 15.0, 1.0) == pytest.approx(0.4**3)
+
+
+def test_stress_lines_of_pull_push_and_equal_stress():
+    pull, push, shear, equal, nothing = np.array(
+        [[9.0, 1.0, 0.0], [1.0, -9.0, 0.0], [0.0, 0.0, 3.0], [5.0, 5.0, 0.0], [0.0, 0.0, 0.0]]
+    )
+    lines = stress_lines(np.stack([pull, push, shear, equal, nothing]))
+    np.testing.assert_allclose(lines.value[:4], [9.0, -9.0, 3.0, 5.0])
+    np.testing.assert_array_equal(lines.defined, [True, True, True, False, False])
+    across = np.array([[0.0, 1.0]] * 5)
+    beta = misalignment(across, lines, 22.5)
+    np.testing.assert_allclose(beta, [90.0, 0.0, 45.0, 22.5, 22.5], atol=1e-9)
+    np.testing.assert_allclose(misalignment(-across, lines, 22.5), beta, atol=1e-9)
+
+
+def test_stress_at_points_is_that_of_the_layer(stressed):
+    stress = stressed(shapely.box(0, 0, 20, 10), [[4.0, 1.0], [1.0, -2.0]])
+    at = np.array([[5.0, 5.0], [20.5, 5.0], [40.0, 5.0]])
+    expected = [[4.0, -2.0, 1.0], [4.0, -2.0, 1.0], [0.0, 0.0, 0.0]]
+    np.testing.assert_allclose(plane_stress_at(stress, at, 1.0), expected, atol=1e-12)

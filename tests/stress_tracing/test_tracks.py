@@ -1,0 +1,101 @@
+import numpy as np
+import pytest
+import shapely
+
+from ccfem.geometry.polylines import turning_angles
+from ccfem.stress_tracing.band import band
+from ccfem.stress_tracing.frame import frame
+from ccfem.stress_tracing.main_paths import MainPath, main_paths
+from ccfem.stress_tracing.tracks import clipped, eased, track_count, tracks
+
+PULL = [[1.0, 0.0], [0.0, 0.0]]
+
+
+def only_band(section, step=0.4):
+    members = frame(section, step)
+    (member,) = members.members
+    return band(MainPath((member,), member.closed), members)
+
+
+def laid(section, width, step=0.4):
+    strip = only_band(section, step)
+    return tracks(strip, track_count(strip, width), section)
+
+
+def test_straight_strip_is_filled_from_end_to_end():
+    found = laid(shapely.box(0, 0, 60, 9), 0.9)
+    heights = np.sort([line[:, 1].mean() for line in found])
+    np.testing.assert_allclose(heights, 0.45 + 0.9 * np.arange(10), atol=1e-6)
+    for line in found:
+        assert np.ptp(line[:, 1]) < 1e-6
+        np.testing.assert_allclose(np.sort(line[[0, -1], 0]), [0.0, 60.0], atol=1e-9)
+
+
+def test_member_thinner_than_a_fibre_has_one_track():
+    (line,) = laid(shapely.box(0, 0, 40, 0.5), 0.9, 0.1)
+    np.testing.assert_allclose(line[:, 1], 0.25, atol=1e-6)
+
+
+def test_ring_has_closed_tracks_at_even_distances():
+    part = shapely.Point(0, 0).buffer(20, quad_segs=64) - shapely.Point(0, 0).buffer(11, 64)
+    found = laid(part, 0.9)
+    assert len(found) == 10
+    radii = [np.hypot(*line.T) for line in found]
+    np.testing.assert_allclose(
+        np.sort([r.mean() for r in radii]), 11.45 + 0.9 * np.arange(10), atol=0.01
+    )
+    for line, radius in zip(found, radii, strict=True):
+        np.testing.assert_array_equal(line[0], line[-1])
+        assert np.ptp(radius) < 0.02
+
+
+def test_distance_follows_the_width():
+    """A wedge 4 to 8 mm wide: everywhere the tracks share out its width."""
+    wedge = shapely.Polygon([(0, -2), (80, -4), (80, 4), (0, 2)])
+    found = laid(wedge, 1.0)
+    for x in (20.0, 40.0, 60.0):
+        heights = [np.interp(x, *line[np.argsort(line[:, 0])].T) for line in found]
+        apart = np.diff(np.sort(heights))
+        np.testing.assert_allclose(apart, (4.0 + 0.05 * x) / len(found), rtol=0.02)
+
+
+def test_tracks_that_end_in_a_joint_cross_it_or_stop_in_it(stressed):
+    tee = shapely.box(-40, 0, 40, 8) | shapely.box(-3, -40, 3, 0)
+    members = frame(tee, 0.4)
+    (post,) = (p for p in main_paths(members, stressed(tee, PULL)) if len(p.members) == 1)
+    across = tracks(band(post, members), 6, tee)
+    stopped = tracks(band(post, members, crossing=False), 6, tee)
+    np.testing.assert_allclose([line[:, 1].max() for line in across], 8.0, atol=1e-6)
+    joint = members.joints[0, 1]
+    np.testing.assert_allclose([line[:, 1].max() for line in stopped], joint, atol=0.6)
+
+
+def test_short_excursions_do_not_end_a_track():
+    section = shapely.box(0, 0, 20, 10) - shapely.box(9.5, 4, 10.5, 6) - shapely.box(14, 4, 17, 6)
+    line = np.stack([np.arange(-5.0, 25.5, 0.5), np.full(61, 5.0)], axis=1)
+    kept = clipped(line, section, slice(10, 20))
+    np.testing.assert_allclose(kept[[0, -1], 0], [0.0, 14.0])
+
+
+def test_tracks_stay_in_a_section_with_a_notch():
+    """The rails jump at the notch: the track beside it would cut its corners."""
+    notched = shapely.box(0, 0, 60, 9) - shapely.box(28, 7.5, 32, 9)
+    for line in laid(notched, 0.9):
+        assert shapely.LineString(line).buffer(1e-9).within(notched.buffer(1e-6))
+
+
+def test_sharp_turns_are_eased_to_the_radius():
+    corner = np.concatenate(
+        [
+            np.stack([np.arange(-20, 0, 0.5), np.zeros(40)], 1),
+            np.stack([np.zeros(41), np.arange(0, 20.5, 0.5)], 1),
+        ]
+    )
+    line = eased(corner, 3.0)
+    turn = turning_angles(line, np.array([0, len(line)]), np.zeros(1, dtype=bool))[1:-1]
+    steps = np.linalg.norm(np.diff(line, axis=0), axis=1)
+    curvature = 2.0 * np.sin(0.5 * turn) / (0.5 * (steps[1:] + steps[:-1]))
+    assert curvature.max() <= 1.0 / 3.0 + 1e-9
+    np.testing.assert_array_equal(line[[0, -1]], corner[[0, -1]])
+    assert eased(corner, 0.0) is corner
+    assert curvature.max() == pytest.approx(1.0 / 3.0, rel=0.2)
