@@ -96,10 +96,11 @@ def ring_routes(
 
 def _ring(section: Any, distance: float) -> FloatArray:
     """Lay a closed curve (n, 2) round a section at a distance; round the hull of several parts."""
-    grown = shapely.buffer(shapely.union_all(_filled(section)), 2.0 * distance)
-    if len(shapely.get_parts(grown)) > 1:
-        grown = shapely.buffer(shapely.convex_hull(section), 2.0 * distance)
-    outline = shapely.buffer(_filled(grown)[0], -distance, quad_segs=32)
+    for filled in (shapely.union_all(_filled(section)), shapely.convex_hull(section)):
+        grown = shapely.union_all(_filled(shapely.buffer(filled, 2.0 * distance)))
+        outline = shapely.buffer(grown, -distance, quad_segs=32)
+        if outline.geom_type == "Polygon":
+            break
     ring = shapely.get_coordinates(shapely.get_exterior_ring(shapely.normalize(outline)))
     return ring if shapely.is_ccw(shapely.linearrings(ring)) else ring[::-1]
 

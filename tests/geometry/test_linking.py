@@ -158,6 +158,32 @@ def test_closed_tracks_become_a_spiral() -> None:
     assert laid > 0.95 * sum(length(ring) for ring in rings)
 
 
+def test_parts_that_lie_apart_are_joined_too() -> None:
+    bars = [shapely.box(x, 0.0, x + 30.0, 4.5) for x in (0.0, 50.0)]
+    groups = [bundle((x, 2.25), (x + 30.0, 2.25), 5) for x in (0.0, 50.0)]
+    section = shapely.union_all(bars)
+    path = link_tracks(groups, section, RADIUS, WIDTH)
+    assert len(path.links) == 9
+    assert in_section(path, section) < 1e-6
+    # An odd number of strands: the way from bar to bar is straight, but for the bulbs.
+    assert sorted(length(link) for link in path.links)[-1] < 25.0
+
+
+def test_rings_and_strands_together() -> None:
+    angle = np.linspace(0.0, 2.0 * np.pi, 200)
+    circle = np.column_stack([np.cos(angle), np.sin(angle)])
+    circle[-1] = circle[0]
+    ring = shapely.Point(0, 0).buffer(14.5).difference(shapely.Point(0, 0).buffer(11.5))
+    section = shapely.union_all([ring, shapely.box(10.0, -2.0, 40.0, 2.0)])
+    rings = [r * circle for r in (12.0, 13.0, 14.0)]
+    path = link_tracks([rings, bundle((13.0, 0.0), (40.0, 0.0), 4)], section, RADIUS, WIDTH)
+    laid = sorted(length(strand) for strand in strands(path))
+    assert len(laid) == 7
+    np.testing.assert_allclose(laid[:4], 27.0)
+    np.testing.assert_allclose(laid[4:], 2 * np.pi * np.array([12.0, 13.0, 14.0]), rtol=0.05)
+    assert max(sharpest(link) for link in path.links) < 1.05 / RADIUS
+
+
 def test_nothing_one_and_one_closed() -> None:
     empty = link_tracks([[], [np.zeros((1, 2))]], WINDOWED, RADIUS, WIDTH)
     assert empty.points.shape == (0, 2)

@@ -6,6 +6,7 @@ import numpy as np
 import pytest
 
 from ccfem.errors import InputError
+from ccfem.geometry.exchanges import improved_order
 from ccfem.geometry.ordering import costs_between_ends, order_clusters, strand_visits
 
 
@@ -100,6 +101,20 @@ def test_search_comes_close_to_the_best_order() -> None:
         ratio.append(found / best)
     assert min(ratio) > 1.0 - 1e-12
     assert max(ratio) < 1.03
+
+
+def test_a_given_order_is_only_changed_for_the_better() -> None:
+    visit, offsets = strand_visits(9), 2 * np.arange(10)
+    for seed in range(5):
+        links = distances(seed, 18)
+        best = order_clusters(links, visit, offsets)
+        kept = improved_order(best[:, 0] // 2, links, visit, offsets, 0, 1.0)
+        assert cost(kept, links, visit) == pytest.approx(cost(best, links, visit), rel=1e-12)
+        start = np.arange(9)
+        better = improved_order(start, links, visit, offsets, 0, 1.0)
+        np.testing.assert_array_equal(start, np.arange(9))
+        straight = np.stack([2 * start, 2 * start + 1], axis=1)
+        assert cost(better, links, visit) < cost(straight, links, visit)
 
 
 def test_many_strands_in_a_row_are_laid_one_after_the_other() -> None:
