@@ -8,7 +8,7 @@ import numpy as np
 import shapely
 
 from ccfem.arrays import FloatArray, IntArray
-from ccfem.geometry.free_ends import lead_on, strips
+from ccfem.geometry.free_ends import lead_on
 from ccfem.geometry.shells import concentric
 
 __all__ = ["fill_rest", "grow", "lengthened", "open_lines", "parallels"]
@@ -69,8 +69,8 @@ def grow(
         )
         if _length(line) >= pitch
     ]
-    lines = lead_on(lines, region, pitch, closest, _REACH * pitch)
-    return lines + fill_rest(region, lines, pitch, closest)
+    lines, rest = lead_on(lines, region, pitch, closest, _REACH * pitch)
+    return lines + fill_rest(rest, pitch, closest)
 
 
 def parallels(
@@ -173,15 +173,12 @@ def _without_hooks(line: FloatArray, least: float) -> FloatArray:
     return line[long[0] : long[-1] + 2] if len(long) else line
 
 
-def fill_rest(
-    region: Any, lines: Sequence[FloatArray], pitch: float, closest: float
-) -> list[FloatArray]:
-    """Concentric strands in the part of a region that strands along given lines leave open.
+def fill_rest(rest: Any, pitch: float, closest: float) -> list[FloatArray]:
+    """Concentric strands in what other strands leave open.
 
     Parameters
     ----------
-    region : shapely (Multi)Polygon, mm
-    lines : sequence of (k, 2) arrays, mm
+    rest : shapely (Multi)Polygon, mm
     pitch : float, mm
         Width that each strand takes.
     closest : float
@@ -192,9 +189,6 @@ def fill_rest(
     list of (k, 2) arrays, mm
         Strips narrower than half a pitch and specks stay open.
     """
-    rest = region
-    if len(lines):
-        rest = shapely.difference(region, strips(lines, pitch))
     rest = shapely.buffer(rest, -_SLIVER * pitch, join_style="mitre")
     rest = shapely.buffer(rest, _SLIVER * pitch, join_style="mitre")
     parts = shapely.get_parts(rest)

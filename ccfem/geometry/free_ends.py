@@ -32,7 +32,7 @@ def strips(lines: Sequence[FloatArray], pitch: float) -> Any:
 
 def lead_on(
     lines: Sequence[FloatArray], region: Any, pitch: float, closest: float, reach: float
-) -> list[FloatArray]:
+) -> tuple[list[FloatArray], Any]:
     """Lead the free ends of strands on, straight, to what lies ahead where that is near.
 
     The longer of two strands goes first where both would take the same place.
@@ -52,30 +52,32 @@ def lead_on(
 
     Returns
     -------
-    list of (k, 2) arrays, mm
-        In the order of `lines`.
+    lines : list of (k, 2) arrays, mm
+        In the order of those given.
+    rest : shapely (Multi)Polygon, mm
+        What their strips leave of the region.
     """
     led = list(lines)
+    rest = shapely.difference(region, strips(lines, pitch)) if led else region
     ends = _free_ends(lines, pitch)
     if not ends:
-        return led
+        return led, rest
     here = np.array([lines[number][end] for number, end in ends])
     along = here - np.array([lines[number][1 if end == 0 else -2] for number, end in ends])
     along /= np.linalg.norm(along, axis=1)[:, None]
     slack = (closest - 0.5) * pitch
-    rest = shapely.difference(region, strips(lines, pitch))
-    room = shapely.buffer(rest, -slack, join_style="mitre")
-    shapely.prepare(room)
+    open_parts = _Parts(rest)
+    rooms = _Parts(shapely.buffer(rest, -slack, join_style="mitre"))
     start = here + 1.01 * slack * along
     rays = shapely.linestrings(np.stack([start, here + reach * along], axis=1))
     ahead = _Obstacles.of(lines, region, pitch)
     ways: list[Any] = []
-    for k in np.flatnonzero(shapely.contains_xy(room, start)):
-        free, space = rest, room
+    for k, space in rooms.round(start).items():
+        free = open_parts.round(start[k : k + 1]).get(0, shapely.Polygon())
         rivals = [way for way in ways if way.distance(rays[k]) < (closest + 0.5) * pitch]
         if rivals:
             taken = shapely.buffer(shapely.union_all(rivals), 0.5 * pitch, cap_style="flat")
-            free = shapely.difference(shapely.intersection(rest, rays[k].buffer(2 * pitch)), taken)
+            free = shapely.difference(free, taken)
             space = shapely.buffer(free, -slack, join_style="mitre")
         stop = _first_exit(rays[k], space)
         if stop is not None:
@@ -88,7 +90,8 @@ def lead_on(
         if ahead.angle(stop, along[k], number) >= np.radians(_STEEPEST):
             ways.append(shapely.LineString([here[k], stop]))
             led[number] = np.insert(led[number], 0 if end == 0 else len(led[number]), stop, axis=0)
-    return led
+    ways = [shapely.get_coordinates(way) for way in ways]
+    return led, shapely.difference(rest, strips(ways, pitch)) if ways else rest
 
 
 def _free_ends(lines: Sequence[FloatArray], pitch: float) -> list[tuple[int, int]]:
@@ -97,6 +100,18 @@ def _free_ends(lines: Sequence[FloatArray], pitch: float) -> list[tuple[int, int
     order = np.argsort(-np.round(size / pitch, 3), kind="stable")
     is_open = [not bool((line[0] == line[-1]).all()) for line in lines]
     return [(int(number), end) for number in order if is_open[number] for end in (0, -1)]
+
+
+class _Parts:
+    """Parts of an area, found by a point inside."""
+
+    def __init__(self, area: Any) -> None:
+        self._tree = shapely.STRtree(shapely.get_parts(area))
+
+    def round(self, points: FloatArray) -> dict[int, Any]:
+        """Part round each of several points (k, 2) that has one."""
+        point, part = self._tree.query(shapely.points(points), predicate="within")
+        return dict(zip(point.tolist(), self._tree.geometries[part], strict=True))
 
 
 def _first_exit(ray: Any, space: Any) -> FloatArray | None:

@@ -22,7 +22,7 @@ _SHIFTS = np.array([0.0, 0.5, 0.25, -0.25, 0.125, -0.125, 0.375, -0.375])
 _BETTER = 0.01
 """Mean misfit a side, in pitches, by which a shift must be better than one before it."""
 _STEP = 1.0
-_FAR = 60.0
+_FAR = 30.0
 """Distance of samples along a guide, and length of the rays to both sides of it, in pitches."""
 _ROUNDS = 3
 """A guide is fitted between its neighbours, and these move too: times that all are fitted."""
