@@ -230,6 +230,20 @@ def test_groups_of_one_cell_change_nothing():
     np.testing.assert_array_equal(pairs.density[::2], pairs.density[1::2])
 
 
+def test_filters_prevent_checkerboards():
+    def board(design, ny, nx):
+        """Mean size of the alternating part of the density of 2 x 2 cells."""
+        rho = design.density.reshape(ny, nx)
+        return np.abs(rho[1:, 1:] - rho[1:, :-1] - rho[:-1, 1:] + rho[:-1, :-1]).mean() / 4.0
+
+    # Below the distance of the cells nothing is averaged.
+    none = simp(mbb(30, 10), 0.5, radius=0.9, iterations=40)
+    some = simp(mbb(30, 10), 0.5, radius=1.5, iterations=40)
+    assert board(none, 10, 30) > 0.1
+    assert board(some, 10, 30) < 0.4 * board(none, 10, 30)
+    assert none.grey < 0.2
+
+
 def test_filled_cells_have_the_volume():
     design = simp(mbb(30, 10), 0.5, radius=1.5, iterations=20)
     filled = design.filled(0.4)
