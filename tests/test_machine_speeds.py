@@ -121,6 +121,20 @@ def test_points_a_hair_apart_do_not_make_a_line_bent():
         np.testing.assert_array_equal(speeds_of(way)[0], 35.0)
 
 
+def test_corners_of_a_meshed_circle_are_no_turns():
+    # A circle of radius 30 in chords of 2.4 mm, as a mesh has it, with points anywhere on them.
+    rng = np.random.default_rng(1)
+    (layer,) = slice_planar(box_mesh((90.0, 90.0, 1.0), (1, 1, 1)), count=1)
+    turn = np.linspace(0.0, 2.0 * np.pi, 79)
+    corners = 45.0 + 30.0 * np.stack([np.cos(turn), np.sin(turn)], axis=1)
+    share = rng.random((78, 2, 1))
+    share.sort(axis=1)
+    between = (1.0 - share) * corners[:-1, None] + share * corners[1:, None]
+    line = np.concatenate([corners[:-1, None], between], axis=1).reshape(-1, 2)
+    path = Toolpaths.from_plane([np.concatenate([line, line[:1]])], layer)
+    np.testing.assert_array_equal(step_speeds(path, Machine(speeds=TABLE))[:-1], 35.0)
+
+
 def test_repeated_points_and_paths_without_length_change_nothing():
     line = turned([30.0, 40.0, 30.0], [90.0, -120.0])
     again = np.repeat(line, [1, 3, 2, 2], axis=0)
