@@ -22,7 +22,7 @@ _DIGITS = 9
 _REACH = 2.0
 """Least length over which curvature is taken, in fibre widths. Our choice: over less, the corners
 that a mesh gives to round borders and to isocurves count as turns, and paths fall into short slow
-pieces. On the loop, four strategies spend the same shares in the three rows from 2 to 5."""
+pieces."""
 
 
 @dataclass(frozen=True)
