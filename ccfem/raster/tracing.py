@@ -64,7 +64,7 @@ def trace(regions: IntArray, linked: BoolArray, seed: int = 0) -> PixelPaths:
 
     Each region is thinned, and its lines are followed, without spurs and straight on where they
     fork. Pixels left over come back as corners of diagonal steps, then as paths of their own;
-    single ones stay isolated. Paths of one region whose ends meet are joined.
+    single ones stay isolated. Paths of one region whose ends meet are joined. No two paths cross.
 
     Parameters
     ----------

@@ -16,7 +16,16 @@ _STEPS = NEIGHBOURS.copy()
 
 
 @njit(cache=True)
-def _next(line, regions, linked, used, i, j, way):  # type: ignore[no-untyped-def]
+def _crosses(following, width, i, j, k):  # type: ignore[no-untyped-def]
+    """Whether a step from a pixel would cross a diagonal step of a path."""
+    if k % 2 == 0:
+        return False
+    a, b = (i + _STEPS[k, 0]) * width + j, i * width + j + _STEPS[k, 1]
+    return following[a] == b or following[b] == a
+
+
+@njit(cache=True)
+def _next(line, regions, linked, used, following, i, j, way):  # type: ignore[no-untyped-def]
     """Sense (0 to 7) of the way on from a pixel, as straight as can be; -1 where there is none."""
     best, least = -1, 99
     for k in range(8):
@@ -24,6 +33,8 @@ def _next(line, regions, linked, used, i, j, way):  # type: ignore[no-untyped-de
             continue
         a, b = i + _STEPS[k, 0], j + _STEPS[k, 1]
         if not line[a, b] or used[a, b] or regions[a, b] != regions[i, j]:
+            continue
+        if _crosses(following, regions.shape[1], i, j, k):
             continue
         turn = 0 if way < 0 else min((k - way) % 8, (way - k) % 8)
         cost = 2 * turn + k % 2
@@ -33,7 +44,7 @@ def _next(line, regions, linked, used, i, j, way):  # type: ignore[no-untyped-de
 
 
 @njit(cache=True)
-def _follow(line, regions, linked, used, start, chain):  # type: ignore[no-untyped-def]
+def _follow(line, regions, linked, used, following, start, chain):  # type: ignore[no-untyped-def]
     """Follow a line both ways from a pixel into `chain`; the number of its pixels."""
     width = regions.shape[1]
     used[start // width, start % width] = True
@@ -49,7 +60,7 @@ def _follow(line, regions, linked, used, start, chain):  # type: ignore[no-untyp
             way = (ahead + 4) % 8 if ahead >= 0 else -1
         while True:
             i, j = at // width, at % width
-            way = _next(line, regions, linked, used, i, j, way)
+            way = _next(line, regions, linked, used, following, i, j, way)
             if way < 0:
                 break
             if at == start and half == 0:
@@ -115,7 +126,7 @@ def walk(line, regions, linked, used, following, before, stub):  # type: ignore[
                 continue
             if from_ends and _beside_on(line, regions, linked, i, j)[0] > 1:
                 continue
-            size = _follow(line, regions, linked, used, start, chain)
+            size = _follow(line, regions, linked, used, following, start, chain)
             short = size < stub and _beside(chain, size, regions, linked, already)
             if size == 1 or short:
                 for k in range(size):
@@ -187,6 +198,8 @@ def extend_ends(regions, linked, used, following, before):  # type: ignore[no-un
                     continue
                 if max(abs(a - last // width), abs(b - last % width)) < 2:
                     continue
+                if _crosses(following, width, i, j, k):
+                    continue
                 if best < 0 or k % 2 < best % 2:
                     best = k
             if best < 0:
@@ -217,6 +230,8 @@ def join_ends(regions, linked, used, following, before):  # type: ignore[no-unty
                 if not used[a, b] or regions[a, b] != regions[i, j]:
                     continue
                 if following[there] >= 0 and before[there] >= 0:
+                    continue
+                if _crosses(following, width, i, j, k):
                     continue
                 if following[here] >= 0 and before[here] >= 0:
                     break

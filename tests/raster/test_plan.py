@@ -118,6 +118,14 @@ def test_paths_stay_inside_the_layer(name, section):
         assert np.array_equal(path[0], path[-1]) == closed
 
 
+@pytest.mark.parametrize("section", SECTIONS)
+@pytest.mark.parametrize("name", PATTERNS)
+def test_paths_do_not_cross(name, section):
+    steps = [np.stack([p[:-1, :2], p[1:, :2]], axis=1) for p in paths_of(name, section)]
+    pieces = shapely.linestrings(np.concatenate(steps))
+    assert shapely.STRtree(pieces).query(pieces, predicate="crosses").shape[1] == 0
+
+
 @pytest.mark.parametrize("name", PATTERNS)
 def test_same_input_gives_the_same_paths(name):
     one, other = paths_of(name, "plate"), paths_of(name, "plate")

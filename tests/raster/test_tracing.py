@@ -87,6 +87,16 @@ def test_rows_of_different_regions_stay_apart():
     assert paths.label[3, 1] == paths.label[2, 1]
 
 
+def test_diagonals_of_two_regions_do_not_cross():
+    regions = regions_of("000..1", "...01.", "...10.", "111..0")
+    linked = free_links(regions >= 0)
+    paths = trace(regions, linked)
+    check(paths, regions, linked)
+    ends = np.concatenate([paths.pixels[:-1], paths.pixels[1:]], axis=1)
+    steps = {tuple(row) for row in ends.tolist()} | {tuple(row[[2, 3, 0, 1]]) for row in ends}
+    assert ((2, 4, 3, 5) in steps) != ((2, 5, 3, 4) in steps)
+
+
 def test_links_that_are_missing_cut_paths():
     regions = regions_of("0000000000")
     linked = free_links(regions >= 0)
