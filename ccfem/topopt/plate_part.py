@@ -59,6 +59,37 @@ def plate_part(
     height = _height(plate) if thickness is None else thickness
     mesh = extrude(polygon, height, edge_length, keep=_ends(plate, polygon, size))
     walls = _walls(mesh)
+    patches = _patches(plate, walls, size, edge_length)
+    loads: dict[str, tuple[Load, ...]] = {}
+    for case, given in plate.loads.items():
+        loads[case] = ()
+        for load in given:
+            if isinstance(load, PointForce):
+                name = f"{case}_point_{len(loads[case])}"
+                patches[name] = _at_point(load, walls, size, edge_length)
+                load = Force(name, load.vector)
+            loads[case] += (load,)
+    supports = [
+        replace(support, components=support.components.replace("z", ""))
+        for support in plate.supports
+    ]
+    return Problem(
+        mesh.with_patches({**patches, _BOTTOM: _level(mesh, 0.0)}),
+        material,
+        (*supports, Support(_BOTTOM, "z")),
+        loads,
+        None if design.angle is None else _axes(design, mesh),
+    )
+
+
+def _patches(
+    plate: PlaneProblem, walls: _Walls, size: float, edge_length: float
+) -> dict[str, IntArray]:
+    """Patches of the walls by those of the plate; the ones that nothing is left of drop out."""
+    if _BOTTOM in plate.mesh.patches:
+        raise InputError(
+            f"'{_BOTTOM}' names the face at z = 0 of the part: give the plate's patch another name"
+        )
     needed = {support.patch for support in plate.supports}
     needed |= {
         load.patch
@@ -66,7 +97,7 @@ def plate_part(
         for load in case
         if not isinstance(load, PointForce)
     }
-    patches = {_BOTTOM: _level(mesh, 0.0)}
+    patches = {}
     for name, edges in plate.mesh.patches.items():
         chosen = _taken_over(plate, edges, walls, size, edge_length)
         if chosen.any():
@@ -76,33 +107,18 @@ def plate_part(
                 f"the outline of the design does not reach patch '{name}': mark the cells there "
                 "as solid, or raise the volume fraction"
             )
-    loads: dict[str, tuple[Load, ...]] = {}
-    for case, given in plate.loads.items():
-        loads[case] = ()
-        for load in given:
-            if isinstance(load, PointForce):
-                name = f"{case}_point_{len(loads[case])}"
-                near = _round(np.array([load.point[:2]]), walls, size, edge_length)
-                if not near.any():
-                    raise InputError(
-                        f"the point force at {load.point} is not on the outline of the design: "
-                        "move it to the border of the plate, or mark the cells there as solid"
-                    )
-                patches[name] = walls.facets[near]
-                load = Force(name, load.vector)
-            loads[case] += (load,)
-    supports = tuple(
-        replace(support, components=support.components.replace("z", ""))
-        for support in plate.supports
-    )
-    axes = None if design.angle is None else _axes(design, mesh)
-    return Problem(
-        mesh.with_patches(patches),
-        material,
-        (*supports, Support(_BOTTOM, "z")),
-        loads,
-        axes,
-    )
+    return patches
+
+
+def _at_point(load: PointForce, walls: _Walls, size: float, edge_length: float) -> IntArray:
+    """Facets (k, 3) that carry a point force."""
+    near = _round(np.array([load.point[:2]]), walls, size, edge_length)
+    if not near.any():
+        raise InputError(
+            f"the point force at {load.point} is not on the outline of the design: move it to the "
+            "border of the plate, or mark the cells there as solid"
+        )
+    return walls.facets[near]
 
 
 def _height(plate: PlaneProblem) -> float:

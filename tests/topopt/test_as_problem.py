@@ -146,6 +146,9 @@ def test_what_cannot_be_carried_over_is_refused():
     with pytest.raises(InputError, match="1 to 2 mm thick: name the thickness"):
         as_problem(full(uneven), PLA)
     mesh = strip(mask).mesh
+    named = replace(strip(mask), mesh=mesh.with_patches({"bottom": mesh.patch("y_min")}))
+    with pytest.raises(InputError, match="'bottom' names the face at z = 0"):
+        as_problem(full(named), PLA)
     middle = mesh.cells[np.linalg.norm(mesh.centres - [15.0, 4.0], axis=1).argmin()][:2]
     hidden = replace(
         strip(mask), mesh=mesh.with_patches({"x_min": [middle]}), supports=(Support("x_min"),)
