@@ -239,6 +239,10 @@ def print_seconds(paths: PlanePaths) -> float:
 def bead_area(paths: PlanePaths, bead: float) -> tuple[float, float]:
     """Shares of the area of a layer that beads cover twice, and that none covers.
 
+    Beads of every pattern end square: length times width is what is extruded, or cut from the
+    roll, so the two shares differ by no more than length times width over area less 1. Round ends
+    would add half a disc at each end that nobody has paid for, and hide gaps.
+
     Parameters
     ----------
     paths : PlanePaths

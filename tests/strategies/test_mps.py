@@ -1,4 +1,5 @@
 from dataclasses import replace
+from functools import partial
 from types import SimpleNamespace
 
 import numpy as np
@@ -325,3 +326,40 @@ def test_without_a_direction_mps_is_concentric():
 def test_parameters_are_checked(kind, wrong, message):
     with pytest.raises(InputError, match=message):
         kind(**wrong)
+
+
+def round_and_round(points):
+    """Tension along circles about the origin, as in a ring that is blown up."""
+    x, y = points.T / np.hypot(*points.T)
+    return np.column_stack([y * y, x * x, -x * y])
+
+
+@pytest.mark.parametrize("outer", [16.0, 16.3, 16.6])
+def test_streamlines_that_close_give_closed_strands(outer):
+    origin = shapely.Point(0, 0)
+    ring = origin.buffer(outer, quad_segs=48) - origin.buffer(6, quad_segs=48)
+    lines, section = plan(PATTERNS["mps"], ring, round_and_round)
+    closed = [np.array_equal(line[0], line[-1]) for line in lines]
+    length = np.array([shapely.LineString(line).length for line in lines])
+    assert length[closed].sum() > 0.9 * length.sum()
+    assert agreement(lines, section, round_and_round) > 95.0
+    assert shares(lines, section)[0] < 0.06
+
+
+@pytest.mark.parametrize("name", PATTERNS)
+def test_parts_thinner_than_a_strand_stay_empty(name):
+    """A strip of half a strand, alone and beside a part that is wide enough."""
+    strip = shapely.box(0, 0, 50, 0.4)
+    assert plan(PATTERNS[name], strip)[0] == []
+    both, _ = plan(PATTERNS[name], shapely.MultiPolygon([strip, affinity.translate(BAR, 0, 5)]))
+    alone, _ = plan(PATTERNS[name], affinity.translate(BAR, 0, 5))
+    assert covered(both).area == pytest.approx(covered(alone).area, rel=1e-3)
+
+
+def test_mps_under_mirrored_tension_is_mirrored():
+    """Nothing prefers a side: a symmetric part under a symmetric stress."""
+    part = shapely.box(-30, -10, 30, 10) - shapely.Point(0, 0).buffer(3, quad_segs=16)
+    lines, section = plan(PATTERNS["mps"], part, partial(round_hole, centre=(0.0, 0.0)))
+    laid = covered(lines)
+    mirrored = affinity.scale(laid, 1, -1, origin=(0, 0))
+    assert laid.symmetric_difference(mirrored).area < 0.01 * section.area
