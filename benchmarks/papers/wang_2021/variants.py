@@ -1,0 +1,73 @@
+"""What was tried where a number of the paper hangs on what it does not state: the turns' radius."""
+
+from collections.abc import Mapping
+from dataclasses import dataclass, replace
+
+from benchmarks.papers.wang_2021.study import LIMIT, PATTERNS, PlateStudy, curvature_along
+from ccfem.evaluate.curvature import sample_curvature
+from ccfem.evaluate.manufacture import sample_manufacture
+from ccfem.evaluate.plane_paths import PlanePaths, plane_paths
+from ccfem.strategies import create, plan
+
+__all__ = ["RADII", "Tried", "try_radii", "variant_quantities", "variant_table"]
+
+RADII = (0.45, 0.8, 1.5, 2.5, 3.85)
+"""Tightest turns, mm: half a strand, ours, and the paper's limit of 0.26 / mm among them."""
+_PLATES = ("bridge", "suspension")
+
+
+@dataclass(frozen=True)
+class Tried:
+    """What lpp gives with one radius: shares below 0.26 / mm, %, length, mm, and time, s."""
+
+    vertices: float
+    length_share: float
+    length: float
+    seconds: float
+
+
+def try_radii(study: Mapping[str, PlateStudy]) -> dict[tuple[str, float], Tried]:
+    """Plan lpp with every radius, by plate and radius."""
+    found = {}
+    for name in _PLATES:
+        if name not in study or "lpp" not in study[name].optimised.patterns:
+            continue
+        part = study[name].optimised
+        for radius in RADII:
+            machine = replace(part.machine, minimum_radius=radius)
+            strategy, parameters = PATTERNS["lpp"]
+            made = plan(create(strategy, parameters), (part.layer,), part.field, machine)
+            paths = plane_paths(made, part.layer)
+            whole = PlanePaths(part.layer, paths.points, paths.offsets, paths.closed)
+            found[name, radius] = Tried(
+                100.0 * float((sample_curvature(whole, machine.fibre_width).native < LIMIT).mean()),
+                100.0 * float((curvature_along(whole)[1] < LIMIT).mean()),
+                float(paths.lengths.sum()),
+                float(sample_manufacture(paths, made, machine).seconds[0]),
+            )
+    return found
+
+
+def variant_quantities(tried: Mapping[tuple[str, float], Tried]) -> dict[str, float]:
+    """Smallest and largest share of the vertices below 0.26 / mm over the radii, by plate."""
+    found = {}
+    for name in {name for name, _ in tried}:
+        shares = [one.vertices for (plate, _), one in tried.items() if plate == name]
+        found[f"variant least share of vertices below 0.26 {name}"] = min(shares)
+        found[f"variant largest share of vertices below 0.26 {name}"] = max(shares)
+    return found
+
+
+def variant_table(tried: Mapping[tuple[str, float], Tried]) -> str:
+    """Markdown table of all radii."""
+    lines = [
+        "| plate | tightest turn, mm | vertices below 0.26 / mm, % | length below, % | "
+        "length, mm | time, s |",
+        "|---|---|---|---|---|---|",
+    ]
+    lines += [
+        f"| {name} | {radius:g} | {one.vertices:.1f} | {one.length_share:.1f} | {one.length:.0f} | "
+        f"{one.seconds:.0f} |"
+        for (name, radius), one in tried.items()
+    ]
+    return "\n".join(lines) + "\n"
