@@ -73,7 +73,8 @@ def check_machine(machine: Machine) -> None:
     InputError
     """
     for name in ("fibre_speed", "matrix_speed", "travel_speed", "matrix_height"):
-        if getattr(machine, name) == 0.0:
+        unused = name == "fibre_speed" and machine.speeds is not None
+        if getattr(machine, name) == 0.0 and not unused:
             raise InputError(f"machine.{name} must be above 0 to print; got 0: set it in [machine]")
     if machine.minimum_length < machine.tail * (1.0 - _SHORT):
         raise InputError(

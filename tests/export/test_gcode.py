@@ -343,6 +343,9 @@ def test_prints_that_cannot_be(plate, tmp_path):
         check_machine(replace(MACHINE, minimum_length=20.0, cutter_distance=42.0))
     with pytest.raises(InputError, match=r"machine\.matrix_height must be above 0 to print"):
         check_machine(replace(MACHINE, matrix_height=0.0))
+    with pytest.raises(InputError, match=r"machine\.fibre_speed must be above 0 to print"):
+        check_machine(replace(MACHINE, fibre_speed=0.0, speeds=None))
+    check_machine(replace(MACHINE, fibre_speed=0.0))
     with pytest.raises(InputError, match="fibre lies on layer 1, which is not among"):
         plan_print(paths, layers[:1], mesh, MACHINE)
     with pytest.raises(InputError, match=r"fibre layer 0 at 3\.66667 mm does not fit .* 3 and 7"):
