@@ -14,7 +14,7 @@ from ccfem.arrays import FloatArray, IntArray
 from ccfem.geometry.dubins import WORDS, advance, curve_points, word_sizes
 from ccfem.geometry.section_grid import SectionGrid, contains, side_and_room
 
-__all__ = ["LinkCurves", "curve_cost", "link_curve", "link_curves"]
+__all__ = ["LinkCurves", "curve_cost", "link_curve", "link_curves", "stub_points"]
 
 _SAMPLE = 0.25
 """Step, mm, at which a curve is looked at close to the border."""
@@ -80,12 +80,12 @@ def link_curve(
     word = int(curves.word[a, b])
     turns = WORDS[word] * np.where(sizes[word] < 0.0, -1, 1)
     curve = curve_points(start, end, turns, np.abs(sizes[word]), radius, step)
-    before, after = _stub(ends[a], first, step), _stub(ends[b], second, step)[::-1]
+    before, after = stub_points(ends[a], first, step), stub_points(ends[b], second, step)[::-1]
     return np.concatenate([before, curve, after])
 
 
-def _stub(end: FloatArray, reach: float, step: float) -> FloatArray:
-    """Points from an end along its extension, without the last one."""
+def stub_points(end: FloatArray, reach: float, step: float) -> FloatArray:
+    """Points (n, 2), mm, from an end along its straight extension, without the last one."""
     parts = max(1, int(np.ceil(reach / step))) if reach > 0.0 else 0
     at = reach * np.arange(parts)[:, None] / max(parts, 1)
     return end[:2] + at * [np.cos(end[2]), np.sin(end[2])]

@@ -18,7 +18,7 @@ import shapely
 from ccfem.arrays import BoolArray, FloatArray, IntArray, read_only
 from ccfem.errors import InputError
 from ccfem.geometry.exchanges import improved_order
-from ccfem.geometry.link_curves import LinkCurves, link_curve, link_curves
+from ccfem.geometry.link_curves import LinkCurves, link_curve, link_curves, stub_points
 from ccfem.geometry.offsets import ring_from
 from ccfem.geometry.ordering import costs_between_ends, order_clusters, strand_visits
 from ccfem.geometry.polylines import between
@@ -183,6 +183,8 @@ class _Network:
     ----------
     ends : (t, 3) array
         Poses at the ends, heading out of the track: 2k and 2k + 1 are those of track k.
+    reach : (t,) array, mm
+        Straight extension of an end before a way round the part.
     cost : (t, t) array, mm
     curves : LinkCurves
     routes : RingRoutes
@@ -192,6 +194,7 @@ class _Network:
     """
 
     ends: FloatArray
+    reach: FloatArray
     cost: FloatArray
     curves: LinkCurves
     routes: RingRoutes
@@ -217,14 +220,15 @@ class _Network:
         around = around + reach[:, 0] + reach[:, :1]
         curves = link_curves(ends, reach, radius, grid, weight, around)
         cost = np.minimum(curves.cost, np.minimum(around, around.T))
-        return cls(ends, cost, curves, routes, ~np.isfinite(curves.cost), way)
+        return cls(ends, reach[:, 0], cost, curves, routes, ~np.isfinite(curves.cost), way)
 
     def link(self, a: int, b: int, step: float) -> FloatArray:
         """Points (n, 2), mm, from end a to end b."""
         if not self.by_ring[a, b]:
             return link_curve(self.ends, a, b, self.curves, self.routes.radius, step)
         curve = ring_curve(self.routes, a, b, int(self.way[a, b]), step)
-        return np.concatenate([self.ends[a : a + 1, :2], curve, self.ends[b : b + 1, :2]])
+        before, after = (stub_points(self.ends[k], self.reach[k], step) for k in (a, b))
+        return np.concatenate([before, curve, after[::-1]])
 
 
 def _end_poses(tracks: Sequence[FloatArray]) -> FloatArray:

@@ -131,6 +131,9 @@ def test_a_link_leads_round_the_part_rather_than_through_it() -> None:
     (link,) = path.links
     assert in_section(path, block) < 1e-6
     assert 100.0 < length(link) < 150.0
+    steps = np.linalg.norm(np.diff(path.points, axis=0), axis=1)
+    assert steps.min() > 1e-6
+    assert np.linalg.norm(np.diff(link, axis=0), axis=1).max() < 0.51
     assert sharpest(link) < 1.05 / RADIUS
 
 
