@@ -12,7 +12,7 @@ from ccfem.mesh import TetMesh
 
 __all__ = ["CASES", "DESIGNED", "build"]
 
-CASES = ("bar", "loop", "open_hole")
+CASES = ("bar", "loop", "open_hole", "bracket")
 DESIGNED = ("bridge", "suspension", "cantilever", "m_shape", "l_shape")
 """Cases of optimised plates: an outline and its mesh each."""
 
