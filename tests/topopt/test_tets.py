@@ -7,7 +7,12 @@ import pytest
 
 from ccfem.elasticity import Force, PlaneProblem, Problem, Support, raster_mesh, rotate_plane
 from ccfem.errors import InputError
-from ccfem.materials import isotropic, plane_stress, transversely_isotropic
+from ccfem.materials import (
+    isotropic,
+    named_material,
+    plane_stress,
+    transversely_isotropic,
+)
 from ccfem.patches import Box
 from ccfem.structured import box_mesh
 from ccfem.tensor import rotate_stiffness
@@ -113,6 +118,24 @@ def test_bridge_of_tetrahedra_is_that_of_quadrilaterals(bridges):
     model = OrientedCompliance(compliance_of(quads.full), WANG, image(tets.angle))
     again = model(image(tets.factor)).compliance
     assert again == pytest.approx(quads.compliance[-1], rel=0.005)
+
+
+def test_a_sheet_and_a_solid_held_on_its_bottom_answer_alike(bridges):
+    # Specification 001, addendum I1: within 0.3 %.
+    tets, _ = bridges
+    laminate = named_material("wang_laminate").stiffness
+    # Its compliance in the plane is that of the sheet.
+    inverse = np.linalg.inv(np.linalg.inv(laminate)[np.ix_([0, 1, 5], [0, 1, 5])])
+    np.testing.assert_allclose(inverse, WANG, rtol=1e-9, atol=1e-6)
+    free = tuple(support for support in tets.full.supports if support.patch != "z_max")
+    found = [
+        OrientedCompliance(compliance_of(problem), material, tets.angle)(tets.factor).compliance
+        for problem, material in (
+            (tets.full, sheet(WANG)),
+            (replace(tets.full, supports=free), laminate),
+        )
+    ]
+    assert found[1] == pytest.approx(found[0], rel=0.003)
 
 
 def test_columns_share_density_and_angle(bridges):
