@@ -53,6 +53,9 @@ class Svt:
     crossings : bool, default True
         Whether strands that end in a joint cross it and leave the section on the far side, as in
         the paper; otherwise they stop in its middle.
+    aligned : bool, default True
+        Whether strands turn to the stress in joints and beside free ends; otherwise they run there
+        as the medial axis and a smooth curve across the joint have it.
     turn : float, default 75
         Largest turn, degrees, of a main path in a joint.
     width_ratio : float, default 2
@@ -64,6 +67,7 @@ class Svt:
     spacing: float = 1.0
     links: Literal["outside", "none"] = "outside"
     crossings: bool = True
+    aligned: bool = True
     turn: float = 75.0
     width_ratio: float = 2.0
     minimum_length: float | None = None
@@ -105,7 +109,8 @@ class Svt:
         for path in main_paths(members, stress, criterion, self.width_ratio):
             strip = band(path, members, self.crossings)
             count = track_count(strip, self.spacing * machine.fibre_width)
-            found.append(tracks(strip, count, piece, machine.minimum_radius))
+            follow = stress if self.aligned else None
+            found.append(tracks(strip, count, piece, machine.minimum_radius, follow))
         return found
 
     def _piece(

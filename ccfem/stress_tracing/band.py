@@ -2,7 +2,7 @@
 
 The middle of both rails and half the vector between them describe the strip. Beside joints and
 free ends the rails belong to other members: there the strip is bridged by a cubic and extended
-straight.
+straight. While it is made, a strip is an array (n, 5) of both vectors, and of 1 where it is free.
 """
 
 from dataclasses import dataclass
@@ -27,6 +27,8 @@ _NORMAL = 2.0
 """Length, mm, over which its width is taken where it is extended."""
 _SMOOTHING = 2.0
 """Standard deviation, mm, of the Gaussian that smooths a band."""
+_TURNED = np.array([1.0, 1.0, -1.0, -1.0, 1.0])
+"""What a strip is multiplied by where it is walked the other way."""
 _PADDING = 10.0
 """Length, mm, that is cut off at both ends after that."""
 _EXTENSION = 30.0
@@ -45,6 +47,8 @@ class Band:
         Points that are not extended.
     width : (k,) array, mm
         Distance of the rails along the core, before smoothing.
+    free : (n,) array
+        From 0 where rails guide the band to 1 where it is bridged or extended.
     closed : bool
         Whether the last point leads to the first.
     """
@@ -53,10 +57,11 @@ class Band:
     half: FloatArray
     core: slice
     width: FloatArray
+    free: FloatArray
     closed: bool = False
 
     def __post_init__(self) -> None:
-        for name in ("middle", "half", "width"):
+        for name in ("middle", "half", "width", "free"):
             object.__setattr__(self, name, read_only(getattr(self, name)))
 
 
@@ -73,29 +78,31 @@ def band(path: MainPath, frame: Frame, crossing: bool = True) -> Band:
     own = np.concatenate([_own(member, frame) for member in path.members])
     left = np.concatenate([member.left for member in path.members])[own]
     right = np.concatenate([member.right for member in path.members])[own]
-    middle, half = 0.5 * (left + right), 0.5 * (left - right)
+    strip = np.column_stack([0.5 * (left + right), 0.5 * (left - right), np.zeros(len(left))])
     gap = np.diff(np.flatnonzero(own)) > 1
     if path.closed:
-        middle, half, gap = _as_ring(middle, half, np.append(gap, not own[0] or not own[-1]))
-    middle, half = _even(*_bridged(middle, half, gap), path.closed)
-    width = 2.0 * np.linalg.norm(half, axis=1)
+        strip, gap = _as_ring(strip, np.append(gap, not own[0] or not own[-1]))
+    strip = _even(_bridged(strip, gap), path.closed)
+    width = 2.0 * np.linalg.norm(strip[:, 2:4], axis=1)
     if path.closed:
-        middle, half = (_smoothed(x[:-1], "wrap") for x in (middle, half))
-        return Band(middle, half, slice(0, len(middle)), width, closed=True)
+        strip = _smoothed(strip[:-1], "wrap")
+        return _as_band(strip, slice(0, len(strip)), width, closed=True)
     ends = (path.members[0].ends[0], path.members[-1].ends[1])
     reach = [
         _EXTENSION if crossing or end == FREE else float(np.linalg.norm(frame.joints[end] - place))
-        for end, place in zip(ends, middle[[0, -1]], strict=True)
+        for end, place in zip(ends, strip[[0, -1], :2], strict=True)
     ]
-    before, beside = _extension(middle[::-1], half[::-1], reach[0] + _PADDING)
-    after, along = _extension(middle, half, reach[1] + _PADDING)
+    before = _extension(strip[::-1], reach[0] + _PADDING)[::-1]
+    after = _extension(strip, reach[1] + _PADDING)
     padding = round(_PADDING / STEP)
-    first = len(before) - padding
-    core = slice(first, first + len(middle))
-    middle = np.concatenate([before[::-1], middle, after])
-    half = np.concatenate([beside[::-1], half, along])
-    middle, half = (_smoothed(x, "nearest")[padding:-padding] for x in (middle, half))
-    return Band(middle, half, core, width)
+    core = slice(len(before) - padding, len(before) - padding + len(strip))
+    strip = _smoothed(np.concatenate([before, strip, after]), "nearest")[padding:-padding]
+    return _as_band(strip, core, width, closed=False)
+
+
+def _as_band(strip: FloatArray, core: slice, width: FloatArray, closed: bool) -> Band:
+    free = np.clip(strip[:, 4], 0.0, 1.0)
+    return Band(strip[:, :2], strip[:, 2:4], core, width, free, closed)
 
 
 def _own(member: Member, frame: Frame) -> BoolArray:
@@ -116,37 +123,34 @@ def _own(member: Member, frame: Frame) -> BoolArray:
     return np.asarray(share >= min(1.0, 0.9 * float(share.max())))
 
 
-def _as_ring(
-    middle: FloatArray, half: FloatArray, gap: BoolArray
-) -> tuple[FloatArray, FloatArray, BoolArray]:
-    """Close a band, counter-clockwise: its first point is repeated.
+def _as_ring(strip: FloatArray, gap: BoolArray) -> tuple[FloatArray, BoolArray]:
+    """Close a strip, counter-clockwise: its first point is repeated.
 
     It starts in the middle of its longest stretch without gaps.
     """
-    count = len(middle)
-    x, y = middle.T
+    count = len(strip)
+    x, y = strip[:, :2].T
     if x @ np.roll(y, -1) < y @ np.roll(x, -1):
-        middle, half, gap = middle[::-1], -half[::-1], np.roll(gap[::-1], -1)
+        strip, gap = strip[::-1] * _TURNED, np.roll(gap[::-1], -1)
     gaps = np.flatnonzero(gap)
     if len(gaps):
         size = np.diff(np.append(gaps, gaps[0] + count))
         longest = int(np.argmax(size))
         start = (int(gaps[longest]) + 1 + int(size[longest]) // 2) % count
-        middle, half = (np.roll(x, -start, axis=0) for x in (middle, half))
-        gap = np.roll(gap, -start)
-    return np.concatenate([middle, middle[:1]]), np.concatenate([half, half[:1]]), gap
+        strip, gap = np.roll(strip, -start, axis=0), np.roll(gap, -start)
+    return np.concatenate([strip, strip[:1]]), gap
 
 
-def _arc_length(points: FloatArray) -> FloatArray:
-    steps = np.linalg.norm(np.diff(points, axis=0), axis=1)
+def _arc_length(strip: FloatArray) -> FloatArray:
+    steps = np.linalg.norm(np.diff(strip[:, :2], axis=0), axis=1)
     return np.concatenate([[0.0], np.cumsum(steps)])
 
 
-def _bridged(middle: FloatArray, half: FloatArray, gap: BoolArray) -> tuple[FloatArray, FloatArray]:
-    """Fill gaps (n - 1,) by cubics that go on in the directions of the band at both sides."""
-    along = _arc_length(middle)
+def _bridged(strip: FloatArray, gap: BoolArray) -> FloatArray:
+    """Fill gaps (n - 1,) by cubics that go on in the directions of the strip at both sides."""
+    along, middle = _arc_length(strip), strip[:, :2]
     gaps = np.flatnonzero(gap & (np.diff(along) > STEP))
-    places, halves, start = [], [], 0
+    parts, start = [], 0
     for k, here in enumerate(gaps):
         a, b = middle[here], middle[here + 1]
         size = float(np.linalg.norm(b - a))
@@ -158,12 +162,12 @@ def _bridged(middle: FloatArray, half: FloatArray, gap: BoolArray) -> tuple[Floa
         t = np.arange(1.0, round(size / STEP))[:, None] * (STEP / size)
         place, slope = _cubic(a, b, size * into, size * out, t)
         tangent = slope / np.maximum(np.linalg.norm(slope, axis=1), 1e-12)[:, None]
-        wide = np.linalg.norm(half[here : here + 2], axis=1)
+        wide = np.linalg.norm(strip[here : here + 2, 2:4], axis=1)
         normal = np.stack([-tangent[:, 1], tangent[:, 0]], axis=1)
-        places += [middle[start : here + 1], place]
-        halves += [half[start : here + 1], ((1.0 - t) * wide[0] + t * wide[1]) * normal]
+        half = ((1.0 - t) * wide[0] + t * wide[1]) * normal
+        parts += [strip[start : here + 1], np.column_stack([place, half, np.ones(len(t))])]
         start = int(here) + 1
-    return np.concatenate([*places, middle[start:]]), np.concatenate([*halves, half[start:]])
+    return np.concatenate([*parts, strip[start:]])
 
 
 def _direction(step: FloatArray, otherwise: FloatArray) -> FloatArray:
@@ -190,31 +194,31 @@ def _cubic(
     return place, slope
 
 
-def _even(middle: FloatArray, half: FloatArray, closed: bool) -> tuple[FloatArray, FloatArray]:
-    """Band in equal steps along its middle; a closed one from its point nearest to its centre."""
-    along = _arc_length(middle)
+def _even(strip: FloatArray, closed: bool) -> FloatArray:
+    """Strip in equal steps along its middle; a closed one from its point nearest to its centre."""
+    along = _arc_length(strip)
     at = np.linspace(0.0, along[-1], max(4, round(along[-1] / STEP)) + 1)
     if closed:
-        centre = shapely.centroid(shapely.Polygon(middle))
-        at = (at + shapely.line_locate_point(shapely.LineString(middle), centre)) % along[-1]
-    middle, half = (
-        np.stack([np.interp(at, along, x) for x in values.T], axis=1) for values in (middle, half)
-    )
-    return middle, half
+        centre = shapely.centroid(shapely.Polygon(strip[:, :2]))
+        line = shapely.LineString(strip[:, :2])
+        at = (at + shapely.line_locate_point(line, centre)) % along[-1]
+    return np.stack([np.interp(at, along, x) for x in strip.T], axis=1)
 
 
-def _smoothed(values: FloatArray, mode: str) -> FloatArray:
+def _smoothed(strip: FloatArray, mode: str) -> FloatArray:
     """Smooth by a Gaussian, twice, so that arcs keep their radius."""
-    once = gaussian_filter1d(values, _SMOOTHING / STEP, axis=0, mode=mode)
-    rest = gaussian_filter1d(values - once, _SMOOTHING / STEP, axis=0, mode=mode)
+    once = gaussian_filter1d(strip, _SMOOTHING / STEP, axis=0, mode=mode)
+    rest = gaussian_filter1d(strip - once, _SMOOTHING / STEP, axis=0, mode=mode)
     return np.asarray(once + rest)
 
 
-def _extension(middle: FloatArray, half: FloatArray, reach: float) -> tuple[FloatArray, FloatArray]:
-    """Points and half vectors that go straight on for `reach`, mm, beyond the last point."""
+def _extension(strip: FloatArray, reach: float) -> FloatArray:
+    """Strip that goes straight on for `reach`, mm, beyond the last point."""
+    middle = strip[:, :2]
     tangent = middle[-1] - middle[max(len(middle) - 1 - round(_TANGENT[1] / STEP), 0)]
     tangent = tangent / np.linalg.norm(tangent)
-    mean = half[-round(_NORMAL / STEP) :].mean(axis=0)
-    mean = mean - (mean @ tangent) * tangent
-    at = STEP * np.arange(1, int(reach / STEP) + 1)
-    return middle[-1] + at[:, None] * tangent, np.broadcast_to(mean, (len(at), 2))
+    half = strip[-round(_NORMAL / STEP) :, 2:4].mean(axis=0)
+    half = half - (half @ tangent) * tangent
+    at = STEP * np.arange(1, int(reach / STEP) + 1)[:, None]
+    ones = np.ones_like(at)
+    return np.column_stack([middle[-1] + at * tangent, half * ones, ones])

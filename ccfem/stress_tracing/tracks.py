@@ -10,9 +10,11 @@ import shapely
 from scipy.ndimage import gaussian_filter1d, maximum_filter1d
 
 from ccfem.arrays import BoolArray, FloatArray
+from ccfem.elasticity.stress_field import LayerStress
 from ccfem.geometry.offsets import ring_from
 from ccfem.geometry.polylines import subdivide, turning_angles
 from ccfem.stress_tracing.band import STEP, Band
+from ccfem.stress_tracing.relaxation import relaxed
 
 __all__ = ["clipped", "eased", "track_count", "tracks"]
 
@@ -34,7 +36,13 @@ def track_count(band: Band, pitch: float) -> int:
     return max(1, round(float(np.percentile(band.width, _PERCENTILE)) / pitch))
 
 
-def tracks(band: Band, count: int, section: Any, radius: float = 0.0) -> list[FloatArray]:
+def tracks(
+    band: Band,
+    count: int,
+    section: Any,
+    radius: float = 0.0,
+    stress: LayerStress | None = None,
+) -> list[FloatArray]:
     """Tracks of a band, evenly over its width, clipped to a section.
 
     Parameters
@@ -44,6 +52,8 @@ def tracks(band: Band, count: int, section: Any, radius: float = 0.0) -> list[Fl
     section : shapely (Multi)Polygon, mm
     radius : float, mm, default 0
         Tighter turns are eased; where the border leaves no room for that they stay.
+    stress : LayerStress, optional
+        That the tracks turn to in joints and beside free ends.
 
     Returns
     -------
@@ -55,8 +65,11 @@ def tracks(band: Band, count: int, section: Any, radius: float = 0.0) -> list[Fl
     inner = shapely.buffer(section, -_INSET)
     seam = shapely.get_coordinates(shapely.centroid(section))[0]
     share = 1.0 - (2.0 * np.arange(count) + 1.0) / count
+    lines = band.middle + share[:, None, None] * band.half
+    if stress is not None:
+        lines = relaxed(lines, band, stress, section)
     found = []
-    for line in band.middle + share[:, None, None] * band.half:
+    for line in lines:
         line = eased(line, radius, band.closed)
         if band.closed:
             line = ring_from(np.concatenate([line, line[:1]]), seam)

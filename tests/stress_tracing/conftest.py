@@ -8,13 +8,12 @@ from ccfem.meshing import extrude
 
 def _stressed(section, tensor):
     layer = slice_planar(extrude(section, 1.0, 3.0, 1), count=1)[0]
-    stress = np.zeros((3, 3))
-    stress[:2, :2] = tensor
-    nodal = np.broadcast_to(stress, (len(layer.points), 3, 3))
-    return LayerStress(layer, np.broadcast_to(stress, (len(layer.triangles), 3, 3)), nodal, None)
+    nodal = np.zeros((len(layer.points), 3, 3))
+    nodal[:, :2, :2] = tensor(layer.plane_points) if callable(tensor) else tensor
+    return LayerStress(layer, nodal[layer.triangles].mean(axis=1), nodal, None)
 
 
 @pytest.fixture(scope="session")
 def stressed():
-    """Stress on a layer of a section, the same tensor (2, 2) in MPa all over it."""
+    """Stress on a layer of a section, MPa: one tensor (2, 2), or a function of points (n, 2)."""
     return _stressed

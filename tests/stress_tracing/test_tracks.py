@@ -3,7 +3,8 @@ import pytest
 import shapely
 
 from ccfem.geometry.polylines import turning_angles
-from ccfem.stress_tracing.band import band
+from ccfem.stress_tracing import relaxation
+from ccfem.stress_tracing.band import Band, band
 from ccfem.stress_tracing.frame import frame
 from ccfem.stress_tracing.main_paths import MainPath, main_paths
 from ccfem.stress_tracing.tracks import clipped, eased, track_count, tracks
@@ -99,3 +100,53 @@ def test_sharp_turns_are_eased_to_the_radius():
     np.testing.assert_array_equal(line[[0, -1]], corner[[0, -1]])
     assert eased(corner, 0.0) is corner
     assert curvature.max() == pytest.approx(1.0 / 3.0, rel=0.2)
+
+
+def test_move_of_a_track_solves_its_equation(monkeypatch):
+    """Without bending u'' = u / l^2: a sinh inside, which decays outside, the flux continuous."""
+    monkeypatch.setattr(relaxation, "_BENDING", 0.0)
+    x = np.arange(-60.0, 60.25, 0.5)
+    middles = 0.5 * (x[1:] + x[:-1])
+    free, slope = np.abs(x) < 10.0, np.where(np.abs(middles) < 10.0, 0.2, 0.0)
+    hold = np.where(free, 1.0 / 12.0**2, 1.0 / 4.0**2)
+    hold[np.abs(x) == 10.0] = 0.5 * (1.0 / 12.0**2 + 1.0 / 4.0**2)
+    moved = relaxation._least(np.ones(len(middles)), slope, hold, closed=False)
+    size = 0.2 / (np.cosh(10.0 / 12.0) / 12.0 + np.sinh(10.0 / 12.0) / 4.0)
+    expected = size * np.where(
+        free,
+        np.sinh(x / 12.0),
+        np.sign(x) * np.sinh(10.0 / 12.0) * np.exp(-(np.abs(x) - 10.0) / 4.0),
+    )
+    np.testing.assert_allclose(moved, expected, atol=0.01 * expected.max())
+
+
+def test_tracks_turn_to_the_stress_where_nothing_guides_them(stressed):
+    """Stress at 20 degrees to a strip in its middle, along it elsewhere."""
+    angle = np.radians(20.0)
+    leaning = np.outer(*[[np.cos(angle), np.sin(angle)]] * 2)
+    section = shapely.box(0, 0, 60, 20)
+
+    def tensor(points):
+        inner = np.abs(points[:, 0] - 30.0) < 10.0
+        return np.where(inner[:, None, None], leaning, np.array(PULL))
+
+    x = np.arange(0.0, 60.5, 0.5)
+    lines = np.stack([np.stack([x, np.full(len(x), y)], axis=1) for y in (8.0, 12.0)])
+    zero = np.zeros((len(x), 2))
+    free = (np.abs(x - 30.0) < 10.0).astype(float)
+    strip = Band(lines[0], zero, slice(0, len(x)), np.zeros(len(x)), free)
+    moved = relaxation.relaxed(lines, strip, stressed(section, tensor), section)
+    slope = np.degrees(np.arctan(np.diff(moved[0, :, 1]) / 0.5))
+    assert 2.0 < slope[60] < 20.0
+    np.testing.assert_allclose(moved[:, [0, -1]], lines[:, [0, -1]], atol=0.01)
+
+
+def test_tracks_along_the_stress_or_across_it_stay(stressed):
+    x = np.arange(0.0, 60.5, 0.5)
+    lines = np.stack([x, np.full(len(x), 10.0)], axis=1)[None]
+    section = shapely.box(0, 0, 60, 20)
+    zero = np.zeros((len(x), 2))
+    strip = Band(lines[0], zero, slice(0, len(x)), np.zeros(len(x)), np.ones(len(x)))
+    for tensor in (PULL, [[0.0, 0.0], [0.0, -1.0]]):
+        moved = relaxation.relaxed(lines, strip, stressed(section, tensor), section)
+        np.testing.assert_allclose(moved, lines, atol=1e-9)

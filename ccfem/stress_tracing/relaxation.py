@@ -1,0 +1,110 @@
+"""Tracks turned to the stress where no rails guide them: in joints and beside free ends.
+
+A track may move sidewise by u(s). What is least is the sum over its length of ::
+
+    cos(2 r) (u' - tan r)^2 + (c u'')^2 + (u / l)^2
+
+with the angle r from the track to the stress: misalignment, curvature, and the distance from where
+it was, which counts much in members, where tracks share out the width, and little in joints. Where
+r is over 45 degrees, in the joints that it crosses, a track is left alone.
+"""
+
+from typing import Any
+
+import numpy as np
+import shapely
+from scipy.sparse import coo_array
+from scipy.sparse.linalg import spsolve
+
+from ccfem.arrays import FloatArray
+from ccfem.elasticity.stress_field import LayerStress
+from ccfem.stress_tracing.band import STEP, Band
+from ccfem.stress_tracing.stress_lines import plane_stress_at, stress_lines
+
+__all__ = ["relaxed"]
+
+_BENDING = 2.0
+_HELD = 2.0
+_FREE = 12.0
+"""Lengths, mm: c, and l in members and in joints."""
+_ROUNDS = 2
+
+
+def relaxed(lines: FloatArray, band: Band, stress: LayerStress, section: Any) -> FloatArray:
+    """Turn the tracks of a band to the stress.
+
+    Parameters
+    ----------
+    lines : (k, n, 2) array, mm
+        Tracks along the points of the band.
+    band : Band
+    stress : LayerStress
+    section : shapely (Multi)Polygon, mm
+
+    Returns
+    -------
+    (k, n, 2) array, mm
+    """
+    along = np.roll(lines, -1, axis=1) - np.roll(lines, 1, axis=1)
+    if not band.closed:
+        along[:, [0, -1]] = np.diff(lines, axis=1)[:, [0, -1]]
+    along = along / np.linalg.norm(along, axis=2, keepdims=True)
+    normal = np.stack([-along[..., 1], along[..., 0]], axis=2)
+    hold = (1.0 - band.free) / _HELD**2 + band.free / _FREE**2
+    moved = np.zeros(lines.shape[:2])
+    for _ in range(_ROUNDS):
+        weight, slope = _wanted(lines + moved[..., None] * normal, band.closed, stress, section)
+        slope += _differences(moved, band.closed) / STEP
+        moved = np.stack(
+            [_least(w, g, hold, band.closed) for w, g in zip(weight, slope, strict=True)]
+        )
+    return lines + moved[..., None] * normal
+
+
+def _differences(values: FloatArray, closed: bool) -> FloatArray:
+    """From each point of lines (k, n, ...) to the next."""
+    if closed:
+        return np.roll(values, -1, axis=1) - values
+    return np.diff(values, axis=1)
+
+
+def _wanted(
+    lines: FloatArray, closed: bool, stress: LayerStress, section: Any
+) -> tuple[FloatArray, FloatArray]:
+    """Weight and wanted slope (k, n or n - 1) of every step of lines."""
+    steps = _differences(lines, closed)
+    middles = lines[:, : steps.shape[1]] + 0.5 * steps
+    points = middles.reshape(-1, 2)
+    found = stress_lines(plane_stress_at(stress, points, STEP))
+    x, y = found.direction.T
+    heading = np.arctan2(steps[..., 1], steps[..., 0])
+    turn = np.arctan2(y, x).reshape(heading.shape) - heading
+    turn = (turn + 0.5 * np.pi) % np.pi - 0.5 * np.pi
+    counts = found.defined & shapely.contains_xy(section, points)
+    weight = np.where(counts.reshape(turn.shape), np.maximum(np.cos(2.0 * turn), 0.0), 0.0)
+    return weight, np.where(weight > 0.0, np.tan(turn), 0.0)
+
+
+def _least(weight: FloatArray, slope: FloatArray, hold: FloatArray, closed: bool) -> FloatArray:
+    """Move (n,) of one line for which the sum is least."""
+    count = len(hold)
+    first = np.arange(len(weight))
+    bent = np.arange(count) if closed else np.arange(1, count - 1)
+    rise = _rows([(first, -1.0), ((first + 1) % count, 1.0)], count) / STEP
+    bend = _rows([(bent - 1, 1.0), (bent, -2.0), ((bent + 1) % count, 1.0)], count) / STEP**2
+    diagonal = np.arange(count)
+    matrix = (
+        rise.T @ (weight[:, None] * rise)
+        + _BENDING**2 * (bend.T @ bend)
+        + coo_array((hold, (diagonal, diagonal)), shape=(count, count))
+    )
+    return np.asarray(spsolve(matrix.tocsc(), rise.T @ (weight * slope)))
+
+
+def _rows(terms: list[tuple[Any, float]], count: int) -> Any:
+    """Sparse matrix with one row for every entry of the columns of each term."""
+    size = len(terms[0][0])
+    row = np.tile(np.arange(size), len(terms))
+    column = np.concatenate([index % count for index, _ in terms])
+    value = np.repeat([factor for _, factor in terms], size)
+    return coo_array((value, (row, column)), shape=(size, count)).tocsr()

@@ -1,0 +1,154 @@
+"""The bridge of Wang et al. 2021 as one path, and parts without a frame."""
+
+import numpy as np
+import pytest
+import shapely
+
+from ccfem.cases import create_case
+from ccfem.elasticity import Force, Problem, Support, solve
+from ccfem.errors import InputError
+from ccfem.evaluate.matching import matching_rate
+from ccfem.geometry.polylines import resample, turning_angles
+from ccfem.layers import slice_planar
+from ccfem.machine import Machine
+from ccfem.materials import isotropic
+from ccfem.meshing import extrude
+from ccfem.patches import Plane, patches_from_rules
+from ccfem.strategies import create
+
+DISC = shapely.Point(0, 0).buffer(9.0, quad_segs=32) & shapely.box(-8.9, -9, 8.9, 9)
+"""With short flats to hold and pull it at."""
+MACHINE = Machine(fibre_width=0.9, minimum_radius=1.5, minimum_length=5.0)
+
+
+@pytest.fixture(scope="module")
+def bridge():
+    case = create_case("bridge")
+    stress = solve(case.problem)["down"]
+    layer = slice_planar(case.problem.mesh, case.build, count=1)[0]
+    return layer, stress.on(layer), case.machine
+
+
+@pytest.fixture(scope="module")
+def bridge_path(bridge):
+    return create("svt")(*bridge)
+
+
+def pulled(section):
+    """Layer, and stress of a part that is pulled along x."""
+    mesh = extrude(section, 1.0, 2.0, 1)
+    rules = {name: Plane("x", side, 1e-6) for name, side in (("left", "min"), ("right", "max"))}
+    mesh = patches_from_rules(mesh, rules)
+    load = {"pull": (Force("right", (100.0, 0.0, 0.0)),)}
+    problem = Problem(mesh, isotropic(1000.0, 0.3), (Support("left"),), load)
+    layer = slice_planar(mesh, count=1)[0]
+    return layer, solve(problem)["pull"].on(layer)
+
+
+def plane_strands(paths):
+    """Strands between links, as (n, 2) arrays."""
+    found = []
+    for start, end in zip(paths.offsets[:-1], paths.offsets[1:], strict=True):
+        laid = np.concatenate([[False], ~paths.link[start : end - 1], [False]])
+        edges = np.flatnonzero(np.diff(laid.astype(int)))
+        points = paths.points[start:end, :2]
+        found += [points[a : b + 1] for a, b in zip(edges[::2], edges[1::2], strict=True)]
+    return found
+
+
+def test_bridge_is_one_path_with_its_links_outside(bridge, bridge_path):
+    layer, _, _ = bridge
+    assert len(bridge_path) == 1
+    starts = np.flatnonzero(bridge_path.link)
+    plane = bridge_path.points[:, :2]
+    links = shapely.linestrings(np.stack([plane[starts], plane[starts + 1]], axis=1))
+    inner = layer.polygon.buffer(-1e-6)
+    assert shapely.length(shapely.intersection(links, inner)).sum() < 1e-3
+    for strand in plane_strands(bridge_path):
+        assert layer.polygon.buffer(1e-4).covers(shapely.LineString(strand))
+
+
+def test_bridge_has_arch_tie_and_four_diagonals(bridge):
+    """Figure 7 of the paper: the arch with the rafters, the tie, and the diagonals between."""
+    layer, stress, machine = bridge
+    groups = create("svt").groups(layer.polygon, stress, machine)
+    assert len(groups) == 6
+    reach = sorted(np.ptp(np.concatenate(group)[:, 0]) for group in groups)
+    assert all(size > 170.0 for size in reach[4:])
+    assert all(30.0 < size < 70.0 for size in reach[:4])
+
+
+def test_bridge_is_covered_without_sharp_turns(bridge, bridge_path):
+    layer, _, machine = bridge
+    strands = plane_strands(bridge_path)
+    beads = shapely.buffer([shapely.LineString(s) for s in strands], 0.5 * machine.fibre_width)
+    covered = shapely.union_all(beads).intersection(layer.polygon).area / layer.polygon.area
+    assert covered >= 0.96
+    for strand in strands:
+        even, offsets = resample(strand, np.array([0, len(strand)]), 0.5)
+        turn = turning_angles(even, offsets, np.zeros(1, dtype=bool))
+        assert (2.0 * np.sin(0.5 * turn) / 0.5).max() <= 0.26
+
+
+def test_alignment_in_the_joints_raises_the_matching_rate(bridge):
+    """Within 5 and 10 degrees, by 1.5 points of a hundred at least."""
+    rates = [
+        matching_rate(create("svt", {"aligned": aligned})(*bridge), [bridge[1]], links=False)
+        for aligned in (True, False)
+    ]
+    assert (rates[0][:2] > rates[1][:2] + 0.015).all()
+
+
+def test_single_strands_are_those_of_the_path(bridge, bridge_path):
+    single = create("svt", {"links": "none", "minimum_length": 0.0})(*bridge)
+    joined = plane_strands(bridge_path)
+    assert len(single) == len(joined)
+    assert single.lengths.sum() == pytest.approx(
+        sum(shapely.LineString(strand).length for strand in joined), rel=1e-6
+    )
+    assert not single.link.any()
+
+
+@pytest.mark.parametrize("section", [shapely.box(0, 0, 18, 18), DISC], ids=["square", "disc"])
+def test_square_and_disc_are_filled_by_rings(section):
+    layer, stress = pulled(section)
+    paths = create("svt")(layer, stress, MACHINE)
+    fill = paths.lengths.sum() * MACHINE.fibre_width / layer.polygon.area
+    assert 0.85 < fill < 1.02
+    assert not paths.link.any()
+
+
+def test_strip_is_one_path_of_straight_strands():
+    layer, stress = pulled(shapely.box(0, 0, 60, 9))
+    paths = create("svt", {"aligned": False})(layer, stress, MACHINE)
+    assert len(paths) == 1
+    strands = plane_strands(paths)
+    assert len(strands) == 10
+    for strand in strands:
+        assert np.ptp(strand[:, 1]) < 1e-6
+        assert np.ptp(strand[:, 0]) == pytest.approx(60.0, abs=1e-3)
+
+
+def test_every_piece_of_a_section_has_its_path():
+    """A fork is sliced across its prongs, 6 and 9 mm wide and 30 mm deep."""
+    fork = shapely.box(0, 0, 40, 6) | shapely.box(0, 6, 6, 20) | shapely.box(31, 6, 40, 20)
+    mesh = extrude(fork, 30.0, 3.0, 10)
+    mesh = patches_from_rules(
+        mesh, {"foot": Plane("y", "min", 1e-6), "top": Plane("y", "max", 1e-6)}
+    )
+    load = {"pull": (Force("top", (0.0, 0.0, 100.0)),)}
+    stress = solve(Problem(mesh, isotropic(1000.0, 0.3), (Support("foot"),), load))["pull"]
+    layer = slice_planar(mesh, (0.0, 1.0, 0.0), count=4)[3]
+    paths = create("svt")(layer, stress.on(layer), MACHINE)
+    assert len(paths) == 2
+    counts = sorted(len(plane_strands(paths.select(np.arange(2) == k))) for k in range(2))
+    assert counts == [7, 10]
+
+
+@pytest.mark.parametrize(
+    ("name", "value"),
+    [("spacing", 0.5), ("links", "inside"), ("turn", 180.0), ("width_ratio", 0.5)],
+)
+def test_parameters_out_of_range_are_refused(name, value):
+    with pytest.raises(InputError, match=f"svt.{name}"):
+        create("svt", {name: value})
