@@ -52,21 +52,23 @@ def shells(
         The rest of the section, half a pitch inside the innermost rings.
     """
     lines, interior = _shells(corners_only(section), width, pitch, count, closest)
-    return list(lines), interior
+    # A copy for each: layers are planned in threads, and a prepared geometry bears only one.
+    return list(lines), shapely.from_wkb(interior)
 
 
 @lru_cache(maxsize=_SECTIONS)
 def _shells(
     section: Any, width: float, pitch: float, count: int, closest: float
-) -> tuple[tuple[FloatArray, ...], Any]:
+) -> tuple[tuple[FloatArray, ...], bytes]:
+    """Shells of a section, and the interior as WKB."""
     if count == 0:
-        return (), section
+        return (), shapely.to_wkb(section)
     interior = inset(section, 0.5 * width + (count - 0.5) * pitch)
     parts = shapely.get_parts(interior)  # without those of no width but for rounding
     wide = ~shapely.is_empty(shapely.buffer(parts, -1e-3 * pitch, join_style="mitre"))
     interior = interior if wide.all() else shapely.multipolygons(parts[wide])
     lines = concentric(section, pitch, closest, 0.5 * width, count)
-    return tuple(read_only(line) for line in lines), interior
+    return tuple(read_only(line) for line in lines), shapely.to_wkb(interior)
 
 
 def concentric(
