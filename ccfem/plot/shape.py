@@ -75,7 +75,6 @@ def shape_picture(
                 away = np.array(view) / np.linalg.norm(view)
                 plotter.camera_position = [tuple(middle + reach * away), tuple(middle), up]
                 plotter.reset_camera()
-                plotter.camera.zoom(1.2)
             plotter.enable_anti_aliasing("ssaa")
             image = plotter.screenshot(None, return_img=True)
         finally:

@@ -16,7 +16,7 @@ _THIN = 0.02
 """Cells below this share of the mean volume must not shrink."""
 
 
-def relaxed(cut: CutMesh, passes: int = 10) -> TetMesh:
+def relaxed(cut: CutMesh, passes: int = 30) -> TetMesh:
     """Smooth a cut mesh.
 
     Its surface is smoothed by Taubin's passes 0.5 and -0.53 (Curve and surface smoothing without
@@ -27,7 +27,7 @@ def relaxed(cut: CutMesh, passes: int = 10) -> TetMesh:
     Parameters
     ----------
     cut : CutMesh
-    passes : int, default 10
+    passes : int, default 30
 
     Returns
     -------
@@ -36,28 +36,41 @@ def relaxed(cut: CutMesh, passes: int = 10) -> TetMesh:
     """
     mesh = cut.mesh
     n, surface = len(mesh.points), np.unique(mesh.boundary)
-    outer = _mean(mesh.boundary[:, [[0, 1], [1, 2], [2, 0]]].reshape(-1, 2), n)
-    inner = _mean(mesh.cells[:, mesh.edges].reshape(-1, 2), n)
+    outer = _mean(_surface_pairs(cut), n)
+    inner = _mean(_both_ways(mesh.cells[:, mesh.edges]), n)
     free = _free_directions(cut)
-    on_surface = np.zeros(n, dtype=bool)
-    on_surface[surface] = True
+    inside = np.setdiff1d(np.arange(n), surface)
     points = np.array(mesh.points)
     for _ in range(passes):
+        # Both steps before the check: one of them alone, taken again and again, would not end.
+        wanted = points.copy()
         for factor in (0.5, -0.53):
-            step = np.zeros_like(points)
-            step[surface] = factor * (outer @ points - points)[surface]
-            step = np.einsum("kij,kj->ki", free, step)
-            if factor > 0.0:
-                rest = ~on_surface
-                step[rest] = factor * (inner @ points - points)[rest]
-            points = _safely_moved(mesh.cells, points, step)
+            step = (outer @ wanted - wanted)[surface]
+            wanted[surface] += factor * np.einsum("kij,kj->ki", free[surface], step)
+        wanted[inside] = (inner @ wanted)[inside]
+        points = _safely_moved(mesh.cells, points, wanted)
     return TetMesh(points, mesh.cells, mesh.patches)
 
 
+def _both_ways(edges: IntArray) -> IntArray:
+    """Pairs (k, 2) of each edge (..., 2) and of the same turned round."""
+    edges = edges.reshape(-1, 2)
+    return np.concatenate([edges, edges[:, ::-1]])
+
+
+def _surface_pairs(cut: CutMesh) -> IntArray:
+    """Nodes (k, 2) of the surface with the neighbours that they follow.
+
+    Nodes of the cut follow neighbours on the cut only, so that its rim stays sharp.
+    """
+    sides = cut.mesh.boundary[:, [[0, 1], [1, 2], [2, 0]]]
+    own, rest = _both_ways(sides[cut.facet < 0]), _both_ways(sides[cut.facet >= 0])
+    return np.concatenate([own, rest[~np.isin(rest[:, 0], own[:, 0])]])
+
+
 def _mean(pairs: IntArray, n: int) -> sp.csr_array:
-    """Matrix (n, n) that averages over the nodes that share an edge with each."""
-    both = np.concatenate([pairs, pairs[:, ::-1]])
-    links = sp.csr_array((np.ones(len(both)), both.T), shape=(n, n))
+    """Matrix (n, n) that averages over the second nodes of the pairs (k, 2) of each first one."""
+    links = sp.csr_array((np.ones(len(pairs)), pairs.T), shape=(n, n))
     links.data[:] = 1.0
     count = np.maximum(np.diff(links.indptr), 1)
     return sp.csr_array(sp.diags_array(1.0 / count) @ links)
@@ -91,11 +104,11 @@ def _patch_ends(mesh: TetMesh, border: IntArray) -> BoolArray:
     return ends
 
 
-def _safely_moved(cells: IntArray, points: FloatArray, step: FloatArray) -> FloatArray:
-    """Points moved by their steps, save those whose cells would become flat."""
+def _safely_moved(cells: IntArray, points: FloatArray, wanted: FloatArray) -> FloatArray:
+    """Points moved to where they are wanted, save those whose cells would become flat."""
     before = _volumes(points, cells)
     least = _THIN * float(before.mean())
-    moved = points + step
+    moved = wanted.copy()
     while True:
         after = _volumes(moved, cells)
         flat = (after < least) & (after < before * (1.0 - 1e-12))
