@@ -31,8 +31,10 @@ _TURNED = np.array([1.0, 1.0, -1.0, -1.0, 1.0])
 """What a strip is multiplied by where it is walked the other way."""
 _PADDING = 10.0
 """Length, mm, that is cut off at both ends after that."""
-_EXTENSION = 30.0
-"""Length, mm, by which a band is extended at both ends; its tracks are clipped afterwards."""
+_EXTENSION = 5.0
+_LEAST_HALF = 3.0
+"""A band is extended at both ends by so often half its width and so many mm; its tracks are clipped
+afterwards."""
 
 
 @dataclass(frozen=True)
@@ -89,8 +91,10 @@ def band(path: MainPath, frame: Frame, crossing: bool = True) -> Band:
         return _as_band(strip, slice(0, len(strip)), width, closed=True)
     ends = (path.members[0].ends[0], path.members[-1].ends[1])
     reach = [
-        _EXTENSION if crossing or end == FREE else float(np.linalg.norm(frame.joints[end] - place))
-        for end, place in zip(ends, strip[[0, -1], :2], strict=True)
+        _EXTENSION * (_LEAST_HALF + wide)
+        if crossing or end == FREE
+        else float(np.linalg.norm(frame.joints[end] - place))
+        for end, place, wide in zip(ends, strip[[0, -1], :2], 0.5 * width[[0, -1]], strict=True)
     ]
     before = _extension(strip[::-1], reach[0] + _PADDING)[::-1]
     after = _extension(strip, reach[1] + _PADDING)

@@ -13,6 +13,8 @@ from typing import Any
 
 import numpy as np
 import shapely
+from scipy.ndimage import gaussian_filter1d
+from scipy.optimize import isotonic_regression
 from scipy.sparse import coo_array
 from scipy.sparse.linalg import spsolve
 
@@ -27,6 +29,8 @@ _BENDING = 2.0
 _HELD = 2.0
 _FREE = 12.0
 """Lengths, mm: c, and l in members and in joints."""
+_CLOSEST = 0.6
+"""Share of their distance that tracks keep."""
 _ROUNDS = 2
 
 
@@ -58,6 +62,7 @@ def relaxed(lines: FloatArray, band: Band, stress: LayerStress, section: Any) ->
         moved = np.stack(
             [_least(w, g, hold, band.closed) for w, g in zip(weight, slope, strict=True)]
         )
+        moved = _apart(moved, band)
     return lines + moved[..., None] * normal
 
 
@@ -99,6 +104,20 @@ def _least(weight: FloatArray, slope: FloatArray, hold: FloatArray, closed: bool
         + coo_array((hold, (diagonal, diagonal)), shape=(count, count))
     )
     return np.asarray(spsolve(matrix.tocsc(), rise.T @ (weight * slope)))
+
+
+def _apart(moved: FloatArray, band: Band) -> FloatArray:
+    """Find the moves (k, n) nearest to those given that keep tracks apart."""
+    count = len(moved)
+    size = np.linalg.norm(band.half, axis=1)
+    number = np.arange(count)[:, None]
+    even = (2.0 * number + 1.0) / count * size
+    least = _CLOSEST * 2.0 * size / count * number
+    place = even - moved - least  # from the left, to grow from track to track
+    for column in np.flatnonzero((np.diff(place, axis=0) < 0.0).any(axis=0)):
+        place[:, column] = isotonic_regression(place[:, column]).x
+    mode = "wrap" if band.closed else "nearest"
+    return np.asarray(gaussian_filter1d(even - place - least, 1.0 / STEP, axis=1, mode=mode))
 
 
 def _rows(terms: list[tuple[Any, float]], count: int) -> Any:

@@ -150,3 +150,28 @@ def test_tracks_along_the_stress_or_across_it_stay(stressed):
     for tensor in (PULL, [[0.0, 0.0], [0.0, -1.0]]):
         moved = relaxation.relaxed(lines, strip, stressed(section, tensor), section)
         np.testing.assert_allclose(moved, lines, atol=1e-9)
+
+
+def test_tracks_that_turn_keep_apart(stressed):
+    """Stress that leans to the middle of a strip from both sides would draw all tracks there."""
+    section = shapely.box(0, 0, 60, 20)
+
+    def tensor(points):
+        lean = np.arctan(np.where(points[:, 0] < 30.0, -0.05, 0.05) * (points[:, 1] - 10.0))
+        along = np.stack([np.cos(lean), np.sin(lean)], axis=1)
+        return along[:, :, None] * along[:, None, :]
+
+    x = np.arange(0.0, 60.5, 0.5)
+    middle = np.stack([x, np.full(len(x), 10.0)], axis=1)
+    half = np.broadcast_to([0.0, 8.0], middle.shape)
+    strip = Band(middle, half, slice(0, len(x)), np.zeros(len(x)), np.ones(len(x)))
+    lines = middle + np.array([0.75, 0.25, -0.25, -0.75])[:, None, None] * half
+    apart = -np.diff(relaxation.relaxed(lines, strip, stressed(section, tensor), section), axis=0)
+    assert apart[..., 1].min() < 3.0
+    assert apart[..., 1].min() >= 0.6 * 4.0 - 1e-9
+
+
+def test_wide_strip_is_filled_to_its_ends():
+    """Its axis ends 25 mm before them."""
+    for line in laid(shapely.box(0, 0, 185, 50), 5.0, 1.0):
+        np.testing.assert_allclose(np.sort(line[[0, -1], 0]), [0.0, 185.0], atol=1e-9)
