@@ -105,9 +105,9 @@ assert svt["link_inside"] < 0.01 * svt["fibre_length"]
 # %% [markdown]
 # ## How well fibre and stress match
 #
-# The paper compares with patterns on the full plate, where `svt` leads by far. On the optimised
-# part plain rings match as well or better: the members are slim, rings follow them too, and where
-# strands of `svt` cross in a joint one family does not match.
+# Beside patterns on the full plate `svt` leads by far. On the optimised part plain rings match as
+# well or better: the members are slim, rings follow them too, and where strands of `svt` cross in
+# a joint one family does not match.
 
 # %%
 at = [int(np.flatnonzero(angle == THRESHOLDS)[0]) for angle in (10.0, 20.0, 30.0)]
@@ -115,13 +115,14 @@ for (where, name), rate in rates.items():
     print(f"{where:9s} {name:10s} within 10, 20, 30 degrees:", np.round(rate[at], 1), "%")
 others = np.max([rate for (where, _), rate in rates.items() if where == "full"], axis=0)
 assert (rates["optimised", "svt"][at] > others[at] + 15.0).all()
-assert (rates["optimised", "concentric"][at] > rates["optimised", "svt"][at]).all()
+lead = rates["optimised", "svt"][at] - rates["optimised", "concentric"][at]
+assert np.abs(lead).max() < 5.0
 
 # %% [markdown]
 # ## What that is worth
 #
 # The part is solved again with its fibre: all patterns with the same volume of it in the part,
-# bonded in tension and compression. There `svt` wins, though rings match better: its strands go
+# bonded in tension and compression. There `svt` wins, though rings match as well: its strands go
 # through the joints, rings turn round in them.
 
 # %%

@@ -12,7 +12,12 @@ from benchmarks.papers.wang_2021.claims import claim_table, quantities, verdicts
 from benchmarks.papers.wang_2021.figures import draw_all
 from benchmarks.papers.wang_2021.study import run_study
 from benchmarks.papers.wang_2021.tables import plate_table, result_table, speed_table
-from benchmarks.papers.wang_2021.variants import try_radii, variant_quantities, variant_table
+from benchmarks.papers.wang_2021.variants import (
+    try_hole,
+    try_radii,
+    variant_quantities,
+    variant_table,
+)
 from ccfem.evaluate.matching import READINGS, THRESHOLDS
 
 
@@ -21,7 +26,7 @@ def main(folder: Path) -> None:
     begun = perf_counter()
     study = run_study()
     tried = try_radii(study)
-    found = quantities(study) | variant_quantities(tried)
+    found = quantities(study) | variant_quantities(tried, try_hole())
     checks = verdicts(found)
     computed = perf_counter() - begun
     drawn = draw_all(study, folder)
