@@ -219,8 +219,10 @@ class _Graph:
             return None
         edges = np.asarray(diagram.ridge_vertices, dtype=np.int64)
         sites = np.asarray(diagram.ridge_points, dtype=np.int64)
-        shapely.prepare(section)
-        inner = shapely.contains_xy(section, diagram.vertices)
+        # A copy: a prepared geometry must not be seen by another thread, and a section may be.
+        prepared = shapely.force_2d(section)
+        shapely.prepare(prepared)
+        inner = shapely.contains_xy(prepared, diagram.vertices)
         nearest = np.zeros(len(inner) + 1, dtype=np.int64)  # the last one is at infinity
         nearest[edges] = sites[:, :1]
         inner &= _equidistant(diagram.vertices, nearest[:-1], border.points, inner)

@@ -123,3 +123,10 @@ def test_parts_are_told_apart_and_flat_ones_left_out():
 def test_step_must_be_positive():
     with pytest.raises(InputError, match="step"):
         medial_axis(PLATE, 0.0)
+
+
+def test_section_is_not_prepared():
+    """Sections are shared by threads, and GEOS crashes where two use one that is prepared."""
+    section = shapely.from_wkb(shapely.to_wkb(PLATE))
+    medial_axis(section, 1.0)
+    assert not shapely.is_prepared(section)
