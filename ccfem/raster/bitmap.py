@@ -36,6 +36,7 @@ class Bitmap:
     origin : (2,) array, mm
         Lower left corner of the bitmap.
     section : shapely (Multi)Polygon, mm
+        Is prepared: no other thread must use it.
     """
 
     mask: BoolArray
@@ -114,6 +115,7 @@ def bitmap(section: Any, pixel: float) -> Bitmap:
     """
     if not 0.0 < pixel < np.inf:
         raise InputError(f"the pixel of a bitmap must be above 0 mm; got {pixel}")
+    section = shapely.force_2d(section)  # a copy of its own, to be prepared
     if shapely.is_empty(section):
         return Bitmap(np.zeros((2, 2), dtype=bool), pixel, np.zeros(2), section)
     low, high = np.array(shapely.bounds(section)).reshape(2, 2)

@@ -82,3 +82,10 @@ def test_empty_and_bad_input():
         bitmap(shapely.box(0, 0, 1, 1), 0.0)
     with pytest.raises(InputError, match="too large"):
         bitmap(shapely.box(0, 0, 1e4, 1e4), 1e-2)
+
+
+def test_section_given_is_not_prepared():
+    """Threads may share it, and GEOS crashes where two use one that is prepared."""
+    section = shapely.box(0, 0, 20, 12)
+    assert bitmap(section, 1.0).linked.any()
+    assert not shapely.is_prepared(section)
