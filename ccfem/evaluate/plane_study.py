@@ -21,7 +21,7 @@ from ccfem.evaluate.plane_paths import PlanePaths
 from ccfem.evaluate.sensitivity import ANGLES, Sensitivity, plane_compliance
 from ccfem.evaluate.sinuosity import LONG
 from ccfem.evaluate.stiffness_alignment import Reading, agreement, performance_index, strongest
-from ccfem.geometry.order import nearest_end_order
+from ccfem.geometry.print_order import nearest_end_order
 from ccfem.materials import Material
 from ccfem.tensor import largest_in_plane
 

@@ -10,8 +10,8 @@ from ccfem.arrays import FloatArray, read_only
 from ccfem.errors import InputError
 from ccfem.geometry.hatch import zigzag
 from ccfem.geometry.offsets import offset_rings
-from ccfem.geometry.order import nearest_end_order
 from ccfem.geometry.polylines import merge_repeated, pack
+from ccfem.geometry.print_order import nearest_end_order
 from ccfem.layers import Layer, slice_planar
 from ccfem.machine import Machine
 from ccfem.mesh import TetMesh

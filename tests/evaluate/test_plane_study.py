@@ -18,8 +18,8 @@ from ccfem.evaluate.plane_study import (
     turned_energies,
 )
 from ccfem.evaluate.sensitivity import ANGLES, OffAxis
-from ccfem.geometry.order import nearest_end_order
 from ccfem.geometry.polylines import pack
+from ccfem.geometry.print_order import nearest_end_order
 from ccfem.materials import isotropic, named_material, plane_stress
 
 TABLE_5 = {

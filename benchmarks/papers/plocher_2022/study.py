@@ -34,8 +34,8 @@ from ccfem.evaluate.sinuosity import path_sinuosity, sample_sinuosity, sinuosity
 from ccfem.evaluate.stiffness_alignment import READINGS
 from ccfem.export.gcode import gcode
 from ccfem.export.print_plan import PrintPlan
-from ccfem.geometry.order import nearest_end_order
 from ccfem.geometry.polylines import lengths, pack
+from ccfem.geometry.print_order import nearest_end_order
 from ccfem.layers.layer import Layer
 from ccfem.machine import Machine
 from ccfem.materials import named_material
