@@ -274,7 +274,8 @@ def _cut(toolpaths: Toolpaths, along: Sequence[Profile], chosen: dict[int, BoolA
     parts, source, closed = [], [], []
     for k in range(len(toolpaths)):
         own = slice(toolpaths.offsets[k], toolpaths.offsets[k + 1])
-        line = np.hstack([toolpaths.points[own], toolpaths.normals[own]])
+        link = toolpaths.link[own, None]
+        line = np.hstack([toolpaths.points[own], toolpaths.normals[own], link])
         whole = k not in chosen or bool(chosen[k].all())
         found = [line] if whole else _stretches(line, profile[k], chosen[k], toolpaths.closed[k])
         parts += found
@@ -283,7 +284,7 @@ def _cut(toolpaths: Toolpaths, along: Sequence[Profile], chosen: dict[int, BoolA
     if not parts:
         return Toolpaths.empty()
     columns = np.concatenate(parts)
-    normals = columns[:, 3:] / np.linalg.norm(columns[:, 3:], axis=1)[:, None]
+    normals = columns[:, 3:6] / np.linalg.norm(columns[:, 3:6], axis=1)[:, None]
     return Toolpaths(
         points=columns[:, :3],
         normals=normals,
@@ -291,13 +292,14 @@ def _cut(toolpaths: Toolpaths, along: Sequence[Profile], chosen: dict[int, BoolA
         layer=toolpaths.layer[source],
         kind=toolpaths.kind[source],
         closed=np.array(closed),
+        link=columns[:, 6] > 0.0,
     )
 
 
 def _stretches(
     line: FloatArray, profile: Profile, keep: BoolArray, closed: bool
 ) -> list[FloatArray]:
-    """Kept stretches of a line (n, 6); those on both sides of the seam of a ring are one."""
+    """Kept stretches of a line (n, 7); those on both sides of the seam of a ring are one."""
     turns = np.flatnonzero(np.diff(np.concatenate([[False], keep, [False]]).astype(np.int8)))
     runs = [(int(a), int(b)) for a, b in zip(turns[::2], turns[1::2], strict=True)]
     if closed and len(runs) > 1 and keep[0] and keep[-1]:
@@ -307,12 +309,17 @@ def _stretches(
 
 
 def _between(line: FloatArray, start: float, end: float) -> FloatArray:
-    """Part of a line (n, 6) between two arc lengths, which may go on past the end of a ring."""
+    """Part of a line (n, 7) between two arc lengths, which may go on past the end of a ring.
+
+    Columns are the point, its normal, and whether the step to the next point is a link.
+    """
     size = np.linalg.norm(np.diff(line[:, :3], axis=0), axis=1)
     along = np.concatenate([[0.0], np.cumsum(size)])
     if end > along[-1] * (1.0 + 1e-12):  # on past the seam, at most once round
-        line = np.concatenate([line, line[1:], line[1:]])
+        line = np.concatenate([line[:-1], line[:-1], line])
         along = np.concatenate([along, along[-1] + along[1:], 2.0 * along[-1] + along[1:]])
     inside = along[(along > start + 1e-9) & (along < end - 1e-9)]
     wanted = np.concatenate([[start], inside, [end]])
-    return np.column_stack([np.interp(wanted, along, column) for column in line.T])
+    step = np.searchsorted(along, 0.5 * (wanted[1:] + wanted[:-1]), side="right") - 1
+    link = np.append(line[step, 6], 0.0)
+    return np.column_stack([*(np.interp(wanted, along, x) for x in line[:, :6].T), link])

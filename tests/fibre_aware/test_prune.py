@@ -128,6 +128,27 @@ def test_ring_is_opened_where_it_is_worth_least(pulled_bar):
     assert left.points[:, 0].min() > ring[:, 0].min() + 0.5
 
 
+def test_links_outside_the_part_stay_links(pulled_bar):
+    """Else the virtual test of what is left would take them for fibre outside the part."""
+    stress, layers = pulled_bar
+    line = np.array([[0, 5], [60, 5], [64, 5], [64, 15], [60, 15], [0, 15]], dtype=float)
+    ring = np.array([[60, 8], [64, 8], [64, 12], [60, 12], [5, 12], [5, 8], [60, 8]], dtype=float)
+    link = [np.array([0, 1, 1, 1, 0, 0], bool), np.array([1, 1, 1, 0, 0, 0, 0], bool)]
+    across = [np.array([[x, 2.0], [x, 18.0]]) for x in (10.0, 50.0)]
+    link += [np.zeros(2, bool)] * 2
+    paths = Toolpaths.concatenate(
+        Toolpaths.from_plane([line, ring, *across], layer, link=link) for layer in layers
+    )
+    left = prune(paths, stress, paths.lengths.sum() - len(layers) * 40.0, SHORT)
+    assert not left.closed.any()  # rings are opened at their links, which carry nothing
+    step = np.flatnonzero(np.linalg.norm(np.diff(left.points, axis=0), axis=1) > 0.0)
+    step = step[~np.isin(step, left.offsets[1:] - 1)]
+    middle = 0.5 * (left.points[step] + left.points[step + 1])
+    np.testing.assert_array_equal(left.link[step], middle[:, 0] > 60.0)
+    assert left.link.any()
+    virtual_test(left, stress, span=())
+
+
 def test_cuts_that_save_little_are_not_made(pulled_bar):
     stress, layers = pulled_bar
     line = np.array([[0.0, 10.0], [60.0, 10.0]])
