@@ -271,7 +271,8 @@ def least_price(
 def _cut(toolpaths: Toolpaths, along: Sequence[Profile], chosen: dict[int, BoolArray]) -> Toolpaths:
     """Toolpaths with each profiled path cut to its stretches."""
     profile = {one.path: one for one in along}
-    parts, source, closed = [], [], []
+    parts: list[FloatArray] = []
+    source, closed = [], []
     for k in range(len(toolpaths)):
         own = slice(toolpaths.offsets[k], toolpaths.offsets[k + 1])
         link = toolpaths.link[own, None]
