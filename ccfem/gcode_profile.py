@@ -1,5 +1,6 @@
 """What a printer's firmware wants to be told: commands as lines to fill in, and its small moves."""
 
+import math
 import re
 from collections.abc import Mapping
 from dataclasses import dataclass
@@ -86,12 +87,24 @@ class GcodeProfile:
                 self._check(name, line)
         for name in ("lift", "retract"):
             if not 0.0 <= getattr(self, name) < float("inf"):
-                raise InputError(f"{name} must be a finite number >= 0; got {getattr(self, name)}")
+                raise InputError(
+                    f"{name} must be a finite number >= 0; got {getattr(self, name)}: correct it"
+                )
         for name in ("lift_speed", "retract_speed", "feed_speed", "longest_feed"):
             if not 0.0 < getattr(self, name) < float("inf"):
-                raise InputError(f"{name} must be a finite number > 0; got {getattr(self, name)}")
+                raise InputError(
+                    f"{name} must be a finite number > 0; got {getattr(self, name)}: correct it"
+                )
+        for name in ("matrix_angle", "matrix_turn"):
+            if not math.isfinite(getattr(self, name)):
+                raise InputError(
+                    f"{name} must be a finite number of degrees; got {getattr(self, name)}: "
+                    "correct it"
+                )
         if not all(0.0 < size < float("inf") for size in self.bed):
-            raise InputError(f"bed must be three sizes in mm above 0; got {list(self.bed)}")
+            raise InputError(
+                f"bed must be three sizes in mm above 0; got {list(self.bed)}: correct it"
+            )
 
     @staticmethod
     def _check(name: str, line: str) -> None:

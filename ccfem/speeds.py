@@ -66,7 +66,7 @@ class SpeedTable:
                 good &= name != "angle" or rising[-1] <= 180.0
             if not good:
                 raise InputError(
-                    f"the speed table needs {size} {order} as {name}; got {list(given)}: order them"
+                    f"the speed table needs {size} {order} as {name}; got {list(given)}: correct it"
                 )
 
     def at(self, curvature: ArrayLike, length: ArrayLike, angle: ArrayLike) -> FloatArray:

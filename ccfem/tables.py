@@ -68,7 +68,8 @@ def from_table(make: Callable[..., T], table: object, where: str, infinite: bool
 
 def _converted(value: object, hint: Any, where: str, infinite: bool) -> Any:
     """Value as the annotation wants it, or an error that says what it wants."""
-    for option in (hint, *get_args(hint)):
+    union = get_origin(hint) in (Union, types.UnionType)
+    for option in get_args(hint) if union else (hint,):
         if isinstance(value, Mapping) and _is_dataclass(option):
             return from_table(option, value, where, infinite)
     found = _fitted(value, hint, infinite)

@@ -8,6 +8,7 @@ import pytest
 from ccfem.errors import InputError
 from ccfem.evaluate.manufacture import manufacture_indices, sample_manufacture
 from ccfem.evaluate.plane_paths import plane_paths
+from ccfem.gcode_profile import GcodeProfile
 from ccfem.geometry.polylines import pack
 from ccfem.layers import slice_planar
 from ccfem.machine import Machine
@@ -168,7 +169,7 @@ def test_the_table_is_for_fibre_and_the_print_time_goes_by_it():
 @pytest.mark.parametrize(
     ("given", "message"),
     [
-        ({"speed": (7.0, 35.0, 15.0)}, "3 rising numbers above 0 as speed; got .*: order them"),
+        ({"speed": (7.0, 35.0, 15.0)}, "3 rising numbers above 0 as speed; got .*: correct it"),
         ({"speed": (0.0, 15.0, 35.0)}, "3 rising numbers above 0 as speed"),
         ({"curvature": (0.05, 0.2)}, "2 falling numbers >= 0 as curvature"),
         ({"length": (15.0, np.nan)}, "2 rising numbers >= 0 as length"),
@@ -231,8 +232,25 @@ def test_the_cutter_allows_the_shortest_strand():
         ({"speeds": {"speed": [3, 2, 1]}}, r"machine\.speeds: the speed table needs 3 rising"),
         ({"cut_wait": -1.0}, r"machine\.cut_wait must be a finite number >= 0"),
         ({"matrix_diameter": 0}, r"machine\.matrix_diameter must be above 0"),
+        (
+            {"gcode": {"lift": -1}},
+            r"machine\.gcode: lift must be a finite number >= 0; got -1",
+        ),
+        ({"gcode": {"bed": [9, 0, 9]}}, r"machine\.gcode: bed must be three sizes in mm above 0"),
     ],
 )
 def test_machines_that_make_no_sense(table, message):
     with pytest.raises(InputError, match=message):
         from_table(Machine, table, "machine")
+
+
+def test_a_direction_of_the_matrix_is_a_number():
+    with pytest.raises(InputError, match="matrix_angle must be a finite number of degrees"):
+        GcodeProfile(matrix_angle=np.nan)
+
+
+def test_tables_of_tables_are_left_to_their_reader():
+    def make(given: dict[str, SpeedTable]) -> dict[str, SpeedTable]:
+        return given
+
+    assert from_table(make, {"given": {"one": {}}}, "it") == {"one": {}}
