@@ -36,6 +36,9 @@ class Toolpaths:
     link : (P,) bool array, optional
         Whether the step from each point to the next one of its path is a link: fibre that is there
         to join two strands, not to carry load. False at the last point of a path. Default: none is.
+        A strategy marks what may leave the section or cross a void, as `svt` does, for that is
+        measured apart; short links within the section that follow the border or the field, as those
+        of `isocurve` and `zigzag`, are fibre like any other and not marked.
     """
 
     points: FloatArray
