@@ -245,16 +245,22 @@ def _about_links(total: Mapping[str, float]) -> list[str]:
 
 
 def bound_remark(comparison: Comparison) -> str:
-    """Say how far the best run is from what any paths could reach; empty without a bound."""
+    """Say how far the best run is from what any paths could reach; empty without a bound.
+
+    The bound is for strands beside each other: strands that overlap may exceed it.
+    """
     tested = [run for run in ranking(comparison) if run.tested is not None]
     if comparison.bound is None or not tested:
         return ""
     length = max(run.length_per_layer for run in tested)
-    return (
-        f"no paths of {length:.0f} mm a layer in {len(comparison.layers)} layers can make the part "
-        f"more than {comparison.bound.ratio:.2f} times as stiff (fibres carrying tension only): "
-        f"{tested[0].name} reaches {comparison.bound.share(_ratio(tested[0])):.0%} of that gain"
+    name, share = tested[0].name, comparison.bound.share(_ratio(tested[0]))
+    most = (
+        f"paths of {length:.0f} mm a layer in {len(comparison.layers)} layers can make the part "
+        f"more than {comparison.bound.ratio:.2f} times as stiff (fibres carrying tension only)"
     )
+    if share > 1.0:
+        return f"only where strands overlap, as those of {name} do, {most}"
+    return f"no {most}: {name} reaches {share:.0%} of that gain"
 
 
 def stiffness_ratios(one: Run, other: Run) -> tuple[float, float]:

@@ -11,9 +11,11 @@ from ccfem.compare import compare, create_all
 from ccfem.elasticity.problem import Force, Problem, Support
 from ccfem.equal_fibre import length_per_layer
 from ccfem.errors import InputError
+from ccfem.evaluate import evaluate
 from ccfem.headline import best_values, headline_values, ranking, remarks, verdict
 from ccfem.machine import Machine
 from ccfem.materials import isotropic
+from ccfem.plot.pictures import caption
 from ccfem.strategies import create, plan
 from ccfem.structured import box_mesh
 from ccfem.toolpaths import Toolpaths
@@ -212,3 +214,22 @@ def test_no_run_exceeds_the_bound(compared):
     area = SIZE[1] * SIZE[2]
     assert compared.bound.ratio == pytest.approx(1.0 + 4.0 * length / SIZE[0] / area, rel=2e-2)
     assert f"more than {compared.bound.ratio:.2f} times" in remarks(compared)[-1]
+
+
+def test_strands_that_overlap_may_exceed_the_bound(compared):
+    best = ranking(compared)[0]
+    ratio = 0.5 * (1.0 + best.tested.bracket.tension.ratio)
+    beaten = replace(compared, bound=replace(compared.bound, ratio=ratio))
+    said = remarks(beaten)[-1]
+    assert said.startswith(f"only where strands overlap, as those of {best.name} do, paths of ")
+    assert f"more than {ratio:.2f} times as stiff" in said
+
+
+def test_captions_of_pictures_count_paths(compared):
+    layer, machine = compared.layers[0], compared.case.machine
+    line = np.array([[0.0, 10.0], [60.0, 10.0]])
+    for count, said in ((0, "no fibre"), (1, "60 mm in 1 path,"), (2, "120 mm in 2 paths,")):
+        lines = [line + np.array([0.0, 3.0 * k]) for k in range(count)]
+        paths = Toolpaths.from_plane(lines, layer)
+        found = evaluate(paths, compared.layers, compared.stress, machine)
+        assert caption(replace(compared.runs[0], evaluation=found), layer).startswith(said)

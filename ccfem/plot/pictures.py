@@ -99,10 +99,12 @@ def caption(run: Run, layer: Layer) -> str:
     if run.evaluation is None:
         return ""
     values = run.evaluation.of_layer(layer.index)
-    return (
-        f"{values['fibre_length']:.0f} mm in {values['paths']:.0f} paths, "
-        f"efficiency {values['efficiency']:.2f}"
-    )
+    count = int(values["paths"])
+    if not count:
+        return "no fibre"
+    laid = f"{values['fibre_length']:.0f} mm in {count} path{'s' if count > 1 else ''}"
+    efficiency = values["efficiency"]
+    return laid if np.isnan(efficiency) else f"{laid}, efficiency {efficiency:.2f}"
 
 
 def _curves(comparison: Comparison) -> tuple[dict[str, FloatArray], dict[str, FloatArray]]:
