@@ -171,17 +171,19 @@ def _speeds(
     inner = np.ones(len(points), dtype=bool)
     inner[offsets[1:] - 1] = False
     start = np.flatnonzero(inner)
+    speeds = np.full(len(points), table.speed[0])
+    if not len(start):
+        return speeds
     curvature = _step_curvatures(points, offsets, corner, shortest)
     row = table.row_of(curvature)
     new = corner[start]
-    new[:1] = True
+    new[0] = True
     new[1:] |= (row[1:] != row[:-1]) | (np.diff(start) > 1)
     piece = np.cumsum(new) - 1
     first = np.flatnonzero(new)
     last = np.append(first[1:], len(start)) - 1
     length = np.bincount(piece, np.linalg.norm(points[start + 1] - points[start], axis=1))
     least = np.minimum(angle[start[first]], angle[start[last] + 1])
-    speeds = np.full(len(points), table.speed[0])
     speeds[start] = table.at(curvature[first], length, least)[piece]
     return speeds
 

@@ -145,6 +145,8 @@ def test_repeated_points_and_paths_without_length_change_nothing():
     np.testing.assert_array_equal(found[moves], [15, 7, 7])
     np.testing.assert_array_equal(other, [15, 7, 7])
     assert (first > 0.0).all()
+    (alone,) = speeds_of(point)
+    assert (alone > 0.0).all()
     assert table_speeds(np.zeros((0, 2)), np.zeros(1, dtype=np.int64), TABLE, WIDTH).shape == (0,)
 
 

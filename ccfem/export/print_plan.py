@@ -145,18 +145,20 @@ def plan_print(
 
 def _check_fibre(fibre: Toolpaths, layers: Sequence[Layer], machine: Machine) -> None:
     """Every path lies on a layer given and is long enough for the cutter."""
+    if not layers:
+        raise InputError("a print needs at least one layer; got none: give those of the plan")
     missing = set(fibre.layer.tolist()) - {layer.index for layer in layers}
-    if missing or not layers:
+    if missing:
         raise InputError(
-            f"fibre lies on layer {min(missing, default=0)}, which is not among the layers given: "
+            f"fibre lies on layer {min(missing)}, which is not among the layers given: "
             "give those that it was planned on"
         )
     short = fibre.lengths < machine.tail * (1.0 - _SHORT)
     if short.any():
         raise InputError(
-            f"{int(short.sum())} fibre paths are shorter than the {machine.tail:g} mm "
-            f"from the cutter to the nozzle, the shortest {fibre.lengths.min():.4g} mm: plan with "
-            "machine.minimum_length of at least that"
+            f"fibre paths must be no shorter than the {machine.tail:g} mm from the cutter to the "
+            f"nozzle; {int(short.sum())} of {len(fibre)} are, the shortest "
+            f"{fibre.lengths.min():.4g} mm: plan with machine.minimum_length of at least that"
         )
 
 
