@@ -2,7 +2,7 @@
 
 Every strand is extended straight beyond its ends; the link is a Dubins curve from one extended end
 to the other. Of several extensions and all words the cheapest counts: length, and extra for what
-runs inside the part.
+runs inside the part or over its voids.
 """
 
 from typing import NamedTuple
@@ -12,7 +12,7 @@ from numba import njit
 
 from ccfem.arrays import FloatArray, IntArray
 from ccfem.geometry.dubins import WORDS, advance, curve_points, word_sizes
-from ccfem.geometry.section_grid import SectionGrid, contains, side_and_room
+from ccfem.geometry.section_grid import SectionGrid, place, place_and_room
 
 __all__ = ["LinkCurves", "curve_cost", "link_curve", "link_curves", "stub_points"]
 
@@ -46,7 +46,7 @@ def link_curves(
     reach: FloatArray,
     radius: float,
     grid: SectionGrid,
-    weight: float,
+    weights: FloatArray,
     bound: FloatArray,
 ) -> LinkCurves:
     """Cheapest curves between all ends.
@@ -59,12 +59,12 @@ def link_curves(
         Extensions to choose from; the first is the usual one.
     radius : float, mm
     grid : SectionGrid
-    weight : float
-        Extra cost of each mm inside the part.
+    weights : (3,) array
+        Extra cost of each mm inside the part, over its voids, and outside.
     bound : (t, t) array, mm
         What the link costs otherwise: dearer curves are not looked for.
     """
-    return LinkCurves(*_link_curves(ends, reach, radius, grid, weight, bound))
+    return LinkCurves(*_link_curves(ends, reach, radius, grid, weights, bound))
 
 
 def link_curve(
@@ -107,8 +107,8 @@ def _reversed(pose):  # type: ignore[no-untyped-def]
 
 
 @njit(cache=True, nogil=True)
-def curve_cost(start, turns, sizes, radius, grid, weight, limit):  # type: ignore[no-untyped-def]
-    """Length of a curve and `weight` times what of it lies in the section; inf above the limit."""
+def curve_cost(start, turns, sizes, radius, grid, weights, limit):  # type: ignore[no-untyped-def]
+    """Length of a curve and `weights` times what of it lies in each place; inf above the limit."""
     cost = np.abs(sizes).sum()
     x, y, heading = start
     for piece in range(3):
@@ -119,22 +119,20 @@ def curve_cost(start, turns, sizes, radius, grid, weight, limit):  # type: ignor
             if cost >= limit:
                 return np.inf
             px, py, _ = advance(x, y, heading, turn, sense * done, radius)
-            room = side_and_room(grid, px, py)
-            move = min(max(abs(room), _SAMPLE), total - done)
-            inside = room > 0.0
-            if abs(room) < move:
+            where, room = place_and_room(grid, px, py)
+            move = min(max(room, _SAMPLE), total - done)
+            if room < move:
                 middle = sense * (done + 0.5 * move)
                 px, py, _ = advance(x, y, heading, turn, middle, radius)
-                inside = contains(grid, px, py)
-            if inside:
-                cost += weight * move
+                where = place(grid, px, py)
+            cost += weights[where] * move
             done += move
         x, y, heading = advance(x, y, heading, turn, size, radius)
     return cost if cost < limit else np.inf
 
 
 @njit(cache=True, nogil=True)
-def _link_curves(ends, reach, radius, grid, weight, bound):  # type: ignore[no-untyped-def]
+def _link_curves(ends, reach, radius, grid, weights, bound):  # type: ignore[no-untyped-def]
     count, variants = reach.shape
     cost = np.full((count, count), np.inf)
     chosen = np.zeros((count, count))
@@ -145,7 +143,7 @@ def _link_curves(ends, reach, radius, grid, weight, bound):  # type: ignore[no-u
         for v in range(variants):
             straight[1] = reach[a, v]
             stub[a, v] = curve_cost(
-                ends[a], np.zeros(3, np.int64), straight, radius, grid, weight, np.inf
+                ends[a], np.zeros(3, np.int64), straight, radius, grid, weights, np.inf
             )
     for a in range(count):
         for b in range(a + 1, count):
@@ -165,7 +163,7 @@ def _link_curves(ends, reach, radius, grid, weight, bound):  # type: ignore[no-u
                     if stubs + np.abs(sizes[k]).sum() >= best:
                         continue
                     found = stubs + curve_cost(
-                        start, WORDS[k], sizes[k], radius, grid, weight, best - stubs
+                        start, WORDS[k], sizes[k], radius, grid, weights, best - stubs
                     )
                     if found < best - 1e-9:
                         best = found

@@ -67,6 +67,7 @@ def link_tracks(
     radius: float,
     width: float,
     inside_weight: float = 8.0,
+    void_weight: float = 4.0,
     step: float = 0.5,
     time_limit: float = 30.0,
 ) -> LinkedPath:
@@ -94,6 +95,8 @@ def link_tracks(
         Distance of neighbouring tracks.
     inside_weight : float, default 8
         Extra cost of each mm of a link inside the section.
+    void_weight : float, default 4
+        Extra cost of each mm of a link over a hole of the section, where nothing holds the fibre.
     step : float, mm, default 0.5
         Longest distance between neighbouring points of a link.
     time_limit : float, s, default 30
@@ -124,7 +127,8 @@ def link_tracks(
     opened = _opened(wanted, radius, width)
     closed = [_is_closed(track) for group in wanted for track in group]
     tracks = [track for group in opened for track in group]
-    network = _Network.between(tracks, np.array(closed), section, radius, inside_weight)
+    weights = np.array([inside_weight, void_weight, 0.0])
+    network = _Network.between(tracks, np.array(closed), section, radius, weights)
     sizes = np.array([len(group) for group in opened])
     visits = _order(network.cost, np.concatenate([[0], np.cumsum(sizes)]), time_limit)
     return _assembled(tracks, visits, network, step)
@@ -208,17 +212,17 @@ class _Network:
         closed: BoolArray,
         section: Any,
         radius: float,
-        weight: float,
+        weights: FloatArray,
     ) -> "_Network":
         ends = _end_poses(tracks)
         grid = section_grid(section, 30.0)
         reach = np.repeat(np.where(closed, 0.0, 1.0), 2)[:, None] * np.array(_REACH)
         starts = ends.copy()
         starts[:, :2] += reach[:, :1] * np.stack([np.cos(ends[:, 2]), np.sin(ends[:, 2])], axis=1)
-        routes = ring_routes(starts, section, radius, grid, weight)
+        routes = ring_routes(starts, section, radius, grid, weights)
         around, way = ring_cost(routes)
         around = around + reach[:, 0] + reach[:, :1]
-        curves = link_curves(ends, reach, radius, grid, weight, around)
+        curves = link_curves(ends, reach, radius, grid, weights, around)
         cost = np.minimum(curves.cost, np.minimum(around, around.T))
         return cls(ends, reach[:, 0], cost, curves, routes, ~np.isfinite(curves.cost), way)
 

@@ -60,7 +60,7 @@ class RingRoutes:
 
 
 def ring_routes(
-    starts: FloatArray, section: Any, radius: float, grid: SectionGrid, weight: float
+    starts: FloatArray, section: Any, radius: float, grid: SectionGrid, weights: FloatArray
 ) -> RingRoutes:
     """Ring round a part, and the cheapest leads to it.
 
@@ -71,8 +71,8 @@ def ring_routes(
     section : shapely (Multi)Polygon, mm
     radius : float, mm
     grid : SectionGrid
-    weight : float
-        Extra cost of each mm inside the part.
+    weights : (3,) array
+        Extra cost of each mm inside the part, over its voids, and outside.
     """
     ring = _ring(section, max(_DISTANCE, radius))
     line = shapely.LineString(ring)
@@ -90,7 +90,7 @@ def ring_routes(
     goal = np.concatenate(
         [here.reshape(*position.shape, 2), np.arctan2(way[..., 1:], way[..., :1])], axis=-1
     )
-    cost, word = _leads(starts, goal, radius, grid, weight)
+    cost, word = _leads(starts, goal, radius, grid, weights)
     return RingRoutes(ring, length, starts, goal, position, cost, word, radius)
 
 
@@ -110,7 +110,7 @@ def _filled(section: Any) -> Any:
 
 
 @njit(cache=True, nogil=True)
-def _leads(starts, goal, radius, grid, weight):  # type: ignore[no-untyped-def]
+def _leads(starts, goal, radius, grid, weights):  # type: ignore[no-untyped-def]
     count, _, variants, _ = goal.shape
     cost = np.full(goal.shape[:3], np.inf)
     word = np.zeros(goal.shape[:3], np.int64)
@@ -121,7 +121,7 @@ def _leads(starts, goal, radius, grid, weight):  # type: ignore[no-untyped-def]
                 word_sizes(starts[a], goal[a, side, v], radius, sizes)
                 for k in range(6):
                     found = curve_cost(
-                        starts[a], WORDS[k], sizes[k], radius, grid, weight, cost[a, side, v]
+                        starts[a], WORDS[k], sizes[k], radius, grid, weights, cost[a, side, v]
                     )
                     if found < cost[a, side, v]:
                         cost[a, side, v] = found

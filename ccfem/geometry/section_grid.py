@@ -1,4 +1,4 @@
-"""A section for compiled loops: whether a point lies in it, and how far its border is at least."""
+"""A section for compiled loops: where a point lies about it, and how much room it has there."""
 
 from typing import Any, NamedTuple
 
@@ -7,9 +7,10 @@ import shapely
 from numba import njit
 from scipy.ndimage import distance_transform_edt
 
-from ccfem.arrays import FloatArray, IntArray
+from ccfem.arrays import BoolArray, FloatArray, IntArray
+from ccfem.geometry.places import INSIDE, OUTSIDE, VOID
 
-__all__ = ["SectionGrid", "contains", "section_grid", "side_and_room"]
+__all__ = ["SectionGrid", "contains", "place", "place_and_room", "section_grid"]
 
 _MOST_CELLS = 1_000_000
 
@@ -23,22 +24,27 @@ class SectionGrid(NamedTuple):
         Lowest corner of the grid.
     cell : float, mm
         Height of the rows, and size of the cells.
+    places : (nx, ny) int array
+        INSIDE, VOID or OUTSIDE: of the middle of each cell.
     room : (nx, ny) array, mm
-        No point of the border is nearer to any point of a cell; positive inside the section,
-        negative outside, 0 close to the border.
+        No point of the border is nearer to any point of a cell; 0 close to the border.
     starts, edges : (ny + 1,) int and (e, 4) arrays, mm
         Row j meets ``edges[starts[j]:starts[j + 1]]``, as x, y of both ends.
+    outer : (e,) bool array
+        Whether an edge is one of an outer ring, not of a hole.
     """
 
     origin: FloatArray
     cell: float
+    places: IntArray
     room: FloatArray
     starts: IntArray
     edges: FloatArray
+    outer: BoolArray
 
 
 def section_grid(section: Any, margin: float, cell: float = 0.5) -> SectionGrid:
-    """Prepare a section for `contains` and `side_and_room`.
+    """Prepare a section for `place` and `place_and_room`.
 
     Parameters
     ----------
@@ -49,11 +55,14 @@ def section_grid(section: Any, margin: float, cell: float = 0.5) -> SectionGrid:
         Made larger where the grid would have more than a million cells. Room is known where the
         section and its voids are wider than this.
     """
-    points, ring = shapely.get_coordinates(
-        shapely.get_rings(shapely.get_parts(section)), return_index=True
-    )
+    parts = shapely.get_parts(section)
+    rings = shapely.get_rings(shapely.normalize(parts))
+    holes = shapely.get_num_interior_rings(parts)
+    first = np.concatenate([[0], np.cumsum(holes + 1)])[:-1]
+    points, ring = shapely.get_coordinates(rings, return_index=True)
     follows = ring[1:] == ring[:-1]
     edges = np.concatenate([points[:-1], points[1:]], axis=1)[follows]
+    outer = np.isin(ring[1:][follows], first)
     low, high = points.min(axis=0) - margin, points.max(axis=0) + margin
     cell = max(cell, float(np.sqrt(np.prod(high - low) / _MOST_CELLS)))
     nx, ny = (np.floor((high - low) / cell) + 1).astype(int)
@@ -62,52 +71,82 @@ def section_grid(section: Any, margin: float, cell: float = 0.5) -> SectionGrid:
     edge = np.repeat(np.arange(len(edges)), count)
     row = rows[edge, 0] + np.arange(len(edge)) - np.repeat(np.cumsum(count) - count, count)
     starts = np.concatenate([[0], np.cumsum(np.bincount(row, minlength=ny))])
-    by_row = np.ascontiguousarray(edges[edge[np.argsort(row, kind="stable")]])
-    bare = SectionGrid(low, cell, np.zeros((nx, ny)), starts.astype(np.int64), by_row)
-    inside = _centres_inside(bare)
+    by_row = edge[np.argsort(row, kind="stable")]
+    places, room = np.empty((nx, ny), dtype=np.int64), np.empty((nx, ny))
+    bare = SectionGrid(
+        low, cell, places, room, starts.astype(np.int64), edges[by_row], outer[by_row]
+    )
+    _fill_places(bare)
+    inside = places == INSIDE
     # A centre of the other side at distance d: the border is no nearer to the centre than about
     # d less one cell's diagonal, and to the rest of the cell by half a diagonal less.
-    away = distance_transform_edt(inside) - distance_transform_edt(~inside)
-    room = np.sign(away) * np.maximum(np.abs(away) - 2.2, 0.0) * cell
-    return bare._replace(room=room)
+    away = distance_transform_edt(inside) + distance_transform_edt(~inside)
+    room[:] = np.maximum(away - 2.2, 0.0) * cell
+    return bare
 
 
 @njit(cache=True, nogil=True)
-def _centres_inside(grid):  # type: ignore[no-untyped-def]
-    nx, ny = grid.room.shape
-    inside = np.zeros((nx, ny), np.bool_)
+def _fill_places(grid):  # type: ignore[no-untyped-def]
+    nx, ny = grid.places.shape
+    about, around = np.empty(nx + 1, np.int64), np.empty(nx + 1, np.int64)
     for j in range(ny):
         y = grid.origin[1] + (j + 0.5) * grid.cell
+        about[:], around[:] = 0, 0
         for k in range(grid.starts[j], grid.starts[j + 1]):
             x0, y0, x1, y1 = grid.edges[k]
             if (y0 > y) != (y1 > y):
                 x = x0 + (y - y0) * (x1 - x0) / (y1 - y0)
-                last = int(np.floor((x - grid.origin[0]) / grid.cell + 0.5))
-                for i in range(min(last, nx)):
-                    inside[i, j] = not inside[i, j]
-    return inside
+                last = min(int(np.floor((x - grid.origin[0]) / grid.cell + 0.5)), nx)
+                sense = 1 if y1 > y0 else -1
+                about[last] += sense
+                if grid.outer[k]:
+                    around[last] += sense
+        for i in range(nx - 1, -1, -1):
+            about[i] += about[i + 1]
+            around[i] += around[i + 1]
+            grid.places[i, j] = _place(about[i + 1], around[i + 1])
+
+
+@njit(cache=True, nogil=True)
+def place(grid, x, y):  # type: ignore[no-untyped-def]
+    """INSIDE the section, in a VOID within its outer rings, or OUTSIDE, of a point."""
+    j = int(np.floor((y - grid.origin[1]) / grid.cell))
+    if j < 0 or j >= grid.room.shape[1]:
+        return OUTSIDE
+    about, around = 0, 0
+    for k in range(grid.starts[j], grid.starts[j + 1]):
+        x0, y0, x1, y1 = grid.edges[k]
+        if (y0 > y) != (y1 > y) and x < x0 + (y - y0) * (x1 - x0) / (y1 - y0):
+            sense = 1 if y1 > y0 else -1
+            about += sense
+            if grid.outer[k]:
+                around += sense
+    return _place(about, around)
 
 
 @njit(cache=True, nogil=True)
 def contains(grid, x, y):  # type: ignore[no-untyped-def]
     """Whether a point lies in the section."""
-    j = int(np.floor((y - grid.origin[1]) / grid.cell))
-    if j < 0 or j >= grid.room.shape[1]:
-        return False
-    inside = False
-    for k in range(grid.starts[j], grid.starts[j + 1]):
-        x0, y0, x1, y1 = grid.edges[k]
-        if (y0 > y) != (y1 > y) and x < x0 + (y - y0) * (x1 - x0) / (y1 - y0):
-            inside = not inside
-    return inside
+    return place(grid, x, y) == INSIDE
 
 
 @njit(cache=True, nogil=True)
-def side_and_room(grid, x, y):  # type: ignore[no-untyped-def]
-    """Distance that is free of border: positive inside, negative outside, 0 close to the border."""
+def _place(about, around):  # type: ignore[no-untyped-def]
+    """Place by how often all rings, and the outer ones, wind round it."""
+    if about != 0:
+        return INSIDE
+    return VOID if around != 0 else OUTSIDE
+
+
+@njit(cache=True, nogil=True)
+def place_and_room(grid, x, y):  # type: ignore[no-untyped-def]
+    """Place of a point, and the distance round it that is free of border; 0 close to the border.
+
+    Where that is 0 the place is that of the middle of the cell.
+    """
     i = int(np.floor((x - grid.origin[0]) / grid.cell))
     j = int(np.floor((y - grid.origin[1]) / grid.cell))
     nx, ny = grid.room.shape
     if i < 0 or j < 0 or i >= nx or j >= ny:
         i, j = min(max(i, 0), nx - 1), min(max(j, 0), ny - 1)
-    return grid.room[i, j]
+    return grid.places[i, j], grid.room[i, j]

@@ -8,7 +8,8 @@ from ccfem.errors import InputError
 from ccfem.geometry.dubins import dubins, dubins_curve
 from ccfem.geometry.link_curves import curve_cost
 from ccfem.geometry.linking import link_tracks
-from ccfem.geometry.section_grid import contains, section_grid, side_and_room
+from ccfem.geometry.places import INSIDE, OUTSIDE, VOID
+from ccfem.geometry.section_grid import contains, place, place_and_room, section_grid
 
 RADIUS, WIDTH = 1.5, 0.9
 WINDOWED = shapely.box(0, 0, 40, 30).difference(shapely.Point(14, 15).buffer(8.0))
@@ -207,21 +208,44 @@ def test_bad_input_is_refused() -> None:
         link_tracks([track * 2], WINDOWED, RADIUS, 0.0)
 
 
-def test_grid_knows_sides_and_room() -> None:
-    grid = section_grid(WINDOWED, 10.0)
+@pytest.mark.parametrize(("weight", "over"), [(0.0, True), (4.0, False)])
+def test_a_link_leads_round_the_part_rather_than_over_a_window(weight, over) -> None:
+    """Strands through both walls: 40 mm over the window, or about 115 mm round the part."""
+    frame = shapely.box(0, 0, 60, 60).difference(shapely.box(10, 10, 50, 50))
+    walls = [np.array([[x, 30.0], [x + 10.0, 30.0]]) for x in (0.0, 50.0)]
+    path = link_tracks([walls], frame, RADIUS, WIDTH, void_weight=weight)
+    (link,) = path.links
+    line = shapely.LineString(link)
+    if over:
+        assert line.length == pytest.approx(40.0)
+    else:
+        assert line.intersection(shapely.box(0, 0, 60, 60)).length < 1e-6
+        assert line.length < 150.0
+
+
+def test_grid_knows_places_and_room() -> None:
+    """An island in the window counts as a part of its own."""
+    section = shapely.MultiPolygon([WINDOWED, shapely.Point(14, 15).buffer(3.0)])
+    filled = shapely.box(0, 0, 40, 30)
+    grid = section_grid(section, 10.0)
     random = np.random.default_rng(0)
     points = random.uniform((-15.0, -15.0), (55.0, 45.0), (4000, 2))
-    border = shapely.distance(shapely.boundary(WINDOWED), shapely.points(points))
-    inside = shapely.contains_xy(WINDOWED, points)
+    border = shapely.distance(shapely.boundary(section), shapely.points(points))
+    inside = shapely.contains_xy(section, points)
+    where = np.where(shapely.contains_xy(filled, points), VOID, OUTSIDE)
+    where[inside] = INSIDE
+    assert set(where) == {INSIDE, VOID, OUTSIDE}
+    assert [place(grid, *point) for point in points] == where.tolist()
     assert [contains(grid, *point) for point in points] == inside.tolist()
-    room = np.array([side_and_room(grid, *point) for point in points])
-    assert (np.abs(room) <= border).all()
-    assert (inside[room > 0.0]).all()
-    assert not inside[room < 0.0].any()
-    assert (np.abs(room)[border > 3.0] > 0.0).all()
+    cell, room = np.array([place_and_room(grid, *point) for point in points]).T
+    assert (room <= border).all()
+    assert (cell == where)[room > 0.0].all()
+    assert (room[border > 3.0] > 0.0).all()
 
 
-def test_cost_of_a_curve_is_its_length_and_what_lies_inside() -> None:
+def test_cost_of_a_curve_is_its_length_and_what_lies_inside_and_over_voids() -> None:
+    hole = shapely.Polygon(WINDOWED.interiors[0])
+    weights = np.array([8.0, 3.0, 0.0])
     grid = section_grid(WINDOWED, 10.0)
     random = np.random.default_rng(1)
     low, high = (-5.0, -5.0, -3.0), (45.0, 35.0, 3.0)
@@ -231,7 +255,7 @@ def test_cost_of_a_curve_is_its_length_and_what_lies_inside() -> None:
         line = shapely.LineString(dubins_curve(starts[k], ends[k], 4.0, 0.05))
         inside = line.intersection(WINDOWED)
         crossings = len(shapely.get_parts(inside)) * 2
-        found = curve_cost(starts[k], turns[k], sizes[k], 4.0, grid, 8.0, np.inf)
-        expected = sizes[k].sum() + 8.0 * inside.length
+        found = curve_cost(starts[k], turns[k], sizes[k], 4.0, grid, weights, np.inf)
+        expected = sizes[k].sum() + 8.0 * inside.length + 3.0 * line.intersection(hole).length
         assert abs(found - expected) <= 8.0 * (0.125 * crossings + 1e-3) + 1e-6
-        assert curve_cost(starts[k], turns[k], sizes[k], 4.0, grid, 8.0, 0.9 * found) == np.inf
+        assert curve_cost(starts[k], turns[k], sizes[k], 4.0, grid, weights, 0.9 * found) == np.inf
