@@ -238,7 +238,6 @@ def test_the_cutter_allows_the_shortest_strand():
             {"gcode": {"lift": -1}},
             r"machine\.gcode: lift must be a finite number >= 0; got -1",
         ),
-        ({"gcode": {"bed": [9, 0, 9]}}, r"machine\.gcode: bed must be three sizes in mm above 0"),
     ],
 )
 def test_machines_that_make_no_sense(table, message):
