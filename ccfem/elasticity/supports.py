@@ -232,7 +232,8 @@ def _words(motions: FloatArray, centre: FloatArray, radius: float) -> list[str]:
         shift = rotating[:3] @ weights
         through = centre + radius * np.cross(direction, shift)
         pitch = float(direction @ shift)
-        point = ", ".join(f"{c:.4g}" for c in through + 0.0)
+        through[np.abs(through) < 1e-9 * radius] = 0.0
+        point = ", ".join(f"{c:.4g}" for c in through)
         verb = "rotate" if abs(pitch) < 1e-6 else "screw"
         words.append(f"{verb} about the axis through ({point}) along {_name(direction)}")
     return words
