@@ -1,6 +1,7 @@
 """Direct factorisations, each of one library."""
 
 import os
+import threading
 import weakref
 from collections.abc import Callable
 
@@ -11,7 +12,7 @@ from scipy.sparse.linalg import splu
 from ccfem.arrays import FloatArray
 from ccfem.errors import SolveError
 
-__all__ = ["cholmod", "pardiso", "superlu"]
+__all__ = ["Pardiso", "cholmod", "superlu"]
 
 Apply = Callable[[FloatArray], FloatArray]
 
@@ -32,27 +33,65 @@ def superlu(matrix: sp.bsr_array) -> Apply:
     return lambda rhs: np.asarray(factor.solve(rhs))
 
 
-def pardiso(matrix: sp.bsr_array) -> Apply:
-    """PARDISO of the MKL, Cholesky of the upper triangle (matrix type 2)."""
-    from pypardiso import PyPardisoSolver
-    from pypardiso.pardiso_wrapper import PyPardisoError
+class Pardiso:
+    """Cholesky factorisation by PARDISO of the MKL, of the upper triangle (matrix type 2).
 
-    upper = sp.csr_matrix(sp.triu(matrix.tocsr(), format="csr"))
-    solver = PyPardisoSolver(mtype=2)
-    # It searches the whole environment for the library every time unless told where that is.
-    os.environ.setdefault("PYPARDISO_MKL_RT", solver.libmkl._name)
-    try:
-        solver.factorize(upper)
-    except PyPardisoError as error:
-        raise SolveError(f"pypardiso: {error}; the stiffness is not positive definite") from error
+    Its analysis of the pattern (ordering and symbolic factorisation) serves any number of
+    matrices; its memory is released with the object. Threads may share it.
 
-    def apply(rhs: FloatArray) -> FloatArray:
+    Parameters
+    ----------
+    matrix : bsr_array (n, n)
+        Symmetric positive definite, columns sorted; its pattern is analysed.
+    """
+
+    def __init__(self, matrix: sp.bsr_array) -> None:
+        from pypardiso import PyPardisoSolver
+
+        self._solver = PyPardisoSolver(mtype=2)
+        weakref.finalize(self, self._solver.free_memory, everything=True)
+        # It searches the whole environment for the library every time unless told where that is.
+        os.environ.setdefault("PYPARDISO_MKL_RT", self._solver.libmkl._name)
+        self._solver.set_iparm(1, 1)  # no defaults, which refine every solution once
+        self._solver.set_iparm(2, 2)  # nested dissection
+        entries = np.arange(matrix.data.size, dtype=np.float64).reshape(matrix.data.shape)
+        numbered = sp.bsr_array((entries, matrix.indices, matrix.indptr), shape=matrix.shape)
+        self._upper = sp.csr_matrix(sp.triu(numbered.tocsr(), format="csr"))
+        self._solver._check_A(self._upper)
+        self._entries = self._upper.data.astype(np.int64)
+        self._lock = threading.Lock()
+        self._latest = 0
+
+    def _call(self, phase: int, rhs: FloatArray) -> FloatArray:
         # Its public `solve` compares the whole matrix with the factorised one at every call.
-        solver.set_phase(33)
-        return np.asarray(solver._call_pardiso(upper, np.asfortranarray(rhs)))
+        self._solver.set_phase(phase)
+        return np.asarray(self._solver._call_pardiso(self._upper, np.asfortranarray(rhs)))
 
-    weakref.finalize(apply, solver.free_memory, everything=True)
-    return apply
+    def factorise(self, matrix: sp.bsr_array) -> Apply:
+        """Factorise a matrix of the pattern; the factor before it, if any, is spent."""
+        from pypardiso.pardiso_wrapper import PyPardisoError
+
+        with self._lock:
+            self._latest += 1
+            own = self._latest
+            self._upper.data = matrix.data.reshape(-1)[self._entries]
+            try:
+                self._call(12 if own == 1 else 22, np.zeros(matrix.shape[0]))
+            except PyPardisoError as error:
+                raise SolveError(
+                    f"pypardiso: {error}; the stiffness is not positive definite"
+                ) from error
+
+        def apply(rhs: FloatArray) -> FloatArray:
+            with self._lock:
+                if own != self._latest:
+                    raise SolveError(
+                        "pypardiso: a later matrix took the place of this factor: solve with what "
+                        "`refactorise` returned"
+                    )
+                return self._call(33, rhs)
+
+        return apply
 
 
 def cholmod(matrix: sp.bsr_array) -> Apply:

@@ -1,7 +1,8 @@
 """Backends that solve the stiffness equations, and the choice among them."""
 
 from collections.abc import Callable
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
+from functools import partial
 from importlib.util import find_spec
 from typing import NamedTuple
 
@@ -37,6 +38,9 @@ _RESTARTS = 2
 _SKYLINE = 1e9
 """Operations up to which the skyline is quicker than the sparse factorisations (measured)."""
 
+_SKYLINE_RENEWED = 1e7
+"""The same for matrices of one pattern, of which PARDISO analyses the first alone (measured)."""
+
 LARGEST_DIRECT = 100_000
 """Unknowns up to which a direct backend is worth its memory."""
 
@@ -70,12 +74,46 @@ class Solver:
         Solution of a right-hand side (n,): exact to rounding of a direct backend, else one
         application of the preconditioner.
     exact : bool
+    make : callable
+        Makes `apply` of any matrix with the pattern of this one.
     """
 
     backend: str
     matrix: sp.bsr_array
     apply: Callable[[FloatArray], FloatArray]
     exact: bool
+    make: Callable[[sp.bsr_array], Callable[[FloatArray], FloatArray]]
+
+    def refactorise(self, matrix: sp.bsr_array) -> "Solver":
+        """Factorise another matrix of the same pattern, such as another stiffness on the mesh.
+
+        "pypardiso" keeps its ordering, and this solver is spent; the others begin anew.
+
+        Parameters
+        ----------
+        matrix : bsr_array (n, n)
+            Symmetric positive definite.
+
+        Raises
+        ------
+        InputError
+            When its pattern is another one.
+        SolveError
+            When the factorisation fails.
+        """
+        own = self.matrix
+        if not (
+            matrix.shape == own.shape
+            and matrix.data.shape == own.data.shape
+            and np.array_equal(matrix.indptr, own.indptr)
+            and np.array_equal(matrix.indices, own.indices)
+        ):
+            raise InputError(
+                f"refactorise takes a matrix with the pattern of the one before ({own.shape[0]} "
+                f"unknowns, {len(own.indices)} blocks); got another ({matrix.shape[0]}, "
+                f"{len(matrix.indices)}): use factorise"
+            )
+        return replace(self, matrix=matrix, apply=self.make(matrix))
 
     def solve(
         self, rhs: FloatArray, x0: FloatArray | None = None, tolerance: float = 1e-8
@@ -169,11 +207,18 @@ def direct_backend() -> str:
     return "superlu"
 
 
-def choose_direct(matrix: sp.bsr_array) -> str:
-    """Name the direct backend that suits a plane system and what is installed."""
-    if skyline_operations(matrix) <= _SKYLINE:
-        return "skyline"
-    return direct_backend()
+def choose_direct(matrix: sp.bsr_array, renewed: bool = False) -> str:
+    """Name the direct backend that suits a plane system and what is installed.
+
+    Parameters
+    ----------
+    matrix : bsr_array (n, n)
+    renewed : bool, default False
+        Whether many matrices of its pattern will follow.
+    """
+    best = direct_backend()
+    limit = _SKYLINE_RENEWED if renewed and best == "pypardiso" else _SKYLINE
+    return "skyline" if skyline_operations(matrix) <= limit else best
 
 
 def choose(unknowns: int, order: int, solves: int = 1) -> str:
@@ -233,18 +278,22 @@ def factorise(
         raise InputError(f"no backend named '{backend}'; there are: auto, {', '.join(BACKENDS)}")
     if backend in _MODULES and find_spec(_MODULES[backend]) is None:
         raise InputError(f"backend '{backend}' is not installed: {_CURES[backend]}")
-    if backend == "amg":
-        return Solver(backend, matrix, multigrid.smoothed_aggregation(matrix, points), False)
+    make = _maker(backend, matrix, points, parents)
+    return Solver(backend, matrix, make(matrix), backend in DIRECT, make)
+
+
+def _maker(
+    backend: str, matrix: sp.bsr_array, points: FloatArray, parents: IntArray | None
+) -> Callable[[sp.bsr_array], Callable[[FloatArray], FloatArray]]:
+    """Choose what makes `Solver.apply` of this matrix, and of others of its pattern."""
+    if backend == "pypardiso":
+        return direct.Pardiso(matrix).factorise
     if backend == "two-level":
         if parents is None:
             raise InputError("backend 'two-level' is for quadratic meshes: use mesh.quadratic()")
-        return Solver(backend, matrix, multigrid.two_level(matrix, points, parents), False)
+        return partial(multigrid.two_level, points=points, parents=parents)
+    if backend == "amg":
+        return partial(multigrid.smoothed_aggregation, points=points)
     if backend == "petsc":
-        return Solver(backend, matrix, multigrid.petsc_gamg(matrix, points), False)
-    makers = {
-        "pypardiso": direct.pardiso,
-        "cholmod": direct.cholmod,
-        "superlu": direct.superlu,
-        "skyline": skyline,
-    }
-    return Solver(backend, matrix, makers[backend](matrix), True)
+        return partial(multigrid.petsc_gamg, points=points)
+    return {"cholmod": direct.cholmod, "superlu": direct.superlu, "skyline": skyline}[backend]

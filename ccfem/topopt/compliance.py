@@ -15,7 +15,7 @@ from ccfem.elasticity.plane_problem import PlaneProblem
 from ccfem.elasticity.problem import Problem
 from ccfem.elasticity.recovery import cell_strain
 from ccfem.elasticity.solve import System, prepare
-from ccfem.elasticity.solvers import LARGEST_DIRECT, direct_backend
+from ccfem.elasticity.solvers import LARGEST_DIRECT, Solver, choose_direct, direct_backend
 from ccfem.errors import InputError
 
 __all__ = ["GroupedCompliance", "Loaded", "PlaneCompliance", "TetCompliance", "compliance_of"]
@@ -51,12 +51,20 @@ class _Answer:
     system: PlaneSystem | System
     weights: Mapping[str, float]
     backend: str = "auto"
+    _solver: Solver | None = None
     _before: dict[str, FloatArray] = field(default_factory=dict)
+
+    def _factorised(self, matrix: sp.bsr_array) -> Solver:
+        if self._solver is None:
+            self._solver = self.system.factorise(matrix, self.backend, len(self.system.forces))
+        else:
+            self._solver = self._solver.refactorise(self.system.held.reduce(matrix))
+        return self._solver
 
     def solved(self, matrix: sp.bsr_array) -> dict[str, FloatArray]:
         """Displacement of every load case; iterative backends start at the one before."""
         held = self.system.held
-        solver = self.system.factorise(matrix, self.backend, len(self.system.forces))
+        solver = self._factorised(matrix)
         for case, forces in self.system.forces.items():
             rhs = held.right_hand_side(matrix, forces)
             start = self._before.get(case)
@@ -95,6 +103,9 @@ class PlaneCompliance:
     ) -> None:
         self.system = prepare_plane(problem)
         self.weights = weights
+        if backend == "auto":
+            first = self.system.held.reduce(self.system.assemble())
+            backend = choose_direct(first, renewed=True)
         self._answer = _Answer(self.system, weights, backend)
         self.centres = problem.mesh.centres
         self.volumes = problem.mesh.areas * problem.thickness

@@ -1,4 +1,6 @@
+import gc
 import importlib.util
+from concurrent.futures import ThreadPoolExecutor
 
 import numpy as np
 import pytest
@@ -164,3 +166,95 @@ def test_automatic_choice_goes_on_with_a_direct_backend(monkeypatch):
     assert {field.record.backend for field in fields.values()} == {"superlu"}
     with pytest.raises(SolveError, match="amg"):
         solve(problem, "amg")
+
+
+def reduced_by(prepared, factor):
+    """Return the reduced matrix with a factor on the stiffness of each cell."""
+    stiffness = factor[:, None, None] * isotropic(100.0, 0.3).stiffness
+    return prepared.held.reduce(assemble(prepared.problem.mesh, stiffness))
+
+
+@pytest.mark.parametrize("backend", BACKENDS)
+def test_refactorising_solves_with_the_new_matrix(backend):
+    if not installed(backend):
+        pytest.skip(f"{backend} is not installed")
+    prepared = system(2 if backend == "two-level" else 1, (4, 2, 2))
+    _, rhs, _ = equations(prepared)
+    solver = prepared.factorise(prepared.assemble(), backend)
+    numbers = np.random.default_rng(1)
+    for _ in range(3):
+        factor = numbers.uniform(1e-3, 1.0, len(prepared.problem.mesh.cells))
+        changed = reduced_by(prepared, factor)
+        solver = solver.refactorise(changed)
+        assert solver.backend == backend
+        assert solver.matrix is changed
+        found = solver.solve(rhs, tolerance=1e-10).values
+        exact = np.linalg.solve(changed.toarray(), rhs)
+        np.testing.assert_allclose(found, exact, atol=1e-8 * np.abs(exact).max())
+
+
+@pytest.mark.parametrize("backend", [b for b in ("superlu", "pypardiso") if installed(b)])
+def test_refactorising_checks_pattern_and_residual(backend):
+    prepared = system(1, (4, 2, 2))
+    matrix, rhs, points = equations(prepared)
+    solver = factorise(matrix, points, backend)
+    nodes = np.random.default_rng(2).permutation(len(points))
+    unknowns = (3 * nodes[:, None] + np.arange(3)).reshape(-1)
+    shuffled = matrix.tocsr()[unknowns][:, unknowns]
+    for other in (equations(system(1, (5, 2, 2)))[0], shuffled.tobsr((3, 3))):
+        with pytest.raises(InputError, match=r"pattern of the one before .* use factorise"):
+            solver.refactorise(other)
+    solver = solver.refactorise(2.0 * matrix)
+    with pytest.raises(SolveError, match=rf"{backend}: relative residual \d\.\de-\d+ after"):
+        solver.solve(rhs, tolerance=1e-25)
+
+
+needs_pardiso = pytest.mark.skipif(not installed("pypardiso"), reason="pypardiso is not installed")
+
+
+@needs_pardiso
+def test_pardiso_orders_once_and_refuses_a_spent_factor(monkeypatch):
+    from pypardiso import PyPardisoSolver
+
+    gc.collect()  # what other tests left
+    phases, call = [], PyPardisoSolver._call_pardiso
+
+    def watched(solver, matrix, rhs):
+        phases.append(solver.phase)
+        return call(solver, matrix, rhs)
+
+    monkeypatch.setattr(PyPardisoSolver, "_call_pardiso", watched)
+    matrix, rhs, points = equations(system(1, (4, 2, 2)))
+    first = factorise(matrix, points, "pypardiso")
+    second = first.refactorise(2.0 * matrix)
+    second.solve(rhs)
+    with pytest.raises(SolveError, match="a later matrix took the place"):
+        first.solve(rhs)
+    assert phases == [12, 22, 33]
+    del first
+    gc.collect()
+    assert -1 not in phases
+    del second
+    gc.collect()
+    assert phases == [12, 22, 33, -1]
+
+
+@needs_pardiso
+def test_pardiso_goes_on_after_a_matrix_that_is_not_positive_definite():
+    matrix, rhs, points = equations(system(1, (4, 2, 2)))
+    solver = factorise(matrix, points, "pypardiso")
+    with pytest.raises(SolveError, match="not positive definite"):
+        solver.refactorise(-1.0 * matrix)
+    found = solver.refactorise(2.0 * matrix).solve(rhs).values
+    np.testing.assert_allclose(found, factorise(2.0 * matrix, points).solve(rhs).values)
+
+
+@needs_pardiso
+def test_pardiso_serves_threads():
+    matrix, rhs, points = equations(system(1, (8, 4, 3)))
+    solver = factorise(matrix, points, "pypardiso")
+    sides = [k * rhs for k in range(1, 41)]
+    with ThreadPoolExecutor(4) as pool:
+        found = list(pool.map(lambda side: solver.solve(side).values, sides))
+    for side, values in zip(sides, found, strict=True):
+        np.testing.assert_allclose(matrix @ values, side, atol=1e-9 * np.abs(side).max())
