@@ -34,13 +34,15 @@ from ccfem.evaluate.sinuosity import path_sinuosity, sample_sinuosity, sinuosity
 from ccfem.evaluate.stiffness_alignment import READINGS
 from ccfem.export.gcode import gcode
 from ccfem.export.print_plan import PrintPlan
+from ccfem.geometry import shells
+from ccfem.geometry.medial_fill import medial_fill
 from ccfem.geometry.polylines import lengths, pack
 from ccfem.geometry.print_order import nearest_end_order
 from ccfem.layers.layer import Layer
 from ccfem.machine import Machine
 from ccfem.materials import named_material
 from ccfem.raster.plan import RasterPlan
-from ccfem.strategies import create, plan
+from ccfem.strategies import create, mps, plan
 from ccfem.toolpaths import FIBRE, Toolpaths
 
 __all__ = [
@@ -167,6 +169,7 @@ def run_case(
     for name, (strategy, parameters) in patterns.items():
         planner = create(strategy, parameters)
         chosen = layers[: 2 if strategy == "grid" else 1]
+        _forget()
         start = perf_counter()
         first = plan(planner, chosen[:1], stress, machine)
         planned = perf_counter() - start
@@ -193,6 +196,12 @@ def run_case(
         }
         found[name] = PatternStudy(toolpaths, paths, maps, laid, values, raster)
     return CaseStudy(plate, benchmarks, found, perf_counter() - begun)
+
+
+def _forget() -> None:
+    """Forget what is remembered of sections, so that every pattern is timed from nothing."""
+    for remembered in (shells._shells, medial_fill, mps._middles):
+        remembered.cache_clear()
 
 
 def _printed(toolpaths: Toolpaths, machine: Machine) -> str:
