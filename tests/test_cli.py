@@ -226,7 +226,7 @@ def test_bad_parts_end_in_one_line(ccfem, folder, text, message):
     ("arguments", "message"),
     [
         (["gone.toml"], "part file gone.toml does not exist: check its name and folder"),
-        (["lop"], "no case named 'lop'; there are: bar, bridge, cantilever, l_shape, loop"),
+        (["lop"], "no case named 'lop'; there are: bar, bracket, bridge, cantilever, l_shape"),
         (["part.toml", "--strategies", "zigzag,spiral"], "no strategy named 'spiral'; there are:"),
         (["part.toml", "--strategies", ","], "at least one strategy"),
         (["part.toml", "--set", "zigzag.pitch=2"], "'zigzag' has no parameter 'pitch'; it has:"),
