@@ -2,6 +2,7 @@
 
 import dataclasses
 import inspect
+import os
 from pathlib import Path
 
 import numpy as np
@@ -22,6 +23,10 @@ from ccfem.headline import (
 )
 
 __all__ = ["print_cases", "print_comparison", "print_strategies"]
+
+_TITLES, _NUMBERS = 30, 20
+"""Characters that a table is given for its titles and for each strategy, where neither a terminal
+nor COLUMNS sets its width."""
 
 
 def print_cases() -> None:
@@ -63,11 +68,13 @@ def print_comparison(comparison: Comparison, where: Path, seconds: float) -> Non
     best = best_values(comparison)
     runs = [run for run in ranking(comparison) if run.evaluation is not None]
     values = [headline_values(run) for run in runs]
+    if not console.is_terminal and "COLUMNS" not in os.environ:
+        console.width = max(console.width, _TITLES + _NUMBERS * len(runs))
     console.print(comparison.case.title, style="bold", markup=False)
     table = Table(header_style="bold", box=box.SIMPLE_HEAD)
     table.add_column("")
     for run in runs:
-        table.add_column(run.name, justify="right")
+        table.add_column(run.name, justify="right", overflow="fold")
     for head in HEADLINE:
         if not any(head.column in found for found in values):
             continue
