@@ -286,6 +286,7 @@ def _run(
     """Compare and write; a failure leaves nothing behind."""
     from ccfem.compare import compare as run_comparison
     from ccfem.compare import create_all
+    from ccfem.export.print_plan import check_machine
     from ccfem.results import staged, write_results
     from ccfem.screen import print_comparison
 
@@ -293,8 +294,6 @@ def _run(
     case = load()
     seconds = {"start": imported - _STARTED, "mesh": time.perf_counter() - imported}
     if gcode:
-        from ccfem.export.print_plan import check_machine
-
         check_machine(case.machine)
     if calibration is not None:
         from ccfem.calibrate import read_calibration

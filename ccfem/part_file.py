@@ -109,9 +109,7 @@ import tomllib
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass, field
 from pathlib import Path
-from typing import Any, Literal
-
-import numpy as np
+from typing import Any
 
 from ccfem.cases.case import Case
 from ccfem.elasticity.problem import (
@@ -125,12 +123,10 @@ from ccfem.elasticity.problem import (
     Traction,
 )
 from ccfem.errors import InputError
-from ccfem.io import read_mesh, read_surface
 from ccfem.io.whole import existing_file
 from ccfem.machine import Machine
 from ccfem.materials import Material, isotropic, named_material, transversely_isotropic
-from ccfem.mesh import TetMesh
-from ccfem.mesh_check import check_mesh
+from ccfem.part_body import Body
 from ccfem.patches import (
     Box,
     Cylinder,
@@ -162,32 +158,8 @@ _LOADS: dict[str, Callable[..., Load]] = {
 }
 
 
-@dataclass(frozen=True)
-class _Hole:
-    """A hole of a planform: a circle or a polygon."""
-
-    centre: tuple[float, float] | None = None
-    radius: float | None = None
-    outline: tuple[tuple[float, float], ...] | None = None
-
-    def __post_init__(self) -> None:
-        circle = self.centre is not None and self.radius is not None
-        if circle == (self.outline is not None):
-            raise InputError("a hole needs centre and radius, or outline: give one of them")
-
-
-@dataclass(frozen=True)
-class _Planform:
-    """The table [planform]."""
-
-    outline: tuple[tuple[float, float], ...]
-    height: float
-    edge_length: float
-    holes: tuple[dict[str, Any], ...] = ()
-
-
-@dataclass(frozen=True)
-class _Part:
+@dataclass(frozen=True, kw_only=True)
+class _Part(Body):
     """The keys of a part file."""
 
     material: str | dict[str, Any]
@@ -196,13 +168,6 @@ class _Part:
     name: str = ""
     title: str = ""
     source: str = ""
-    mesh: str | None = None
-    surface: str | None = None
-    planform: dict[str, Any] | None = None
-    edge_length: float | None = None
-    scale: float = 1.0
-    merge_nodes: bool = False
-    order: Literal[1, 2] | None = None
     build: str | Vector = "z"
     layers: int = 12
     patches: dict[str, Any] = field(default_factory=dict)
@@ -257,7 +222,7 @@ def _case(content: Mapping[str, Any], path: Path) -> Case:
     machine = from_table(Machine, part.machine, "machine")
     material = _material(part.material)
     _check_strategies(part.strategies)
-    mesh, findings = _body(part, path.parent)
+    mesh, findings = part.read(path.parent)
     mesh = patches_from_rules(mesh, rules)
     for value in (*supports, *(load for case in loads.values() for load in case)):
         if not isinstance(value, PointForce):
@@ -274,78 +239,6 @@ def _case(content: Mapping[str, Any], path: Path) -> Case:
         source=part.source,
         findings=findings,
     )
-
-
-def _body(part: _Part, folder: Path) -> tuple[TetMesh, tuple[str, ...]]:
-    """Mesh of the part, checked, and what was found in it."""
-    given = [key for key in ("mesh", "surface", "planform") if getattr(part, key) is not None]
-    if len(given) != 1:
-        raise InputError(
-            f"a part needs one of mesh, surface and planform; got {' and '.join(given) or 'none'}: "
-            "name one"
-        )
-    if (part.edge_length is not None) != (part.surface is not None):
-        raise InputError("edge_length goes with surface: give both or neither")
-    if part.planform is not None and part.scale != 1.0:
-        raise InputError("scale goes with mesh or surface: leave it out of a planform")
-    if part.mesh is not None:
-        mesh = read_mesh(folder / part.mesh, part.scale, check=False)
-        if part.order == 1 and mesh.order == 2:
-            mesh = _linear(mesh)
-        mesh, report = check_mesh(mesh, merge=part.merge_nodes)
-    else:
-        mesh, report = check_mesh(_filled(part, folder))
-    return mesh.quadratic() if part.order == 2 else mesh, report.findings
-
-
-def _linear(mesh: TetMesh) -> TetMesh:
-    """Mesh of the corners of a quadratic mesh."""
-    corners, cells = np.unique(mesh.corners, return_inverse=True)
-    number = np.zeros(len(mesh.points), dtype=np.int64)
-    number[corners] = np.arange(len(corners))
-    patches = {name: number[facets] for name, facets in mesh.patches.items()}
-    return TetMesh(mesh.points[corners], cells.reshape(-1, 4), patches)
-
-
-def _filled(part: _Part, folder: Path) -> TetMesh:
-    """Mesh of a surface or a planform."""
-    if part.surface is not None and part.edge_length is not None:
-        from ccfem.meshing import tetrahedralise
-
-        return tetrahedralise(read_surface(folder / part.surface, part.scale), part.edge_length)
-    import shapely
-
-    from ccfem.meshing import extrude
-
-    plan = from_table(_Planform, part.planform, "planform")
-    rings = []
-    for k, table in enumerate(plan.holes):
-        hole = from_table(_Hole, table, f"planform.holes[{k}]")
-        if hole.outline is not None:
-            rings.append(_polygon(hole.outline, f"planform.holes[{k}]"))
-        else:
-            rings.append(shapely.Point(hole.centre).buffer(hole.radius, quad_segs=32))
-    body = _polygon(plan.outline, "planform")
-    for k, ring in enumerate(rings):
-        if not body.contains_properly(ring):
-            raise InputError(f"planform.holes[{k}] must lie inside the outline: move or shrink it")
-    holes = shapely.union_all(rings)
-    return extrude(body.difference(holes), plan.height, plan.edge_length)
-
-
-def _polygon(outline: tuple[tuple[float, float], ...], where: str) -> Any:
-    """Make a polygon of an outline that does not cut itself."""
-    import shapely
-
-    if len(outline) < 3:
-        raise InputError(f"{where}.outline needs at least 3 points; got {len(outline)}: add some")
-    polygon = shapely.Polygon(outline)
-    if not polygon.is_valid or not polygon.area > 0.0:
-        raise InputError(
-            f"{where}.outline is not a valid polygon: {shapely.is_valid_reason(polygon)}: go round "
-            "it without crossing"
-        )
-    return polygon
 
 
 def _rule(table: object, where: str) -> PatchRule:

@@ -205,7 +205,7 @@ def without(start, stop=None):
     ("text", "message"),
     [
         ("[patches", "part.toml is not a TOML file: "),
-        ("colour = 'red'" + PART, "has no key 'colour'; it has: material, supports, "),
+        ("colour = 'red'" + PART, "has no key 'colour'; it has: mesh, surface, planform, "),
         ("layers = 2.5" + PART, "layers must be a whole number; got 2.5"),
         ("layers = true" + PART, "layers must be a whole number; got True"),
         ("layers = 0" + PART, "layers must be at least 1; got 0"),
