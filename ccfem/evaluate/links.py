@@ -48,7 +48,10 @@ def sample_links(paths: PlanePaths) -> LinkSamples:
     first = np.flatnonzero(paths.link)
     if not len(first):
         return LinkSamples(np.zeros(1), np.zeros((1, 3)))
-    follows = paths.link[first - 1] & (first > 0)
+    before = np.arange(len(paths.link)) - 1
+    # The step before the first one of a closed path is its last one.
+    before[paths.offsets[:-1][paths.closed]] = paths.offsets[1:][paths.closed] - 2
+    follows = paths.link[before[first]]
     start, end = paths.points[first], paths.points[first + 1]
     pieces = cut_at_section(start, end, paths.layer.polygon)
     size = np.linalg.norm(end - start, axis=1)[pieces.step] * (pieces.end - pieces.begin)

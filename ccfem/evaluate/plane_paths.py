@@ -115,7 +115,8 @@ def _without(paths: PlanePaths, dropped: BoolArray) -> PlanePaths:
     """Paths without the steps that the points in a (P,) mask start; their pieces are open."""
     if not dropped.any():
         return paths
-    step = ~dropped
+    order = _from_gaps(paths, dropped)
+    points, link, step = paths.points[order], paths.link[order], ~dropped[order]
     step[paths.offsets[1:] - 1] = False
     kept = step | np.concatenate([[False], step[:-1]])
     last = ~step[kept]
@@ -123,11 +124,23 @@ def _without(paths: PlanePaths, dropped: BoolArray) -> PlanePaths:
     whole = paths.closed & (np.bincount(path, dropped, len(paths)) == 0)
     return PlanePaths(
         paths.layer,
-        paths.points[kept],
+        points[kept],
         np.concatenate([[0], np.flatnonzero(last) + 1]),
         whole[path[kept][last]],
-        (paths.link & step)[kept],
+        (link & step)[kept],
     )
+
+
+def _from_gaps(paths: PlanePaths, dropped: BoolArray) -> IntArray:
+    """Order of the points, (P,), in which closed paths begin after a step that is dropped."""
+    order = np.arange(len(paths.points))
+    for k in np.flatnonzero(paths.closed).tolist():
+        first, last = int(paths.offsets[k]), int(paths.offsets[k + 1]) - 1
+        gaps = np.flatnonzero(dropped[first:last])
+        if len(gaps):
+            ring = np.roll(np.arange(first, last), -(gaps[0] + 1))
+            order[first : last + 1] = np.append(ring, ring[0])
+    return order
 
 
 def pool(parts: Sequence[Samples]) -> Samples:

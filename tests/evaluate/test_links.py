@@ -29,6 +29,13 @@ def test_lengths_of_a_path_by_hand(framed):
     assert values["link_outside"] == pytest.approx(15.0, abs=1e-3)
 
 
+def test_a_link_over_the_start_of_a_closed_path_is_one(framed):
+    ring = [[5, 5], [55, 5], [55, 35], [5, 35], [5, 5]]
+    values = indices(framed.plane([[2, 2], [9, 2]], ring, links=[[0], [0, 3]]))
+    assert values["links"] == 2.0
+    assert indices(framed.plane(ring, links=[[0, 2]]))["links"] == 2.0
+
+
 def test_no_links(framed):
     assert set(indices(framed.plane(LINE)).values()) == {0.0}
     assert set(indices(framed.plane()).values()) == {0.0}

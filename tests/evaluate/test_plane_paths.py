@@ -62,7 +62,12 @@ def test_links_end_where_they_leave_the_part(framed):
 def test_a_closed_path_stays_closed_only_where_it_is_whole(framed):
     ring = [[5, 5], [55, 5], [55, 35], [5, 35], [5, 5]]
     assert framed.plane(ring, links=[[1]]).in_part.closed.tolist() == [True]
-    assert framed.plane(ring, links=[[1]]).strands.closed.tolist() == [False, False]
+    one = framed.plane(ring, links=[[1]]).strands
+    assert one.closed.tolist() == [False]
+    # The strand goes on where the path began.
+    assert pieces(one) == [[[55, 35], [5, 35], [5, 5], [55, 5]]]
+    two = framed.plane(LINE, ring, LINE, links=[[], [0, 2, 3], []]).strands
+    assert pieces(two) == [LINE, [[55, 5], [55, 35]], LINE]
 
 
 def test_a_path_of_links_alone_has_no_strands(framed):
