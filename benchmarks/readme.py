@@ -1,4 +1,4 @@
-"""Put the table that ``ccfem compare loop`` prints, and its picture, into the README.
+"""Put the table that ``ccfem compare loop`` prints into the README, and draw its pictures.
 
 Run ``python benchmarks/readme.py`` whenever a default changes.
 """
@@ -11,14 +11,31 @@ import sys
 import tempfile
 from pathlib import Path
 
+from ccfem.cases import create_case
+from ccfem.elasticity import solve
+from ccfem.layers import slice_planar
+from ccfem.plot.paths import layer_picture
+from ccfem.strategies import create, plan
+
 ROOT = Path(__file__).resolve().parents[1]
 PLACE = re.compile(
     r"(<!-- printed by: python benchmarks/readme.py -->\n```text\n).*?(```\n<!-- end -->)", re.S
 )
 
 
+def draw_bridge() -> None:
+    """Draw the one path of `svt` on the optimised bridge: docs/bridge.png."""
+    case = create_case("bridge")
+    stress = solve(case.problem)["down"]
+    layers = slice_planar(case.problem.mesh, case.build, count=1)
+    paths = plan(create("svt"), layers, stress, case.machine)
+    layer = layers[0]
+    figure = layer_picture(layer, stress.on(layer), paths, case.machine.fibre_width)
+    figure.savefig(ROOT / "docs" / "bridge.png", dpi=220)
+
+
 def main() -> None:
-    """Run the comparison and write README.md and docs/loop.png."""
+    """Run the comparison and write README.md, docs/loop.png and docs/bridge.png."""
     with tempfile.TemporaryDirectory() as folder:
         command = [sys.executable, "-m", "ccfem", "compare", "loop", "--out", folder]
         environment = {**os.environ, "COLUMNS": "100"}
@@ -27,7 +44,6 @@ def main() -> None:
         )
         lines = [line.rstrip() for line in done.stdout.splitlines()]
         shown = [line for line in lines[:-1] if line]  # the last one names the temporary folder
-        (ROOT / "docs").mkdir(exist_ok=True)
         shutil.copy(Path(folder) / "overview.png", ROOT / "docs" / "loop.png")
     readme = ROOT / "README.md"
     text = "\n".join(shown) + "\n"
@@ -35,6 +51,7 @@ def main() -> None:
     if count != 1:
         raise SystemExit("README.md has no place for the table: put its two comments back")
     readme.write_text(page)
+    draw_bridge()
 
 
 if __name__ == "__main__":

@@ -7,10 +7,12 @@ in one hue from light to dark; a quantity with a sign runs from blue over grey t
 from collections.abc import Iterable
 from typing import Any
 
-__all__ = ["INK", "OUTLINE", "SECTION", "palette", "scale"]
+__all__ = ["INK", "LINK", "OUTLINE", "SECTION", "palette", "scale"]
 
 INK = "#1d2430"
 """Text, and fibre over a stress map."""
+LINK = "#4a8fd4"
+"""Fibre that only joins strands."""
 OUTLINE = "#5d6878"
 """Border of a section."""
 SECTION = "#ececea"

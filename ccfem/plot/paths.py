@@ -2,6 +2,7 @@
 
 from collections.abc import Iterable, Mapping
 from dataclasses import dataclass
+from itertools import pairwise
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
@@ -10,7 +11,7 @@ from ccfem.arrays import FloatArray
 from ccfem.elasticity.stress_field import LayerStress
 from ccfem.layers.layer import Layer
 from ccfem.plot.canvas import colour_bar, extents_of, inches_per_mm, new_figure, scale_bar, title
-from ccfem.plot.colours import INK, OUTLINE, SECTION, palette, scale
+from ccfem.plot.colours import INK, LINK, OUTLINE, SECTION, palette, scale
 from ccfem.tensor import in_plane, largest_in_plane
 from ccfem.toolpaths import FIBRE, Toolpaths
 
@@ -128,7 +129,7 @@ def draw_stress(axes: "Axes", stress: LayerStress, limit: float) -> Any:
 def draw_paths(
     axes: "Axes", layer: Layer, paths: Toolpaths, width: float, colour: str = INK
 ) -> None:
-    """Draw the fibre paths of a layer in one colour.
+    """Draw the fibre paths of a layer in one colour, and their links in another.
 
     Parameters
     ----------
@@ -143,18 +144,33 @@ def draw_paths(
     from matplotlib.collections import LineCollection
 
     wanted = paths.select((paths.layer == layer.index) & (paths.kind == FIBRE))
-    lines = [layer.to_plane(path) for path in wanted]
-    axes.add_collection(
-        LineCollection(
-            lines,
-            colors=colour,
-            linewidths=_points(axes, _LINE * width),
-            capstyle="round",
-            joinstyle="round",
-            zorder=2.0,
-        ),
-        autolim=False,
-    )
+    strands, links = _strands_and_links(wanted, layer)
+    for lines, shown, order in ((strands, colour, 2.0), (links, LINK, 1.9)):
+        axes.add_collection(
+            LineCollection(
+                lines,
+                colors=shown,
+                linewidths=_points(axes, _LINE * width),
+                capstyle="round",
+                joinstyle="round",
+                zorder=order,
+            ),
+            autolim=False,
+        )
+
+
+def _strands_and_links(paths: Toolpaths, layer: Layer) -> tuple[list[FloatArray], list[FloatArray]]:
+    """Paths cut where links begin and end: the strands, and the links, as (n, 2) arrays, mm."""
+    found: tuple[list[FloatArray], list[FloatArray]] = ([], [])
+    plane = layer.to_plane(paths.points)
+    for start, end in pairwise(paths.offsets.tolist()):
+        link = paths.link[start : end - 1]
+        if not len(link):
+            continue
+        turns = [0, *(np.flatnonzero(np.diff(link)) + 1).tolist(), len(link)]
+        for first, last in pairwise(turns):
+            found[int(link[first])].append(plane[start + first : start + last + 1])
+    return found
 
 
 def draw_segments(axes: "Axes", coloured: Coloured, width: float) -> Any:

@@ -8,7 +8,7 @@ from ccfem.elasticity.stress_field import LayerStress
 from ccfem.errors import InputError
 from ccfem.layers.planar import slice_planar
 from ccfem.plot.canvas import extents_of, inches_per_mm, new_figure, png, save
-from ccfem.plot.colours import INK, SECTION, palette, scale
+from ccfem.plot.colours import INK, LINK, SECTION, palette, scale
 from ccfem.plot.fields import scalar_picture, tension_picture
 from ccfem.plot.on_paths import alignment_on_paths, curvature_on_paths, force_on_paths
 from ccfem.plot.paths import (
@@ -242,3 +242,11 @@ def test_pictures_show_links_outside_the_section():
         left, right = figure.axes[0].get_xlim()
         assert left < 0.0
         assert right > 80.0 > inside[1]
+
+
+def test_links_have_a_colour_of_their_own():
+    line = np.array([[10.0, 8.0], [50.0, 8.0], [50.0, 22.0], [10.0, 22.0]])
+    paths = Toolpaths.from_plane([line], LAYER, link=[np.array([False, True, False, False])])
+    figure = layer_picture(LAYER, None, paths, 4.0)
+    for x, y, colour in [(30.0, 8.0, INK), (50.0, 15.0, LINK), (30.0, 22.0, INK)]:
+        np.testing.assert_array_equal(pixel(figure, x, y), rgb(colour))
