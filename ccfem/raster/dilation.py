@@ -38,8 +38,7 @@ def first_touch(ring: IntArray) -> int:
     return int(ring[inside & ~ndimage.binary_erosion(inside)].min())
 
 
-def ring_regions(ring: IntArray, guide: IntArray, last: int | None = None) -> IntArray:
-    """One region for each ring of each guide, up to a last ring; -1 beyond and outside."""
+def ring_regions(ring: IntArray, guide: IntArray) -> IntArray:
+    """One region for each ring of each guide; -1 outside."""
     count = int(ring.max(initial=0)) + 1
-    wanted = ring >= 0 if last is None else (ring >= 0) & (ring <= last)
-    return np.where(wanted, guide * count + ring, -1)
+    return np.where(ring >= 0, guide * count + ring, -1)
