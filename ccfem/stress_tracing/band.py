@@ -32,7 +32,7 @@ _TURNED = np.array([1.0, 1.0, -1.0, -1.0, 1.0])
 _PADDING = 10.0
 """Length, mm, that is cut off at both ends after that."""
 _EXTENSION = 5.0
-_LEAST_HALF = 3.0
+_LEAST_HALF = 5.0
 """A band is extended at both ends by so often half its width and so many mm; its tracks are clipped
 afterwards."""
 
@@ -47,6 +47,8 @@ class Band:
         In nearly equal steps.
     core : slice
         Points that are not extended.
+    within : slice
+        Points that do not lie beyond the middle of the joints that it ends in.
     width : (k,) array, mm
         Distance of the rails along the core, before smoothing.
     free : (n,) array
@@ -58,6 +60,7 @@ class Band:
     middle: FloatArray
     half: FloatArray
     core: slice
+    within: slice
     width: FloatArray
     free: FloatArray
     closed: bool = False
@@ -88,25 +91,32 @@ def band(path: MainPath, frame: Frame, crossing: bool = True) -> Band:
     width = 2.0 * np.linalg.norm(strip[:, 2:4], axis=1)
     if path.closed:
         strip = _smoothed(strip[:-1], "wrap")
-        return _as_band(strip, slice(0, len(strip)), width, closed=True)
+        every = slice(0, len(strip))
+        return _as_band(strip, every, every, width, closed=True)
     ends = (path.members[0].ends[0], path.members[-1].ends[1])
-    reach = [
-        _EXTENSION * (_LEAST_HALF + wide)
-        if crossing or end == FREE
-        else float(np.linalg.norm(frame.joints[end] - place))
-        for end, place, wide in zip(ends, strip[[0, -1], :2], 0.5 * width[[0, -1]], strict=True)
+    farthest = _EXTENSION * (_LEAST_HALF + 0.5 * width[[0, -1]])
+    middle = [
+        far if end == FREE else float(np.linalg.norm(frame.joints[end] - place))
+        for end, place, far in zip(ends, strip[[0, -1], :2], farthest, strict=True)
     ]
+    reach = farthest if crossing else middle
     before = _extension(strip[::-1], reach[0] + _PADDING)[::-1]
     after = _extension(strip, reach[1] + _PADDING)
     padding = round(_PADDING / STEP)
     core = slice(len(before) - padding, len(before) - padding + len(strip))
     strip = _smoothed(np.concatenate([before, strip, after]), "nearest")[padding:-padding]
-    return _as_band(strip, core, width, closed=False)
+    within = slice(
+        max(0, core.start - round(middle[0] / STEP)),
+        min(len(strip), core.stop + round(middle[1] / STEP)),
+    )
+    return _as_band(strip, core, within, width, closed=False)
 
 
-def _as_band(strip: FloatArray, core: slice, width: FloatArray, closed: bool) -> Band:
+def _as_band(
+    strip: FloatArray, core: slice, within: slice, width: FloatArray, closed: bool
+) -> Band:
     free = np.clip(strip[:, 4], 0.0, 1.0)
-    return Band(strip[:, :2], strip[:, 2:4], core, width, free, closed)
+    return Band(strip[:, :2], strip[:, 2:4], core, within, width, free, closed)
 
 
 def _own(member: Member, frame: Frame) -> BoolArray:

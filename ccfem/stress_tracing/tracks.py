@@ -74,7 +74,7 @@ def tracks(
         if band.closed:
             line = ring_from(np.concatenate([line, line[:1]]), seam)
         else:
-            line = clipped(line, section, band.core)
+            line = clipped(line, section, band.core, band.within)
         if len(line) > 1:
             found.append(_held(line, section, inner, band.closed))
     return found
@@ -103,11 +103,12 @@ def eased(line: FloatArray, radius: float, closed: bool = False) -> FloatArray:
     return line
 
 
-def clipped(line: FloatArray, section: Any, core: slice) -> FloatArray:
+def clipped(line: FloatArray, section: Any, core: slice, within: slice) -> FloatArray:
     """Part of a line round the middle of its core up to where it leaves a section for good.
 
     Excursions shorter than 1.5 mm do not end it: they would cut a track that grazes the border
-    into pieces. Its ends lie on the border, or are those of the line.
+    into pieces. Its ends lie on the border; an end where it does not leave the section, but would
+    run on along the member behind a joint, is that of the points `within`.
     """
     inside = shapely.contains_xy(section, line)
     own = np.flatnonzero(inside[core]) + core.start
@@ -117,8 +118,15 @@ def clipped(line: FloatArray, section: Any, core: slice) -> FloatArray:
     start = int(own[np.argmin(np.abs(own - middle))])
     first = start - _last_inside(line[start::-1], inside[start::-1])
     last = start + _last_inside(line[start:], inside[start:])
-    ahead = _way_out(line[last], line[last + 1], section) if last + 1 < len(line) else line[:0]
-    back = _way_out(line[first], line[first - 1], section) if first > 0 else line[:0]
+    ahead = back = line[:0]
+    if first > 0:
+        back = _way_out(line[first], line[first - 1], section)
+    else:
+        first = min(within.start, start)
+    if last + 1 < len(line):
+        ahead = _way_out(line[last], line[last + 1], section)
+    else:
+        last = max(within.stop - 1, start)
     return np.concatenate([back, line[first : last + 1], ahead])
 
 

@@ -74,8 +74,15 @@ def test_tracks_that_end_in_a_joint_cross_it_or_stop_in_it(stressed):
 def test_short_excursions_do_not_end_a_track():
     section = shapely.box(0, 0, 20, 10) - shapely.box(9.5, 4, 10.5, 6) - shapely.box(14, 4, 17, 6)
     line = np.stack([np.arange(-5.0, 25.5, 0.5), np.full(61, 5.0)], axis=1)
-    kept = clipped(line, section, slice(10, 20))
+    kept = clipped(line, section, slice(10, 20), slice(0, 61))
     np.testing.assert_allclose(kept[[0, -1], 0], [0.0, 14.0])
+
+
+def test_tracks_that_do_not_leave_stop_where_they_may():
+    """At the one end the line leaves the section, at the other it ends in it."""
+    line = np.stack([np.arange(-5.0, 25.5, 0.5), np.full(61, 5.0)], axis=1)
+    kept = clipped(line, shapely.box(0, 0, 40, 10), slice(20, 30), slice(25, 45))
+    np.testing.assert_allclose(kept[[0, -1], 0], [0.0, 17.0])
 
 
 def test_tracks_stay_in_a_section_with_a_notch():
@@ -134,7 +141,7 @@ def test_tracks_turn_to_the_stress_where_nothing_guides_them(stressed):
     lines = np.stack([np.stack([x, np.full(len(x), y)], axis=1) for y in (8.0, 12.0)])
     zero = np.zeros((len(x), 2))
     free = (np.abs(x - 30.0) < 10.0).astype(float)
-    strip = Band(lines[0], zero, slice(0, len(x)), np.zeros(len(x)), free)
+    strip = Band(lines[0], zero, *2 * (slice(0, len(x)),), np.zeros(len(x)), free)
     moved = relaxation.relaxed(lines, strip, stressed(section, tensor), section)
     slope = np.degrees(np.arctan(np.diff(moved[0, :, 1]) / 0.5))
     assert 2.0 < slope[60] < 20.0
@@ -146,7 +153,7 @@ def test_tracks_along_the_stress_or_across_it_stay(stressed):
     lines = np.stack([x, np.full(len(x), 10.0)], axis=1)[None]
     section = shapely.box(0, 0, 60, 20)
     zero = np.zeros((len(x), 2))
-    strip = Band(lines[0], zero, slice(0, len(x)), np.zeros(len(x)), np.ones(len(x)))
+    strip = Band(lines[0], zero, *2 * (slice(0, len(x)),), np.zeros(len(x)), np.ones(len(x)))
     for tensor in (PULL, [[0.0, 0.0], [0.0, -1.0]]):
         moved = relaxation.relaxed(lines, strip, stressed(section, tensor), section)
         np.testing.assert_allclose(moved, lines, atol=1e-9)
@@ -164,7 +171,7 @@ def test_tracks_that_turn_keep_apart(stressed):
     x = np.arange(0.0, 60.5, 0.5)
     middle = np.stack([x, np.full(len(x), 10.0)], axis=1)
     half = np.broadcast_to([0.0, 8.0], middle.shape)
-    strip = Band(middle, half, slice(0, len(x)), np.zeros(len(x)), np.ones(len(x)))
+    strip = Band(middle, half, *2 * (slice(0, len(x)),), np.zeros(len(x)), np.ones(len(x)))
     lines = middle + np.array([0.75, 0.25, -0.25, -0.75])[:, None, None] * half
     apart = -np.diff(relaxation.relaxed(lines, strip, stressed(section, tensor), section), axis=0)
     assert apart[..., 1].min() < 3.0
