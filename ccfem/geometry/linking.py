@@ -21,6 +21,7 @@ from ccfem.geometry.exchanges import improved_order
 from ccfem.geometry.link_curves import LinkCurves, link_curve, link_curves, stub_points
 from ccfem.geometry.offsets import ring_from
 from ccfem.geometry.ordering import costs_between_ends, order_clusters, strand_visits
+from ccfem.geometry.places import INSIDE, cut_at_section
 from ccfem.geometry.polylines import between
 from ccfem.geometry.ring_routes import RingRoutes, ring_cost, ring_curve, ring_routes
 from ccfem.geometry.section_grid import section_grid
@@ -57,8 +58,33 @@ class LinkedPath:
     @property
     def links(self) -> list[FloatArray]:
         """The links in their order, as (m, 2) arrays, mm."""
-        edges = np.flatnonzero(np.diff(np.concatenate([[False], self.link, [False]]).astype(int)))
-        return [self.points[a : b + 1] for a, b in zip(edges[::2], edges[1::2], strict=True)]
+        return [self.points[a : b + 1] for a, b in self._stretches()]
+
+    def without_links_inside(self, section: Any, longest: float) -> "list[LinkedPath]":
+        """Leave out links of which more than `longest`, mm, lies inside a section.
+
+        The path falls into one piece more than there are such links.
+        """
+        stretches = self._stretches()
+        steps = np.flatnonzero(self.link)
+        cut = cut_at_section(self.points[steps], self.points[steps + 1], section)
+        size = np.linalg.norm(self.points[steps + 1] - self.points[steps], axis=1)[cut.step]
+        inside = size * (cut.end - cut.begin) * (cut.place == INSIDE)
+        owner = np.repeat(np.arange(len(stretches)), np.diff(stretches)[:, 0])
+        left_out = np.bincount(owner[cut.step], inside, len(stretches)) > longest
+        starts = [0, *stretches[left_out, 1]]
+        ends = [*stretches[left_out, 0], len(self.points) - 1]
+        found = []
+        for a, b in zip(starts, ends, strict=True):
+            link = self.link[a : b + 1].copy()
+            link[-1:] = False
+            found.append(LinkedPath(self.points[a : b + 1], link))
+        return found
+
+    def _stretches(self) -> IntArray:
+        """Points (k, 2) at which each link begins and ends."""
+        edges = np.diff(np.concatenate([[False], self.link, [False]]).astype(int))
+        return np.flatnonzero(edges).reshape(-1, 2)
 
 
 def link_tracks(

@@ -24,6 +24,7 @@ from ccfem.stress_tracing.criterion import Criterion
 from ccfem.stress_tracing.frame import frame
 from ccfem.stress_tracing.main_paths import main_paths
 from ccfem.stress_tracing.tracks import track_count, tracks
+from ccfem.stress_tracing.walk import walk
 from ccfem.toolpaths import Toolpaths
 
 __all__ = ["Svt"]
@@ -43,13 +44,24 @@ class Svt:
     the section join them to one path for each piece of the section. A section without members (a
     disc, a square) is filled by concentric rings.
 
+    It is meant for frames of slim members. In parts with wide ones, as a plate with a hole, joints
+    take most of the section: strands lie there side by side, or over each other, and where links
+    would lead through the section for long the path is cut.
+
     Attributes
     ----------
+    mode : "graph" or "points", default "graph"
+        Whether members are joined at the joints; or load paths are traced over the points of the
+        medial axis, as the paper has it, and are laid themselves, as single strands, whatever the
+        parameters below up to `minimum_length`: that skips joints and leaves points over, so that
+        no section is filled from them.
     spacing : float, default 1
         Distance of neighbouring strands in fibre widths, at least 1, where the main path is wide;
         strands are closer where it is narrow.
     links : "outside" or "none", default "outside"
         Join all strands of a piece of the section to one path, or lay single strands.
+    longest_inside : float, mm, default 6
+        Links of which more than that lies inside the section are left out: the path is cut there.
     crossings : bool, default True
         Whether strands that end in a joint cross it and leave the section on the far side, as in
         the paper; otherwise they stop in its middle.
@@ -64,8 +76,10 @@ class Svt:
         Shorter paths are dropped; by default the shortest that the machine can cut.
     """
 
+    mode: Literal["graph", "points"] = "graph"
     spacing: float = 1.0
     links: Literal["outside", "none"] = "outside"
+    longest_inside: float = 6.0
     crossings: bool = True
     aligned: bool = True
     turn: float = 75.0
@@ -76,10 +90,16 @@ class Svt:
     crosses: ClassVar[bool] = True
 
     def __post_init__(self) -> None:
+        if self.mode not in ("graph", "points"):
+            raise InputError(f"svt.mode must be 'graph' or 'points'; got {self.mode!r}")
         if not 1.0 <= self.spacing < float("inf"):
             raise InputError(f"svt.spacing must be at least 1 fibre width; got {self.spacing}")
         if self.links not in ("outside", "none"):
             raise InputError(f"svt.links must be 'outside' or 'none'; got {self.links!r}")
+        if not 0.0 <= self.longest_inside < float("inf"):
+            raise InputError(
+                f"svt.longest_inside must be a finite number >= 0; got {self.longest_inside}"
+            )
         if not 0.0 < self.turn < 180.0:
             raise InputError(f"svt.turn must lie between 0 and 180 degrees; got {self.turn}")
         if not self.width_ratio >= 1.0:
@@ -90,7 +110,7 @@ class Svt:
             )
 
     def __call__(self, layer: Layer, stress: LayerStress, machine: Machine) -> Toolpaths:
-        """Plan the paths of one layer: one for each piece of its section, with links outside."""
+        """Plan the paths of one layer: for each piece of its section one, or as few as can be."""
         lines: list[FloatArray] = []
         link: list[BoolArray] = []
         for piece in shapely.get_parts(layer.polygon):
@@ -117,14 +137,17 @@ class Svt:
         self, piece: Any, stress: LayerStress, machine: Machine
     ) -> list[tuple[FloatArray, BoolArray]]:
         """Paths of one piece of the section, with the mask of their links."""
+        if self.mode == "points":
+            return _unlinked(walk(piece, stress, _SAMPLING * machine.fibre_width))
         groups = self.groups(piece, stress, machine)
         if not any(groups):
-            return [(line, np.zeros(len(line), dtype=bool)) for line in self._rings(piece, machine)]
+            return _unlinked(self._rings(piece, machine))
         if self.links == "none":
-            return [(line, np.zeros(len(line), bool)) for group in groups for line in group]
+            return _unlinked([line for group in groups for line in group])
         width = self.spacing * machine.fibre_width
         path = link_tracks(groups, piece, machine.minimum_radius, width)
-        return [(path.points, path.link)]
+        parts = path.without_links_inside(piece, self.longest_inside)
+        return [(part.points, part.link) for part in parts]
 
     def _rings(self, piece: Any, machine: Machine) -> list[FloatArray]:
         """Concentric rings of a piece that has no members, joined by ramps."""
@@ -132,3 +155,7 @@ class Svt:
         levels = offset_rings(piece, 0.5 * width, self.spacing * width, width)
         start = rings(piece)[0][:2].mean(axis=0)
         return join_rings(levels, start, self.spacing * width, width) if levels else []
+
+
+def _unlinked(lines: list[FloatArray]) -> list[tuple[FloatArray, BoolArray]]:
+    return [(line, np.zeros(len(line), dtype=bool)) for line in lines]

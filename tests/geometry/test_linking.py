@@ -7,7 +7,7 @@ import shapely
 from ccfem.errors import InputError
 from ccfem.geometry.dubins import dubins, dubins_curve
 from ccfem.geometry.link_curves import curve_cost
-from ccfem.geometry.linking import link_tracks
+from ccfem.geometry.linking import LinkedPath, link_tracks
 from ccfem.geometry.places import INSIDE, OUTSIDE, VOID
 from ccfem.geometry.section_grid import contains, place, place_and_room, section_grid
 
@@ -221,6 +221,23 @@ def test_a_link_leads_round_the_part_rather_than_over_a_window(weight, over) -> 
     else:
         assert line.intersection(shapely.box(0, 0, 60, 60)).length < 1e-6
         assert line.length < 150.0
+
+
+def test_links_inside_are_left_out() -> None:
+    """Links of 10 mm outside, of 2 mm inside, of 5 mm inside, and of 3 mm over the window."""
+    section = shapely.box(0, 0, 30, 20) - shapely.box(20, 5, 23, 15)
+    points = [[0, 0], [0, -5], [5, -5], [5, 0], [5, 5], [7, 5], [7, 10], [12, 10], [20, 10]]
+    points = np.array([*points, [23, 10], [30, 10]], float)
+    link = np.isin(np.arange(11), [0, 1, 2, 4, 6, 8])
+    link[0] = False
+    path = LinkedPath(points, link)
+    assert [len(part.points) for part in path.without_links_inside(section, 5.0)] == [11]
+    first, last = path.without_links_inside(section, 4.9)
+    np.testing.assert_array_equal(first.points, points[:7])
+    np.testing.assert_array_equal(last.points, points[7:])
+    np.testing.assert_array_equal(
+        np.concatenate([first.link, last.link]), np.where(np.arange(11) == 6, False, link)
+    )
 
 
 def test_grid_knows_places_and_room() -> None:

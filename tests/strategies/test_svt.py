@@ -1,5 +1,7 @@
 """The bridge of Wang et al. 2021 as one path, and parts without a frame."""
 
+from dataclasses import replace
+
 import numpy as np
 import pytest
 import shapely
@@ -109,6 +111,50 @@ def test_single_strands_are_those_of_the_path(bridge, bridge_path):
     assert not single.link.any()
 
 
+def test_paths_traced_over_points_lie_on_the_medial_axis():
+    """The strip has one, along its middle; nothing is filled or linked."""
+    layer, stress = pulled(shapely.box(0, 0, 60, 9))
+    paths = create("svt", {"mode": "points"})(layer, stress, MACHINE)
+    assert len(paths) == 1
+    np.testing.assert_allclose(paths.points[:, 1], 4.5, atol=1e-3)
+    assert np.ptp(paths.points[:, 0]) > 50.0
+    assert not paths.link.any()
+
+
+@pytest.fixture(scope="module")
+def plate_with_hole():
+    """Both ends are wide members, each forked into two beside the hole."""
+    return pulled(shapely.box(-60, -12, 60, 12) - shapely.Point(0, 0).buffer(5.0))
+
+
+def test_wide_members_are_not_laid_over_each_other(plate_with_hole):
+    layer, stress = plate_with_hole
+    paths = create("svt", {"links": "none"})(layer, stress, MACHINE)
+    lines = np.split(paths.points[:, :2], paths.offsets[1:-1])
+    beads = shapely.buffer([shapely.LineString(x) for x in lines], 0.45, cap_style="flat")
+    covered = shapely.union_all(beads).intersection(layer.polygon).area / layer.polygon.area
+    assert covered > 0.95
+    assert paths.lengths.sum() * MACHINE.fibre_width / layer.polygon.area < 1.15
+
+
+@pytest.mark.parametrize("longest", [6.0, 1000.0])
+def test_no_link_lies_inside_for_longer_than_is_allowed(plate_with_hole, longest):
+    layer, stress = plate_with_hole
+    machine = replace(MACHINE, fibre_width=1.8, minimum_radius=3.0)
+    paths = create("svt", {"longest_inside": longest})(layer, stress, machine)
+    edges = np.flatnonzero(np.diff(np.concatenate([[False], paths.link]).astype(int)))
+    plane = paths.points[:, :2]
+    links = [plane[a : b + 1] for a, b in zip(edges[::2], edges[1::2], strict=True)]
+    inside = [shapely.LineString(x).intersection(layer.polygon).length for x in links]
+    assert len(plane_strands(paths)) == len(links) + len(paths)
+    assert max(inside) <= longest
+    if longest == 1000.0:
+        assert len(paths) == 1
+        assert max(inside) > 6.0
+    else:
+        assert len(paths) > 10
+
+
 @pytest.mark.parametrize("section", [shapely.box(0, 0, 18, 18), DISC], ids=["square", "disc"])
 def test_square_and_disc_are_filled_by_rings(section):
     layer, stress = pulled(section)
@@ -147,7 +193,15 @@ def test_every_piece_of_a_section_has_its_path():
 
 @pytest.mark.parametrize(
     ("name", "value"),
-    [("spacing", 0.5), ("links", "inside"), ("turn", 180.0), ("width_ratio", 0.5)],
+    [
+        ("mode", "walk"),
+        ("longest_inside", -1.0),
+        ("longest_inside", float("nan")),
+        ("spacing", 0.5),
+        ("links", "inside"),
+        ("turn", 180.0),
+        ("width_ratio", 0.5),
+    ],
 )
 def test_parameters_out_of_range_are_refused(name, value):
     with pytest.raises(InputError, match=f"svt.{name}"):
