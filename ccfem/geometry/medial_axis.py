@@ -229,6 +229,9 @@ class _Graph:
         if not inner.any():
             return None
         kept = (edges >= 0).all(axis=1) & inner[edges].all(axis=1)
+        # From one side of a thin hole to the other.
+        ways = shapely.linestrings(diagram.vertices[edges[kept]])
+        kept[kept] = shapely.contains(prepared, ways)
         sites, edges = sites[kept], (np.cumsum(inner) - 1)[edges[kept]]
         points, nearest = diagram.vertices[inner], nearest[:-1][inner]
         # Samples on one circle give several vertices in one place.

@@ -130,3 +130,14 @@ def test_section_is_not_prepared():
     section = shapely.from_wkb(shapely.to_wkb(PLATE))
     medial_axis(section, 1.0)
     assert not shapely.is_prepared(section)
+
+
+@pytest.mark.parametrize(
+    "hole", [[(10, 9.5), (20.3, 10.2), (14, 10.5)], [(10, 10), (15, 14), (20, 10), (15, 12)]]
+)
+def test_axis_does_not_cross_a_thin_hole(hole) -> None:
+    """Samples at both sides of its tip are neighbours, across the hole."""
+    plate = shapely.box(0, 0, 40, 20).difference(shapely.Polygon(hole))
+    for segment in medial_axis(plate, 0.45, object_angle=None, arc_chord=1.6).segments:
+        assert plate.covers(shapely.LineString(segment.points))
+        assert np.linalg.norm(segment.left - segment.right, axis=1).min() > 0.1
