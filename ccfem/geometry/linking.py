@@ -34,6 +34,8 @@ _EXACT_GROUPS = 10
 """Most groups of which the best order is found for sure."""
 _ROUNDS = 15
 """Of the search among single tracks."""
+_ON_BORDER = 1e-3
+"""Length, mm, of a link that begins on the border, by which it may seem to lie inside."""
 
 
 @dataclass(frozen=True)
@@ -67,11 +69,11 @@ class LinkedPath:
         """
         stretches = self._stretches()
         steps = np.flatnonzero(self.link)
-        cut = cut_at_section(self.points[steps], self.points[steps + 1], section)
+        cut = cut_at_section(self.points[steps], self.points[steps + 1], section, tolerance=0.0)
         size = np.linalg.norm(self.points[steps + 1] - self.points[steps], axis=1)[cut.step]
         inside = size * (cut.end - cut.begin) * (cut.place == INSIDE)
         owner = np.repeat(np.arange(len(stretches)), np.diff(stretches)[:, 0])
-        left_out = np.bincount(owner[cut.step], inside, len(stretches)) > longest
+        left_out = np.bincount(owner[cut.step], inside, len(stretches)) > longest + _ON_BORDER
         starts = [0, *stretches[left_out, 1]]
         ends = [*stretches[left_out, 0], len(self.points) - 1]
         found = []

@@ -85,6 +85,8 @@ def band(path: MainPath, frame: Frame, crossing: bool = True) -> Band:
     right = np.concatenate([member.right for member in path.members])[own]
     strip = np.column_stack([0.5 * (left + right), 0.5 * (left - right), np.zeros(len(left))])
     gap = np.diff(np.flatnonzero(own)) > 1
+    if _arc_length(strip)[-1] < STEP:
+        strip, gap = _stub(strip), np.zeros(1, dtype=bool)
     if path.closed:
         strip, gap = _as_ring(strip, np.append(gap, not own[0] or not own[-1]))
     strip = _even(_bridged(strip, gap), path.closed)
@@ -110,6 +112,16 @@ def band(path: MainPath, frame: Frame, crossing: bool = True) -> Band:
         min(len(strip), core.stop + round(middle[1] / STEP)),
     )
     return _as_band(strip, core, within, width, closed=False)
+
+
+def _stub(strip: FloatArray) -> FloatArray:
+    """Strip of one step, (2, 5), for one without length: across the vector between its sides."""
+    centre = strip.mean(axis=0)
+    x, y = centre[2:4]
+    along = np.array([y, -x]) / np.hypot(x, y)
+    ends = np.stack([centre, centre])
+    ends[:, :2] += STEP * np.array([[-0.5], [0.5]]) * along
+    return ends
 
 
 def _as_band(

@@ -70,6 +70,11 @@ def test_bridge_is_one_path_with_its_links_outside(bridge, bridge_path):
         assert layer.polygon.buffer(1e-4).covers(shapely.LineString(strand))
 
 
+def test_links_outside_are_never_left_out(bridge, bridge_path):
+    strict = create("svt", {"longest_inside": 0.0})(*bridge)
+    np.testing.assert_array_equal(strict.points, bridge_path.points)
+
+
 def test_bridge_has_arch_tie_and_four_diagonals(bridge):
     """Figure 7 of the paper: the arch with the rafters, the tie, and the diagonals between."""
     layer, stress, machine = bridge

@@ -5,7 +5,7 @@ import shapely
 from ccfem.geometry.polylines import turning_angles
 from ccfem.stress_tracing import relaxation
 from ccfem.stress_tracing.band import Band, band
-from ccfem.stress_tracing.frame import frame
+from ccfem.stress_tracing.frame import FREE, Frame, Member, frame
 from ccfem.stress_tracing.main_paths import MainPath, main_paths
 from ccfem.stress_tracing.tracks import clipped, eased, track_count, tracks
 
@@ -35,6 +35,19 @@ def test_straight_strip_is_filled_from_end_to_end():
 def test_member_thinner_than_a_fibre_has_one_track():
     (line,) = laid(shapely.box(0, 0, 40, 0.5), 0.9, 0.1)
     np.testing.assert_allclose(line[:, 1], 0.25, atol=1e-6)
+
+
+def test_member_without_length_has_tracks_across_its_rails():
+    """As between holes that almost touch: both joints take all of it but one point."""
+    section = shapely.box(-8, -6, 8, 6) - shapely.box(-8, 2, -1, 6) - shapely.box(-8, -6, -1, -2)
+    point, left, right = np.array([[[-5.0, 0.0]], [[-5.0, 2.0]], [[-5.0, -2.0]]])
+    members = Frame((Member(point, left, right, (FREE, FREE)),), np.zeros((0, 2)), np.zeros(0))
+    strip = band(MainPath(members.members), members)
+    found = tracks(strip, 4, section)
+    assert len(found) == 4
+    for line, height in zip(found, (1.5, 0.5, -0.5, -1.5), strict=True):
+        np.testing.assert_allclose(line[:, 1], height, atol=1e-9)
+        np.testing.assert_allclose(line[[0, -1], 0], [-8.0, 8.0], atol=1e-9)
 
 
 def test_ring_has_closed_tracks_at_even_distances():
