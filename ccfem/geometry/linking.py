@@ -21,7 +21,7 @@ from ccfem.geometry.exchanges import improved_order
 from ccfem.geometry.link_curves import LinkCurves, link_curve, link_curves, stub_points
 from ccfem.geometry.offsets import ring_from
 from ccfem.geometry.ordering import costs_between_ends, order_clusters, strand_visits
-from ccfem.geometry.places import INSIDE, cut_at_section
+from ccfem.geometry.places import INSIDE, VOID, cut_at_section
 from ccfem.geometry.polylines import between
 from ccfem.geometry.ring_routes import RingRoutes, ring_cost, ring_curve, ring_routes
 from ccfem.geometry.section_grid import section_grid
@@ -62,8 +62,10 @@ class LinkedPath:
         """The links in their order, as (m, 2) arrays, mm."""
         return [self.points[a : b + 1] for a, b in self._stretches()]
 
-    def without_links_inside(self, section: Any, longest: float) -> "list[LinkedPath]":
-        """Leave out links of which more than `longest`, mm, lies inside a section.
+    def without_long_links(
+        self, section: Any, inside: float, over_void: float = np.inf
+    ) -> "list[LinkedPath]":
+        """Leave out links of which more than so many mm lies inside a section or over its voids.
 
         The path falls into one piece more than there are such links.
         """
@@ -71,9 +73,11 @@ class LinkedPath:
         steps = np.flatnonzero(self.link)
         cut = cut_at_section(self.points[steps], self.points[steps + 1], section, tolerance=0.0)
         size = np.linalg.norm(self.points[steps + 1] - self.points[steps], axis=1)[cut.step]
-        inside = size * (cut.end - cut.begin) * (cut.place == INSIDE)
-        owner = np.repeat(np.arange(len(stretches)), np.diff(stretches)[:, 0])
-        left_out = np.bincount(owner[cut.step], inside, len(stretches)) > longest + _ON_BORDER
+        owner = np.repeat(np.arange(len(stretches)), np.diff(stretches)[:, 0])[cut.step]
+        left_out = np.zeros(len(stretches), dtype=bool)
+        for place, longest in ((INSIDE, inside), (VOID, over_void)):
+            there = size * (cut.end - cut.begin) * (cut.place == place)
+            left_out |= np.bincount(owner, there, len(stretches)) > longest + _ON_BORDER
         starts = [0, *stretches[left_out, 1]]
         ends = [*stretches[left_out, 0], len(self.points) - 1]
         found = []

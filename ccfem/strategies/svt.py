@@ -62,6 +62,9 @@ class Svt:
         Join all strands of a piece of the section to one path, or lay single strands.
     longest_inside : float, mm, default 6
         Links of which more than that lies inside the section are left out: the path is cut there.
+    longest_over_void : float, mm, optional
+        Likewise of links over holes, where nothing holds the fibre. By default these stay, for
+        strands leave members into windows as they do outside, and turn there.
     crossings : bool, default True
         Whether strands that end in a joint cross it and leave the section on the far side, as in
         the paper; otherwise they stop in its middle.
@@ -80,6 +83,7 @@ class Svt:
     spacing: float = 1.0
     links: Literal["outside", "none"] = "outside"
     longest_inside: float = 6.0
+    longest_over_void: float | None = None
     crossings: bool = True
     aligned: bool = True
     turn: float = 75.0
@@ -96,18 +100,14 @@ class Svt:
             raise InputError(f"svt.spacing must be at least 1 fibre width; got {self.spacing}")
         if self.links not in ("outside", "none"):
             raise InputError(f"svt.links must be 'outside' or 'none'; got {self.links!r}")
-        if not 0.0 <= self.longest_inside < float("inf"):
-            raise InputError(
-                f"svt.longest_inside must be a finite number >= 0; got {self.longest_inside}"
-            )
+        for name in ("longest_inside", "longest_over_void", "minimum_length"):
+            value = getattr(self, name)
+            if value is not None and not 0.0 <= value < float("inf"):
+                raise InputError(f"svt.{name} must be a finite number >= 0; got {value}")
         if not 0.0 < self.turn < 180.0:
             raise InputError(f"svt.turn must lie between 0 and 180 degrees; got {self.turn}")
         if not self.width_ratio >= 1.0:
             raise InputError(f"svt.width_ratio must be at least 1; got {self.width_ratio}")
-        if self.minimum_length is not None and not 0.0 <= self.minimum_length < float("inf"):
-            raise InputError(
-                f"svt.minimum_length must be a finite number >= 0; got {self.minimum_length}"
-            )
 
     def __call__(self, layer: Layer, stress: LayerStress, machine: Machine) -> Toolpaths:
         """Plan the paths of one layer: for each piece of its section one, or as few as can be."""
@@ -146,7 +146,8 @@ class Svt:
             return _unlinked([line for group in groups for line in group])
         width = self.spacing * machine.fibre_width
         path = link_tracks(groups, piece, machine.minimum_radius, width)
-        parts = path.without_links_inside(piece, self.longest_inside)
+        over_void = np.inf if self.longest_over_void is None else self.longest_over_void
+        parts = path.without_long_links(piece, self.longest_inside, over_void)
         return [(part.points, part.link) for part in parts]
 
     def _rings(self, piece: Any, machine: Machine) -> list[FloatArray]:

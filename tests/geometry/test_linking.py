@@ -223,7 +223,7 @@ def test_a_link_leads_round_the_part_rather_than_over_a_window(weight, over) -> 
         assert line.length < 150.0
 
 
-def test_links_inside_are_left_out() -> None:
+def test_long_links_are_left_out() -> None:
     """Links of 10 mm outside, of 2 mm inside, of 5 mm inside, and of 3 mm over the window."""
     section = shapely.box(0, 0, 30, 20) - shapely.box(20, 5, 23, 15)
     points = [[0, 0], [0, -5], [5, -5], [5, 0], [5, 5], [7, 5], [7, 10], [12, 10], [20, 10]]
@@ -231,13 +231,15 @@ def test_links_inside_are_left_out() -> None:
     link = np.isin(np.arange(11), [0, 1, 2, 4, 6, 8])
     link[0] = False
     path = LinkedPath(points, link)
-    assert [len(part.points) for part in path.without_links_inside(section, 5.0)] == [11]
-    first, last = path.without_links_inside(section, 4.9)
+    assert [len(part.points) for part in path.without_long_links(section, 5.0, 3.0)] == [11]
+    first, last = path.without_long_links(section, 4.9)
     np.testing.assert_array_equal(first.points, points[:7])
     np.testing.assert_array_equal(last.points, points[7:])
     np.testing.assert_array_equal(
         np.concatenate([first.link, last.link]), np.where(np.arange(11) == 6, False, link)
     )
+    over = path.without_long_links(section, 5.0, 2.9)
+    assert [len(part.points) for part in over] == [9, 2]
 
 
 def test_grid_knows_places_and_room() -> None:

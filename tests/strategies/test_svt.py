@@ -160,6 +160,20 @@ def test_no_link_lies_inside_for_longer_than_is_allowed(plate_with_hole, longest
         assert len(paths) > 10
 
 
+def test_no_link_lies_over_voids_where_none_may(plate_with_hole):
+    layer, stress = plate_with_hole
+    hole = shapely.Polygon(layer.polygon.interiors[0]).buffer(-1e-3)
+    machine = replace(MACHINE, fibre_width=1.8, minimum_radius=3.0)
+    over = []
+    for parameters in ({}, {"longest_over_void": 0.0}):
+        paths = create("svt", parameters)(layer, stress, machine)
+        start = np.flatnonzero(paths.link)
+        steps = np.stack([paths.points[start, :2], paths.points[start + 1, :2]], axis=1)
+        over.append(shapely.length(shapely.intersection(shapely.linestrings(steps), hole)).sum())
+    assert over[0] > 10.0
+    assert over[1] == 0.0
+
+
 @pytest.mark.parametrize("section", [shapely.box(0, 0, 18, 18), DISC], ids=["square", "disc"])
 def test_square_and_disc_are_filled_by_rings(section):
     layer, stress = pulled(section)
@@ -201,7 +215,8 @@ def test_every_piece_of_a_section_has_its_path():
     [
         ("mode", "walk"),
         ("longest_inside", -1.0),
-        ("longest_inside", float("nan")),
+        ("longest_over_void", -1.0),
+        ("minimum_length", -1.0),
         ("spacing", 0.5),
         ("links", "inside"),
         ("turn", 180.0),
