@@ -16,6 +16,13 @@ __all__ = ["Pardiso", "cholmod", "superlu"]
 
 Apply = Callable[[FloatArray], FloatArray]
 
+_SMALL = 300_000
+"""Entries of an upper triangle up to which PARDISO keeps to one thread: with more it is hardly
+quicker, and several times slower beside other work on the machine (measured)."""
+
+_PIVOT = -4
+"""Error of PARDISO at a pivot that is not positive."""
+
 
 def superlu(matrix: sp.bsr_array) -> Apply:
     """SuperLU in symmetric mode: minimum degree ordering, no pivoting off the diagonal."""
@@ -61,26 +68,33 @@ class Pardiso:
         self._entries = self._upper.data.astype(np.int64)
         self._lock = threading.Lock()
         self._latest = 0
+        mkl = self._solver.libmkl
+        self._threads = 1 if self._upper.nnz <= _SMALL else mkl.MKL_Get_Max_Threads()
+        self._call(11, np.zeros(matrix.shape[0]))
 
     def _call(self, phase: int, rhs: FloatArray) -> FloatArray:
-        # Its public `solve` compares the whole matrix with the factorised one at every call.
-        self._solver.set_phase(phase)
-        return np.asarray(self._solver._call_pardiso(self._upper, np.asfortranarray(rhs)))
+        from pypardiso.pardiso_wrapper import PyPardisoError
+
+        # It crashes where the phases differ in their number of threads.
+        limit = self._solver.libmkl.MKL_Set_Num_Threads_Local
+        before = limit(self._threads)
+        try:
+            # Its public `solve` compares the whole matrix with the factorised one at every call.
+            self._solver.set_phase(phase)
+            return np.asarray(self._solver._call_pardiso(self._upper, np.asfortranarray(rhs)))
+        except PyPardisoError as error:
+            why = "; the stiffness is not positive definite" if error.value == _PIVOT else ""
+            raise SolveError(f"pypardiso: {error}{why}") from error
+        finally:
+            limit(before)
 
     def factorise(self, matrix: sp.bsr_array) -> Apply:
         """Factorise a matrix of the pattern; the factor before it, if any, is spent."""
-        from pypardiso.pardiso_wrapper import PyPardisoError
-
         with self._lock:
             self._latest += 1
             own = self._latest
             self._upper.data = matrix.data.reshape(-1)[self._entries]
-            try:
-                self._call(12 if own == 1 else 22, np.zeros(matrix.shape[0]))
-            except PyPardisoError as error:
-                raise SolveError(
-                    f"pypardiso: {error}; the stiffness is not positive definite"
-                ) from error
+            self._call(22, np.zeros(matrix.shape[0]))
 
         def apply(rhs: FloatArray) -> FloatArray:
             with self._lock:
