@@ -18,6 +18,7 @@ import numpy as np
 
 from ccfem import __version__
 from ccfem.comparison import Comparison, Run
+from ccfem.elasticity.stress_field import StressField
 from ccfem.errors import InputError
 from ccfem.headline import TEST_COLUMNS, headline_values
 from ccfem.progress import Progress, silent
@@ -35,6 +36,8 @@ _PACKAGES = ("numpy", "scipy", "numba", "pyamg", "shapely", "pypardiso")
 def staged(directory: Path) -> Iterator[Path]:
     """Yield a temporary folder whose files move to `directory` when the block ends well.
 
+    What earlier results left there, by the list "files" of their ``results.json``, is removed, so
+    that the folder holds one run and no paths or G-code of another.
     The temporary folder is made before the block runs, inside `directory` or else its nearest
     existing parent, so that a folder that cannot be written to is found before any work is done.
     When the block raises, `directory` is as it was.
@@ -62,10 +65,30 @@ def staged(directory: Path) -> Iterator[Path]:
 def _move(folder: Path, directory: Path) -> None:
     try:
         directory.mkdir(parents=True, exist_ok=True)
-        for path in sorted(folder.iterdir()):
-            os.replace(path, directory / path.name)
+        earlier = _written(directory)
+        new = sorted(path.name for path in folder.iterdir())
+        for name in new:
+            os.replace(folder / name, directory / name)
+        for name in earlier.difference(new):
+            (directory / name).unlink(missing_ok=True)
     except OSError as error:
         raise _unwritable(directory, error) from error
+
+
+def _written(directory: Path) -> set[str]:
+    """Names of the files that the results in a folder consist of, as far as they tell."""
+    try:
+        about = json.loads((directory / "results.json").read_text(encoding="utf-8"))
+        names = about["files"]
+    except (OSError, ValueError, KeyError, TypeError):
+        return set()
+    if not isinstance(names, list):
+        return set()
+    return {
+        name
+        for name in names
+        if isinstance(name, str) and (directory / name).is_file() and Path(name).name == name
+    }
 
 
 def _unwritable(directory: Path, error: OSError) -> InputError:
@@ -135,6 +158,7 @@ def record(comparison: Comparison, command: str, seconds: Mapping[str, float]) -
                 "source": case.source,
                 "findings": case.findings,
                 "load_case": stress.case,
+                "load": _load(stress),
                 "material": case.problem.material.name,
                 "build": case.build,
                 "layers": len(comparison.layers),
@@ -152,6 +176,15 @@ def record(comparison: Comparison, command: str, seconds: Mapping[str, float]) -
             "strategies": [_run_record(run) for run in comparison.runs],
         }
     )
+
+
+def _load(stress: StressField) -> list[float] | None:
+    """Resultant that the supports hold, N; None where nothing is left over, as between grips."""
+    total = -stress.reactions.sum(axis=0)
+    size = float(np.linalg.norm(total))
+    if not size > 1e-6 * float(np.linalg.norm(stress.reactions, axis=1).sum()):
+        return None
+    return [float(size * share) for share in np.round(total / size, 6) + 0.0]
 
 
 def _run_record(run: Run) -> dict[str, Any]:
@@ -247,10 +280,11 @@ def write_results(
     number = np.repeat(np.arange(float(len(runs))), [len(run.toolpaths) for run in runs])
     write_paths(every, folder / "paths.vtp", path_data={"strategy": number})
     about = record(comparison, command, spent)
-    text = json.dumps(about, indent=1, ensure_ascii=False, allow_nan=False)
-    (folder / "results.json").write_text(text + "\n", encoding="utf-8")
     page = report_html(comparison, about, pictures)
     (folder / "report.html").write_text(page, encoding="utf-8")
+    about["files"] = sorted({path.name for path in folder.iterdir()} | {"results.json"})
+    text = json.dumps(about, indent=1, ensure_ascii=False, allow_nan=False)
+    (folder / "results.json").write_text(text + "\n", encoding="utf-8")
 
 
 def _write_gcode(path: Path, toolpaths: Toolpaths, comparison: Comparison) -> None:

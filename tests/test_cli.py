@@ -13,6 +13,7 @@ from ccfem import __version__
 from ccfem.cli import main
 from ccfem.export.waypoints import read_waypoints
 from ccfem.io import write_mesh
+from ccfem.results import staged
 from ccfem.structured import box_mesh
 
 PART = """
@@ -94,6 +95,8 @@ def test_compare_writes_everything(ccfem, folder):
     assert about["ccfem"] == __version__
     assert about["command"].startswith("ccfem compare part.toml")
     assert about["case"]["layers"] == 3
+    assert about["case"]["load"] == pytest.approx([1000.0, 0.0, 0.0], rel=1e-5)
+    assert "load case “pull”, in all (1000, 0, 0) N" in (where / "report.html").read_text()
     assert about["solver"]["residual"] < 1e-8
     assert about["versions"]["numpy"] == np.__version__
     assert {"start", "mesh", "solve", "slice", "pictures"} <= set(about["seconds"])
@@ -137,6 +140,33 @@ def test_the_report_needs_no_other_file(ccfem, folder):
     assert "angle = 0" in page
     assert "ccfem plan part.toml --strategy zigzag --set angle=0" in page
     assert {p.name for p in (folder / "one").glob("*layer*")} == {"zigzag_layer_00.png"}
+
+
+def test_a_second_run_leaves_nothing_of_the_first(ccfem, folder):
+    plan = ("plan", "part.toml", "--set", "angle=0", "--no-virtual-test", "--out", "twice")
+    ccfem(*plan, "--strategy", "zigzag", "--layers", 2)
+    where = folder / "twice"
+    assert (where / "zigzag_layer_01.png").exists()
+    (where / "zigzag.gcode").write_text("; not of this program\n")
+    assert ccfem(*plan, "--strategy", "contour_zigzag", "--layers", 1)[0] == 0
+    names = {path.name for path in where.iterdir()}
+    assert names >= {"contour_zigzag_layer_00.png", "report.html", "results.json", "zigzag.gcode"}
+    assert not [name for name in names - {"zigzag.gcode"} if name.startswith("zigzag")]
+    files = json.loads((where / "results.json").read_text())["files"]
+    assert set(files) == names - {"zigzag.gcode"}
+
+
+@pytest.mark.parametrize("files", ['["../kept.txt", 3]', '"kept.txt"', "{}", "nonsense"])
+def test_only_files_of_the_folder_are_removed(tmp_path, files):
+    where = tmp_path / "results"
+    where.mkdir()
+    (tmp_path / "kept.txt").write_text("kept")
+    (where / "results.json").write_text('{"files": ' + files + "}")
+    with staged(where) as new:
+        (new / "report.html").write_text("new")
+    assert (tmp_path / "kept.txt").exists()
+    assert (where / "report.html").read_text() == "new"
+    assert (where / "results.json").exists()
 
 
 def test_a_failed_strategy_is_shown(ccfem, folder):

@@ -110,8 +110,11 @@ def _header(comparison: Comparison, record: Mapping[str, Any]) -> str:
         if comparison.fibre_per_layer is None
         else f"{comparison.fibre_per_layer:.0f} mm of fibre per layer"
     )
+    load = ""
+    if about["load"] is not None:
+        load = f", in all ({', '.join(f'{part:.4g}' for part in about['load'])}) N"
     facts = [
-        f"load case “{about['load_case']}”",
+        f"load case “{about['load_case']}”{load}",
         f"{about['cells']:,} tetrahedra of order {about['order']}",
         f"{about['layers']} layers",
         amount,
