@@ -66,8 +66,9 @@ _Fibre = Annotated[
     typer.Option(
         "--fibre-per-layer",
         metavar="MM",
-        help="Fibre length that each strategy is held to, mean over the layers. By default the "
-        "smallest that any of them lays of its own accord.",
+        help="Fibre length that each strategy is held to, mean over the layers. By default compare "
+        "takes the smallest that any of them lays of its own accord, and one strategy alone lays "
+        "its own.",
     ),
 ]
 _VirtualTest = Annotated[
@@ -90,7 +91,12 @@ _Calibration = Annotated[
     ),
 ]
 _Backend = Annotated[
-    str, typer.Option("--backend", metavar="NAME", help="Linear solver; default by size.")
+    str,
+    typer.Option(
+        "--backend",
+        metavar="NAME",
+        help="Linear solver, such as superlu, amg or pypardiso; default by size.",
+    ),
 ]
 
 
@@ -127,7 +133,10 @@ def compare(
     case: _CasePath,
     strategies: Annotated[
         str | None,
-        typer.Option(metavar="A,B,..", help="Strategies; default the four of ccfem."),
+        typer.Option(
+            metavar="A,B,..",
+            help="Strategies; default isocurve, concentric, zigzag and contour_zigzag.",
+        ),
     ] = None,
     set_case: _SetCase = None,
     layers: _Layers = None,

@@ -255,7 +255,11 @@ def _evaluated(name: str, planner: _Planner, seconds: dict[str, float]) -> Run:
     planned = planner.found[name]
     evaluation, failure = None, ""
     if not len(planned.toolpaths):
-        failure = "laid no fibre: the layers are too thin, or the shortest strand is too long"
+        shortest = planner.case.machine.minimum_length
+        failure = (
+            "laid no fibre: the sections are too small, or the shortest strand is too long "
+            f"(machine.minimum_length = {shortest:g} mm): are all lengths in mm?"
+        )
     else:
         try:
             with _timed(seconds, "evaluate"):

@@ -36,7 +36,10 @@ class Body:
                 f"{' and '.join(given) or 'none'}: name one"
             )
         if (self.edge_length is not None) != (self.surface is not None):
-            raise InputError("edge_length goes with surface: give both or neither")
+            raise InputError(
+                "edge_length goes with surface, and surface with edge_length: add the one that is "
+                "missing (a planform has its own edge_length)"
+            )
         if self.planform is not None and self.scale != 1.0:
             raise InputError("scale goes with mesh or surface: leave it out of a planform")
         if self.mesh is not None:
