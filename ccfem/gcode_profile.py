@@ -31,7 +31,7 @@ class GcodeProfile:
         Lines that cut the fibre and wait; {wait} is `Machine.cut_wait` in milliseconds.
     bed : tuple of 3 floats, mm
         Width, depth and height of the space to print in; its corner is the origin. The default is
-        the working space of paper 000, section 5.2.
+        the working space of Chen et al. 2021, section 5.2.
     lift, lift_speed : float, mm and mm/s
         How far the nozzle rises before it travels.
     retract, retract_speed : float, mm and mm/s

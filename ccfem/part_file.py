@@ -50,7 +50,7 @@ them with a minus ("-z"), or three numbers.
     tolerance = 0.1                   # optional
 
     [patches.pin]
-    rule = "cylinder"                 # the wall of a hole or a pin
+    rule = "cylinder"                 # the walls of holes and pins up to this radius
     point = [15, 15, 0]
     axis = "z"
     radius = 5.0
@@ -92,7 +92,7 @@ them with a minus ("-z"), or three numbers.
 
     [machine.speeds]                  # fibre speed by curvature, length and angle of a path's
     speed = [7, 15, 35]               # pieces (ccfem.speeds.SpeedTable) in place of fibre_speed;
-    curvature = [0.2, 0.05]           # what is left out is that of paper 001, table 2
+    curvature = [0.2, 0.05]           # what is left out: Wang et al. 2021, table 2
     length = [15, 25]
     angle = [90, 135]
 

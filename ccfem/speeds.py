@@ -1,4 +1,4 @@
-"""Printing speed along a path: table 2 of paper 001, or one speed for each kind of path."""
+"""Printing speed along a path: table 2 of Wang et al. 2021, or one speed for each kind of path."""
 
 from dataclasses import dataclass
 from typing import TYPE_CHECKING
@@ -29,8 +29,8 @@ pieces."""
 class SpeedTable:
     """Three speeds of the fibre, and which pieces of a path each is for.
 
-    The defaults are table 2 of paper 001. A piece gets the least of the three speeds that its
-    curvature, its length and its angle allow.
+    The defaults are table 2 of Wang et al. 2021. A piece gets the least of the three speeds that
+    its curvature, its length and its angle allow.
 
     Attributes
     ----------

@@ -1,4 +1,4 @@
-"""A tensile bar: of the size of the bar of paper 000."""
+"""A tensile bar: of the size of the bar of Chen et al. 2021."""
 
 from typing import Any
 

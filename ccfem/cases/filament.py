@@ -6,7 +6,7 @@ __all__ = ["printed_pla"]
 
 
 def printed_pla() -> Material:
-    """PLA+ with the modulus taken for the parts of paper 000: 3500 MPa, nu 0.35.
+    """PLA+ with the modulus taken for the parts of Chen et al. 2021: 3500 MPa, nu 0.35.
 
     Both are assumed, as for a dense print; the strengths are those of ``pla_plus`` in the table of
     materials.

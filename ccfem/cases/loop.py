@@ -1,4 +1,4 @@
-"""A ring with two lugs, pulled at the holes: of the size of the Loop of paper 000."""
+"""A ring with two lugs, pulled at the holes: of the size of the Loop of Chen et al. 2021."""
 
 from typing import Any
 

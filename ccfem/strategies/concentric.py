@@ -20,7 +20,7 @@ from ccfem.toolpaths import Toolpaths
 __all__ = ["Concentric"]
 
 _CLOSEST = 0.6
-"""Least distance of filled rings, in spacings [paper 004]."""
+"""Least distance of filled rings, in spacings [Plocher et al. 2022]."""
 
 
 @dataclass(frozen=True)
@@ -29,7 +29,7 @@ class Concentric:
 
     The first ring lies half a fibre width inside the border; opposite sides of a ring stay a fibre
     width apart, which leaves a gap along the middle where no further ring fits. This is the fill
-    that slicers call concentric, and model C of paper 000, figure 3.
+    that slicers call concentric, and model C of Chen et al. 2021, figure 3.
 
     Attributes
     ----------
@@ -45,8 +45,8 @@ class Concentric:
         middle of the first edge of the layer's border.
     filled : bool, default False
         Whether the rings run sharply into corners and to within 0.6 spacings of each other, and
-        lines along the middle fill what they leave, as paper 004 has it: less gaps, some overlap.
-        Not with `joined`.
+        lines along the middle fill what they leave, as Plocher et al. 2022 have it: less
+        gaps, some overlap. Not with `joined`.
     minimum_length : float, mm, optional
         Shorter paths are dropped; by default the shortest that the machine can cut.
     mode : {"polyline", "raster"}, default "polyline"

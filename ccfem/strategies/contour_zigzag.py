@@ -21,8 +21,8 @@ __all__ = ["ContourZigzag"]
 class ContourZigzag:
     """Rings along every border, and linked parallel lines in what is left.
 
-    What commercial fibre slicers lay, and the load-independent paths that paper 000 compares
-    itself with (its table 2). The stress is unseen.
+    What commercial fibre slicers lay, and the load-independent paths that Chen et al. 2021 compare
+    theirs with (table 2). The stress is unseen.
 
     Attributes
     ----------

@@ -20,8 +20,8 @@ __all__ = ["Zigzag"]
 class Zigzag:
     """Parallel lines at one angle a layer, linked into as few strands as possible.
 
-    What slicers call rectilinear or isotropic fibre fill, and model B of paper 000, figure 3. The
-    stress is unseen.
+    What slicers call rectilinear or isotropic fibre fill, and model B of Chen et al. 2021,
+    figure 3. The stress is unseen.
 
     Attributes
     ----------
@@ -31,7 +31,7 @@ class Zigzag:
         Direction of the lines on layer 0 to the first axis of the layer.
     turn : float, degrees, default 90
         Turn from each layer to the next; 90 alternates between two directions as the published
-        paths of paper 000 do, 45 goes round four.
+        paths of Chen et al. 2021 do, 45 goes round four.
     """
 
     spacing: float = 1.0
