@@ -3,6 +3,7 @@
 import dataclasses
 import inspect
 import os
+import typing
 from pathlib import Path
 
 import numpy as np
@@ -42,20 +43,28 @@ def print_cases() -> None:
 
 
 def print_strategies() -> None:
-    """Print the strategies with their parameters and defaults; that of the amount is marked."""
+    """Print the strategies with their parameters, defaults and choices; the amount is marked."""
     from ccfem.strategies import named
 
     console = Console(highlight=False)
     for name, strategy in sorted(named().items()):
         console.print(f"[bold]{name}[/bold]  {_first_line(strategy)}")
         table = Table(box=None, show_header=False, padding=(0, 2, 0, 4))
+        hints = typing.get_type_hints(strategy)
         for field in dataclasses.fields(strategy):  # type: ignore[arg-type]
-            note = ""
+            note = _choices(hints[field.name])
             if field.name == strategy.amount.parameter:
                 amount = strategy.amount
                 note = f"sets the amount of fibre: {amount.most:g} most, {amount.least:g} least"
             table.add_row(field.name, repr(field.default), note)
         console.print(table)
+
+
+def _choices(hint: object) -> str:
+    """Words that a parameter takes, where it takes words."""
+    if typing.get_origin(hint) is not typing.Literal:
+        return ""
+    return "one of " + ", ".join(repr(word) for word in typing.get_args(hint))
 
 
 def _first_line(what: object) -> str:

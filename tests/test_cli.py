@@ -191,6 +191,7 @@ def test_lists(ccfem):
     assert code == 0
     for name in ("isocurve", "concentric", "zigzag", "contour_zigzag", "spacing", "cap"):
         assert name in out
+    assert "one of 'polyline', 'raster'" in " ".join(out.split())
     code, out, _ = ccfem()
     assert code == 0
     assert "compare" in out
