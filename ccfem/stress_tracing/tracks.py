@@ -18,8 +18,11 @@ from ccfem.stress_tracing.relaxation import relaxed
 
 __all__ = ["clipped", "eased", "track_count", "tracks"]
 
-_PERCENTILE = 75.0
-"""Of the width of a band that its tracks are counted for: its wide members are to be filled."""
+_WIDE, _NARROW = 75.0, 5.0
+"""Percentiles of the width of a band that its tracks are counted for: wide members are to be
+filled, while in narrow ones tracks come no nearer than some share of the pitch."""
+_CLOSEST = 0.45
+"""That share."""
 _OUTSIDE = 1.5
 """Way outside the section, mm, after which a track has left it for good."""
 _INSET = 0.1
@@ -32,8 +35,12 @@ _ROUNDS = 60
 
 
 def track_count(band: Band, pitch: float) -> int:
-    """Count the tracks of a band, a pitch, mm, apart where it is wide; at least 1."""
-    return max(1, round(float(np.percentile(band.width, _PERCENTILE)) / pitch))
+    """Count the tracks of a band, a pitch, mm, apart where it is wide; at least 1.
+
+    Fewer, where they would come nearer than 0.45 pitches along more than a twentieth of the band.
+    """
+    narrow, wide = np.percentile(band.width, [_NARROW, _WIDE])
+    return max(1, min(round(wide / pitch), int(narrow / (_CLOSEST * pitch))))
 
 
 def tracks(

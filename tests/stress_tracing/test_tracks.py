@@ -195,3 +195,11 @@ def test_wide_strip_is_filled_to_its_ends():
     """Its axis ends 25 mm before them."""
     for line in laid(shapely.box(0, 0, 185, 50), 5.0, 1.0):
         np.testing.assert_allclose(np.sort(line[[0, -1], 0]), [0.0, 185.0], atol=1e-9)
+
+
+def test_tracks_do_not_press_together_in_a_long_narrow_member():
+    """A fifth of the strip is a third as wide as the rest: as many tracks as 0.45 widths allow."""
+    wide, narrow = shapely.box(0, 0, 80, 9), shapely.box(80, 3, 100, 6)
+    strip = only_band(shapely.union(wide, narrow))
+    assert track_count(strip, 0.9) == int(3.0 / (0.45 * 0.9))
+    assert track_count(only_band(wide), 0.9) == 10
