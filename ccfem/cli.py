@@ -1,7 +1,6 @@
 """The command line: ``ccfem cases``, ``strategies``, ``compare``, ``plan``, ``calibrate``.
 
-Only this module turns strings into objects. Everything heavy is imported by the command that needs
-it, so that ``ccfem --help`` answers at once.
+Everything heavy is imported by the command that needs it, so that ``ccfem --help`` answers at once.
 """
 
 import shlex
@@ -17,6 +16,7 @@ from typing import TYPE_CHECKING, Annotated, Any
 import typer
 
 from ccfem import __version__
+from ccfem.arguments import assignment, names_of, numbers_of, parameters_of
 from ccfem.errors import InputError, SolveError
 
 if TYPE_CHECKING:
@@ -158,10 +158,10 @@ def compare(
     """Plan a part by several strategies and show which is best, with numbers and pictures."""
     from ccfem.compare import STRATEGIES
 
-    names = STRATEGIES if strategies is None else _names(strategies)
+    names = STRATEGIES if strategies is None else names_of(strategies)
     parameters: dict[str, dict[str, Any]] = {}
     for text in set_ or ():
-        path, value = _assignment(text)
+        path, value = assignment(text)
         strategy, dot, name = path.partition(".")
         if not dot:
             raise InputError(f"--set expects STRATEGY.NAME=VALUE; got '{text}'")
@@ -194,7 +194,7 @@ def plan(
     out: _Out = None,
 ) -> None:
     """Plan a part by one strategy, by default with as much fibre as it lays of its own accord."""
-    parameters = {strategy: dict(_assignment(text) for text in set_ or ())}
+    parameters = {strategy: parameters_of(strategy, set_ or ())}
     options = _options(layers, heights, fibre_per_layer, virtual_test, load_case, backend)
     options["natural"] = fibre_per_layer is None
     load = partial(_load, case, set_case)
@@ -242,9 +242,8 @@ def calibrate(
     loaded = _load(case, set_case)
     paths = None
     if strategy is not None:
-        chosen = create_all(
-            loaded, (strategy,), {strategy: dict(_assignment(text) for text in set_ or ())}
-        )
+        parameters = {strategy: parameters_of(strategy, set_ or ())}
+        chosen = create_all(loaded, (strategy,), parameters)
         options = _options(layers, None, fibre_per_layer, False, load_case, "auto")
         (run,) = run_comparison(loaded, chosen, natural=fibre_per_layer is None, **options).runs
         if not len(run.toolpaths):
@@ -274,7 +273,7 @@ def _options(
     if layers is not None and heights is not None:
         raise InputError("give either --layers or --heights, not both")
     return {
-        "layers": layers if heights is None else _numbers(heights),
+        "layers": layers if heights is None else numbers_of(heights),
         "fibre_per_layer": fibre_per_layer,
         "strand": DEFAULT_STRAND if virtual_test else None,
         "load_case": load_case,
@@ -332,7 +331,7 @@ def _load(name: str, set_case: list[str] | None) -> "Case":
     """Read a part file, or make a case from its name and parameters."""
     from ccfem.cases.named import create_case
 
-    parameters = dict(_assignment(text) for text in set_case or ())
+    parameters = dict(assignment(text) for text in set_case or ())
     if not (name.endswith(".toml") or "/" in name or "\\" in name):
         return create_case(name, **parameters)
     if parameters:
@@ -342,30 +341,6 @@ def _load(name: str, set_case: list[str] | None) -> "Case":
     from ccfem.part_file import read_part
 
     return read_part(Path(name))
-
-
-def _numbers(text: str) -> tuple[float, ...]:
-    try:
-        return tuple(float(number) for number in _names(text))
-    except ValueError:
-        raise InputError(f"expected numbers with commas between; got '{text}'") from None
-
-
-def _assignment(text: str) -> tuple[str, Any]:
-    """Split ``name=value``; the value is read as TOML, or else as a plain string."""
-    import tomllib
-
-    name, equals, value = (part.strip() for part in text.partition("="))
-    if not equals or not name:
-        raise InputError(f"expected NAME=VALUE; got '{text}': write for example cap=90")
-    try:
-        return name, tomllib.loads(f"value = {value}")["value"]
-    except tomllib.TOMLDecodeError:
-        return name, value
-
-
-def _names(text: str) -> tuple[str, ...]:
-    return tuple(name.strip() for name in text.split(",") if name.strip())
 
 
 @contextmanager

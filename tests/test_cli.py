@@ -142,6 +142,21 @@ def test_the_report_needs_no_other_file(ccfem, folder):
     assert {p.name for p in (folder / "one").glob("*layer*")} == {"zigzag_layer_00.png"}
 
 
+@pytest.mark.parametrize("name", ["angle", "zigzag.angle"])
+def test_plan_takes_a_parameter_with_and_without_its_strategy(ccfem, folder, name):
+    code, _, err = ccfem("plan", "part.toml", "--strategy", "zigzag", "--set", f"{name}=30",
+                         "--layers", 1, "--no-virtual-test", "--out", "prefix")  # fmt: skip
+    assert (code, err) == (0, "")
+    (run,) = json.loads((folder / "prefix" / "results.json").read_text())["strategies"]
+    assert run["parameters"]["angle"] == 30.0
+
+
+def test_plan_refuses_a_parameter_of_another_strategy(ccfem, folder):
+    message = r"parameter of zigzag.*; got 'grid\.angle=30': write angle=VALUE or zigzag\.angle="
+    refused(ccfem, folder, message,
+            "plan", "part.toml", "--strategy", "zigzag", "--set", "grid.angle=30")  # fmt: skip
+
+
 def test_a_second_run_leaves_nothing_of_the_first(ccfem, folder):
     plan = ("plan", "part.toml", "--set", "angle=0", "--no-virtual-test", "--out", "twice")
     ccfem(*plan, "--strategy", "zigzag", "--layers", 2)
