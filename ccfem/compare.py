@@ -16,7 +16,7 @@ from ccfem.equal_fibre import (
     length_per_layer,
     plan_to_length,
 )
-from ccfem.errors import InputError, SolveError
+from ccfem.errors import InputError, SolveError, known_names
 from ccfem.evaluate import evaluate
 from ccfem.evaluate.virtual_test.equilibrium import BONDED, TENSION
 from ccfem.evaluate.virtual_test.specimen import Specimen
@@ -69,7 +69,7 @@ def create_all(
         if name not in names:
             raise InputError(
                 f"parameters are given for '{name}', which is not among the strategies: "
-                f"{', '.join(names)}"
+                f"{known_names(name, names)}"
             )
     return {
         name: create(name, {**case.parameters.get(name, {}), **given.get(name, {})})

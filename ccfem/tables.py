@@ -8,7 +8,7 @@ import typing
 from collections.abc import Callable, Mapping
 from typing import Any, Literal, TypeVar, Union, get_args, get_origin
 
-from ccfem.errors import InputError
+from ccfem.errors import InputError, known_names
 
 __all__ = ["from_table"]
 
@@ -51,7 +51,7 @@ def from_table(make: Callable[..., T], table: object, where: str, infinite: bool
     hints = typing.get_type_hints(make)
     for key in table:
         if key not in parameters:
-            raise InputError(f"{where} has no key '{key}'; it has: {', '.join(parameters)}")
+            raise InputError(f"{where} has no key '{key}'; it has: {known_names(key, parameters)}")
     values = {}
     for name, parameter in parameters.items():
         if name in table:

@@ -8,7 +8,7 @@ from importlib.metadata import entry_points
 from typing import Any, get_type_hints
 
 from ccfem.cases.case import Case
-from ccfem.errors import InputError
+from ccfem.errors import InputError, known_names
 from ccfem.tables import from_table
 
 __all__ = ["create_case", "named_cases"]
@@ -44,13 +44,14 @@ def create_case(name: str, **parameters: Any) -> Case:
     known = named_cases()
     if name not in known:
         raise InputError(
-            f"no case named '{name}'; there are: {', '.join(sorted(known))}: name one of them or "
-            "a part file (.toml)"
+            f"no case named '{name}'; there are: {known_names(name, sorted(known))} "
+            "(or name a part file, .toml)"
         )
     fields = inspect.signature(known[name]).parameters
     for parameter in parameters:
         if parameter not in fields:
             raise InputError(
-                f"case '{name}' has no parameter '{parameter}'; it has: {', '.join(fields)}"
+                f"case '{name}' has no parameter '{parameter}'; it has: "
+                f"{known_names(parameter, fields)}"
             )
     return from_table(known[name], parameters, f"case {name}")

@@ -11,7 +11,7 @@ from importlib.metadata import entry_points
 from typing import Any, ClassVar, Protocol, runtime_checkable
 
 from ccfem.elasticity.stress_field import LayerStress, StressField
-from ccfem.errors import InputError
+from ccfem.errors import InputError, known_names
 from ccfem.layers.layer import Layer
 from ccfem.machine import Machine
 from ccfem.tables import from_table
@@ -92,13 +92,15 @@ def create(name: str, parameters: Mapping[str, Any] | None = None) -> Strategy:
     """
     known = named()
     if name not in known:
-        raise InputError(f"no strategy named '{name}'; there are: {', '.join(sorted(known))}")
+        raise InputError(
+            f"no strategy named '{name}'; there are: {known_names(name, sorted(known))}"
+        )
     fields = {f.name for f in dataclasses.fields(known[name])}  # type: ignore[arg-type]
     for parameter in parameters or {}:
         if parameter not in fields:
             raise InputError(
                 f"strategy '{name}' has no parameter '{parameter}'; it has: "
-                f"{', '.join(sorted(fields))}"
+                f"{known_names(parameter, sorted(fields))}"
             )
     table = {
         key: list(value) if isinstance(value, tuple) else value
