@@ -24,7 +24,7 @@ from ccfem.evaluate.virtual_test.strands import cut_strands
 from ccfem.evaluate.virtual_test.strength import matrix_peak
 from ccfem.evaluate.virtual_test.virtual_test import virtual_test
 from ccfem.force_displacement import Curve
-from ccfem.io import whole_file
+from ccfem.io.whole import existing_file, whole_file
 from ccfem.materials import Material, isotropic
 from ccfem.toolpaths import Toolpaths
 
@@ -221,11 +221,13 @@ def read_calibration(path: str | Path) -> Calibration:
     InputError
         When the file cannot be read or a value is missing.
     """
+    path = existing_file(path, "material file")
     try:
-        values = tomllib.loads(Path(path).read_text(encoding="utf-8"))
+        values = tomllib.loads(path.read_text(encoding="utf-8"))
     except (OSError, UnicodeDecodeError, tomllib.TOMLDecodeError) as error:
         raise InputError(
-            f"expected a material file at {path}; it cannot be read: {error}"
+            f"expected a material file at {path}; it cannot be read: {error}: write it by ccfem "
+            "calibrate"
         ) from None
     numbers = {}
     for key in ("modulus", "poisson", "tensile_strength", "rho"):
@@ -240,7 +242,7 @@ def read_calibration(path: str | Path) -> Calibration:
             raise InputError(f"{path}: expected a number for {key}; got {value!r}: correct it")
         numbers[key] = float(value)
     return Calibration(
-        name=str(values.get("name", Path(path).stem)),
+        name=str(values.get("name", path.stem)),
         modulus=numbers["modulus"],
         poisson=numbers["poisson"],
         matrix_strength=numbers["tensile_strength"],

@@ -235,7 +235,9 @@ def calibrate(
     from ccfem.compare import compare as run_comparison
     from ccfem.compare import create_all
     from ccfem.force_displacement import read_curve
+    from ccfem.io.whole import check_writable
 
+    check_writable(out)
     curves = [None if path is None else read_curve(path) for path in (unreinforced, reinforced)]
     if (reinforced is None) != (strategy is None):
         raise InputError("--reinforced and --strategy belong together; got only one of them")

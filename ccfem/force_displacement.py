@@ -8,6 +8,7 @@ import numpy as np
 
 from ccfem.arrays import FloatArray, read_only
 from ccfem.errors import InputError
+from ccfem.io.whole import existing_file
 
 __all__ = ["Curve", "read_curve"]
 
@@ -88,7 +89,7 @@ def read_curve(path: str | Path) -> Curve:
     InputError
         When the file cannot be read, a column is missing, or a value is no number.
     """
-    path = Path(path)
+    path = existing_file(path, "CSV file")
     try:
         text = path.read_text(encoding="utf-8-sig")
     except (OSError, UnicodeDecodeError) as error:

@@ -113,16 +113,16 @@ def test_bad_curve_files_are_refused(tmp_path, text, message):
 
 
 def test_missing_files_are_refused(tmp_path):
-    with pytest.raises(InputError, match="cannot be read"):
+    with pytest.raises(InputError, match="does not exist: check its name"):
         read_curve(tmp_path / "none.csv")
-    with pytest.raises(InputError, match="cannot be read"):
+    with pytest.raises(InputError, match="does not exist: check its name"):
         read_calibration(tmp_path / "none.toml")
     path = tmp_path / "m.toml"
     path.write_text("modulus = 'a'\n")
     with pytest.raises(InputError, match="expected a number for modulus; got 'a'"):
         read_calibration(path)
     path.write_text("modulus = \n")
-    with pytest.raises(InputError, match="cannot be read"):
+    with pytest.raises(InputError, match="cannot be read.*write it by ccfem calibrate"):
         read_calibration(path)
 
 

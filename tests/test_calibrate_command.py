@@ -8,6 +8,7 @@ import numpy as np
 import pytest
 
 from ccfem.calibrate import read_calibration
+from ccfem.cli import main
 
 QUICK = ["--set-case", "element_size=4.0", "--layers", "2"]
 
@@ -56,7 +57,7 @@ def test_the_calibrated_part_has_the_measured_stiffness(calibrated: Path) -> Non
 @pytest.mark.parametrize(
     ("arguments", "message"),
     [
-        (["--unreinforced", "no.csv"], "expected a CSV file at no.csv"),
+        (["--unreinforced", "no.csv"], "CSV file no.csv does not exist: check its name and folder"),
         (["--unreinforced", "none.csv", "--reinforced", "fibre.csv"], "belong together"),
     ],
 )
@@ -68,11 +69,29 @@ def test_bad_input_is_one_line(calibrated: Path, arguments: list[str], message: 
     assert not (calibrated / "x.toml").exists()
 
 
+@pytest.mark.parametrize("out", ["nofolder/x.toml", "."])
+def test_a_file_that_cannot_be_written_is_refused_before_the_solve(
+    calibrated: Path, out: str, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
+) -> None:
+    solved = []
+    monkeypatch.setattr("ccfem.calibrate.calibrate", lambda *_: solved.append(1))
+    monkeypatch.chdir(calibrated)
+    command = ["ccfem", "calibrate", "bar", "--unreinforced", "none.csv", "--out", out]
+    monkeypatch.setattr(sys, "argv", command)
+    with pytest.raises(SystemExit) as ended:
+        main()
+    assert ended.value.code == 2
+    said = capsys.readouterr().err
+    assert said.startswith(f"ccfem: error: cannot write {out}: ")
+    assert said.count("\n") == 1
+    assert not solved
+
+
 def test_a_missing_material_is_one_line(calibrated: Path) -> None:
     run = ccfem(
         "plan", "bar", *QUICK, "--strategy", "isocurve", "--calibration", "no.toml",
         "--out", "none", folder=calibrated,
     )  # fmt: skip
     assert run.returncode == 2
-    assert "expected a material file at no.toml" in run.stderr
+    assert "material file no.toml does not exist: check its name and folder" in run.stderr
     assert not (calibrated / "none").exists()

@@ -7,7 +7,7 @@ from pathlib import Path
 
 from ccfem.errors import InputError
 
-__all__ = ["existing_file", "whole_file"]
+__all__ = ["check_writable", "existing_file", "whole_file"]
 
 
 @contextmanager
@@ -39,9 +39,7 @@ def whole_file(path: str | os.PathLike[str]) -> Iterator[Path]:
     >>> (folder / "note.txt").read_text()
     'all of it'
     """
-    path = Path(path)
-    if not path.parent.is_dir():
-        raise InputError(f"cannot write {path}: there is no folder {path.parent}: make it first")
+    path = check_writable(path)
     temporary = path.with_name(f".{path.stem}.{os.getpid()}{path.suffix}")
     try:
         yield temporary
@@ -53,6 +51,24 @@ def whole_file(path: str | os.PathLike[str]) -> Iterator[Path]:
     finally:
         if temporary.exists():
             temporary.unlink()
+
+
+def check_writable(path: str | os.PathLike[str]) -> Path:
+    """Return `path` when a file of that name can be written: to be asked before long work.
+
+    Raises
+    ------
+    InputError
+        When its folder does not exist or may not be written to, or `path` is a folder itself.
+    """
+    path = Path(path)
+    if path.is_dir():
+        raise InputError(f"cannot write {path}: it is a folder: name the file in it")
+    if not path.parent.is_dir():
+        raise InputError(f"cannot write {path}: there is no folder {path.parent}: make it first")
+    if not os.access(path.parent, os.W_OK):
+        raise InputError(f"cannot write {path}: choose a folder you may write to")
+    return path
 
 
 def existing_file(path: str | os.PathLike[str], what: str) -> Path:
