@@ -121,11 +121,19 @@ def cases() -> None:
 
 
 @app.command()
-def strategies() -> None:
-    """List the strategies with their parameters and defaults."""
-    from ccfem.screen import print_strategies
+def strategies(
+    name: Annotated[
+        str | None,
+        typer.Argument(metavar="NAME", help="Explain this one, and what its parameters mean."),
+    ] = None,
+) -> None:
+    """List the strategies with their parameters and defaults, or explain one of them."""
+    from ccfem.screen import print_strategies, print_strategy
 
-    print_strategies()
+    if name is None:
+        print_strategies()
+    else:
+        print_strategy(name)
 
 
 @app.command()

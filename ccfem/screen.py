@@ -3,15 +3,19 @@
 import dataclasses
 import inspect
 import os
+import re
 import typing
 from pathlib import Path
 
 import numpy as np
 from rich import box
 from rich.console import Console
+from rich.markup import escape
 from rich.table import Table
 
 from ccfem.comparison import Comparison
+from ccfem.docstring import about, attributes
+from ccfem.errors import InputError, known_names
 from ccfem.evaluate.virtual_test.verdict import HONEST_PROMISE
 from ccfem.headline import (
     HEADLINE,
@@ -23,7 +27,10 @@ from ccfem.headline import (
     verdict,
 )
 
-__all__ = ["print_cases", "print_comparison", "print_strategies"]
+if typing.TYPE_CHECKING:
+    from ccfem.strategies import Strategy
+
+__all__ = ["print_cases", "print_comparison", "print_strategies", "print_strategy"]
 
 _TITLES, _NUMBERS = 30, 20
 """Characters that a table is given for its titles and for each strategy, where neither a terminal
@@ -35,9 +42,9 @@ def print_cases() -> None:
     from ccfem.cases import named_cases
 
     console = Console(highlight=False)
-    for name, about in sorted(named_cases().items()):
-        console.print(f"[bold]{name}[/bold]  {_first_line(about)}")
-        parameters = inspect.signature(about).parameters.values()
+    for name, make in sorted(named_cases().items()):
+        console.print(f"[bold]{name}[/bold]  {_first_line(make)}")
+        parameters = inspect.signature(make).parameters.values()
         given = ", ".join(f"{each.name} = {each.default!r}" for each in parameters)
         console.print(f"    {given}", markup=False)
 
@@ -52,12 +59,56 @@ def print_strategies() -> None:
         table = Table(box=None, show_header=False, padding=(0, 2, 0, 4))
         hints = typing.get_type_hints(strategy)
         for field in dataclasses.fields(strategy):  # type: ignore[arg-type]
-            note = _choices(hints[field.name])
-            if field.name == strategy.amount.parameter:
-                amount = strategy.amount
-                note = f"sets the amount of fibre: {amount.most:g} most, {amount.least:g} least"
+            note = _amount(strategy, field.name) or _choices(hints[field.name])
             table.add_row(field.name, repr(field.default), note)
         console.print(table)
+
+
+def print_strategy(name: str) -> None:
+    """Print what one strategy does, and what each of its parameters means, in its own words.
+
+    Raises
+    ------
+    InputError
+        For an unknown strategy.
+    """
+    from ccfem.strategies import named
+
+    known = named()
+    if name not in known:
+        there = known_names(name, sorted(known))
+        raise InputError(f"no strategy named '{name}'; there are: {there}")
+    strategy, by_class = known[name], {each.__name__: each for each in known.values()}
+
+    def meaning(of: type, parameter: str) -> str:
+        text = attributes(of)[parameter].meaning if parameter in attributes(of) else ""
+        same = re.match(r"As in `(\w+)`", text)
+        if same is None or same[1] not in by_class:
+            return text
+        return meaning(by_class[same[1]], parameter).rstrip(".") + text[same.end() :]
+
+    console = Console(highlight=False)
+    console.print(f"[bold]{name}[/bold]")
+    for paragraph in about(strategy):
+        console.print(paragraph, markup=False)
+    table = Table(box=box.SIMPLE_HEAD, header_style="bold")
+    for column in ("parameter", "default", "type, unit", "meaning"):
+        table.add_column(column, overflow="fold")
+    said = attributes(strategy)
+    for field in dataclasses.fields(strategy):  # type: ignore[arg-type]
+        kind = said[field.name].kind if field.name in said else ""
+        note = _amount(strategy, field.name)
+        text = f"{meaning(strategy, field.name)} {note and f'It {note}.'}".strip()
+        table.add_row(*map(escape, (field.name, repr(field.default), kind, text)))
+    console.print(table)
+
+
+def _amount(strategy: "type[Strategy]", parameter: str) -> str:
+    """Say that a parameter sets the amount of fibre, where it does."""
+    amount = strategy.amount
+    if parameter != amount.parameter:
+        return ""
+    return f"sets the amount of fibre: {amount.most:g} most, {amount.least:g} least"
 
 
 def _choices(hint: object) -> str:

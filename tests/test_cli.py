@@ -1,6 +1,7 @@
 """The command line: what it prints and writes, and one line for everything that is wrong."""
 
 import csv
+import dataclasses
 import json
 import re
 import subprocess
@@ -14,6 +15,7 @@ from ccfem.cli import main
 from ccfem.export.waypoints import read_waypoints
 from ccfem.io import write_mesh
 from ccfem.results import staged
+from ccfem.strategies import named
 from ccfem.structured import box_mesh
 
 PART = """
@@ -210,6 +212,30 @@ def test_lists(ccfem):
     code, out, _ = ccfem()
     assert code == 0
     assert "compare" in out
+
+
+@pytest.mark.parametrize("name", sorted(named()))
+def test_every_parameter_of_a_strategy_is_explained(ccfem, monkeypatch, name):
+    monkeypatch.setenv("COLUMNS", "1000")
+    code, out, _ = ccfem("strategies", name)
+    assert code == 0
+    rows = [[cell.strip() for cell in re.split(r" {2,}", line.strip())] for line in out.split("\n")]
+    found = {row[0]: row[1:] for row in rows if len(row) == 4}
+    for field in dataclasses.fields(named()[name]):
+        default, kind, meaning = found[field.name]
+        assert default == repr(field.default)
+        assert kind
+        assert len(meaning) > 15
+        assert not meaning.startswith("As in")
+
+
+def test_a_parameter_is_explained_in_the_words_of_its_class(ccfem, monkeypatch, folder):
+    monkeypatch.setenv("COLUMNS", "1000")
+    _, out, _ = ccfem("strategies", "contour_zigzag")
+    assert "Direction of the lines on layer 0 to the first axis of the layer." in out
+    assert "float, degrees" in out
+    assert "It sets the amount of fibre: 1 most, 20 least." in out
+    refused(ccfem, folder, "did you mean 'zigzag'", "strategies", "zigzga")
 
 
 def test_it_is_a_module_too():
