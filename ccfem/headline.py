@@ -7,7 +7,7 @@ import numpy as np
 
 from ccfem.comparison import Comparison, Run
 from ccfem.equal_fibre import TOLERANCE
-from ccfem.evaluate import Column
+from ccfem.evaluate import Column, Evaluation
 from ccfem.evaluate.virtual_test.verdict import UNDECIDED
 from ccfem.evaluate.virtual_test.verdict import verdict as verdict_of_pair
 
@@ -214,6 +214,8 @@ def remarks(comparison: Comparison) -> list[str]:
             about.append(f"no first-failure load: {run.tested.note}")
         if run.evaluation is not None:
             about += _about_links(run.evaluation.total)
+            if getattr(run.strategy, "crosses", False):
+                about += _about_crossings(run.evaluation, comparison.bound is not None)
         if run.note:
             placed = ", so it is placed last" if _too_long(run, comparison) else ""
             about.append(f"{run.note}{placed}")
@@ -244,19 +246,36 @@ def _about_links(total: Mapping[str, float]) -> list[str]:
     ]
 
 
+def _about_crossings(evaluation: Evaluation, bounded: bool) -> list[str]:
+    """Say how often strands that cross by intention lie over each other, and what that means."""
+    crossings = evaluation.values["crossings"] + evaluation.values["self_crossings"]
+    if not crossings[-1]:
+        return []
+    line = (
+        f"strands cross in the joints: {crossings[-1]:.0f} crossings on "
+        f"{np.count_nonzero(crossings[:-1])} of {len(evaluation.layers)} layers, thicker there"
+    )
+    bound = "; the bound does not hold for strands laid over each other"
+    return [line + bound if bounded else line]
+
+
 def bound_remark(comparison: Comparison) -> str:
     """Say how far the best run is from what any paths could reach; empty without a bound.
 
-    The bound is for strands beside each other: strands that overlap may exceed it.
+    The bound is for strands beside each other that carry tension only: strands that overlap may
+    exceed it, and so may bonded ones.
     """
     tested = [run for run in ranking(comparison) if run.tested is not None]
     if comparison.bound is None or not tested:
         return ""
     length = max(run.length_per_layer for run in tested)
     name, share = tested[0].name, comparison.bound.share(_ratio(tested[0]))
+    bonded = max(_ratio(run, "bonded") for run in tested)
+    free = "; bonded fibres are not bounded" if bonded > comparison.bound.ratio else ""
     most = (
         f"paths of {length:.0f} mm a layer in {len(comparison.layers)} layers can make the part "
-        f"more than {comparison.bound.ratio:.2f} times as stiff (fibres carrying tension only)"
+        f"more than {comparison.bound.ratio:.2f} times as stiff (fibres carrying tension only"
+        f"{free})"
     )
     if share > 1.0:
         return f"only where strands overlap, as those of {name} do, {most}"

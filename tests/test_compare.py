@@ -2,6 +2,7 @@
 
 import re
 from dataclasses import dataclass, replace
+from typing import ClassVar
 
 import numpy as np
 import pytest
@@ -172,6 +173,35 @@ def test_links_outside_the_part_are_reported_and_carry_nothing():
     assert inside == pytest.approx(total["fibre_length"] - total["link_outside"], rel=1e-4)
     assert "joined: 80 mm of links lie outside the part, to be cut off" in remarks(result)
     assert not any("voids" in line for line in remarks(result))
+
+
+@dataclass(frozen=True)
+class Woven:
+    """Three strands along a strip and two across it: six crossings, on layers of even number."""
+
+    crosses: ClassVar[bool] = True
+
+    def __call__(self, layer, stress, machine):
+        along = [np.array([[1.0, y], [59.0, y]]) for y in (6.0, 12.0, 18.0)]
+        across = [np.array([[x, 1.0], [x, 23.0]]) for x in (20.0, 40.0)]
+        return Toolpaths.from_plane(along if layer.index % 2 else along + across, layer)
+
+
+def test_strands_that_cross_by_intention_are_reported():
+    result = compare(strip(), {"woven": Woven()}, natural=True)
+    said = "woven: strands cross in the joints: 12 crossings on 2 of 4 layers, thicker there"
+    assert f"{said}; the bound does not hold for strands laid over each other" in remarks(result)
+    assert said in remarks(replace(result, bound=None))
+
+
+def test_the_bound_says_that_it_is_not_one_of_bonded_fibres(compared):
+    best = ranking(compared)[0]
+    assert "(fibres carrying tension only): " in remarks(compared)[-1]
+    bracket = best.tested.bracket
+    stiff = replace(bracket.bonded, stiffness=10.0 * bracket.bonded.stiffness)
+    tested = replace(best.tested, bracket=replace(bracket, bonded=stiff))
+    more = replace(compared, runs=(replace(best, tested=tested),))
+    assert "tension only; bonded fibres are not bounded): " in remarks(more)[-1]
 
 
 def test_thin_fibre_is_reported_not_dropped():
