@@ -13,13 +13,19 @@ __all__ = ["Check", "claim_table", "judged"]
 
 @dataclass(frozen=True)
 class Check:
-    """One number of one claim; `verdict` is "reproduced", "differs" or "not tried"."""
+    """One number of one claim; `verdict` is "reproduced", "differs" or "not tried".
+
+    `low` to `high` counts as reproduced: what the paper says, widened by `tolerance`.
+    """
 
     claim: str
     text: str
     source: str
     quantity: str
     paper: str
+    low: float
+    high: float
+    tolerance: str
     ours: float
     verdict: str
     why: str
@@ -33,28 +39,42 @@ def judged(found: Mapping[str, float], path: Path) -> list[Check]:
     for claim in claims:
         for check in claim["checks"]:
             ours = found.get(check["quantity"], np.nan)
+            low, high = check["low"], check["high"]
             if np.isnan(ours):
                 verdict = "not tried"
             else:
-                inside = check["low"] - 1e-9 <= ours <= check["high"] + 1e-9
+                inside = low - 1e-9 <= ours <= high + 1e-9
                 verdict = "reproduced" if inside else "differs"
             about = (claim["id"], claim["text"], claim["source"])
             why = claim["why"] if verdict != "reproduced" else ""
-            checks.append(Check(*about, check["quantity"], check["paper"], ours, verdict, why))
+            said = (check["quantity"], check["paper"], low, high, claim["tolerance"])
+            checks.append(Check(*about, *said, ours, verdict, why))
     return checks
 
 
 def claim_table(checks: list[Check]) -> str:
-    """Markdown table claim / paper / ours / verdict, and the reasons below it."""
-    lines = ["| claim | source | quantity | paper | ours | verdict |", "|---|---|---|---|---|---|"]
+    """Markdown table claim / paper / ours / verdict; tolerances and reasons below it."""
+    head = ["claim", "source", "quantity", "paper", "counts as reproduced", "ours", "verdict"]
+    lines = [f"| {' | '.join(head)} |", "|---" * len(head) + "|"]
     for k, c in enumerate(checks):
         new = k == 0 or checks[k - 1].claim != c.claim
-        head = f"{c.claim} {c.text}" if new else ""
+        claim = f"{c.claim} {c.text}" if new else ""
         ours = "–" if np.isnan(c.ours) else f"{c.ours:.4g}"
         lines.append(
-            f"| {head} | {c.source if new else ''} | {c.quantity} | {c.paper} | {ours} | "
-            f"{c.verdict} |"
+            f"| {claim} | {c.source if new else ''} | {c.quantity} | {c.paper} | {_range(c)} | "
+            f"{ours} | {c.verdict} |"
         )
+    tolerances = {c.claim: c.tolerance for c in checks if c.tolerance}
     reasons = {c.claim: c.why for c in checks if c.why}
-    lines += ["", *(f"- {claim}: {why}" for claim, why in reasons.items())]
+    lines += ["", "Tolerance of each claim:", ""]
+    lines += [f"- {claim}: {tolerance}" for claim, tolerance in tolerances.items()]
+    lines += ["", "Where ours differs or was not tried:", ""]
+    lines += [f"- {claim}: {why}" for claim, why in reasons.items()]
     return "\n".join(lines) + "\n"
+
+
+def _range(check: Check) -> str:
+    """Write what counts as reproduced; a million stands for no limit."""
+    if check.low == check.high:
+        return f"{check.low:g}"
+    return f"from {check.low:g}" if check.high >= 1e6 else f"{check.low:g} to {check.high:g}"

@@ -81,7 +81,9 @@ def test_verdicts_follow_the_ranges():
     assert checks["width bridge"].verdict == "reproduced"
     assert checks["height bridge"].verdict == "differs"
     assert checks["width suspension"].verdict == "not tried"
-    assert "| height bridge | 50 mm | 49 | differs |" in claim_table(list(checks.values()))
+    table = claim_table(list(checks.values()))
+    assert "| height bridge | 50 mm | 50 | 49 | differs |" in table
+    assert "| crossings of lpp l_shape | cross | from 1 | – | not tried |" in table
 
 
 def test_figures_and_tables(plate, tmp_path):
