@@ -76,6 +76,17 @@ class TetMesh:
         return read_only(np.einsum("ij,ij->i", np.cross(b - a, c - a), d - a) / 6.0)
 
     @cached_property
+    def aspects(self) -> FloatArray:
+        """Longest edge over least height of each cell, (m,), 1.22 or more; infinite where flat."""
+        corner = self.points[self.corners]
+        edges = corner[:, self.edges[:, 1]] - corner[:, self.edges[:, 0]]
+        longest = np.sqrt(np.einsum("ijk,ijk->ij", edges, edges).max(axis=1))
+        a, b, c = np.moveaxis(corner[:, self.faces], 2, 0)
+        largest = 0.5 * np.linalg.norm(np.cross(b - a, c - a), axis=2).max(axis=1)
+        with np.errstate(divide="ignore"):
+            return read_only(longest * largest / (3.0 * np.abs(self.volumes)))
+
+    @cached_property
     def _facet_pairing(self) -> tuple[IntArray, IntArray, IntArray]:
         """Facets sorted so that equal ones are adjacent: order, first of a pair, single ones."""
         facets = np.sort(self.corners[:, _FACES].reshape(-1, 3), axis=1)

@@ -12,10 +12,12 @@ from ccfem.errors import InputError
 from ccfem.mesh import TetMesh
 from ccfem.patches import facet_keys, match_boundary
 
-__all__ = ["MeshReport", "check_mesh"]
+__all__ = ["MeshReport", "about_slivers", "check_mesh"]
 
 _FLAT = 1e-12
 """Volume over the cube of the longest edge, at and below which a cell counts as flat."""
+_SLIVER = 100.0
+"""Longest edge over height from which a cell makes the equations ill-conditioned."""
 _TURNED = {4: [0, 2, 1, 3], 10: [0, 2, 1, 3, 6, 5, 4, 7, 9, 8]}
 """Order of nodes that turns a cell inside out (corners 1 and 2 swapped)."""
 
@@ -46,6 +48,8 @@ class MeshReport:
         Separate pieces of the mesh: left as they are.
     diagonal : float, mm
         Of the bounding box.
+    aspect : float
+        Longest edge over least height of the cells, median.
     """
 
     nodes: int
@@ -60,6 +64,7 @@ class MeshReport:
     merged: bool = False
     components: int = 1
     diagonal: float = 0.0
+    aspect: float = 0.0
 
     @property
     def findings(self) -> tuple[str, ...]:
@@ -77,6 +82,11 @@ class MeshReport:
             (
                 not 1.0 <= self.diagonal <= 1e4,
                 f"the part measures {self.diagonal:.3g} mm across: scale it if its unit is not mm",
+            ),
+            (
+                self.aspect > _SLIVER,
+                f"most cells are some {self.aspect:.3g} times as long as high: check that all "
+                "lengths are in mm",
             ),
         )
         return tuple(text for wanted, text in lines if wanted)
@@ -143,12 +153,25 @@ def check_mesh(mesh: TetMesh, merge: bool = False) -> tuple[TetMesh, MeshReport]
         merged=merged,
         components=_components(mended.corners, len(points)),
         diagonal=diagonal,
+        aspect=float(np.median(mended.aspects)),
     )
     if not changed and still.all() and not dropped:
         return mesh, report
     number = np.cumsum(still) - 1
     named = {name: number[facets] for name, facets in patches.items()}
     return TetMesh(points[still], number[mended.cells], named), report
+
+
+def about_slivers(mesh: TetMesh) -> str:
+    """Say how flat the flattest cell is, with the cure; empty where none is very flat."""
+    worst = int(mesh.aspects.argmax())
+    if not mesh.aspects[worst] > _SLIVER:
+        return ""
+    at = ", ".join(f"{x:.4g}" for x in mesh.points[mesh.corners[worst]].mean(axis=0))
+    return (
+        f"the flattest cell, at ({at}) mm, is {mesh.aspects[worst]:.3g} times as long as high: "
+        "check that all lengths are in mm, or mesh the part with cells of more even shape"
+    )
 
 
 def _leaders(points: FloatArray, used: BoolArray, diagonal: float) -> tuple[IntArray, int]:

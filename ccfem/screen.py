@@ -146,6 +146,8 @@ def print_comparison(comparison: Comparison, where: Path, seconds: float) -> Non
             cells.append(f"{text} [dim]({extra})[/]" if extra else text)
         table.add_row(head.title, *cells)
     console.print(table)
+    for line in comparison.case.findings:
+        console.print(f"mesh: {line}", style="dim", markup=False)
     for line in remarks(comparison):
         console.print(line, style="dim", markup=False)
     said = verdict(comparison)

@@ -14,6 +14,7 @@ from ccfem import __version__
 from ccfem.cli import main
 from ccfem.export.waypoints import read_waypoints
 from ccfem.io import write_mesh
+from ccfem.mesh import TetMesh
 from ccfem.results import staged
 from ccfem.strategies import named
 from ccfem.structured import box_mesh
@@ -197,6 +198,14 @@ def test_a_failed_strategy_is_shown(ccfem, folder):
     assert rows[0]["strategy"] == "isocurve"
     assert rows[0]["failure"].startswith("expected tension")
     assert rows[0]["fibre_length"] == ""
+
+
+def test_what_was_found_in_the_mesh_is_printed(ccfem, folder):
+    mesh = box_mesh((60.0, 24.0, 4.0), (10, 4, 2))
+    write_mesh(TetMesh(mesh.points, mesh.cells[:, [1, 0, 2, 3]], mesh.patches), folder / "in.npz")
+    (folder / "inside.toml").write_text(PART.replace("body.npz", "in.npz"))
+    _, out, _ = ccfem("plan", "inside.toml", "--strategy", "zigzag", "--no-virtual-test")
+    assert f"mesh: {len(mesh.cells)} cells were inside out: turned" in out
 
 
 def test_lists(ccfem):

@@ -19,6 +19,7 @@ from ccfem.elasticity.stress_field import SolveRecord, StressField
 from ccfem.elasticity.supports import Held, held
 from ccfem.errors import InputError, SolveError
 from ccfem.mesh import TetMesh
+from ccfem.mesh_check import about_slivers
 from ccfem.tensor import rotate_stiffness
 
 __all__ = ["System", "cell_stiffness", "prepare", "solve", "solve_system"]
@@ -155,9 +156,15 @@ def solve(
     InputError
         For supports, loads or a backend that nothing sensible can follow from.
     SolveError
-        When a relative residual stays above the tolerance.
+        When a relative residual stays above the tolerance; very flat cells are named.
     """
-    return solve_system(prepare, problem, backend, tolerance)
+    try:
+        return solve_system(prepare, problem, backend, tolerance)
+    except SolveError as error:
+        slivers = about_slivers(problem.mesh)
+        if not slivers:
+            raise
+        raise SolveError(f"{error}; {slivers}") from error
 
 
 class _Equations(Protocol[FieldT]):

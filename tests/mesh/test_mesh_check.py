@@ -6,6 +6,7 @@ from hypothesis import strategies as st
 from ccfem.errors import InputError
 from ccfem.mesh import TetMesh
 from ccfem.mesh_check import check_mesh
+from ccfem.structured import box_mesh
 
 INSIDE_OUT = {1: [1, 0, 2, 3], 2: [1, 0, 2, 3, 4, 6, 5, 8, 7, 9]}
 """Corners 0 and 1 swapped, with the mid-side nodes of edges 01, 12, 02, 03, 13, 23 that follow."""
@@ -155,3 +156,19 @@ def test_what_nothing_can_follow_from(box):
         check_mesh(TetMesh(third, np.concatenate([box.cells, extra])))
     with pytest.raises(InputError, match="patch 'a' must hold facets"):
         check_mesh(TetMesh(box.points, box.cells, {"a": np.array([[0, 1, 999]])}))
+
+
+def test_aspects_of_known_tetrahedra():
+    """Height of the regular one sqrt(2/3) edges; of the corner of a cube 1 / sqrt(3)."""
+    regular = [[0, 0, 0], [1, 0, 0], [0.5, 0.75**0.5, 0], [0.5, 12**-0.5, (2 / 3) ** 0.5]]
+    corner = [[5, 0, 0], [6, 0, 0], [5, 1, 0], [5, 0, 1]]
+    mesh = TetMesh(np.array([*regular, *corner]), np.arange(8).reshape(2, 4))
+    np.testing.assert_allclose(mesh.aspects, [1.5**0.5, 6**0.5], rtol=1e-12)
+    flat = TetMesh(np.array(regular) * [1, 1, 0], np.arange(4)[None])
+    assert flat.aspects[0] == np.inf
+
+
+@pytest.mark.parametrize(("height", "said"), [(3.0, False), (0.3, False), (0.003, True)])
+def test_a_part_with_its_height_in_metres_is_pointed_out(height, said):
+    _, report = check_mesh(box_mesh((30.0, 10.0, height), (15, 5, 1)))
+    assert any("check that all lengths are in mm" in line for line in report.findings) == said
