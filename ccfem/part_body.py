@@ -49,7 +49,19 @@ class Body:
             mesh, report = check_mesh(mesh, merge=self.merge_nodes)
         else:
             mesh, report = check_mesh(_filled(self, folder))
-        return mesh.quadratic() if self.order == 2 else mesh, report.findings
+        found = (*report.findings, *self._about_edge_length(mesh))
+        return mesh.quadratic() if self.order == 2 else mesh, found
+
+    def _about_edge_length(self, mesh: TetMesh) -> tuple[str, ...]:
+        """Say where the edge length is longer than the part is thick."""
+        wanted = self.edge_length if self.planform is None else self.planform["edge_length"]
+        thin = float(np.ptp(mesh.bounds, axis=0).min())
+        if wanted is None or wanted <= thin:
+            return ()
+        return (
+            f"edge_length {wanted:g} mm is longer than the part is thick, {thin:.3g} mm: shorten "
+            "it for more than one cell across, and check that all lengths are in mm",
+        )
 
 
 @dataclass(frozen=True)

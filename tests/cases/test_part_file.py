@@ -306,3 +306,13 @@ def test_nothing_is_executed(folder):
     case = read(folder, "title = \"__import__('os').abort()\"\n" + PART)
     assert case.title == "__import__('os').abort()"
     assert tomllib.loads(PART)["mesh"] == "body.npz"
+
+
+@pytest.mark.parametrize(("height", "said"), [(6.0, False), (2.0, False), (1.5, True)])
+def test_an_edge_longer_than_the_part_is_thick_is_pointed_out(folder, height, said):
+    text = EXAMPLE.read_text().replace("height = 6.0", f"height = {height}")
+    case = read(folder, text.replace("edge_length = 2.5", "edge_length = 2.0"))
+    about = [line for line in case.findings if "edge_length" in line]
+    assert len(about) == said
+    if said:
+        assert about[0].startswith("edge_length 2 mm is longer than the part is thick, 1.5 mm: ")
