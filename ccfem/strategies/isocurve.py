@@ -18,6 +18,7 @@ from ccfem.arrays import BoolArray, FloatArray
 from ccfem.elasticity.stress_field import LayerStress, StressField
 from ccfem.errors import InputError
 from ccfem.fields.compatibility import Incompatible
+from ccfem.fields.crease import orient_along
 from ccfem.fields.fill import fill_laplacian, fill_screened
 from ccfem.fields.layer_tension import MeshTension, SampledTension, layer_tension, mesh_tension
 from ccfem.fields.levels import extract_levels, unit_levels
@@ -253,7 +254,7 @@ class _Planner:
             direction, size = fill_screened(
                 surface, direction, tension.stress, confidence, s.fill_length
             )
-            direction = orient(direction, surface.neighbours, confidence)
+            direction = orient_along(surface, direction, confidence)
         else:
             if not tension.oriented:
                 direction = orient(direction, surface.neighbours)

@@ -2,6 +2,7 @@
 
 import dataclasses
 import os
+from pathlib import Path
 
 import numpy as np
 import pytest
@@ -15,6 +16,7 @@ from ccfem.layers import slice_planar
 from ccfem.machine import Machine
 from ccfem.materials import isotropic
 from ccfem.mesh import TetMesh
+from ccfem.part_file import read_part
 from ccfem.strategies import create, plan
 from ccfem.strategies.isocurve import Isocurve
 from ccfem.structured import box_mesh
@@ -192,6 +194,71 @@ def test_solved_bar_is_filled_with_straight_strands() -> None:
     total = evaluate(paths, layers, field, MACHINE).total
     assert total["aligned_stress_10"] > 0.95
     assert total["coverage"] > 0.85
+
+
+LUG = """
+name = "lug"
+layers = 1
+build = "z"
+material = "pla"
+[planform]
+outline = {outline}
+holes = [{{centre = {centre}, radius = 6}}]
+height = 6.0
+edge_length = {edge_length}
+[patches.foot]
+rule = "plane"
+normal = {along}
+offset = "min"
+[patches.pin]
+rule = "cylinder"
+point = {point}
+axis = "z"
+radius = 6.0
+[[supports]]
+patch = "foot"
+[[loads.pull]]
+kind = "bearing"
+patch = "pin"
+vector = {along}
+"""
+
+
+@pytest.mark.parametrize(
+    ("edge_length", "turn"), [(2.5, 0.0), (1.5, 0.0), (2.5, 20.0), (2.5, 45.0)]
+)
+def test_halves_of_a_symmetric_lug_get_the_same_fibre(
+    edge_length: float, turn: float, tmp_path: Path
+) -> None:
+    # The tension turns round the pin and goes back: no signs of its lines are continuous there.
+    c, s = np.cos(np.radians(turn)), np.sin(np.radians(turn))
+    turned = np.array([[c, -s], [s, c]])
+    corners = np.array([[0.0, 0.0], [80.0, 0.0], [80.0, 30.0], [0.0, 30.0]])
+    centre = (turned @ [65.0, 15.0]).tolist()
+    file = tmp_path / "lug.toml"
+    file.write_text(
+        LUG.format(
+            outline=(corners @ turned.T).tolist(),
+            centre=centre,
+            point=[*centre, 0.0],
+            edge_length=edge_length,
+            along=[float(c), float(s), 0.0],
+        )
+    )
+    case = read_part(file)
+    field = solve(case.problem)["pull"]
+    paths, layers = planned(Isocurve(), field)
+    width = MACHINE.fibre_width
+    upper = lower = 0.0
+    for line in paths:
+        height = line[:, :2] @ turned[:, 1] - 15.0
+        middle = 0.5 * (height[1:] + height[:-1])
+        length = np.linalg.norm(np.diff(line, axis=0), axis=1)
+        # a strand on the line of symmetry belongs to neither half
+        upper += length[middle > width].sum()
+        lower += length[middle < -width].sum()
+    assert upper == pytest.approx(lower, rel=0.05)
+    assert evaluate(paths, layers, field, MACHINE).total["aligned_stress_10"] > 0.94
 
 
 needs_authors_data = pytest.mark.skipif(
