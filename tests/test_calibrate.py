@@ -122,7 +122,7 @@ def test_missing_files_are_refused(tmp_path):
     with pytest.raises(InputError, match="expected a number for modulus; got 'a'"):
         read_calibration(path)
     path.write_text("modulus = \n")
-    with pytest.raises(InputError, match="cannot be read.*write it by ccfem calibrate"):
+    with pytest.raises(InputError, match=r"cannot be read.*write it by ccfem calibrate"):
         read_calibration(path)
 
 
