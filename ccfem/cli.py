@@ -6,8 +6,7 @@ Everything heavy is imported by the command that needs it, so that ``ccfem --hel
 import shlex
 import sys
 import time
-from collections.abc import Callable, Iterator
-from contextlib import contextmanager
+from collections.abc import Callable
 from dataclasses import replace
 from functools import partial
 from pathlib import Path
@@ -18,10 +17,10 @@ import typer
 from ccfem import __version__
 from ccfem.arguments import assignment, names_of, numbers_of, parameters_of
 from ccfem.errors import InputError, SolveError
+from ccfem.progress import Progress, progress_bar
 
 if TYPE_CHECKING:
     from ccfem.cases.case import Case
-    from ccfem.progress import Progress
 
 __all__ = ["app", "main"]
 
@@ -322,7 +321,7 @@ def _run(
             options["strand"] = fitted.strand(options["strand"])
     chosen = create_all(case, names, parameters)
     where = out if out is not None else Path("results") / f"{case.name}{suffix}"
-    with staged(where) as folder, _bar() as progress:
+    with staged(where) as folder, progress_bar() as progress:
         comparison = run_comparison(case, chosen, progress=_part(progress, 0.0, 0.75), **options)
         if not comparison.succeeded:
             reasons = "; ".join(f"{run.name}: {run.failure}" for run in comparison.runs)
@@ -332,7 +331,7 @@ def _run(
     print_comparison(comparison, where, time.perf_counter() - _STARTED)
 
 
-def _part(progress: "Progress", first: float, last: float) -> "Progress":
+def _part(progress: Progress, first: float, last: float) -> Progress:
     """Progress of a piece of work that takes the bar from `first` to `last`."""
     return lambda what, share: progress(what, first + (last - first) * share)
 
@@ -351,27 +350,6 @@ def _load(name: str, set_case: list[str] | None) -> "Case":
     from ccfem.part_file import read_part
 
     return read_part(Path(name))
-
-
-@contextmanager
-def _bar() -> Iterator["Progress"]:
-    """Progress bar on stderr, or silence where nobody watches."""
-    from ccfem.progress import silent
-
-    if not sys.stderr.isatty():
-        yield silent
-        return
-    from rich.console import Console
-    from rich.progress import BarColumn, Progress, TextColumn, TimeElapsedColumn
-
-    columns = (BarColumn(), TimeElapsedColumn(), TextColumn("{task.description}"))
-    with Progress(*columns, console=Console(stderr=True), transient=True) as bar:
-        task = bar.add_task("", total=1.0)
-
-        def tell(what: str, share: float) -> None:
-            bar.update(task, description=what, completed=share)
-
-        yield tell
 
 
 def main() -> None:

@@ -9,6 +9,7 @@ import shapely
 from ccfem.cases import create_case
 from ccfem.elasticity import Force, Problem, Support, solve
 from ccfem.errors import InputError
+from ccfem.evaluate import evaluate
 from ccfem.evaluate.matching import matching_rate
 from ccfem.geometry.polylines import resample, turning_angles
 from ccfem.layers import slice_planar
@@ -95,6 +96,31 @@ def test_bridge_is_covered_without_sharp_turns(bridge, bridge_path):
         even, offsets = resample(strand, np.array([0, len(strand)]), 0.5)
         turn = turning_angles(even, offsets, np.zeros(1, dtype=bool))
         assert (2.0 * np.sin(0.5 * turn) / 0.5).max() <= 0.26
+
+
+@pytest.mark.parametrize(
+    ("name", "inside"), [("suspension", 20.0), ("l_shape", 5.0)], ids=["suspension", "l_shape"]
+)
+def test_frames_of_the_paper_are_one_path_of_strands_side_by_side(name, inside):
+    case = create_case(name)
+    stress = solve(case.problem)["down"]
+    layers = slice_planar(case.problem.mesh, case.build, count=1)
+    strategy = create("svt")
+    paths = strategy(layers[0], stress.on(layers[0]), case.machine)
+    assert len(paths) == 1
+    found = evaluate(paths, layers, stress, case.machine).total
+    assert found["link_inside"] <= inside
+    assert found["coverage"] >= 0.95
+    # Distance to the nearest strand of the same main path, along all of them.
+    apart = []
+    for group in strategy.groups(layers[0].polygon, stress.on(layers[0]), case.machine):
+        lines = np.array([shapely.LineString(track) for track in group])
+        for k, track in enumerate(group):
+            even, _ = resample(track, np.array([0, len(track)]), 0.5)
+            even = even[shapely.contains_xy(layers[0].polygon, *even.T)]
+            others = shapely.multilinestrings(np.delete(lines, k))
+            apart.append(shapely.distance(shapely.points(even), others))
+    assert np.percentile(np.concatenate(apart), 5.0) >= 0.5
 
 
 def test_alignment_in_the_joints_raises_the_matching_rate(bridge):
