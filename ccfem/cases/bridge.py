@@ -2,18 +2,9 @@
 
 import shapely
 
-from ccfem.cases.case import Case
-from ccfem.cases.designed import (
-    ELEMENT_SIZE,
-    THICKNESS,
-    DesignPlate,
-    Stretch,
-    designed_case,
-    designed_mesh,
-)
-from ccfem.mesh import TetMesh
+from ccfem.cases.designed import DesignPlate, Stretch, case_of
 
-__all__ = ["bridge", "bridge_mesh", "bridge_plate"]
+__all__ = ["bridge", "bridge_plate"]
 
 
 def bridge_plate(volume_fraction: float = 0.4, force: float = 100.0) -> DesignPlate:
@@ -36,29 +27,4 @@ def bridge_plate(volume_fraction: float = 0.4, force: float = 100.0) -> DesignPl
     )
 
 
-def bridge_mesh(element_size: float) -> TetMesh:
-    """Mesh of the optimised part."""
-    return designed_mesh(bridge_plate(), element_size)
-
-
-def bridge(
-    optimised: bool = True,
-    element_size: float = ELEMENT_SIZE,
-    order: int = 1,
-    force: float = 100.0,
-    thickness: float = THICKNESS,
-) -> Case:
-    """Bridge in three-point bending, 185 x 50 mm: optimised, or the full plate.
-
-    Parameters
-    ----------
-    optimised : bool, default True
-        Whether to take the optimised part, or the full plate.
-    element_size : float, mm
-        Edge length of the cells aimed at.
-    order : {1, 2}
-        Linear or quadratic cells.
-    force : float, N
-    thickness : float, mm
-    """
-    return designed_case(bridge_plate(force=force), optimised, element_size, order, thickness)
+bridge = case_of(bridge_plate, "Bridge in three-point bending, 185 x 50 mm")

@@ -4,7 +4,7 @@ A plate is given by its border, holes, supports and load. From these come the pr
 optimised, the part that the optimum stands for, and the case of either part.
 """
 
-from collections.abc import Mapping
+from collections.abc import Callable, Mapping
 from dataclasses import dataclass, replace
 from functools import cached_property
 from types import MappingProxyType
@@ -41,8 +41,8 @@ __all__ = [
     "DesignPlate",
     "Hole",
     "Stretch",
+    "case_of",
     "designed_case",
-    "designed_mesh",
     "prepreg_printer",
 ]
 
@@ -255,9 +255,43 @@ def prepreg_printer() -> Machine:
     )
 
 
-def designed_mesh(plate: DesignPlate, element_size: float) -> TetMesh:
-    """Mesh of the optimised part at the default thickness."""
-    return plate.mesh(plate.part, element_size, THICKNESS)
+def case_of(plate: Callable[..., DesignPlate], title: str) -> Callable[..., Case]:
+    """Make the case of a plate: a function of the parameters that all of them share.
+
+    Parameters
+    ----------
+    plate : callable
+        Makes the plate, of its `force`.
+    title : str
+        What it is, for the list of cases.
+    """
+
+    def case(
+        optimised: bool = True,
+        element_size: float = ELEMENT_SIZE,
+        order: int = 1,
+        force: float = 100.0,
+        thickness: float = THICKNESS,
+    ) -> Case:
+        return designed_case(plate(force=force), optimised, element_size, order, thickness)
+
+    case.__doc__ = f"""{title}: optimised, or the full plate.
+
+    It is printed of plain matrix, so that the virtual test adds the fibre, and stands on its face
+    at z = 0 without friction, so that it stays plane.
+
+    Parameters
+    ----------
+    optimised : bool, default True
+        Whether to take the optimised part, or the full plate.
+    element_size : float, mm
+        Edge length of the cells aimed at.
+    order : {{1, 2}}
+        Linear or quadratic cells.
+    force : float, N
+    thickness : float, mm
+    """
+    return case
 
 
 def designed_case(
@@ -267,21 +301,7 @@ def designed_case(
     order: int = 1,
     thickness: float = THICKNESS,
 ) -> Case:
-    """Case of a plate: printed of plain matrix, so that the virtual test adds the fibre.
-
-    The part stands on its face at z = 0 without friction, so that it stays plane.
-
-    Parameters
-    ----------
-    plate : DesignPlate
-    optimised : bool, default True
-        Whether to take the optimised part, or the full plate.
-    element_size : float, mm
-        Edge length of the cells aimed at.
-    order : {1, 2}
-        Linear or quadratic cells.
-    thickness : float, mm
-    """
+    """Make the case of one plate; parameters as those of the functions that `case_of` makes."""
     polygon = None if optimised else plate.domain
     key = plate.name if optimised and thickness == THICKNESS else ""
 

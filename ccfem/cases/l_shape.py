@@ -2,18 +2,9 @@
 
 import shapely
 
-from ccfem.cases.case import Case
-from ccfem.cases.designed import (
-    ELEMENT_SIZE,
-    THICKNESS,
-    DesignPlate,
-    Stretch,
-    designed_case,
-    designed_mesh,
-)
-from ccfem.mesh import TetMesh
+from ccfem.cases.designed import DesignPlate, Stretch, case_of
 
-__all__ = ["l_shape", "l_shape_mesh", "l_shape_plate"]
+__all__ = ["l_shape", "l_shape_plate"]
 
 
 def l_shape_plate(volume_fraction: float = 0.4, force: float = 100.0) -> DesignPlate:
@@ -31,29 +22,4 @@ def l_shape_plate(volume_fraction: float = 0.4, force: float = 100.0) -> DesignP
     )
 
 
-def l_shape_mesh(element_size: float) -> TetMesh:
-    """Mesh of the optimised part."""
-    return designed_mesh(l_shape_plate(), element_size)
-
-
-def l_shape(
-    optimised: bool = True,
-    element_size: float = ELEMENT_SIZE,
-    order: int = 1,
-    force: float = 100.0,
-    thickness: float = THICKNESS,
-) -> Case:
-    """L-shaped bracket, 100 x 100 mm: optimised, or the full plate.
-
-    Parameters
-    ----------
-    optimised : bool, default True
-        Whether to take the optimised part, or the full plate.
-    element_size : float, mm
-        Edge length of the cells aimed at.
-    order : {1, 2}
-        Linear or quadratic cells.
-    force : float, N
-    thickness : float, mm
-    """
-    return designed_case(l_shape_plate(force=force), optimised, element_size, order, thickness)
+l_shape = case_of(l_shape_plate, "L-shaped bracket, 100 x 100 mm")

@@ -2,18 +2,9 @@
 
 import shapely
 
-from ccfem.cases.case import Case
-from ccfem.cases.designed import (
-    ELEMENT_SIZE,
-    THICKNESS,
-    DesignPlate,
-    Stretch,
-    designed_case,
-    designed_mesh,
-)
-from ccfem.mesh import TetMesh
+from ccfem.cases.designed import DesignPlate, Stretch, case_of
 
-__all__ = ["m_shape", "m_shape_mesh", "m_shape_plate"]
+__all__ = ["m_shape", "m_shape_plate"]
 
 
 def m_shape_plate(volume_fraction: float = 0.4, force: float = 100.0) -> DesignPlate:
@@ -33,29 +24,4 @@ def m_shape_plate(volume_fraction: float = 0.4, force: float = 100.0) -> DesignP
     )
 
 
-def m_shape_mesh(element_size: float) -> TetMesh:
-    """Mesh of the optimised part."""
-    return designed_mesh(m_shape_plate(), element_size)
-
-
-def m_shape(
-    optimised: bool = True,
-    element_size: float = ELEMENT_SIZE,
-    order: int = 1,
-    force: float = 100.0,
-    thickness: float = THICKNESS,
-) -> Case:
-    """Plate on two corners, 120 x 60 mm, pressed down: optimised (M-shape), or full.
-
-    Parameters
-    ----------
-    optimised : bool, default True
-        Whether to take the optimised part, or the full plate.
-    element_size : float, mm
-        Edge length of the cells aimed at.
-    order : {1, 2}
-        Linear or quadratic cells.
-    force : float, N
-    thickness : float, mm
-    """
-    return designed_case(m_shape_plate(force=force), optimised, element_size, order, thickness)
+m_shape = case_of(m_shape_plate, "Plate on two corners (M-shape), 120 x 60 mm")

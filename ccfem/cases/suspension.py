@@ -2,19 +2,9 @@
 
 import shapely
 
-from ccfem.cases.case import Case
-from ccfem.cases.designed import (
-    ELEMENT_SIZE,
-    THICKNESS,
-    DesignPlate,
-    Hole,
-    Stretch,
-    designed_case,
-    designed_mesh,
-)
-from ccfem.mesh import TetMesh
+from ccfem.cases.designed import DesignPlate, Hole, Stretch, case_of
 
-__all__ = ["suspension", "suspension_mesh", "suspension_plate"]
+__all__ = ["suspension", "suspension_plate"]
 
 
 def suspension_plate(volume_fraction: float = 0.4, force: float = 100.0) -> DesignPlate:
@@ -38,29 +28,4 @@ def suspension_plate(volume_fraction: float = 0.4, force: float = 100.0) -> Desi
     )
 
 
-def suspension_mesh(element_size: float) -> TetMesh:
-    """Mesh of the optimised part."""
-    return designed_mesh(suspension_plate(), element_size)
-
-
-def suspension(
-    optimised: bool = True,
-    element_size: float = ELEMENT_SIZE,
-    order: int = 1,
-    force: float = 100.0,
-    thickness: float = THICKNESS,
-) -> Case:
-    """Suspension arm with holes, 175 x 126 mm: optimised, or the full plate.
-
-    Parameters
-    ----------
-    optimised : bool, default True
-        Whether to take the optimised part, or the full plate.
-    element_size : float, mm
-        Edge length of the cells aimed at.
-    order : {1, 2}
-        Linear or quadratic cells.
-    force : float, N
-    thickness : float, mm
-    """
-    return designed_case(suspension_plate(force=force), optimised, element_size, order, thickness)
+suspension = case_of(suspension_plate, "Suspension arm with holes, 175 x 126 mm")

@@ -94,10 +94,7 @@ def somp(
     if not 0.0 < relaxation <= 1.0:
         raise InputError(f"relaxation must lie in (0, 1]; got {relaxation}")
     m = len(problem.mesh.cells)
-    first = np.asarray(angle, dtype=np.float64)
-    if first.shape not in ((), (m,)) or not np.isfinite(first).all():
-        raise InputError(f"angle must be one number or one a cell ({m}); got shape {first.shape}")
-    first = np.broadcast_to(first, (m,))
+    first = _first_angle(angle, m)
     material = _stiffness(problem, material)
     whole = np.broadcast_to(material, (m, *material.shape))
     model: Any = compliance_of(replace(problem, stiffness=whole), weights, backend)
@@ -120,6 +117,14 @@ def somp(
         design = cells.expanded(design)
         stiffness, angle = stiffness[cells.member], angle[cells.member]
     return replace(design, full=replace(problem, stiffness=stiffness), angle=angle)
+
+
+def _first_angle(angle: FloatArray | float, m: int) -> FloatArray:
+    """Angle of the material axis of each cell at the start, (m,), radians."""
+    first = np.asarray(angle, dtype=np.float64)
+    if first.shape not in ((), (m,)) or not np.isfinite(first).all():
+        raise InputError(f"angle must be one number or one a cell ({m}); got shape {first.shape}")
+    return np.broadcast_to(first, (m,))
 
 
 def _stiffness(problem: PlaneProblem | Problem, material: FloatArray) -> FloatArray:
