@@ -257,8 +257,8 @@ def _evaluated(name: str, planner: _Planner, seconds: dict[str, float]) -> Run:
     if not len(planned.toolpaths):
         shortest = planner.case.machine.minimum_length
         failure = (
-            "laid no fibre: the sections are too small, or the shortest strand is too long "
-            f"(machine.minimum_length = {shortest:g} mm): are all lengths in mm?"
+            "laid no fibre: the sections, or what of them is under tension, are too small for the "
+            f"shortest strand (machine.minimum_length = {shortest:g} mm): are all lengths in mm?"
         )
     else:
         try:

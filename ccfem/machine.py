@@ -9,14 +9,14 @@ from ccfem.speeds import SpeedTable
 __all__ = ["Machine"]
 
 _CUTTER_DISTANCE = 42.0
-"""Paper 000, section 5.2, mm."""
+"""Chen et al. 2021, section 5.2, mm."""
 
 
 @dataclass(frozen=True)
 class Machine:
     """A printer of continuous fibre.
 
-    The defaults are the machine of Chen et al. 2021 (paper 000, section 5 and table 3). What the
+    The defaults are the machine of Chen et al. 2021 (section 5 and table 3). What the
     paper does not give is marked "our choice".
 
     Attributes
@@ -43,7 +43,7 @@ class Machine:
         `fibre_speed`. Default: none.
     cutter_distance : float, mm, optional
         From the cutter to the tip of the fibre nozzle. Default: 42 mm, or `minimum_length` where
-        that is shorter (paper 000, section 5.2: no shorter strand can be cut).
+        that is shorter (section 5.2: no shorter strand can be cut).
     cut_wait : float, s
         Standstill after a cut. Our choice.
     matrix_width : float, mm

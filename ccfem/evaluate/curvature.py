@@ -15,7 +15,7 @@ __all__ = ["COLUMNS", "CurvatureSamples", "curvature_indices", "sample_curvature
 
 _SIMPLIFY = 0.02
 """Tolerance, over the step of the resampling, of the simplification before vertices are counted:
-points that lie straight between others are not the planner's turns (specification, H1)."""
+points that lie straight between others are not the planner's turns."""
 
 _FORMULA = (
     "of the curvature over the fibre's length: every path is resampled in equal steps h of about "

@@ -12,7 +12,7 @@ from ccfem.geometry.polylines import arc_lengths, sample_at
 __all__ = ["FibreMap", "fibre_map"]
 
 _REACH = 2.0
-"""Half length, in bead widths, of the chord that gives the angle (specification, addendum A13)."""
+"""Half length, in bead widths, of the chord that gives the angle."""
 _STEP = 0.25
 """Distance of samples along a path, in bead widths."""
 _NEAR = 0.75

@@ -62,7 +62,7 @@ COLUMNS = (
 
 _UNDEFINED = 0.02
 """Absolute principal values nearer than this share of the larger one have no strongest direction
-(specification: Plocher et al. give no rule)."""
+(our choice: Plocher et al. give no rule)."""
 _CAP = 0.995
 """Quantile of the energies that counts as the largest: point loads have no finite one."""
 

@@ -1,4 +1,4 @@
-"""Waypoint files as published with paper 000: ``X.. Y.. Z..`` lines between ``S`` and ``E``.
+"""Waypoint files as published with Chen et al. 2021: ``X.. Y.. Z..`` lines between ``S`` and ``E``.
 
 A line ``;Layer_CCF: i`` starts layer i. Coordinates are those of the tool: X and Y along the two
 in-plane axes of a layer's frame, Z along the build direction. (For the authors' meshes, built along

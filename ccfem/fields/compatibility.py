@@ -1,4 +1,4 @@
-"""The incompatibility filter: where neighbouring vectors disagree [paper 000, Eq. 2]."""
+"""The incompatibility filter: where neighbouring vectors disagree [Chen et al. 2021, Eq. 2]."""
 
 from typing import Literal
 

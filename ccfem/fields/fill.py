@@ -16,7 +16,7 @@ def fill_laplacian(
     defined: BoolArray,
     iterations: int = 50,
 ) -> tuple[FloatArray, FloatArray]:
-    """Fill by repeated averaging over neighbouring triangles [paper 000, Eq. 3-4], as printed.
+    """Fill by repeated averaging over neighbouring triangles [Chen et al. 2021, Eq. 3-4].
 
     The face of the largest stress is held. The energy that this descends has a constant minimiser,
     so more iterations keep degrading the field: `fill_screened` does not.

@@ -111,7 +111,7 @@ def mesh_tension(
     compression_limit: float = 3.0,
     rule: Incompatible = "any",
 ) -> MeshTension:
-    """Tension in space of all tetrahedra, as paper 000 section 4.1 processes it.
+    """Tension in space of all tetrahedra, as Chen et al. 2021 section 4.1 processes it.
 
     Vectors are chosen by `spatial_tension`, oriented along the minimum spanning tree over the
     faces (cells without a tensile direction take part in that only), and undefined where the

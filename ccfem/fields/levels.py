@@ -1,4 +1,4 @@
-"""How many isocurves fit: the search for their number [paper 000, section 4.3, Eq. 7]."""
+"""How many isocurves fit: the search for their number [Chen et al. 2021, section 4.3, Eq. 7]."""
 
 import numpy as np
 import scipy.sparse as sparse
@@ -17,7 +17,7 @@ __all__ = ["extract_levels", "levels_at", "start_count", "unit_levels"]
 
 
 def levels_at(surface: Surface, values: FloatArray, count: int) -> Isocontours:
-    """Isocurves at `count` levels, half a step from the extremes [paper 000, Eq. 7]."""
+    """Isocurves at `count` levels, half a step from the extremes [Chen et al. 2021, Eq. 7]."""
     first, step = _levels(values, count)
     return isocontours(surface.points, surface.triangles, values, first, step, surface.edges)
 

@@ -1,4 +1,4 @@
-"""Consistent signs for a field of lines along a minimum spanning tree [paper 000, Eq. 1]."""
+"""Consistent signs for a field of lines along a minimum spanning tree [Chen et al. 2021, Eq. 1]."""
 
 import numpy as np
 from numba import njit

@@ -1,4 +1,4 @@
-"""The scalar field whose isocurves are the paths [paper 000, section 4.2, Eq. 6]."""
+"""The scalar field whose isocurves are the paths [Chen et al. 2021, section 4.2, Eq. 6]."""
 
 from typing import Any
 

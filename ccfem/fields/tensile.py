@@ -1,4 +1,4 @@
-"""The direction and size of tension at every point [paper 000, section 4.1]."""
+"""The direction and size of tension at every point [Chen et al. 2021, section 4.1]."""
 
 from dataclasses import dataclass
 

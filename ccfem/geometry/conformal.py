@@ -1,4 +1,4 @@
-"""Curves that run along a chosen boundary, and isocurves led into them [paper 000, section 4.4]."""
+"""Curves that run along a chosen boundary, and isocurves led into them [Chen et al. 2021, 4.4]."""
 
 from collections.abc import Sequence
 from typing import Any

@@ -45,8 +45,8 @@ def close_short_ring(line: FloatArray, least_length: float, overlap: float = 0.1
         Returned as it is when it is open, long enough, or shorter than the overlap can mend.
     least_length : float, mm
     overlap : float, default 0.1
-        Largest part of the ring's length that is laid twice [paper 000: the ring round a hole of
-        10.9 mm is 40.8 mm long, against a minimum of 42 mm].
+        Largest part of the ring's length that is laid twice [Chen et al. 2021: the ring round a
+        hole of 10.9 mm is 40.8 mm long, against a minimum of 42 mm].
 
     Returns
     -------

@@ -1,4 +1,4 @@
-"""The ``.tet`` format of Chen et al. 2021 (paper 000): plain text, linear tetrahedra.
+"""The ``.tet`` format of Chen et al. 2021: plain text, linear tetrahedra.
 
 ::
 

@@ -13,8 +13,8 @@ from ccfem.mesh import TetMesh
 __all__ = ["plane_frame", "slice_heights", "slice_planar"]
 
 _SNAP = 2e-6
-"""Nodes nearer to the plane than this share of the part's size are taken to lie on it [paper 000,
-section 5]: a plane through mesh nodes would otherwise cut slivers."""
+"""Nodes nearer to the plane than this share of the part's size are taken to lie on it [Chen et al.
+2021, section 5]: a plane through mesh nodes would otherwise cut slivers."""
 
 
 def plane_frame(direction: Sequence[float]) -> FloatArray:
@@ -29,7 +29,7 @@ def plane_frame(direction: Sequence[float]) -> FloatArray:
     -------
     (3, 3) array
         Rows: two in-plane unit vectors and the unit normal. Along z they are x, y, z; along y
-        x, -z, y (the tool frame of paper 000); along x y, z, x.
+        x, -z, y (the tool frame of Chen et al. 2021); along x y, z, x.
     """
     normal = np.asarray(direction, dtype=np.float64)
     length = float(np.linalg.norm(normal)) if normal.shape == (3,) else 0.0
@@ -210,7 +210,7 @@ def _cut_cells(
             found += 1
         elif on == 0:
             # Four crossings in the order (i, j) of a 2-2 split: 0-1-3-2 is the cyclic order. The
-            # quad is split along its shorter diagonal [paper 000, section 5].
+            # quad is split along its shorter diagonal [Chen et al. 2021, section 5].
             if ((where[0] - where[3]) ** 2).sum() <= ((where[1] - where[2]) ** 2).sum():
                 a, b, c, d = key[0], key[1], key[3], key[2]
             else:

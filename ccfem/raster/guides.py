@@ -20,8 +20,7 @@ __all__ = ["guide_pixels", "nearest_pixels", "segment_seeds", "stress_guides"]
 _STEP = 0.5
 _APART = 2.0
 _SHORTEST = 6
-"""In pixels: step along a streamline, least distance of guides, and least number of their pixels
-(specification, addendum A1)."""
+"""In pixels: step along a streamline, least distance of guides, and least number of pixels."""
 
 
 def segment_seeds(inside: BoolArray) -> IntArray:

@@ -1,6 +1,6 @@
 """Lines equally spaced from one streamline of the principal stress: a strategy to compare with.
 
-One of the three ways that Wang et al. 2021 (paper 001) show beside their own, after V. S.
+One of the three ways that Wang et al. 2021 show beside their own, after V. S.
 Papapetrou, C. Patel, A. Y. Tamijani, Stiffness-based optimization framework for the topology and
 fiber paths of continuous fiber composites, Composites Part B 183 (2020) 107681 (EQS).
 """

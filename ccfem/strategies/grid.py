@@ -1,8 +1,8 @@
-"""Shells and parallel straight lines: the grids of paper 004.
+"""Shells and parallel straight lines: the grids of Plocher et al. 2022.
 
 J. Plocher, J.-B. Wioland, A. Panesar, Additive manufacturing with fibre-reinforcement: design
 guidelines and investigation into the influence of infill patterns, Rapid Prototyping Journal 28
-(2022) 1241 (paper 004).
+(2022) 1241.
 """
 
 from dataclasses import dataclass

@@ -1,8 +1,8 @@
-"""Shells, strands along the medial axis, and concentric strands in the rest: MAT of paper 004.
+"""Shells, strands along the medial axis, and concentric strands in the rest: MAT.
 
 J. Plocher, J.-B. Wioland, A. Panesar, Additive manufacturing with fibre-reinforcement: design
 guidelines and investigation into the influence of infill patterns, Rapid Prototyping Journal 28
-(2022) 1241 (paper 004).
+(2022) 1241.
 """
 
 from dataclasses import dataclass

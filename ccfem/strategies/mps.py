@@ -1,8 +1,8 @@
-"""Strands along lines of the maximum principal stress, and parallel to them: MPS of paper 004.
+"""Strands along lines of the maximum principal stress, and parallel to them: MPS.
 
 J. Plocher, J.-B. Wioland, A. Panesar, Additive manufacturing with fibre-reinforcement: design
 guidelines and investigation into the influence of infill patterns, Rapid Prototyping Journal 28
-(2022) 1241 (paper 004).
+(2022) 1241.
 """
 
 from dataclasses import dataclass

@@ -1,6 +1,6 @@
 """Level sets of the distance to the border, as they are: a strategy to compare with.
 
-One of the three ways that Wang et al. 2021 (paper 001) show beside their own, after V. S.
+One of the three ways that Wang et al. 2021 show beside their own, after V. S.
 Papapetrou, C. Patel, A. Y. Tamijani, Stiffness-based optimization framework for the topology and
 fiber paths of continuous fiber composites, Composites Part B 183 (2020) 107681.
 """

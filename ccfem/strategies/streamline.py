@@ -1,6 +1,6 @@
 """Evenly spaced streamlines of the principal stress, as they are: a strategy to compare with.
 
-One of the three ways of following the stress that Wang et al. 2021 (paper 001) show beside their
+One of the three ways of following the stress that Wang et al. 2021 show beside their
 own, after V. S. Papapetrou, C. Patel, A. Y. Tamijani, Stiffness-based optimization framework for
 the topology and fiber paths of continuous fiber composites, Composites Part B 183 (2020) 107681.
 The lines are those of B. Jobard, W. Lefer, Creating evenly-spaced streamlines of arbitrary density,

@@ -17,7 +17,7 @@ from ccfem.topopt.parametrisation import Parametrisation, simp_factor
 __all__ = ["Limits", "iterate"]
 
 _WINDOW = 10
-"""Iterations over which the objective must stand still (specification 001, addendum A6)."""
+"""Iterations over which the objective must stand still."""
 
 
 @dataclass(frozen=True)

@@ -97,7 +97,7 @@ def _region(rings: list[FloatArray]) -> Any:
 
 
 def _cleaned(region: Any, size: float, domain: Any, least_hole: float) -> Any:
-    """Open hairs, round re-entrant corners, close small holes (specification 001, addendum B2).
+    """Open hairs, round re-entrant corners, close small holes.
 
     The region still reaches out of the domain, so that corners of the domain stay sharp.
     """

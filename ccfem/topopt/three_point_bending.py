@@ -88,7 +88,7 @@ def three_point_bending(size: float = 0.8, volume_fraction: float = 0.6) -> Bend
 
     SIMP (penalty 3, sensitivity filter of 1.5 cells, at most 120 iterations) on 68 x 20 cells,
     interpolated to pixels a third as large, cut at the volume, largest piece, voids below 12
-    pixels filled, one half copied onto the other (addendum of specification 004, A17).
+    pixels filled, one half copied onto the other.
 
     Parameters
     ----------
