@@ -145,9 +145,9 @@ def table_speeds(
     Notes
     -----
     Wang et al. 2021, section 3.2, give the curvature of a point by the angle between its two
-    direction vectors and their length. These are here the chords to the neighbouring points, or
-    to the points `shortest` before and behind where the neighbours are nearer; they do not
-    reach across corners. On a circle through the points it is that of the circle. A step has the larger
+    direction vectors and their length. These are here the chords to the neighbouring points, or to
+    the points `shortest` before and behind where the neighbours are nearer; they do not reach
+    across corners. On a circle through the points it is that of the circle. A step has the larger
     curvature of its two ends.
     """
     if not len(points):
