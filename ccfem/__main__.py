@@ -1,6 +1,6 @@
 """``python -m ccfem`` is ``ccfem``."""
 
-from ccfem.cli import main
+from ccfem.cli.commands import main
 
 if __name__ == "__main__":
     main()

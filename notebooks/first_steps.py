@@ -20,10 +20,12 @@
 import numpy as np
 
 from ccfem.cases import create_case
-from ccfem.compare import compare
+from ccfem.comparison.compare import compare
 from ccfem.elasticity import solve
-from ccfem.evaluate import evaluate
-from ccfem.headline import headline_values, ranking, verdict
+from ccfem.evaluation import evaluate
+from ccfem.comparison.headline import headline_values
+from ccfem.comparison.remarks import verdict
+from ccfem.comparison.ranking import ranking
 from ccfem.layers import slice_planar
 from ccfem.strategies import create, plan
 

@@ -19,12 +19,12 @@
 # %%
 import numpy as np
 
-from ccfem.cases.plates import single_hole
-from ccfem.evaluate import evaluate
-from ccfem.evaluate.fibre_map import fibre_map
-from ccfem.evaluate.plane_paths import plane_paths
-from ccfem.evaluate.plane_study import benchmark, laid_plate, print_seconds, reduced_stiffness
-from ccfem.evaluate.sensitivity import OffAxis
+from benchmarks.papers.plocher_2022.plates import single_hole
+from ccfem.evaluation import evaluate
+from benchmarks.papers.plocher_2022.fibre_map import fibre_map
+from ccfem.evaluation.plane_paths import plane_paths
+from benchmarks.papers.plocher_2022.plane_study import benchmark, laid_plate, print_seconds, reduced_stiffness
+from ccfem.evaluation.sensitivity import OffAxis
 from ccfem.machine import Machine
 from ccfem.materials import named_material
 from ccfem.strategies import create, plan

@@ -22,12 +22,13 @@ import numpy as np
 
 from ccfem.cases import create_case
 from ccfem.cases.bridge import bridge_plate
-from ccfem.elasticity import solve, solve_plane
-from ccfem.evaluate import evaluate
-from ccfem.evaluate.matching import THRESHOLDS, matching_rate
-from ccfem.evaluate.plane_paths import plane_paths
-from ccfem.evaluate.virtual_test.strand import RHO, Strand
-from ccfem.evaluate.virtual_test.virtual_test import virtual_bracket
+from ccfem.elasticity import solve
+from ccfem.plates import solve_plane
+from ccfem.evaluation import evaluate
+from ccfem.evaluation.matching import THRESHOLDS, matching_rate
+from ccfem.evaluation.plane_paths import plane_paths
+from ccfem.virtual_testing.strand import RHO, Strand
+from ccfem.virtual_testing.virtual_test import virtual_bracket
 from ccfem.layers import slice_planar
 from ccfem.strategies import create, plan
 from ccfem.tensor import in_plane, largest_in_plane

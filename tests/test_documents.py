@@ -10,12 +10,11 @@ from pathlib import Path
 
 import pytest
 
+from ccfem.cases.part_file import read_part
 from ccfem.errors import InputError
-from ccfem.machine import Machine
-from ccfem.part_file import read_part
-from ccfem.speeds import SpeedTable
+from ccfem.io.toml import from_table
+from ccfem.machine import Machine, SpeedTable
 from ccfem.strategies import named
-from ccfem.tables import from_table
 
 ROOT = Path(__file__).parents[1]
 README = (ROOT / "README.md").read_text()

@@ -30,7 +30,7 @@ from ccfem.elasticity.supports import Held
 from ccfem.io import read_mesh
 from ccfem.materials import isotropic
 from ccfem.mesh import TetMesh
-from ccfem.structured import box_mesh
+from ccfem.mesh.box import box_mesh
 
 MATERIAL = (3500.0, 0.35)
 

@@ -18,20 +18,15 @@ from typing import Any
 import numpy as np
 import typer
 
+from benchmarks.papers.plocher_2022.three_point_bending import three_point_bending
 from ccfem.arrays import IntArray
 from ccfem.cases.bracket import bracket_design
-from ccfem.elasticity import (
-    Force,
-    PlaneProblem,
-    PointForce,
-    Problem,
-    Support,
-    raster_mesh,
-)
+from ccfem.elasticity import Force, PointForce, Problem, Support
 from ccfem.materials import isotropic, plane_stress
-from ccfem.patches import Box, patches_from_rules
-from ccfem.structured import box_mesh
-from ccfem.topopt import as_problem, simp, somp, three_point_bending
+from ccfem.mesh.box import box_mesh
+from ccfem.mesh.patches import Box, patches_from_rules
+from ccfem.plates import PlaneProblem, raster_mesh
+from ccfem.topopt import as_problem, simp, somp
 
 UNIT = plane_stress(1.0, 1.0, 0.3, 1.0 / 2.6)
 WANG = plane_stress(18300.0, 19800.0, 0.17, 5150.0)

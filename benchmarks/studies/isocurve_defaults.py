@@ -17,13 +17,13 @@ import numpy as np
 from ccfem.cases import create_case
 from ccfem.elasticity import solve
 from ccfem.elasticity.stress_field import StressField
-from ccfem.equal_fibre import plan_to_length
-from ccfem.evaluate.virtual_test.specimen import Specimen
-from ccfem.evaluate.virtual_test.strength import first_failure
-from ccfem.evaluate.virtual_test.virtual_test import virtual_test
 from ccfem.layers import Layer, slice_planar
 from ccfem.machine import Machine
+from ccfem.planning.equal_fibre import plan_to_length
 from ccfem.strategies.isocurve import Isocurve
+from ccfem.virtual_testing.specimen import Specimen
+from ccfem.virtual_testing.strength import first_failure
+from ccfem.virtual_testing.virtual_test import virtual_test
 
 FIBRE_PER_LAYER = {"loop": 2600.0, "bar": 380.0, "open_hole": 4500.0}
 """Fibre, mm a layer: somewhat less than the defaults lay of their own accord."""

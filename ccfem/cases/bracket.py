@@ -10,9 +10,9 @@ from ccfem.cases.case import Case
 from ccfem.cases.filament import printed_pla
 from ccfem.cases.stored import mesh_of_case
 from ccfem.elasticity.problem import Bearing, Force, Problem, Support
-from ccfem.mesh import TetMesh
+from ccfem.mesh.patches import Cylinder, patches_from_rules
+from ccfem.mesh.tet_mesh import TetMesh
 from ccfem.meshing import extrude
-from ccfem.patches import Cylinder, patches_from_rules
 from ccfem.progress import Progress, silent
 from ccfem.topopt import Design, as_problem, simp
 

@@ -8,7 +8,7 @@ from pathlib import Path
 
 from ccfem.cases.stored import COMMAND, data_folder, write_outline
 from ccfem.io import whole_file, write_mesh
-from ccfem.mesh import TetMesh
+from ccfem.mesh.tet_mesh import TetMesh
 
 __all__ = ["CASES", "DESIGNED", "build"]
 

@@ -6,7 +6,7 @@ from types import MappingProxyType
 from typing import Any
 
 from ccfem.elasticity.problem import Problem
-from ccfem.machine import Machine
+from ccfem.machine.machine import Machine
 
 __all__ = ["Case"]
 

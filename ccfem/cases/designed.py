@@ -18,17 +18,17 @@ from ccfem.arrays import BoolArray, FloatArray, IntArray
 from ccfem.cases.case import Case
 from ccfem.cases.filament import printed_pla
 from ccfem.cases.stored import mesh_of_case, stored_outline
-from ccfem.elasticity.plane_mesh import PlaneMesh, raster_mesh
-from ccfem.elasticity.plane_problem import PlaneProblem
 from ccfem.elasticity.problem import Force, Problem, Support
 from ccfem.errors import InputError
-from ccfem.machine import Machine
+from ccfem.machine.machine import Machine
+from ccfem.machine.speed_table import SpeedTable
 from ccfem.materials import plane_stress
-from ccfem.mesh import TetMesh
+from ccfem.mesh.patches import Cylinder, Plane, patches_from_rules
+from ccfem.mesh.tet_mesh import TetMesh
 from ccfem.meshing import extrude
-from ccfem.patches import Cylinder, Plane, patches_from_rules
+from ccfem.plates.plane_mesh import PlaneMesh, raster_mesh
+from ccfem.plates.problem import PlaneProblem
 from ccfem.progress import Progress, silent
-from ccfem.speeds import SpeedTable
 from ccfem.topopt.design import Design
 from ccfem.topopt.outline import solid
 from ccfem.topopt.somp import somp

@@ -10,9 +10,9 @@ from ccfem.cases.case import Case
 from ccfem.cases.filament import printed_pla
 from ccfem.cases.stored import mesh_of_case
 from ccfem.elasticity.problem import Force, Problem, Support
-from ccfem.mesh import TetMesh
+from ccfem.mesh.patches import Cylinder, patches_from_rules
+from ccfem.mesh.tet_mesh import TetMesh
 from ccfem.meshing import extrude
-from ccfem.patches import Cylinder, patches_from_rules
 
 __all__ = ["loop", "loop_mesh", "loop_outline"]
 

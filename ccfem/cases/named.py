@@ -9,7 +9,7 @@ from typing import Any, get_type_hints
 
 from ccfem.cases.case import Case
 from ccfem.errors import InputError, known_names
-from ccfem.tables import from_table
+from ccfem.io.toml import from_table
 
 __all__ = ["create_case", "named_cases"]
 

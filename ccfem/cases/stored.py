@@ -14,7 +14,7 @@ import shapely
 
 from ccfem.errors import InputError
 from ccfem.io import read_mesh
-from ccfem.mesh import TetMesh
+from ccfem.mesh.tet_mesh import TetMesh
 
 __all__ = [
     "COMMAND",

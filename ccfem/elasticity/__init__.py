@@ -1,15 +1,6 @@
-"""Linear elasticity on tetrahedra and of plates: problem, assembly, solvers, recovery."""
+"""Linear elasticity on tetrahedra: problem, assembly, solvers, recovery."""
 
 from ccfem.elasticity.assembly import add_blocks, assemble, cell_gradients, pattern
-from ccfem.elasticity.plane import (
-    PlaneField,
-    PlaneMesh,
-    PlaneProblem,
-    raster_mesh,
-    rotate_plane,
-    solve_plane,
-    stack_plane,
-)
 from ccfem.elasticity.problem import (
     Bearing,
     Force,
@@ -31,9 +22,6 @@ __all__ = [
     "Force",
     "LayerStress",
     "Load",
-    "PlaneField",
-    "PlaneMesh",
-    "PlaneProblem",
     "PointForce",
     "Pressure",
     "Problem",
@@ -52,9 +40,5 @@ __all__ = [
     "pattern",
     "preconditioned_cg",
     "prepare",
-    "raster_mesh",
-    "rotate_plane",
     "solve",
-    "solve_plane",
-    "stack_plane",
 ]

@@ -13,8 +13,8 @@ import scipy.sparse as sp
 from numba import njit
 
 from ccfem.arrays import FloatArray, IntArray, read_only
-from ccfem.elasticity.plane_mesh import PlaneMesh
-from ccfem.mesh import TetMesh
+from ccfem.elasticity.body import Cells
+from ccfem.mesh.tet_mesh import TetMesh
 
 __all__ = ["Pattern", "add_blocks", "assemble", "cell_gradients", "pattern"]
 
@@ -46,7 +46,7 @@ class Pattern:
             object.__setattr__(self, name, read_only(getattr(self, name), np.int32))
 
 
-def pattern(mesh: TetMesh | PlaneMesh) -> Pattern:
+def pattern(mesh: Cells) -> Pattern:
     """Find the pattern of the stiffness matrix of a mesh."""
     (m, q), n = mesh.cells.shape, len(mesh.points)
     starts = np.arange(0, m * q + 1, q, dtype=np.int32)

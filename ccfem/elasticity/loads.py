@@ -6,55 +6,21 @@ from functools import reduce
 import numpy as np
 
 from ccfem.arrays import FloatArray, IntArray
-from ccfem.elasticity.plane_mesh import PlaneMesh, Sheet
-from ccfem.elasticity.plane_problem import PlaneProblem
+from ccfem.elasticity.body import LoadedBody, SupportedProblem
 from ccfem.elasticity.problem import (
     Bearing,
     Force,
     Load,
     PointForce,
     Pressure,
-    Problem,
     Traction,
 )
 from ccfem.errors import InputError
-from ccfem.mesh import TetMesh
 
-__all__ = ["facet_nodes", "load_case", "nodal_forces"]
-
-
-def facet_nodes(mesh: TetMesh | PlaneMesh | Sheet, facets: IntArray) -> IntArray:
-    """Nodes of facets: their corners, and on a quadratic mesh the middles of their sides.
-
-    Parameters
-    ----------
-    mesh : TetMesh, PlaneMesh or Sheet
-    facets : (k, 3) int array, or (k, 2) of the edges of a plane mesh
-
-    Returns
-    -------
-    (k, 3), (k, 6) or (k, 2) int array
-        Middles in the order of the sides 01, 12, 20.
-    """
-    if not isinstance(mesh, TetMesh) or mesh.order == 1 or not len(facets):
-        return facets
-    n = len(mesh.points)
-    on_facet = np.zeros(n, dtype=bool)
-    on_facet[facets] = True
-    ends = mesh.cells[:, mesh.edges].reshape(-1, 2)
-    chosen = np.flatnonzero(on_facet[ends].all(axis=1))
-    ends = np.sort(ends[chosen], axis=1)
-    keys, first = np.unique(ends[:, 0] * n + ends[:, 1], return_index=True)
-    middle = mesh.cells[:, 4:].reshape(-1)[chosen[first]]
-    sides = np.sort(facets[:, [[0, 1], [1, 2], [2, 0]]], axis=2)
-    wanted = sides[..., 0] * n + sides[..., 1]
-    at = np.minimum(np.searchsorted(keys, wanted), len(keys) - 1)
-    if (keys[at] != wanted).any():
-        raise InputError("a patch has facets that no cell of the mesh has: name boundary facets")
-    return np.hstack([facets, middle[at]])
+__all__ = ["load_case", "nodal_forces"]
 
 
-def _facets(mesh: TetMesh | Sheet, name: str) -> IntArray:
+def _facets(mesh: LoadedBody, name: str) -> IntArray:
     """Facets of a patch that must not be empty."""
     facets = mesh.patch(name)
     if not len(facets):
@@ -62,7 +28,7 @@ def _facets(mesh: TetMesh | Sheet, name: str) -> IntArray:
     return facets
 
 
-def _outward(mesh: TetMesh | Sheet, name: str) -> tuple[IntArray, FloatArray, FloatArray]:
+def _outward(mesh: LoadedBody, name: str) -> tuple[IntArray, FloatArray, FloatArray]:
     """Facets of a patch with their areas and outward unit normals."""
     facets, n = _facets(mesh, name), len(mesh.points)
 
@@ -81,13 +47,13 @@ def _outward(mesh: TetMesh | Sheet, name: str) -> tuple[IntArray, FloatArray, Fl
     return facets, *mesh.facet_areas(facets)
 
 
-def _spread(mesh: TetMesh | Sheet, facets: IntArray, forces: FloatArray) -> FloatArray:
+def _spread(mesh: LoadedBody, facets: IntArray, forces: FloatArray) -> FloatArray:
     """Nodal forces (n, 3) of forces (k, 3) spread evenly over facets; (n, 2) of (k, 2) on a sheet.
 
     A linear facet gives a third to each corner; a quadratic one a third to each middle; an edge
     of a sheet a half to each end.
     """
-    nodes = facet_nodes(mesh, facets)[:, -3:]
+    nodes = mesh.facet_nodes(facets)[:, -3:]
     share = nodes.shape[1]
     result: FloatArray = np.zeros(mesh.points.shape)
     for k in range(mesh.points.shape[1]):
@@ -96,29 +62,29 @@ def _spread(mesh: TetMesh | Sheet, facets: IntArray, forces: FloatArray) -> Floa
     return result
 
 
-def _vector(mesh: TetMesh | Sheet, load: Force | Traction | Bearing | PointForce) -> FloatArray:
+def _vector(mesh: LoadedBody, load: Force | Traction | Bearing | PointForce) -> FloatArray:
     """Components of a load in the space of the mesh; PlaneProblem refuses one out of its plane."""
     return np.array(load.vector, dtype=np.float64)[: mesh.points.shape[1]]
 
 
-def _force(mesh: TetMesh | Sheet, load: Force) -> FloatArray:
+def _force(mesh: LoadedBody, load: Force) -> FloatArray:
     facets = _facets(mesh, load.patch)
     area, _ = mesh.facet_areas(facets)
     return _spread(mesh, facets, area[:, None] / area.sum() * _vector(mesh, load))
 
 
-def _traction(mesh: TetMesh | Sheet, load: Traction) -> FloatArray:
+def _traction(mesh: LoadedBody, load: Traction) -> FloatArray:
     facets = _facets(mesh, load.patch)
     area, _ = mesh.facet_areas(facets)
     return _spread(mesh, facets, area[:, None] * _vector(mesh, load))
 
 
-def _pressure(mesh: TetMesh | Sheet, load: Pressure) -> FloatArray:
+def _pressure(mesh: LoadedBody, load: Pressure) -> FloatArray:
     facets, area, normal = _outward(mesh, load.patch)
     return _spread(mesh, facets, -load.magnitude * area[:, None] * normal)
 
 
-def _bearing(mesh: TetMesh | Sheet, load: Bearing) -> FloatArray:
+def _bearing(mesh: LoadedBody, load: Bearing) -> FloatArray:
     """Pressure ``-normal . a`` where that is positive, the vector a fitted to the total force.
 
     On an evenly meshed half cylinder a is parallel to the force, and the pressure its cosine.
@@ -142,7 +108,7 @@ def _bearing(mesh: TetMesh | Sheet, load: Bearing) -> FloatArray:
     return _spread(mesh, facets, forces)
 
 
-def _point(mesh: TetMesh | Sheet, load: PointForce) -> FloatArray:
+def _point(mesh: LoadedBody, load: PointForce) -> FloatArray:
     used = np.unique(mesh.cells)
     point = np.array(load.point)[: mesh.points.shape[1]]
     distance = np.linalg.norm(mesh.points[used] - point, axis=1)
@@ -160,12 +126,12 @@ _KINDS: dict[type, Callable[..., FloatArray]] = {
 }
 
 
-def nodal_forces(mesh: TetMesh | Sheet, load: Load) -> FloatArray:
+def nodal_forces(mesh: LoadedBody, load: Load) -> FloatArray:
     """Return the forces at the nodes that do the same work as a load.
 
     Parameters
     ----------
-    mesh : TetMesh or Sheet
+    mesh : TetMesh, or Sheet of a plate
     load : Force, Traction, Pressure, Bearing or PointForce
 
     Returns
@@ -187,7 +153,7 @@ def nodal_forces(mesh: TetMesh | Sheet, load: Load) -> FloatArray:
     return _KINDS[type(load)](mesh, load)
 
 
-def load_case(problem: Problem | PlaneProblem, name: str) -> FloatArray:
+def load_case(problem: SupportedProblem, name: str) -> FloatArray:
     """Nodal forces (n, 3), or (n, 2) in the plane, N, of one load case of a problem.
 
     Raises
@@ -195,7 +161,7 @@ def load_case(problem: Problem | PlaneProblem, name: str) -> FloatArray:
     InputError
         For a bad load, or when the loads cancel at every node and no support moves.
     """
-    mesh = problem.sheet if isinstance(problem, PlaneProblem) else problem.mesh
+    mesh = problem.body
     total = np.zeros(mesh.points.shape)
     largest = 0.0
     for load in problem.loads[name]:

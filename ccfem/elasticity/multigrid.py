@@ -7,7 +7,7 @@ import scipy.sparse as sp
 
 from ccfem.arrays import FloatArray, IntArray
 from ccfem.elasticity.direct import Apply
-from ccfem.elasticity.smoothing import GaussSeidel
+from ccfem.elasticity.gauss_seidel import GaussSeidel
 from ccfem.elasticity.supports import rigid_modes
 
 __all__ = ["petsc_gamg", "smoothed_aggregation", "two_level"]

@@ -9,7 +9,7 @@ import numpy as np
 from ccfem.arrays import FloatArray, read_only
 from ccfem.errors import InputError
 from ccfem.materials import Material
-from ccfem.mesh import TetMesh
+from ccfem.mesh.tet_mesh import TetMesh
 
 __all__ = [
     "Bearing",
@@ -146,7 +146,12 @@ class Problem:
             )
 
     @property
-    def loaded_patches(self) -> tuple[str, ...]:
+    def body(self) -> TetMesh:
+        """What loads act on: the mesh."""
+        return self.mesh
+
+    @property
+    def held_or_loaded(self) -> tuple[str, ...]:
         """Names of the patches that carry a support or a load, sorted."""
         names = {support.patch for support in self.supports}
         for case in self.loads.values():

@@ -5,7 +5,7 @@ import scipy.sparse as sp
 
 from ccfem.arrays import FloatArray
 from ccfem.elasticity.assembly import cell_gradients
-from ccfem.mesh import TetMesh
+from ccfem.mesh.tet_mesh import TetMesh
 from ccfem.tensor import from_voigt
 
 __all__ = ["cell_strain", "cell_stress", "nodal_stress", "strain_at_nodes"]

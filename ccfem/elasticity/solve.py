@@ -18,8 +18,8 @@ from ccfem.elasticity.solvers import LARGEST_DIRECT, Solver, direct_backend, fac
 from ccfem.elasticity.stress_field import SolveRecord, StressField
 from ccfem.elasticity.supports import Held, held
 from ccfem.errors import InputError, SolveError
-from ccfem.mesh import TetMesh
-from ccfem.mesh_check import about_slivers
+from ccfem.mesh.check import about_slivers
+from ccfem.mesh.tet_mesh import TetMesh
 from ccfem.tensor import rotate_stiffness
 
 __all__ = ["System", "cell_stiffness", "prepare", "solve", "solve_system"]

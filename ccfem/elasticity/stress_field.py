@@ -9,7 +9,7 @@ from ccfem.elasticity.problem import Problem
 from ccfem.errors import InputError
 from ccfem.geometry.locate import locate_tets
 from ccfem.layers.layer import Layer
-from ccfem.mesh import TetMesh
+from ccfem.mesh.tet_mesh import TetMesh
 
 __all__ = ["LayerStress", "SolveRecord", "StressField"]
 

@@ -8,12 +8,8 @@ import scipy.sparse as sp
 from scipy.sparse.csgraph import connected_components
 
 from ccfem.arrays import BoolArray, FloatArray, IntArray, read_only
-from ccfem.elasticity.loads import facet_nodes
-from ccfem.elasticity.plane_mesh import PlaneMesh
-from ccfem.elasticity.plane_problem import PlaneProblem
-from ccfem.elasticity.problem import Problem
+from ccfem.elasticity.body import Cells, SupportedProblem
 from ccfem.errors import InputError
-from ccfem.mesh import TetMesh
 
 __all__ = ["Held", "check_support", "held", "rigid_modes"]
 
@@ -79,7 +75,7 @@ class Held:
         return np.where(self.free, displacement, 0.0)[self.nodes].reshape(-1)
 
 
-def held(problem: Problem | PlaneProblem) -> Held:
+def held(problem: SupportedProblem) -> Held:
     """Collect the supports of a problem and check that they hold the part.
 
     Nodes that belong to no cell are held at zero.
@@ -102,7 +98,7 @@ def held(problem: Problem | PlaneProblem) -> Held:
         facets = mesh.patch(support.patch)
         if not len(facets):
             raise InputError(f"patch '{support.patch}' is empty: no boundary facet meets its rule")
-        nodes = np.unique(facet_nodes(mesh, facets))
+        nodes = np.unique(mesh.facet_nodes(facets))
         for component in sorted(set(support.components) & set(known)):
             k = "xyz".index(component)
             before = nodes[~free[nodes, k]]
@@ -132,7 +128,7 @@ def rigid_modes(points: FloatArray) -> FloatArray:
     return modes.reshape(-1, 6)
 
 
-def check_support(mesh: TetMesh | PlaneMesh, fixed: BoolArray) -> None:
+def check_support(mesh: Cells, fixed: BoolArray) -> None:
     """Check that no piece of the part can move as a rigid body.
 
     Bodies are cells joined through faces (edges in the plane); bodies that share only an edge or a
@@ -141,7 +137,7 @@ def check_support(mesh: TetMesh | PlaneMesh, fixed: BoolArray) -> None:
 
     Parameters
     ----------
-    mesh : TetMesh or PlaneMesh
+    mesh : TetMesh, or mesh of a plate
     fixed : (n, 3) bool array, or (n, 2) in the plane
 
     Raises

@@ -11,10 +11,10 @@ from ccfem.errors import InputError
 from ccfem.geometry.hatch import zigzag
 from ccfem.geometry.offsets import offset_rings
 from ccfem.geometry.polylines import merge_repeated, pack
-from ccfem.geometry.print_order import nearest_end_order
 from ccfem.layers import Layer, slice_planar
-from ccfem.machine import Machine
-from ccfem.mesh import TetMesh
+from ccfem.linking.print_order import nearest_end_order
+from ccfem.machine.machine import Machine
+from ccfem.mesh.tet_mesh import TetMesh
 from ccfem.toolpaths import FIBRE, MATRIX, Toolpaths
 
 __all__ = ["COORDINATE_DIGITS", "PrintPlan", "check_machine", "plan_print"]

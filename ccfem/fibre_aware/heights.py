@@ -7,7 +7,7 @@ import numpy as np
 from ccfem.arrays import FloatArray, IntArray
 from ccfem.fibre_aware.smeared import SmearedPart
 from ccfem.layers.layer import Layer
-from ccfem.machine import Machine
+from ccfem.machine.machine import Machine
 from ccfem.tensor import in_plane
 
 __all__ = ["alike_share", "fibre_capacity", "group_layers", "nearest_layer"]

@@ -14,12 +14,12 @@ from numba import njit
 from ccfem.arrays import BoolArray, FloatArray
 from ccfem.elasticity.stress_field import StressField
 from ccfem.errors import InputError
-from ccfem.evaluate.virtual_test.equilibrium import equilibrium
-from ccfem.evaluate.virtual_test.specimen import Specimen
-from ccfem.evaluate.virtual_test.strand import Strand
-from ccfem.evaluate.virtual_test.strands import Strands, cut_strands
-from ccfem.machine import Machine
+from ccfem.machine.machine import Machine
 from ccfem.toolpaths import FIBRE, Toolpaths
+from ccfem.virtual_testing.equilibrium import equilibrium
+from ccfem.virtual_testing.specimen import Specimen
+from ccfem.virtual_testing.strand import Strand
+from ccfem.virtual_testing.strands import Strands, cut_strands
 
 __all__ = ["Profile", "least_price", "profiles", "prune", "shorten"]
 

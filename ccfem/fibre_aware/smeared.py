@@ -19,8 +19,8 @@ from ccfem.elasticity.solve import solve
 from ccfem.elasticity.solvers import preconditioned_cg
 from ccfem.elasticity.stress_field import StressField
 from ccfem.errors import SolveError
-from ccfem.evaluate.virtual_test.specimen import Specimen
-from ccfem.mesh import TetMesh
+from ccfem.mesh.tet_mesh import TetMesh
+from ccfem.virtual_testing.specimen import Specimen
 
 __all__ = ["SmearedPart", "SmearedSolution", "on_linear_cells"]
 

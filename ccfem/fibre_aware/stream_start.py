@@ -10,9 +10,9 @@ from ccfem.elasticity.stress_field import StressField
 from ccfem.fibre_aware.smeared import SmearedPart
 from ccfem.fibre_aware.stream_design import StreamProblem
 from ccfem.fields.fill import fill_screened
+from ccfem.fields.layer_elements import Surface, positive_definite
 from ccfem.fields.layer_tension import SampledTension, layer_tension
 from ccfem.fields.orientation import orient
-from ccfem.fields.surface import Surface, positive_definite
 from ccfem.layers.layer import Layer
 
 __all__ = ["plane_axes", "start_field"]

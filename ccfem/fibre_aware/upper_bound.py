@@ -20,13 +20,13 @@ import numpy as np
 from ccfem.arrays import FloatArray, read_only
 from ccfem.elasticity.stress_field import StressField
 from ccfem.errors import InputError
-from ccfem.evaluate.virtual_test.equilibrium import MODES, TENSION
-from ccfem.evaluate.virtual_test.strand import Strand
 from ccfem.fibre_aware.heights import fibre_capacity
 from ccfem.fibre_aware.smeared import SmearedPart, SmearedSolution
 from ccfem.layers.layer import Layer
-from ccfem.machine import Machine
+from ccfem.machine.machine import Machine
 from ccfem.tensor import largest_in_plane
+from ccfem.virtual_testing.equilibrium import MODES, TENSION
+from ccfem.virtual_testing.strand import Strand
 
 __all__ = ["UpperBound", "certificate", "upper_bound"]
 

@@ -11,8 +11,8 @@ import numpy as np
 import scipy.sparse as sparse
 
 from ccfem.arrays import FloatArray
+from ccfem.fields.layer_elements import Surface, positive_definite
 from ccfem.fields.orientation import orient
-from ccfem.fields.surface import Surface, positive_definite
 
 __all__ = ["orient_along"]
 

@@ -4,7 +4,7 @@ import numpy as np
 import scipy.sparse as sparse
 
 from ccfem.arrays import BoolArray, FloatArray
-from ccfem.fields.surface import Surface, positive_definite
+from ccfem.fields.layer_elements import Surface, positive_definite
 
 __all__ = ["fill_laplacian", "fill_screened"]
 

@@ -5,7 +5,7 @@ import scipy.sparse as sparse
 from scipy.sparse.csgraph import connected_components, dijkstra
 
 from ccfem.arrays import FloatArray
-from ccfem.fields.surface import Surface
+from ccfem.fields.layer_elements import Surface
 from ccfem.geometry.isocontours import (
     Isocontours,
     isocontours,

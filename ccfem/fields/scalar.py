@@ -7,7 +7,7 @@ import scipy.sparse as sparse
 
 from ccfem.arrays import FloatArray
 from ccfem.errors import SolveError
-from ccfem.fields.surface import Surface, positive_definite
+from ccfem.fields.layer_elements import Surface, positive_definite
 
 __all__ = ["fit_cone", "fit_constrained", "fit_literal", "fit_weighted"]
 

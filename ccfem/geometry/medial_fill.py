@@ -6,8 +6,8 @@ from typing import Any
 import numpy as np
 
 from ccfem.arrays import FloatArray, read_only
-from ccfem.geometry.dilation import grow
 from ccfem.geometry.medial_axis import medial_axis
+from ccfem.geometry.parallel_strands import grow
 from ccfem.geometry.shells import concentric
 
 __all__ = ["medial_fill"]

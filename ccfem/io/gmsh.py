@@ -9,8 +9,8 @@ import numpy as np
 from ccfem.arrays import IntArray
 from ccfem.errors import InputError
 from ccfem.io.cells import tetrahedra
-from ccfem.mesh import TetMesh
-from ccfem.patches import match_boundary
+from ccfem.mesh.patches import match_boundary
+from ccfem.mesh.tet_mesh import TetMesh
 
 __all__ = ["read_msh"]
 

@@ -13,8 +13,8 @@ from ccfem.io.npz import read_npz, write_npz
 from ccfem.io.tet import read_tet, write_tet
 from ccfem.io.vtu import read_vtu, write_vtu
 from ccfem.io.whole import existing_file, whole_file
-from ccfem.mesh import TetMesh
-from ccfem.mesh_check import check_mesh
+from ccfem.mesh.check import check_mesh
+from ccfem.mesh.tet_mesh import TetMesh
 
 __all__ = ["read_mesh", "write_mesh"]
 
@@ -45,7 +45,7 @@ def read_mesh(path: str | os.PathLike[str], scale: float = 1.0, check: bool = Tr
     scale : float, default 1
         Factor on the coordinates, to make them mm: 1000 for a file in metres.
     check : bool, default True
-        Normalise and mend the mesh with `ccfem.mesh_check.check_mesh`, which also says what it
+        Normalise and mend the mesh with `ccfem.mesh.check.check_mesh`, which also says what it
         did; without it the mesh comes as it stands in the file.
 
     Returns

@@ -12,7 +12,7 @@ from typing import Any
 import numpy as np
 
 from ccfem.errors import InputError
-from ccfem.mesh import TetMesh
+from ccfem.mesh.tet_mesh import TetMesh
 
 __all__ = ["read_npz", "write_npz"]
 

@@ -14,7 +14,7 @@ from pathlib import Path
 import numpy as np
 
 from ccfem.errors import InputError
-from ccfem.mesh import TetMesh
+from ccfem.mesh.tet_mesh import TetMesh
 
 __all__ = ["read_tet", "write_tet"]
 

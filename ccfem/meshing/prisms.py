@@ -8,7 +8,7 @@ from scipy.sparse.csgraph import reverse_cuthill_mckee
 
 from ccfem.arrays import FloatArray, IntArray
 from ccfem.errors import InputError
-from ccfem.mesh import TetMesh
+from ccfem.mesh.tet_mesh import TetMesh
 from ccfem.meshing.planform import triangulate
 
 __all__ = ["extrude"]

@@ -7,8 +7,8 @@ import numpy as np
 
 from ccfem.errors import InputError
 from ccfem.io.surface import Surface
-from ccfem.mesh import TetMesh
-from ccfem.mesh_check import check_mesh
+from ccfem.mesh.check import check_mesh
+from ccfem.mesh.tet_mesh import TetMesh
 
 __all__ = ["tetrahedralise"]
 

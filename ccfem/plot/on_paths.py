@@ -4,7 +4,7 @@ import numpy as np
 
 from ccfem.arrays import FloatArray
 from ccfem.elasticity.stress_field import LayerStress
-from ccfem.evaluate.plane_paths import plane_paths
+from ccfem.evaluation.plane_paths import plane_paths
 from ccfem.geometry.locate import locate
 from ccfem.geometry.polylines import resample, sample_midpoints, turning_angles
 from ccfem.layers.layer import Layer

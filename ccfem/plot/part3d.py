@@ -8,7 +8,7 @@ import numpy as np
 from ccfem.arrays import FloatArray
 from ccfem.elasticity.stress_field import StressField
 from ccfem.errors import InputError
-from ccfem.mesh import TetMesh
+from ccfem.mesh.tet_mesh import TetMesh
 from ccfem.plot.colours import INK, OUTLINE, scale
 from ccfem.tensor import principal
 from ccfem.toolpaths import Toolpaths

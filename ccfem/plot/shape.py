@@ -6,7 +6,7 @@ from collections.abc import Sequence
 import numpy as np
 
 from ccfem.errors import InputError
-from ccfem.mesh import TetMesh
+from ccfem.mesh.tet_mesh import TetMesh
 from ccfem.plot.colours import OUTLINE
 from ccfem.plot.part3d import surface_polydata
 

@@ -8,7 +8,7 @@ import shapely
 
 from ccfem.arrays import FloatArray
 from ccfem.layers.layer import Layer
-from ccfem.machine import Machine
+from ccfem.machine.machine import Machine
 from ccfem.raster.bitmap import Bitmap
 from ccfem.raster.patterns import Regions
 from ccfem.raster.simplify import corners

@@ -1,5 +1,5 @@
 """Strategies: each turns the stress on a layer into fibre paths. One module a strategy."""
 
-from ccfem.strategies.strategy import Amount, LayerStrategy, Strategy, create, named, plan
+from ccfem.planning.strategy import Amount, LayerStrategy, Strategy, create, named, plan
 
 __all__ = ["Amount", "LayerStrategy", "Strategy", "create", "named", "plan"]

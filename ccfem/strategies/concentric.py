@@ -10,11 +10,11 @@ from ccfem.errors import InputError
 from ccfem.geometry.offsets import join_rings, offset_rings
 from ccfem.geometry.shells import concentric
 from ccfem.layers.layer import Layer
-from ccfem.machine import Machine
+from ccfem.machine.machine import Machine
+from ccfem.planning.strategy import Amount
 from ccfem.raster.bitmap import bitmap
 from ccfem.raster.patterns import concentric_regions
 from ccfem.raster.plan import RasterPlan, raster_plan
-from ccfem.strategies.strategy import Amount
 from ccfem.toolpaths import Toolpaths
 
 __all__ = ["Concentric"]

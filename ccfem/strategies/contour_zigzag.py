@@ -9,9 +9,9 @@ from ccfem.elasticity.stress_field import LayerStress
 from ccfem.errors import InputError
 from ccfem.geometry.hatch import zigzag
 from ccfem.layers.layer import Layer
-from ccfem.machine import Machine
+from ccfem.machine.machine import Machine
+from ccfem.planning.strategy import Amount
 from ccfem.strategies.concentric import Concentric
-from ccfem.strategies.strategy import Amount
 from ccfem.toolpaths import Toolpaths
 
 __all__ = ["ContourZigzag"]

@@ -15,10 +15,10 @@ from ccfem.arrays import FloatArray
 from ccfem.elasticity.stress_field import LayerStress
 from ccfem.errors import InputError
 from ccfem.fields.streamlines import streamlines
-from ccfem.geometry.dilation import open_lines
+from ccfem.geometry.parallel_strands import open_lines
 from ccfem.layers.layer import Layer
-from ccfem.machine import Machine
-from ccfem.strategies.strategy import Amount
+from ccfem.machine.machine import Machine
+from ccfem.planning.strategy import Amount
 from ccfem.tensor import in_plane
 from ccfem.toolpaths import Toolpaths
 

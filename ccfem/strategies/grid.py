@@ -15,11 +15,11 @@ from ccfem.errors import InputError
 from ccfem.geometry.hatch import hatch
 from ccfem.geometry.shells import shells
 from ccfem.layers.layer import Layer
-from ccfem.machine import Machine
+from ccfem.machine.machine import Machine
+from ccfem.planning.strategy import Amount
 from ccfem.raster.bitmap import bitmap
 from ccfem.raster.patterns import grid_regions
 from ccfem.raster.plan import RasterPlan, raster_plan
-from ccfem.strategies.strategy import Amount
 from ccfem.toolpaths import Toolpaths
 
 __all__ = ["Grid"]

@@ -20,20 +20,20 @@ from ccfem.errors import InputError
 from ccfem.fields.compatibility import Incompatible
 from ccfem.fields.crease import orient_along
 from ccfem.fields.fill import fill_laplacian, fill_screened
+from ccfem.fields.layer_elements import Surface
 from ccfem.fields.layer_tension import MeshTension, SampledTension, layer_tension, mesh_tension
 from ccfem.fields.levels import extract_levels, unit_levels
 from ccfem.fields.orientation import orient
 from ccfem.fields.scalar import fit_cone, fit_constrained, fit_literal, fit_weighted
-from ccfem.fields.surface import Surface
-from ccfem.geometry.clearance import trim_to_clearance
-from ccfem.geometry.conformal import lead_into, parallel_curve
-from ccfem.geometry.finishing import keep_off_border, linked_paths
 from ccfem.geometry.isocontours import Isocontours
-from ccfem.geometry.rings import holes_on
-from ccfem.geometry.spiral import spiral
+from ccfem.layers.holes import holes_on
 from ccfem.layers.layer import Layer
-from ccfem.machine import Machine
-from ccfem.strategies.strategy import Amount, LayerStrategy
+from ccfem.linking.clearance import trim_to_clearance
+from ccfem.linking.conformal import lead_into, parallel_curve
+from ccfem.linking.finishing import keep_off_border, linked_paths
+from ccfem.linking.spiral import spiral
+from ccfem.machine.machine import Machine
+from ccfem.planning.strategy import Amount, LayerStrategy
 from ccfem.toolpaths import Toolpaths
 
 __all__ = ["Isocurve"]
@@ -309,7 +309,7 @@ class _Planner:
         """Curves round the chosen holes, isocurves led into them, ends linked, the rest dropped."""
         s, width, section = self.strategy, machine.fibre_width, layer.polygon
         rings: list[FloatArray] = []
-        names = part.problem.loaded_patches if s.conformal == "loaded" else s.conformal
+        names = part.problem.held_or_loaded if s.conformal == "loaded" else s.conformal
         for hole in holes_on(layer, names) if s.rings else []:
             for distance in s.rings[:-1]:
                 rings += parallel_curve(hole, distance * width, section)

@@ -16,18 +16,18 @@ from ccfem.arrays import FloatArray, read_only
 from ccfem.elasticity.stress_field import LayerStress
 from ccfem.errors import InputError
 from ccfem.fields.streamlines import streamlines
-from ccfem.geometry.dilation import grow, lengthened
 from ccfem.geometry.guide_fit import fitted_guides
 from ccfem.geometry.guides import spaced_guides
 from ccfem.geometry.medial_axis import medial_axis
+from ccfem.geometry.parallel_strands import grow, lengthened
 from ccfem.geometry.shells import shells
 from ccfem.layers.layer import Layer
-from ccfem.machine import Machine
+from ccfem.machine.machine import Machine
+from ccfem.planning.strategy import Amount
 from ccfem.raster.bitmap import bitmap
 from ccfem.raster.guides import stress_guides
 from ccfem.raster.patterns import inside_shells, stress_regions
 from ccfem.raster.plan import RasterPlan, raster_plan
-from ccfem.strategies.strategy import Amount
 from ccfem.tensor import in_plane
 from ccfem.toolpaths import Toolpaths
 
@@ -118,7 +118,7 @@ class Mps:
         inside = inside_shells(image.mask, self.shells)
         points = None
         if self.seeds == "ends":
-            points = _patch_middles(layer, stress.part.problem.loaded_patches)
+            points = _patch_middles(layer, stress.part.problem.held_or_loaded)
         elif self.seeds != "segments":
             points = np.array(self.seeds, dtype=np.float64).reshape(-1, 2)
         guides = stress_guides(image, inside, layer, stress, points)
@@ -149,7 +149,7 @@ class Mps:
         if self.seeds == "segments":
             return _middles(interior, pitch)
         if self.seeds == "ends":
-            points = _patch_middles(layer, stress.part.problem.loaded_patches)
+            points = _patch_middles(layer, stress.part.problem.held_or_loaded)
         else:
             points = np.array(self.seeds, dtype=np.float64).reshape(-1, 2)
         # Points outside go to the nearest place inside, a little off the border.

@@ -11,14 +11,14 @@ from typing import ClassVar
 import numpy as np
 
 from ccfem.elasticity.stress_field import LayerStress, StressField
-from ccfem.equal_fibre import plan_to_length
 from ccfem.errors import InputError
-from ccfem.evaluate.virtual_test.strand import RHO, Strand
 from ccfem.fibre_aware.prune import prune
 from ccfem.layers.layer import Layer
-from ccfem.machine import Machine
-from ccfem.strategies.strategy import Amount, LayerStrategy, create
+from ccfem.machine.machine import Machine
+from ccfem.planning.equal_fibre import plan_to_length
+from ccfem.planning.strategy import Amount, LayerStrategy, create
 from ccfem.toolpaths import Toolpaths
+from ccfem.virtual_testing.strand import RHO, Strand
 
 __all__ = ["Pruned"]
 

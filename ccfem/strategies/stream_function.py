@@ -14,9 +14,6 @@ import numpy as np
 from ccfem.arrays import FloatArray, IntArray
 from ccfem.elasticity.stress_field import LayerStress, StressField
 from ccfem.errors import InputError
-from ccfem.evaluate.virtual_test.bars import strain_operator
-from ccfem.evaluate.virtual_test.strand import RHO
-from ccfem.evaluate.virtual_test.strands import cut_strands
 from ccfem.fibre_aware.heights import (
     alike_share,
     fibre_capacity,
@@ -29,13 +26,16 @@ from ccfem.fibre_aware.spline_grid import SplineGrid
 from ccfem.fibre_aware.stream_design import StreamDesign, StreamProblem, design
 from ccfem.fibre_aware.stream_start import plane_axes, start_field
 from ccfem.fields.layer_tension import layer_tension
-from ccfem.geometry.clearance import trim_to_clearance
-from ccfem.geometry.finishing import keep_off_border, linked_paths
 from ccfem.geometry.isocontours import isocontours
 from ccfem.layers.layer import Layer
-from ccfem.machine import Machine
-from ccfem.strategies.strategy import Amount, LayerStrategy
+from ccfem.linking.clearance import trim_to_clearance
+from ccfem.linking.finishing import keep_off_border, linked_paths
+from ccfem.machine.machine import Machine
+from ccfem.planning.strategy import Amount, LayerStrategy
 from ccfem.toolpaths import Toolpaths
+from ccfem.virtual_testing.bars import strain_operator
+from ccfem.virtual_testing.strand import RHO
+from ccfem.virtual_testing.strands import cut_strands
 
 __all__ = ["StreamFunction"]
 

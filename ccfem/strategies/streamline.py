@@ -16,8 +16,8 @@ from ccfem.elasticity.stress_field import LayerStress
 from ccfem.errors import InputError
 from ccfem.fields.evenly_spaced import evenly_spaced_streamlines
 from ccfem.layers.layer import Layer
-from ccfem.machine import Machine
-from ccfem.strategies.strategy import Amount
+from ccfem.machine.machine import Machine
+from ccfem.planning.strategy import Amount
 from ccfem.tensor import in_plane
 from ccfem.toolpaths import Toolpaths
 

@@ -14,11 +14,11 @@ import shapely
 from ccfem.arrays import BoolArray, FloatArray
 from ccfem.elasticity.stress_field import LayerStress
 from ccfem.errors import InputError
-from ccfem.geometry.linking import link_tracks
 from ccfem.geometry.offsets import join_rings, offset_rings, rings
 from ccfem.layers.layer import Layer
-from ccfem.machine import Machine
-from ccfem.strategies.strategy import Amount
+from ccfem.linking.single_path import link_tracks
+from ccfem.machine.machine import Machine
+from ccfem.planning.strategy import Amount
 from ccfem.stress_tracing.band import band
 from ccfem.stress_tracing.criterion import Criterion
 from ccfem.stress_tracing.frame import frame

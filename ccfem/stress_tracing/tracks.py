@@ -14,7 +14,7 @@ from ccfem.elasticity.stress_field import LayerStress
 from ccfem.geometry.offsets import ring_from
 from ccfem.geometry.polylines import subdivide, turning_angles
 from ccfem.stress_tracing.band import STEP, Band
-from ccfem.stress_tracing.relaxation import relaxed
+from ccfem.stress_tracing.turning import relaxed
 
 __all__ = ["clipped", "eased", "track_count", "tracks"]
 

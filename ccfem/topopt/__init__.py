@@ -1,20 +1,18 @@
 """Topology optimisation: density filter, optimality criteria, SIMP and SOMP."""
 
 from ccfem.topopt.compliance import compliance_of
-from ccfem.topopt.criteria import optimality_criteria
 from ccfem.topopt.design import Design
 from ccfem.topopt.filters import ConeFilter
+from ccfem.topopt.optimality_criteria import optimality_criteria
 from ccfem.topopt.outline import outline
 from ccfem.topopt.parametrisation import FILTERS, simp_factor
 from ccfem.topopt.part import as_problem, solid
 from ccfem.topopt.simp import simp
 from ccfem.topopt.somp import ORIENTATIONS, somp
-from ccfem.topopt.three_point_bending import BendingBeam, three_point_bending
 
 __all__ = [
     "FILTERS",
     "ORIENTATIONS",
-    "BendingBeam",
     "ConeFilter",
     "Design",
     "as_problem",
@@ -25,5 +23,4 @@ __all__ = [
     "simp_factor",
     "solid",
     "somp",
-    "three_point_bending",
 ]

@@ -10,13 +10,13 @@ import scipy.sparse as sp
 
 from ccfem.arrays import FloatArray, IntArray
 from ccfem.elasticity.assembly import assemble
-from ccfem.elasticity.plane import PlaneSystem, prepare_plane
-from ccfem.elasticity.plane_problem import PlaneProblem
 from ccfem.elasticity.problem import Problem
 from ccfem.elasticity.recovery import cell_strain
 from ccfem.elasticity.solve import System, prepare
 from ccfem.elasticity.solvers import LARGEST_DIRECT, Solver, choose_direct, direct_backend
 from ccfem.errors import InputError
+from ccfem.plates.problem import PlaneProblem
+from ccfem.plates.solve import PlaneSystem, prepare_plane
 
 __all__ = ["GroupedCompliance", "Loaded", "PlaneCompliance", "TetCompliance", "compliance_of"]
 

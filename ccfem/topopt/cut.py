@@ -5,8 +5,8 @@ from typing import NamedTuple
 import numpy as np
 
 from ccfem.arrays import BoolArray, FloatArray, IntArray
-from ccfem.mesh import TetMesh
-from ccfem.patches import facet_keys
+from ccfem.mesh.patches import facet_keys
+from ccfem.mesh.tet_mesh import TetMesh
 
 __all__ = ["CutMesh", "cut_mesh", "volume_above"]
 

@@ -5,9 +5,9 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from ccfem.arrays import BoolArray, FloatArray, read_only
-from ccfem.elasticity.plane_problem import PlaneProblem
 from ccfem.elasticity.problem import Problem
 from ccfem.errors import InputError
+from ccfem.plates.problem import PlaneProblem
 
 __all__ = ["Design"]
 

@@ -6,12 +6,12 @@ from typing import Any
 import numpy as np
 
 from ccfem.arrays import FloatArray
-from ccfem.elasticity.plane_problem import PlaneProblem
 from ccfem.elasticity.problem import Problem
 from ccfem.errors import InputError
+from ccfem.plates.problem import PlaneProblem
 from ccfem.progress import Progress
-from ccfem.topopt.criteria import optimality_criteria
 from ccfem.topopt.design import Design
+from ccfem.topopt.optimality_criteria import optimality_criteria
 from ccfem.topopt.parametrisation import Parametrisation, simp_factor
 
 __all__ = ["Limits", "iterate"]

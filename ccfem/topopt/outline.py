@@ -7,11 +7,11 @@ import numpy as np
 import shapely
 
 from ccfem.arrays import BoolArray, FloatArray
-from ccfem.elasticity.plane_mesh import raster_image
-from ccfem.elasticity.plane_problem import PlaneProblem
 from ccfem.elasticity.problem import PointForce
 from ccfem.errors import InputError
 from ccfem.geometry.isocontours import isocontours
+from ccfem.plates.plane_mesh import raster_image
+from ccfem.plates.problem import PlaneProblem
 from ccfem.topopt.design import Design
 
 __all__ = ["outline", "solid"]

@@ -4,11 +4,11 @@ from typing import Any
 
 import numpy as np
 
-from ccfem.elasticity.plane_problem import PlaneProblem
 from ccfem.elasticity.problem import Problem
 from ccfem.errors import InputError
 from ccfem.io.surface import Surface
 from ccfem.materials import Material
+from ccfem.plates.problem import PlaneProblem
 from ccfem.topopt.design import Design
 from ccfem.topopt.outline import solid as plate_outline
 from ccfem.topopt.plate_part import plate_part

@@ -8,15 +8,15 @@ import shapely
 from scipy.spatial import cKDTree
 
 from ccfem.arrays import BoolArray, FloatArray, IntArray
-from ccfem.elasticity.plane_problem import PlaneProblem
 from ccfem.elasticity.problem import Force, Load, PointForce, Problem, Support
 from ccfem.errors import InputError
 from ccfem.materials import Material
-from ccfem.mesh import TetMesh
+from ccfem.mesh.patches import facet_keys
+from ccfem.mesh.tet_mesh import TetMesh
 from ccfem.meshing import extrude
-from ccfem.patches import facet_keys
+from ccfem.plates.problem import PlaneProblem
 from ccfem.topopt.design import Design
-from ccfem.topopt.orientation import axes_about_z
+from ccfem.topopt.material_axes import axes_about_z
 from ccfem.topopt.outline import solid
 
 __all__ = ["plate_part"]

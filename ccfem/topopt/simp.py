@@ -4,8 +4,8 @@ from collections.abc import Mapping
 from typing import Any
 
 from ccfem.arrays import BoolArray, FloatArray, IntArray
-from ccfem.elasticity.plane_problem import PlaneProblem
 from ccfem.elasticity.problem import Problem
+from ccfem.plates.problem import PlaneProblem
 from ccfem.progress import Progress, silent
 from ccfem.topopt.compliance import GroupedCompliance, compliance_of
 from ccfem.topopt.design import Design

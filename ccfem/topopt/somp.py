@@ -7,15 +7,15 @@ from typing import Any
 import numpy as np
 
 from ccfem.arrays import BoolArray, FloatArray, IntArray
-from ccfem.elasticity.plane_problem import PlaneProblem
 from ccfem.elasticity.problem import Problem
 from ccfem.errors import InputError
+from ccfem.plates.problem import PlaneProblem
 from ccfem.progress import Progress, silent
 from ccfem.topopt.compliance import GroupedCompliance, compliance_of
 from ccfem.topopt.design import Design
 from ccfem.topopt.groups import CellGroups
 from ccfem.topopt.iteration import Limits, iterate
-from ccfem.topopt.orientation import (
+from ccfem.topopt.material_axes import (
     OrientedCompliance,
     by_gradient,
     by_principal_stress,

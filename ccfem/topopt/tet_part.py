@@ -11,11 +11,11 @@ from ccfem.arrays import BoolArray, FloatArray, IntArray
 from ccfem.elasticity.problem import PointForce, Problem
 from ccfem.errors import InputError
 from ccfem.materials import Material
-from ccfem.mesh import TetMesh
+from ccfem.mesh.tet_mesh import TetMesh
 from ccfem.topopt.cut import cut_mesh, volume_above
+from ccfem.topopt.cut_smoothing import relaxed
 from ccfem.topopt.design import Design
-from ccfem.topopt.orientation import axes_about_z
-from ccfem.topopt.relaxation import relaxed
+from ccfem.topopt.material_axes import axes_about_z
 
 __all__ = ["part_mesh", "tet_part"]
 
@@ -106,7 +106,7 @@ def _field(problem: Problem, density: FloatArray) -> _Field:
     n, nodes = len(mesh.points), mesh.cells.reshape(-1)
     weight = np.bincount(nodes, np.repeat(mesh.volumes, 4), n)
     total = np.bincount(nodes, np.repeat(mesh.volumes * density, 4), n)
-    anchors = [np.unique(mesh.patch(name)) for name in problem.loaded_patches]
+    anchors = [np.unique(mesh.patch(name)) for name in problem.held_or_loaded]
     for load in (load for case in problem.loads.values() for load in case):
         if isinstance(load, PointForce):
             anchors.append(np.array([cKDTree(mesh.points).query(load.point)[1]]))

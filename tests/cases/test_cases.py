@@ -14,7 +14,7 @@ from ccfem.cases.open_hole import open_hole_outline
 from ccfem.cases.stored import data_folder, manifest, stored_mesh
 from ccfem.elasticity.solve import solve
 from ccfem.errors import InputError
-from ccfem.mesh_check import check_mesh
+from ccfem.mesh.check import check_mesh
 
 NAMES = ("bar", "loop", "open_hole")
 SIZES = {

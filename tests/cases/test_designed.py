@@ -11,10 +11,11 @@ from ccfem.cases import create_case
 from ccfem.cases.build_data import DESIGNED
 from ccfem.cases.designed import LAMINATE, DesignPlate, Stretch
 from ccfem.cases.stored import manifest
-from ccfem.elasticity import rotate_plane, solve, solve_plane
+from ccfem.elasticity import solve
 from ccfem.errors import InputError
 from ccfem.materials import plane_stress
-from ccfem.mesh_check import check_mesh
+from ccfem.mesh.check import check_mesh
+from ccfem.plates import rotate_plane, solve_plane
 from ccfem.tensor import largest_in_plane
 
 

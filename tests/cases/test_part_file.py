@@ -4,14 +4,14 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-import ccfem.part_file
+import ccfem.cases.part_file
+from ccfem.cases.part_file import read_part
 from ccfem.elasticity.problem import Bearing, Force, PointForce, Pressure, Support, Traction
 from ccfem.elasticity.solve import solve
 from ccfem.errors import InputError
 from ccfem.io import write_mesh
 from ccfem.mesh import TetMesh
 from ccfem.meshing import extrude
-from ccfem.part_file import read_part
 
 EXAMPLE = Path(__file__).parents[2] / "benchmarks" / "studies" / "part_example.toml"
 
@@ -71,13 +71,13 @@ def test_the_example_reads_and_solves():
 
 def test_the_documentation_lists_every_key():
     """The described keys are those that are read: both ways, by reading the description."""
-    described = ccfem.part_file.__doc__.split("::\n", 1)[1]
+    described = ccfem.cases.part_file.__doc__.split("::\n", 1)[1]
     lines = [line[4:] for line in described.splitlines()]
     keys = {line.split("=")[0].strip() for line in lines if "=" in line.split("#")[0]}
     keys |= {line.strip("[]# ").split("]")[0].split(".")[0] for line in lines if line[:1] == "["}
-    for field in ccfem.part_file._Part.__dataclass_fields__:
+    for field in ccfem.cases.part_file._Part.__dataclass_fields__:
         assert field in keys, field
-    for kind in (*ccfem.part_file._RULES, *ccfem.part_file._LOADS):
+    for kind in (*ccfem.cases.part_file._RULES, *ccfem.cases.part_file._LOADS):
         assert f'"{kind}"' in described
 
 

@@ -7,7 +7,7 @@ from ccfem.elasticity.assembly import add_blocks, assemble, cell_gradients, patt
 from ccfem.elasticity.supports import rigid_modes
 from ccfem.materials import isotropic, transversely_isotropic
 from ccfem.mesh import TetMesh
-from ccfem.structured import box_mesh
+from ccfem.mesh.box import box_mesh
 from ccfem.tensor import rotate_stiffness, strain_to_voigt
 
 

@@ -5,7 +5,7 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from ccfem.elasticity.loads import facet_nodes, load_case, nodal_forces
+from ccfem.elasticity.loads import load_case, nodal_forces
 from ccfem.elasticity.problem import (
     Bearing,
     Force,
@@ -17,7 +17,7 @@ from ccfem.elasticity.problem import (
 )
 from ccfem.errors import InputError
 from ccfem.materials import isotropic
-from ccfem.structured import box_mesh
+from ccfem.mesh.box import box_mesh
 
 NAN = float("nan")
 
@@ -64,7 +64,7 @@ def test_quadratic_facets_load_their_middles_only():
     mesh = box(2)
     forces = nodal_forces(mesh, Force("z_max", (0.0, 0.0, 1.0)))
     assert not forces[: len(box().points)].any()
-    assert (forces[np.unique(facet_nodes(mesh, mesh.patch("z_max"))[:, 3:]), 2] > 0.0).all()
+    assert (forces[np.unique(mesh.facet_nodes(mesh.patch("z_max"))[:, 3:]), 2] > 0.0).all()
 
 
 @pytest.mark.parametrize("order", [1, 2])

@@ -3,7 +3,7 @@ import pytest
 
 from ccfem.elasticity.recovery import cell_strain, cell_stress, nodal_stress, strain_at_nodes
 from ccfem.mesh import TetMesh
-from ccfem.structured import box_mesh
+from ccfem.mesh.box import box_mesh
 from ccfem.tensor import strain_to_voigt
 
 

@@ -8,7 +8,7 @@ from ccfem.elasticity.solve import prepare
 from ccfem.errors import InputError, SolveError
 from ccfem.materials import isotropic, transversely_isotropic
 from ccfem.mesh import TetMesh
-from ccfem.structured import box_mesh
+from ccfem.mesh.box import box_mesh
 from ccfem.tensor import rotate_stiffness
 
 LOADS = {

@@ -13,7 +13,7 @@ from ccfem.elasticity.solve import prepare, solve
 from ccfem.elasticity.solvers import BACKENDS, choose, factorise, preconditioned_cg
 from ccfem.errors import InputError, SolveError
 from ccfem.materials import isotropic, transversely_isotropic
-from ccfem.structured import box_mesh
+from ccfem.mesh.box import box_mesh
 
 MODULES = {"pypardiso": "pypardiso", "cholmod": "sksparse", "petsc": "petsc4py"}
 

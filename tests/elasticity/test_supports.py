@@ -9,7 +9,7 @@ from ccfem.elasticity.supports import Held, check_support, held, rigid_modes
 from ccfem.errors import InputError
 from ccfem.materials import isotropic
 from ccfem.mesh import TetMesh
-from ccfem.structured import box_mesh
+from ccfem.mesh.box import box_mesh
 
 
 def box():

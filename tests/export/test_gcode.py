@@ -8,17 +8,16 @@ import pytest
 import shapely
 
 from ccfem.errors import InputError
-from ccfem.evaluate.manufacture import manufacture_indices, sample_manufacture
-from ccfem.evaluate.plane_paths import plane_paths
+from ccfem.evaluation.manufacture import manufacture_indices, sample_manufacture
+from ccfem.evaluation.plane_paths import plane_paths
 from ccfem.export.gcode import gcode, write_gcode
 from ccfem.export.print_plan import check_machine, plan_print
-from ccfem.gcode_profile import GcodeProfile
+from ccfem.io.toml import from_table
 from ccfem.layers import slice_planar
-from ccfem.machine import Machine
+from ccfem.machine import Machine, SpeedTable
+from ccfem.machine.gcode_profile import GcodeProfile
+from ccfem.mesh.box import box_mesh
 from ccfem.meshing import extrude
-from ccfem.speeds import SpeedTable
-from ccfem.structured import box_mesh
-from ccfem.tables import from_table
 from ccfem.toolpaths import MATRIX, Toolpaths
 
 MACHINE = Machine(speeds=SpeedTable(), matrix_height=0.7, fibre_height=0.1)

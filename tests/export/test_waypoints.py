@@ -7,8 +7,8 @@ import pytest
 
 from ccfem.errors import InputError
 from ccfem.export.waypoints import read_waypoints, write_waypoints
-from ccfem.layers.planar import plane_frame, slice_planar
-from ccfem.structured import box_mesh
+from ccfem.layers.slicing.planar import plane_frame, slice_planar
+from ccfem.mesh.box import box_mesh
 from ccfem.toolpaths import MATRIX, Toolpaths
 
 FILE = """;Layer_CCF: 0

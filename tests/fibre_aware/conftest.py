@@ -5,9 +5,9 @@ import pytest
 
 from ccfem.elasticity.problem import Force, Problem, Support, Traction
 from ccfem.elasticity.solve import solve
-from ccfem.layers.planar import slice_planar
+from ccfem.layers.slicing.planar import slice_planar
 from ccfem.materials import isotropic
-from ccfem.structured import box_mesh
+from ccfem.mesh.box import box_mesh
 
 
 @pytest.fixture(scope="session")

@@ -6,13 +6,13 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from ccfem.errors import InputError
-from ccfem.evaluate.virtual_test.strands import cut_strands
-from ccfem.evaluate.virtual_test.virtual_test import virtual_test
 from ccfem.fibre_aware.prune import Profile, profiles, prune, shorten
 from ccfem.machine import Machine
+from ccfem.planning.strategy import plan
 from ccfem.strategies.isocurve import Isocurve
-from ccfem.strategies.strategy import plan
 from ccfem.toolpaths import MATRIX, Toolpaths
+from ccfem.virtual_testing.strands import cut_strands
+from ccfem.virtual_testing.virtual_test import virtual_test
 
 MACHINE = Machine()
 SHORT = Machine(minimum_length=10.0)

@@ -10,10 +10,10 @@ from ccfem.fibre_aware.smeared import SmearedPart
 from ccfem.fibre_aware.spline_grid import SplineGrid
 from ccfem.fibre_aware.stream_design import StreamProblem, design
 from ccfem.fibre_aware.stream_start import plane_axes, start_field
-from ccfem.layers.planar import slice_planar
+from ccfem.layers.slicing.planar import slice_planar
 from ccfem.machine import Machine
 from ccfem.materials import isotropic
-from ccfem.structured import box_mesh
+from ccfem.mesh.box import box_mesh
 
 MACHINE = Machine()
 

@@ -4,16 +4,16 @@ import numpy as np
 import pytest
 
 from ccfem.errors import InputError
-from ccfem.evaluate.virtual_test.strand import Strand
-from ccfem.evaluate.virtual_test.virtual_test import virtual_test
 from ccfem.fibre_aware.heights import fibre_capacity
 from ccfem.fibre_aware.smeared import SmearedPart, SmearedSolution
 from ccfem.fibre_aware.upper_bound import certificate, upper_bound
 from ccfem.machine import Machine
+from ccfem.planning.strategy import plan
 from ccfem.strategies.isocurve import Isocurve
-from ccfem.strategies.strategy import plan
 from ccfem.strategies.zigzag import Zigzag
 from ccfem.toolpaths import Toolpaths
+from ccfem.virtual_testing.strand import Strand
+from ccfem.virtual_testing.virtual_test import virtual_test
 
 MACHINE = Machine()
 

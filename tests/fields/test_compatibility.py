@@ -5,7 +5,7 @@ import pytest
 
 from ccfem.errors import InputError
 from ccfem.fields.compatibility import incompatible
-from ccfem.structured import box_mesh
+from ccfem.mesh.box import box_mesh
 
 
 def plainly(direction, cells, defined, rule, limit):

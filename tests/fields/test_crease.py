@@ -5,7 +5,7 @@ import pytest
 from scipy.spatial import Delaunay
 
 from ccfem.fields.crease import orient_along
-from ccfem.fields.surface import Surface
+from ccfem.fields.layer_elements import Surface
 
 HOLE, RIM = 5.0, 20.0
 

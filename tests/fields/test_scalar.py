@@ -5,9 +5,9 @@ import pytest
 from scipy.spatial import Delaunay
 
 from ccfem.fields.fill import fill_laplacian, fill_screened
+from ccfem.fields.layer_elements import Surface
 from ccfem.fields.orientation import orient
 from ccfem.fields.scalar import fit_constrained, fit_literal, fit_weighted
-from ccfem.fields.surface import Surface
 
 
 def annulus(inner: float = 5.0, outer: float = 15.0, size: float = 0.7) -> Surface:

@@ -7,8 +7,8 @@ from hypothesis import strategies as st
 from scipy.spatial import Delaunay
 from shapely import LineString
 
+from ccfem.fields.layer_elements import Surface
 from ccfem.fields.levels import extract_levels, levels_at, start_count
-from ccfem.fields.surface import Surface
 from ccfem.geometry.isocontours import isocontours, least_distance
 
 

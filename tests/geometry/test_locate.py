@@ -10,7 +10,7 @@ from ccfem.errors import InputError
 from ccfem.geometry.buckets import bucket
 from ccfem.geometry.locate import locate, locate_tets
 from ccfem.materials import isotropic
-from ccfem.structured import box_mesh
+from ccfem.mesh.box import box_mesh
 
 RNG = np.random.default_rng(3)
 

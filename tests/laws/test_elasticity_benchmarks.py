@@ -14,12 +14,12 @@ import pytest
 
 from ccfem.elasticity import Bearing, Force, Pressure, Problem, Support, Traction, solve
 from ccfem.elasticity.assembly import pattern
-from ccfem.elasticity.loads import facet_nodes, nodal_forces
+from ccfem.elasticity.loads import nodal_forces
 from ccfem.elasticity.solve import System
 from ccfem.elasticity.stress_field import SolveRecord
 from ccfem.elasticity.supports import Held
 from ccfem.materials import isotropic
-from ccfem.structured import box_mesh
+from ccfem.mesh.box import box_mesh
 
 
 def mapped(divisions, place, order=2):
@@ -63,7 +63,7 @@ def solve_held(mesh, material, free, values, forces):
 
 
 def nodes_of(mesh, patch):
-    return np.unique(facet_nodes(mesh, mesh.patch(patch)))
+    return np.unique(mesh.facet_nodes(mesh.patch(patch)))
 
 
 def at(mesh, point):

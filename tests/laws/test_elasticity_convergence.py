@@ -15,7 +15,7 @@ from ccfem.elasticity.solve import System
 from ccfem.elasticity.supports import Held
 from ccfem.materials import transversely_isotropic
 from ccfem.mesh import TetMesh
-from ccfem.structured import box_mesh
+from ccfem.mesh.box import box_mesh
 
 MATERIAL = transversely_isotropic(20.0, 6.0, 0.3, 3.0)
 TURN = np.linalg.qr(np.random.default_rng(1).normal(size=(3, 3)))[0]

@@ -13,7 +13,7 @@ from ccfem.elasticity.solve import System
 from ccfem.elasticity.supports import Held
 from ccfem.materials import isotropic, transversely_isotropic
 from ccfem.mesh import TetMesh
-from ccfem.structured import box_mesh
+from ccfem.mesh.box import box_mesh
 from ccfem.tensor import from_voigt, rotate_stiffness, strain_to_voigt
 
 

@@ -9,13 +9,13 @@ import shapely
 
 from ccfem.elasticity.problem import Force, Problem, Support
 from ccfem.elasticity.solve import solve
-from ccfem.evaluate import evaluate
-from ccfem.layers.planar import slice_planar
+from ccfem.evaluation import evaluate
+from ccfem.layers.slicing.planar import slice_planar
 from ccfem.machine import Machine
 from ccfem.materials import isotropic
 from ccfem.mesh import TetMesh
+from ccfem.mesh.box import box_mesh
 from ccfem.strategies import create, named, plan
-from ccfem.structured import box_mesh
 
 MACHINE = Machine()
 NAMES = sorted(named())

@@ -10,8 +10,7 @@ from hypothesis import strategies as st
 from ccfem.errors import InputError
 from ccfem.io import read_mesh
 from ccfem.mesh import TetMesh
-from ccfem.meshing import extrude
-from ccfem.patches import (
+from ccfem.mesh.patches import (
     Box,
     Cylinder,
     Group,
@@ -21,6 +20,7 @@ from ccfem.patches import (
     patches_from_rules,
     unit_vector,
 )
+from ccfem.meshing import extrude
 
 
 @pytest.fixture(scope="module")

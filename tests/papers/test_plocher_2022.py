@@ -5,14 +5,9 @@ import tomllib
 import numpy as np
 import pytest
 
-from benchmarks.papers.plocher_2022.claims import (
-    EXPECTED,
-    claim_table,
-    quantities,
-    raster_quantities,
-    verdicts,
-)
+from benchmarks.papers.plocher_2022.claims import EXPECTED, quantities, raster_quantities, verdicts
 from benchmarks.papers.plocher_2022.figures import draw_all
+from benchmarks.papers.plocher_2022.plates import five_holes
 from benchmarks.papers.plocher_2022.study import RASTER, run_case
 from benchmarks.papers.plocher_2022.tables import (
     ROWS,
@@ -23,7 +18,7 @@ from benchmarks.papers.plocher_2022.tables import (
     result_table,
 )
 from benchmarks.papers.plocher_2022.variants import metric_table
-from ccfem.cases.plates import five_holes
+from benchmarks.papers.verdicts import claim_table
 from ccfem.raster.patterns import INFILL
 
 

@@ -6,7 +6,8 @@ from PIL import Image
 
 from ccfem.elasticity.stress_field import LayerStress
 from ccfem.errors import InputError
-from ccfem.layers.planar import slice_planar
+from ccfem.layers.slicing.planar import slice_planar
+from ccfem.mesh.box import box_mesh
 from ccfem.plot.canvas import extents_of, inches_per_mm, new_figure, png, save
 from ccfem.plot.colours import INK, LINK, SECTION, palette, scale
 from ccfem.plot.fields import scalar_picture, tension_picture
@@ -18,7 +19,6 @@ from ccfem.plot.paths import (
     mark_failure,
     tension_limit,
 )
-from ccfem.structured import box_mesh
 from ccfem.toolpaths import Toolpaths
 
 LAYER = slice_planar(box_mesh((60.0, 30.0, 4.0), (6, 3, 1)), count=1)[0]

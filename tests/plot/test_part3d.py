@@ -7,10 +7,10 @@ from PIL import Image
 from ccfem.elasticity.problem import Problem, Support
 from ccfem.elasticity.stress_field import SolveRecord, StressField
 from ccfem.errors import InputError
-from ccfem.layers.planar import slice_planar
+from ccfem.layers.slicing.planar import slice_planar
 from ccfem.materials import isotropic
+from ccfem.mesh.box import box_mesh
 from ccfem.plot.part3d import part_picture, paths_polydata, surface_polydata
-from ccfem.structured import box_mesh
 from ccfem.toolpaths import Toolpaths
 
 MESH = box_mesh((20.0, 10.0, 4.0), (4, 2, 2))

@@ -5,8 +5,8 @@ import pytest
 from PIL import Image
 
 from ccfem.errors import InputError
+from ccfem.mesh.box import box_mesh
 from ccfem.plot.shape import shape_picture
-from ccfem.structured import box_mesh
 
 
 def test_the_shape_is_rendered_from_every_side():

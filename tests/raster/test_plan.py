@@ -214,7 +214,7 @@ def test_seeds_of_mps():
     edge = np.flatnonzero(layer.points[:, 0] < 1e-9)
     held = replace(layer, patches={"load": np.stack([edge[:-1], edge[1:]], axis=1)})
     stress = pulled(held)
-    problem = SimpleNamespace(problem=SimpleNamespace(loaded_patches=("load",)))
+    problem = SimpleNamespace(problem=SimpleNamespace(held_or_loaded=("load",)))
     stress = LayerStress(held, stress.cell, stress.nodal, problem)
     plan = ends.raster(held, stress, MACHINE)
     # One guide in the middle row: rings mirror each other about it, as far as the hole.

@@ -7,13 +7,13 @@ import shapely
 from ccfem.cases import create_case
 from ccfem.elasticity import Force, Problem, Support, solve
 from ccfem.errors import InputError
-from ccfem.evaluate import evaluate
+from ccfem.evaluation import evaluate
 from ccfem.layers import slice_planar
 from ccfem.machine import Machine
 from ccfem.materials import isotropic
+from ccfem.mesh.box import box_mesh
 from ccfem.strategies import create, plan
 from ccfem.strategies.offset import _level_sets
-from ccfem.structured import box_mesh
 
 MACHINE = Machine(fibre_width=1.0, minimum_length=5.0)
 

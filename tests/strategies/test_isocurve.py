@@ -7,19 +7,19 @@ from pathlib import Path
 import numpy as np
 import pytest
 
+from ccfem.cases.part_file import read_part
 from ccfem.elasticity import solve
 from ccfem.elasticity.problem import Problem, Support, Traction
 from ccfem.elasticity.stress_field import SolveRecord, StressField
 from ccfem.errors import InputError
-from ccfem.evaluate import evaluate
+from ccfem.evaluation import evaluate
 from ccfem.layers import slice_planar
 from ccfem.machine import Machine
 from ccfem.materials import isotropic
 from ccfem.mesh import TetMesh
-from ccfem.part_file import read_part
+from ccfem.mesh.box import box_mesh
 from ccfem.strategies import create, plan
 from ccfem.strategies.isocurve import Isocurve
-from ccfem.structured import box_mesh
 from ccfem.toolpaths import Toolpaths
 
 MACHINE = Machine()

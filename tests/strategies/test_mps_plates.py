@@ -6,10 +6,10 @@ import numpy as np
 import pytest
 import shapely
 
-from ccfem.cases.plates import plates
-from ccfem.evaluate.plane_paths import plane_paths
-from ccfem.evaluate.plane_study import bead_area
-from ccfem.evaluate.stiffness_alignment import agreement, strongest
+from benchmarks.papers.plocher_2022.plane_study import bead_area
+from benchmarks.papers.plocher_2022.plates import plates
+from ccfem.evaluation.plane_paths import plane_paths
+from ccfem.evaluation.stiffness_alignment import agreement, strongest
 from ccfem.machine import Machine
 from ccfem.strategies.mps import Mps
 from ccfem.tensor import largest_in_plane

@@ -5,13 +5,13 @@ import pytest
 
 from ccfem.cases import create_case
 from ccfem.elasticity import solve
-from ccfem.equal_fibre import plan_to_length
 from ccfem.errors import InputError
-from ccfem.evaluate.virtual_test.specimen import Specimen
-from ccfem.evaluate.virtual_test.virtual_test import virtual_test
 from ccfem.layers import slice_planar
+from ccfem.planning.equal_fibre import plan_to_length
 from ccfem.strategies import create, plan
 from ccfem.strategies.pruned import Pruned
+from ccfem.virtual_testing.specimen import Specimen
+from ccfem.virtual_testing.virtual_test import virtual_test
 
 
 @pytest.mark.parametrize("name", ["concentric", "contour_zigzag", "isocurve"])

@@ -8,13 +8,13 @@ import pytest
 
 from ccfem.elasticity.problem import Force, Problem, Support
 from ccfem.elasticity.solve import solve
-from ccfem.evaluate import evaluate
+from ccfem.evaluation import evaluate
 from ccfem.export.waypoints import read_waypoints
 from ccfem.io import read_mesh
-from ccfem.layers.planar import slice_planar
+from ccfem.layers.slicing.planar import slice_planar
 from ccfem.machine import Machine
 from ccfem.materials import isotropic
-from ccfem.patches import Cylinder, patches_from_rules
+from ccfem.mesh.patches import Cylinder, patches_from_rules
 from ccfem.strategies import create, plan
 
 FOLDER = "CCFEM_CHEN2021"

@@ -6,17 +6,17 @@ import pytest
 from ccfem.elasticity.problem import Force, Problem, Support, Traction
 from ccfem.elasticity.solve import solve
 from ccfem.errors import InputError
-from ccfem.evaluate import evaluate
-from ccfem.evaluate.virtual_test.virtual_test import virtual_test
+from ccfem.evaluation import evaluate
 from ccfem.fibre_aware.prune import prune
 from ccfem.fibre_aware.upper_bound import upper_bound
-from ccfem.layers.planar import slice_planar
+from ccfem.layers.slicing.planar import slice_planar
 from ccfem.machine import Machine
 from ccfem.materials import isotropic
+from ccfem.mesh.box import box_mesh
+from ccfem.planning.strategy import plan
 from ccfem.strategies.isocurve import Isocurve
-from ccfem.strategies.strategy import plan
 from ccfem.strategies.stream_function import StreamFunction
-from ccfem.structured import box_mesh
+from ccfem.virtual_testing.virtual_test import virtual_test
 
 MACHINE = Machine(minimum_length=20.0)
 PLA = isotropic(3500.0, 0.35)

@@ -9,14 +9,14 @@ import shapely
 from ccfem.cases import create_case
 from ccfem.elasticity import Force, Problem, Support, solve
 from ccfem.errors import InputError
-from ccfem.evaluate import evaluate
-from ccfem.evaluate.matching import matching_rate
+from ccfem.evaluation import evaluate
+from ccfem.evaluation.matching import matching_rate
 from ccfem.geometry.polylines import resample, turning_angles
 from ccfem.layers import slice_planar
 from ccfem.machine import Machine
 from ccfem.materials import isotropic
+from ccfem.mesh.patches import Plane, patches_from_rules
 from ccfem.meshing import extrude
-from ccfem.patches import Plane, patches_from_rules
 from ccfem.strategies import create
 
 DISC = shapely.Point(0, 0).buffer(9.0, quad_segs=32) & shapely.box(-8.9, -9, 8.9, 9)

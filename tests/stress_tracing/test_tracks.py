@@ -3,7 +3,7 @@ import pytest
 import shapely
 
 from ccfem.geometry.polylines import turning_angles
-from ccfem.stress_tracing import relaxation
+from ccfem.stress_tracing import turning
 from ccfem.stress_tracing.band import Band, band
 from ccfem.stress_tracing.frame import FREE, Frame, Member, frame
 from ccfem.stress_tracing.main_paths import MainPath, main_paths
@@ -124,13 +124,13 @@ def test_sharp_turns_are_eased_to_the_radius():
 
 def test_move_of_a_track_solves_its_equation(monkeypatch):
     """Without bending u'' = u / l^2: a sinh inside, which decays outside, the flux continuous."""
-    monkeypatch.setattr(relaxation, "_BENDING", 0.0)
+    monkeypatch.setattr(turning, "_BENDING", 0.0)
     x = np.arange(-60.0, 60.25, 0.5)
     middles = 0.5 * (x[1:] + x[:-1])
     free, slope = np.abs(x) < 10.0, np.where(np.abs(middles) < 10.0, 0.2, 0.0)
     hold = np.where(free, 1.0 / 12.0**2, 1.0 / 4.0**2)
     hold[np.abs(x) == 10.0] = 0.5 * (1.0 / 12.0**2 + 1.0 / 4.0**2)
-    moved = relaxation._least(np.ones(len(middles)), slope, hold, closed=False)
+    moved = turning._least(np.ones(len(middles)), slope, hold, closed=False)
     size = 0.2 / (np.cosh(10.0 / 12.0) / 12.0 + np.sinh(10.0 / 12.0) / 4.0)
     expected = size * np.where(
         free,
@@ -155,7 +155,7 @@ def test_tracks_turn_to_the_stress_where_nothing_guides_them(stressed):
     zero = np.zeros((len(x), 2))
     free = (np.abs(x - 30.0) < 10.0).astype(float)
     strip = Band(lines[0], zero, *2 * (slice(0, len(x)),), np.zeros(len(x)), free)
-    moved = relaxation.relaxed(lines, strip, stressed(section, tensor), section)
+    moved = turning.relaxed(lines, strip, stressed(section, tensor), section)
     slope = np.degrees(np.arctan(np.diff(moved[0, :, 1]) / 0.5))
     assert 2.0 < slope[60] < 20.0
     np.testing.assert_allclose(moved[:, [0, -1]], lines[:, [0, -1]], atol=0.01)
@@ -168,7 +168,7 @@ def test_tracks_along_the_stress_or_across_it_stay(stressed):
     zero = np.zeros((len(x), 2))
     strip = Band(lines[0], zero, *2 * (slice(0, len(x)),), np.zeros(len(x)), np.ones(len(x)))
     for tensor in (PULL, [[0.0, 0.0], [0.0, -1.0]]):
-        moved = relaxation.relaxed(lines, strip, stressed(section, tensor), section)
+        moved = turning.relaxed(lines, strip, stressed(section, tensor), section)
         np.testing.assert_allclose(moved, lines, atol=1e-9)
 
 
@@ -186,7 +186,7 @@ def test_tracks_that_turn_keep_apart(stressed):
     half = np.broadcast_to([0.0, 8.0], middle.shape)
     strip = Band(middle, half, *2 * (slice(0, len(x)),), np.zeros(len(x)), np.ones(len(x)))
     lines = middle + np.array([0.75, 0.25, -0.25, -0.75])[:, None, None] * half
-    apart = -np.diff(relaxation.relaxed(lines, strip, stressed(section, tensor), section), axis=0)
+    apart = -np.diff(turning.relaxed(lines, strip, stressed(section, tensor), section), axis=0)
     assert apart[..., 1].min() < 3.0
     assert apart[..., 1].min() >= 0.6 * 4.0 - 1e-9
 

@@ -4,18 +4,10 @@ import numpy as np
 import pytest
 import shapely
 
-from ccfem.elasticity import (
-    Force,
-    PlaneProblem,
-    PointForce,
-    Support,
-    raster_mesh,
-    rotate_plane,
-    solve,
-    solve_plane,
-)
+from ccfem.elasticity import Force, PointForce, Support, solve
 from ccfem.errors import InputError
 from ccfem.materials import isotropic, plane_stress, transversely_isotropic
+from ccfem.plates import PlaneProblem, raster_mesh, rotate_plane, solve_plane
 from ccfem.topopt import Design, as_problem, simp, solid
 
 PLA = isotropic(3000.0, 0.35)

@@ -6,7 +6,7 @@ import pytest
 from ccfem.cases.bracket import HOLES, bracket, bracket_design, bracket_domain, bracket_outline
 from ccfem.elasticity import solve
 from ccfem.io.surface import Surface
-from ccfem.mesh_check import check_mesh
+from ccfem.mesh.check import check_mesh
 
 
 @pytest.fixture(scope="module")

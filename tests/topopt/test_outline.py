@@ -4,9 +4,10 @@ import shapely
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from ccfem.elasticity import PlaneProblem, PointForce, Support, raster_mesh
+from ccfem.elasticity import PointForce, Support
 from ccfem.errors import InputError
 from ccfem.materials import plane_stress
+from ccfem.plates import PlaneProblem, raster_mesh
 from ccfem.topopt import outline, simp, solid
 
 

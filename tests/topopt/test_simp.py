@@ -3,21 +3,11 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from ccfem.elasticity import (
-    Force,
-    PlaneMesh,
-    PlaneProblem,
-    PointForce,
-    Problem,
-    Support,
-    raster_mesh,
-    rotate_plane,
-    solve,
-    solve_plane,
-)
+from ccfem.elasticity import Force, PointForce, Problem, Support, solve
 from ccfem.errors import InputError
 from ccfem.materials import isotropic, plane_stress
-from ccfem.structured import box_mesh
+from ccfem.mesh.box import box_mesh
+from ccfem.plates import PlaneMesh, PlaneProblem, raster_mesh, rotate_plane, solve_plane
 from ccfem.topopt import compliance_of, simp, simp_factor
 from ccfem.topopt.parametrisation import parametrise
 

@@ -3,19 +3,12 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from ccfem.elasticity import (
-    Force,
-    PlaneProblem,
-    PointForce,
-    Support,
-    raster_mesh,
-    rotate_plane,
-    solve_plane,
-)
+from ccfem.elasticity import Force, PointForce, Support
 from ccfem.errors import InputError
 from ccfem.materials import plane_stress
+from ccfem.plates import PlaneProblem, raster_mesh, rotate_plane, solve_plane
 from ccfem.topopt import compliance_of, simp, somp
-from ccfem.topopt.orientation import OrientedCompliance
+from ccfem.topopt.material_axes import OrientedCompliance
 
 FIBRE = plane_stress(50000.0, 4000.0, 0.3, 2500.0)
 WANG = plane_stress(18300.0, 19800.0, 0.17, 5150.0)

@@ -9,12 +9,12 @@ from ccfem.elasticity import Force, PointForce, Problem, Support, solve
 from ccfem.errors import InputError
 from ccfem.io.surface import Surface
 from ccfem.materials import isotropic, transversely_isotropic
-from ccfem.mesh_check import check_mesh
-from ccfem.structured import box_mesh
+from ccfem.mesh.box import box_mesh
+from ccfem.mesh.check import check_mesh
 from ccfem.topopt import Design, as_problem, simp, solid
 from ccfem.topopt import cut as cut_module
 from ccfem.topopt.cut import cut_mesh, volume_above
-from ccfem.topopt.relaxation import relaxed
+from ccfem.topopt.cut_smoothing import relaxed
 
 PLA = isotropic(3000.0, 0.35)
 BOX = box_mesh((20.0, 20.0, 20.0), (16, 16, 16), alternating=True)

@@ -5,7 +5,7 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from ccfem.elasticity import Force, PlaneProblem, Problem, Support, raster_mesh, rotate_plane
+from ccfem.elasticity import Force, Problem, Support
 from ccfem.errors import InputError
 from ccfem.materials import (
     isotropic,
@@ -13,12 +13,13 @@ from ccfem.materials import (
     plane_stress,
     transversely_isotropic,
 )
-from ccfem.patches import Box
-from ccfem.structured import box_mesh
+from ccfem.mesh.box import box_mesh
+from ccfem.mesh.patches import Box
+from ccfem.plates import PlaneProblem, raster_mesh, rotate_plane
 from ccfem.tensor import rotate_stiffness
 from ccfem.topopt import compliance_of, simp, somp
 from ccfem.topopt.compliance import GroupedCompliance
-from ccfem.topopt.orientation import OrientedCompliance, harmonics, sheet
+from ccfem.topopt.material_axes import OrientedCompliance, harmonics, sheet
 
 FIBRE = plane_stress(50000.0, 4000.0, 0.3, 2500.0)
 WANG = plane_stress(18300.0, 19800.0, 0.17, 5150.0)

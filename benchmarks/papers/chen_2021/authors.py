@@ -13,11 +13,11 @@ from benchmarks.papers.chen_2021.loop import LAYERS_PUBLISHED, authors_folder, a
 from ccfem.arrays import FloatArray
 from ccfem.elasticity.solve import solve
 from ccfem.elasticity.stress_field import StressField
-from ccfem.evaluate import Evaluation, evaluate
+from ccfem.evaluation import Evaluation, evaluate
 from ccfem.export.waypoints import read_waypoints
 from ccfem.geometry.polylines import turning_angles
 from ccfem.layers.layer import Layer
-from ccfem.layers.planar import slice_planar
+from ccfem.layers.slicing.planar import slice_planar
 from ccfem.machine import Machine
 from ccfem.toolpaths import Toolpaths
 

@@ -20,20 +20,20 @@ from ccfem.cases.case import Case
 from ccfem.elasticity.problem import Bearing
 from ccfem.elasticity.solve import solve
 from ccfem.elasticity.stress_field import StressField
-from ccfem.equal_fibre import plan_to_length
-from ccfem.evaluate.virtual_test.specimen import Specimen
-from ccfem.evaluate.virtual_test.strands import cut_strands
-from ccfem.evaluate.virtual_test.strength import first_failure
-from ccfem.evaluate.virtual_test.verdict import HONEST_PROMISE
-from ccfem.evaluate.virtual_test.virtual_test import virtual_bracket, virtual_test
 from ccfem.fibre_aware.prune import prune
 from ccfem.fibre_aware.upper_bound import upper_bound
 from ccfem.layers.layer import Layer
-from ccfem.layers.planar import slice_planar
+from ccfem.layers.slicing.planar import slice_planar
+from ccfem.planning.equal_fibre import plan_to_length
+from ccfem.planning.strategy import plan
 from ccfem.strategies.isocurve import Isocurve
-from ccfem.strategies.strategy import plan
 from ccfem.strategies.stream_function import StreamFunction
 from ccfem.toolpaths import Toolpaths
+from ccfem.virtual_testing.specimen import Specimen
+from ccfem.virtual_testing.strands import cut_strands
+from ccfem.virtual_testing.strength import first_failure
+from ccfem.virtual_testing.verdict import HONEST_PROMISE
+from ccfem.virtual_testing.virtual_test import virtual_bracket, virtual_test
 
 __all__ = ["LAYER_COUNTS", "LENGTH", "Tested", "bound", "designs", "loop", "sliced", "tested"]
 

@@ -13,7 +13,7 @@ from ccfem.elasticity.problem import Force, Problem, Support
 from ccfem.errors import InputError
 from ccfem.io import read_mesh
 from ccfem.materials import isotropic
-from ccfem.patches import Cylinder, patches_from_rules
+from ccfem.mesh.patches import Cylinder, patches_from_rules
 
 __all__ = ["FOLDER", "LAYERS_PUBLISHED", "LAYERS_TABLE_2", "authors_folder", "authors_loop"]
 

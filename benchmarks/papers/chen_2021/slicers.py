@@ -20,11 +20,11 @@ import numpy as np
 from benchmarks.papers.chen_2021.loop import authors_loop
 from ccfem.arrays import FloatArray
 from ccfem.elasticity import solve
-from ccfem.equal_fibre import TOLERANCE, length_per_layer
 from ccfem.errors import InputError
-from ccfem.evaluate import evaluate
+from ccfem.evaluation import evaluate
 from ccfem.layers import slice_planar
 from ccfem.layers.layer import Layer
+from ccfem.planning.equal_fibre import TOLERANCE, length_per_layer
 from ccfem.toolpaths import Toolpaths
 
 __all__ = [

@@ -15,15 +15,15 @@ from benchmarks.papers.chen_2021.loop import authors_loop
 from benchmarks.papers.chen_2021.slicers import PATTERNS, slicer_found, slicer_paths_to_length
 from benchmarks.papers.chen_2021.virtual_test import MATRIX_STRENGTH, authors_paths
 from ccfem.elasticity import solve
-from ccfem.equal_fibre import plan_to_length
-from ccfem.evaluate import evaluate
-from ccfem.evaluate.virtual_test.specimen import Specimen
-from ccfem.evaluate.virtual_test.strength import first_failure
-from ccfem.evaluate.virtual_test.virtual_test import virtual_test
+from ccfem.evaluation import evaluate
 from ccfem.layers import slice_planar
+from ccfem.planning.equal_fibre import plan_to_length
 from ccfem.strategies import Strategy, create, plan
 from ccfem.strategies.isocurve import Isocurve
 from ccfem.toolpaths import Toolpaths
+from ccfem.virtual_testing.specimen import Specimen
+from ccfem.virtual_testing.strength import first_failure
+from ccfem.virtual_testing.virtual_test import virtual_test
 
 COLUMNS = {
     "fibre_length": ("fibre m", 1e-3),

@@ -13,18 +13,18 @@ from dataclasses import replace
 import numpy as np
 
 from benchmarks.papers.chen_2021.loop import LAYERS_TABLE_2, authors_folder, authors_loop
+from benchmarks.papers.chen_2021.oriented import oriented_ratio
 from ccfem.elasticity.problem import Bearing
 from ccfem.elasticity.solve import solve
-from ccfem.evaluate.virtual_test.oriented import oriented_ratio
-from ccfem.evaluate.virtual_test.specimen import Specimen
-from ccfem.evaluate.virtual_test.strand import Strand
-from ccfem.evaluate.virtual_test.strands import Strands, cut_strands
-from ccfem.evaluate.virtual_test.strength import first_failure, matrix_peak
-from ccfem.evaluate.virtual_test.verdict import HONEST_PROMISE, verdict
-from ccfem.evaluate.virtual_test.virtual_test import virtual_bracket, virtual_test
 from ccfem.export.waypoints import read_waypoints
 from ccfem.materials import named_material
 from ccfem.toolpaths import Toolpaths
+from ccfem.virtual_testing.specimen import Specimen
+from ccfem.virtual_testing.strand import Strand
+from ccfem.virtual_testing.strands import Strands, cut_strands
+from ccfem.virtual_testing.strength import first_failure, matrix_peak
+from ccfem.virtual_testing.verdict import HONEST_PROMISE, verdict
+from ccfem.virtual_testing.virtual_test import virtual_bracket, virtual_test
 
 __all__ = ["MATRIX_STRENGTH", "PHYSICAL", "authors_paths", "ratios"]
 

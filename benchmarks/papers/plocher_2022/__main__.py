@@ -8,12 +8,7 @@ import sys
 from pathlib import Path
 from time import perf_counter
 
-from benchmarks.papers.plocher_2022.claims import (
-    claim_table,
-    quantities,
-    raster_quantities,
-    verdicts,
-)
+from benchmarks.papers.plocher_2022.claims import quantities, raster_quantities, verdicts
 from benchmarks.papers.plocher_2022.figures import draw_all
 from benchmarks.papers.plocher_2022.study import RASTER, run_study
 from benchmarks.papers.plocher_2022.tables import (
@@ -30,6 +25,7 @@ from benchmarks.papers.plocher_2022.variants import (
     variant_quantities,
     variant_table,
 )
+from benchmarks.papers.verdicts import claim_table
 
 PROTOTYPE_NOTE = """\
 Both chains follow the same rules; they share no code. Where they differ:

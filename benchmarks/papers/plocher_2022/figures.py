@@ -9,17 +9,17 @@ from matplotlib.backends.backend_agg import FigureCanvasAgg
 from matplotlib.collections import LineCollection
 from matplotlib.figure import Figure
 
+from benchmarks.papers.plocher_2022.plates import Plate
+from benchmarks.papers.plocher_2022.radar import draw_radar
 from benchmarks.papers.plocher_2022.study import MATERIALS, CaseStudy, PatternStudy
 from ccfem.arrays import FloatArray
-from ccfem.cases.plates import Plate
-from ccfem.evaluate.plane_paths import PlanePaths
-from ccfem.evaluate.sensitivity import OffAxis
-from ccfem.evaluate.sinuosity import LONG
-from ccfem.evaluate.stiffness_alignment import agreement
+from ccfem.evaluation.plane_paths import PlanePaths
+from ccfem.evaluation.sensitivity import OffAxis
+from ccfem.evaluation.sinuosity import LONG
+from ccfem.evaluation.stiffness_alignment import agreement
 from ccfem.materials import named_material
 from ccfem.plot.canvas import save
 from ccfem.plot.colours import INK, OUTLINE, SECTION, scale
-from ccfem.plot.radar import draw_radar
 from ccfem.raster.patterns import inside_shells
 from ccfem.raster.skeleton import skeleton
 from ccfem.tensor import largest_in_plane

@@ -1,7 +1,7 @@
 """Three plates, five infill patterns, two materials: Plocher, Wioland and Panesar (2022).
 
-Rapid Prototyping Journal 28 (2022) 1241. The plates are `ccfem.cases.plates`; one pixel of the
-finite elements is one bead wide. Every pattern is laid as polylines, and as paths of pixels, which
+Rapid Prototyping Journal 28 (2022) 1241. The plates are `plates`; one pixel of the finite
+elements is one bead wide. Every pattern is laid as polylines, and as paths of pixels, which
 is what the paper does.
 """
 
@@ -12,13 +12,8 @@ from typing import Any
 
 import numpy as np
 
-from ccfem.cases.plates import Plate, five_holes, plates
-from ccfem.elasticity.plane import solve_plane
-from ccfem.elasticity.stress_field import StressField
-from ccfem.evaluate import evaluate
-from ccfem.evaluate.fibre_map import FibreMap, fibre_map
-from ccfem.evaluate.plane_paths import PlanePaths, plane_paths
-from ccfem.evaluate.plane_study import (
+from benchmarks.papers.plocher_2022.fibre_map import FibreMap, fibre_map
+from benchmarks.papers.plocher_2022.plane_study import (
     PRINT_SPEED,
     TRAVEL_SPEED,
     Benchmark,
@@ -30,17 +25,22 @@ from ccfem.evaluate.plane_study import (
     print_seconds,
     reduced_stiffness,
 )
-from ccfem.evaluate.sinuosity import path_sinuosity, sample_sinuosity, sinuosity_indices
-from ccfem.evaluate.stiffness_alignment import READINGS
+from benchmarks.papers.plocher_2022.plates import Plate, five_holes, plates
+from ccfem.elasticity.stress_field import StressField
+from ccfem.evaluation import evaluate
+from ccfem.evaluation.plane_paths import PlanePaths, plane_paths
+from ccfem.evaluation.sinuosity import path_sinuosity, sample_sinuosity, sinuosity_indices
+from ccfem.evaluation.stiffness_alignment import READINGS
 from ccfem.export.gcode import gcode
 from ccfem.export.print_plan import PrintPlan
 from ccfem.geometry import shells
 from ccfem.geometry.medial_fill import medial_fill
 from ccfem.geometry.polylines import lengths, pack
-from ccfem.geometry.print_order import nearest_end_order
 from ccfem.layers.layer import Layer
+from ccfem.linking.print_order import nearest_end_order
 from ccfem.machine import Machine
 from ccfem.materials import named_material
+from ccfem.plates.solve import solve_plane
 from ccfem.raster.plan import RasterPlan
 from ccfem.strategies import create, mps, plan
 from ccfem.toolpaths import FIBRE, Toolpaths

@@ -4,9 +4,9 @@ import tomllib
 from collections.abc import Mapping
 from pathlib import Path
 
+from benchmarks.papers.plocher_2022.plane_study import reduced_stiffness
 from benchmarks.papers.plocher_2022.study import MATERIALS, CaseStudy
-from ccfem.evaluate import COLUMNS
-from ccfem.evaluate.plane_study import reduced_stiffness
+from ccfem.evaluation import COLUMNS
 from ccfem.materials import named_material
 
 __all__ = [

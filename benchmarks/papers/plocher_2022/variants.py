@@ -6,16 +6,16 @@ from typing import Any
 
 import numpy as np
 
+from benchmarks.papers.plocher_2022.fibre_map import fibre_map
+from benchmarks.papers.plocher_2022.plane_study import laid_plate, print_seconds, reduced_stiffness
+from benchmarks.papers.plocher_2022.plates import Plate, five_holes, single_hole
 from benchmarks.papers.plocher_2022.study import RASTER, CaseStudy, machine_of
-from ccfem.cases.plates import Plate, five_holes, single_hole
-from ccfem.elasticity.plane import PlaneField
-from ccfem.evaluate.fibre_map import fibre_map
-from ccfem.evaluate.plane_paths import plane_paths
-from ccfem.evaluate.plane_study import laid_plate, print_seconds, reduced_stiffness
-from ccfem.evaluate.sinuosity import path_sinuosity, sample_sinuosity, sinuosity_indices
-from ccfem.evaluate.stiffness_alignment import agreement, strongest
+from ccfem.evaluation.plane_paths import plane_paths
+from ccfem.evaluation.sinuosity import path_sinuosity, sample_sinuosity, sinuosity_indices
+from ccfem.evaluation.stiffness_alignment import agreement, strongest
 from ccfem.geometry.polylines import pack
 from ccfem.materials import named_material
+from ccfem.plates.solve import PlaneField
 from ccfem.raster.patterns import concentric_regions, medial_regions
 from ccfem.raster.plan import raster_plan
 from ccfem.strategies import create, plan

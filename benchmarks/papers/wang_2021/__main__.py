@@ -8,7 +8,8 @@ import sys
 from pathlib import Path
 from time import perf_counter
 
-from benchmarks.papers.wang_2021.claims import claim_table, quantities, verdicts
+from benchmarks.papers.verdicts import claim_table
+from benchmarks.papers.wang_2021.claims import quantities, verdicts
 from benchmarks.papers.wang_2021.figures import draw_all
 from benchmarks.papers.wang_2021.study import run_study
 from benchmarks.papers.wang_2021.tables import plate_table, result_table, speed_table
@@ -18,7 +19,7 @@ from benchmarks.papers.wang_2021.variants import (
     variant_quantities,
     variant_table,
 )
-from ccfem.evaluate.matching import READINGS, THRESHOLDS
+from ccfem.evaluation.matching import READINGS, THRESHOLDS
 
 
 def main(folder: Path) -> None:

@@ -9,9 +9,9 @@ import shapely
 from benchmarks.papers.verdicts import Check, claim_table, judged
 from benchmarks.papers.wang_2021.study import BASELINES, LIMIT, PartStudy, PatternStudy, PlateStudy
 from ccfem.elasticity import LayerStress
-from ccfem.evaluate.matching import THRESHOLDS, matching_rate
+from ccfem.evaluation.matching import THRESHOLDS, matching_rate
 from ccfem.geometry.medial_axis import medial_axis
-from ccfem.speeds import SpeedTable
+from ccfem.machine import SpeedTable
 from ccfem.stress_tracing.frame import frame
 from ccfem.tensor import in_plane, largest_in_plane
 from ccfem.toolpaths import Toolpaths

@@ -23,11 +23,11 @@ from benchmarks.papers.wang_2021.panels import (
     title,
 )
 from benchmarks.papers.wang_2021.study import BASELINES, LIMIT, PatternStudy, PlateStudy
-from ccfem.evaluate.matching import THRESHOLDS
+from ccfem.evaluation.matching import THRESHOLDS
 from ccfem.geometry.medial_axis import medial_axis
+from ccfem.machine.speeds import step_speeds
 from ccfem.plot.canvas import save
 from ccfem.plot.colours import INK, OUTLINE, palette
-from ccfem.speeds import step_speeds
 from ccfem.strategies.svt import Svt
 from ccfem.stress_tracing.criterion import Criterion
 from ccfem.stress_tracing.frame import frame

@@ -19,13 +19,10 @@ from ccfem.cases import Case, create_case
 from ccfem.cases.build_data import DESIGNED
 from ccfem.cases.designed import ELEMENT_SIZE, DesignPlate
 from ccfem.elasticity import LayerStress, StressField, solve
-from ccfem.evaluate import evaluate
-from ccfem.evaluate.curvature import sample_curvature
-from ccfem.evaluate.matching import READINGS, matching_rate
-from ccfem.evaluate.plane_paths import PlanePaths, plane_paths
-from ccfem.evaluate.virtual_test.specimen import Specimen
-from ccfem.evaluate.virtual_test.strand import RHO, Strand
-from ccfem.evaluate.virtual_test.virtual_test import virtual_bracket
+from ccfem.evaluation import evaluate
+from ccfem.evaluation.curvature import sample_curvature
+from ccfem.evaluation.matching import READINGS, matching_rate
+from ccfem.evaluation.plane_paths import PlanePaths, plane_paths
 from ccfem.geometry.polylines import resample, turning_angles
 from ccfem.layers import slice_planar
 from ccfem.layers.layer import Layer
@@ -33,6 +30,9 @@ from ccfem.machine import Machine
 from ccfem.strategies import create, named, plan
 from ccfem.toolpaths import Toolpaths
 from ccfem.topopt import Design
+from ccfem.virtual_testing.specimen import Specimen
+from ccfem.virtual_testing.strand import RHO, Strand
+from ccfem.virtual_testing.virtual_test import virtual_bracket
 
 __all__ = [
     "BASELINES",

@@ -3,7 +3,7 @@
 from collections.abc import Mapping
 
 from benchmarks.papers.wang_2021.study import LIMIT, PatternStudy, PlateStudy
-from ccfem.speeds import SpeedTable
+from ccfem.machine import SpeedTable
 
 __all__ = ["ROWS", "plate_table", "result_table", "speed_table"]
 

@@ -17,9 +17,9 @@ from benchmarks.papers.wang_2021.study import (
 )
 from ccfem.cases.bridge import bridge_plate
 from ccfem.cases.designed import Hole, designed_case
-from ccfem.evaluate.curvature import sample_curvature
-from ccfem.evaluate.manufacture import sample_manufacture
-from ccfem.evaluate.plane_paths import PlanePaths, plane_paths
+from ccfem.evaluation.curvature import sample_curvature
+from ccfem.evaluation.manufacture import sample_manufacture
+from ccfem.evaluation.plane_paths import PlanePaths, plane_paths
 from ccfem.strategies import create, plan
 
 __all__ = ["RADII", "Tried", "try_hole", "try_radii", "variant_quantities", "variant_table"]

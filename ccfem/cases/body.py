@@ -1,0 +1,138 @@
+"""The body of a part file: a mesh, a surface to be filled, or a planform to be extruded."""
+
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any, Literal
+
+import numpy as np
+
+from ccfem.errors import InputError
+from ccfem.io import read_mesh, read_surface
+from ccfem.io.toml import from_table
+from ccfem.mesh.check import check_mesh
+from ccfem.mesh.tet_mesh import TetMesh
+
+__all__ = ["Body"]
+
+
+@dataclass(frozen=True, kw_only=True)
+class Body:
+    """The keys of a part file that say what its body is (see `ccfem.cases.part_file`)."""
+
+    mesh: str | None = None
+    surface: str | None = None
+    planform: dict[str, Any] | None = None
+    edge_length: float | None = None
+    scale: float = 1.0
+    merge_nodes: bool = False
+    order: Literal[1, 2] | None = None
+
+    def read(self, folder: Path) -> tuple[TetMesh, tuple[str, ...]]:
+        """Mesh of the part, checked, and what was found in it; files are relative to a folder."""
+        given = [key for key in ("mesh", "surface", "planform") if getattr(self, key) is not None]
+        if len(given) != 1:
+            raise InputError(
+                "a part needs one of mesh, surface and planform; got "
+                f"{' and '.join(given) or 'none'}: name one"
+            )
+        if (self.edge_length is not None) != (self.surface is not None):
+            raise InputError(
+                "edge_length goes with surface, and surface with edge_length: add the one that is "
+                "missing (a planform has its own edge_length)"
+            )
+        if self.planform is not None and self.scale != 1.0:
+            raise InputError("scale goes with mesh or surface: leave it out of a planform")
+        if self.mesh is not None:
+            mesh = read_mesh(folder / self.mesh, self.scale, check=False)
+            if self.order == 1 and mesh.order == 2:
+                mesh = _linear(mesh)
+            mesh, report = check_mesh(mesh, merge=self.merge_nodes)
+        else:
+            mesh, report = check_mesh(_filled(self, folder))
+        found = (*report.findings, *self._about_edge_length(mesh))
+        return mesh.quadratic() if self.order == 2 else mesh, found
+
+    def _about_edge_length(self, mesh: TetMesh) -> tuple[str, ...]:
+        """Say where the edge length is longer than the part is thick."""
+        wanted = self.edge_length if self.planform is None else self.planform["edge_length"]
+        thin = float(np.ptp(mesh.bounds, axis=0).min())
+        if wanted is None or wanted <= thin:
+            return ()
+        return (
+            f"edge_length {wanted:g} mm is longer than the part is thick, {thin:.3g} mm: shorten "
+            "it for more than one cell across, and check that all lengths are in mm",
+        )
+
+
+@dataclass(frozen=True)
+class _Hole:
+    """A hole of a planform: a circle or a polygon."""
+
+    centre: tuple[float, float] | None = None
+    radius: float | None = None
+    outline: tuple[tuple[float, float], ...] | None = None
+
+    def __post_init__(self) -> None:
+        circle = self.centre is not None and self.radius is not None
+        if circle == (self.outline is not None):
+            raise InputError("a hole needs centre and radius, or outline: give one of them")
+
+
+@dataclass(frozen=True)
+class _Planform:
+    """The table [planform]."""
+
+    outline: tuple[tuple[float, float], ...]
+    height: float
+    edge_length: float
+    holes: tuple[dict[str, Any], ...] = ()
+
+
+def _linear(mesh: TetMesh) -> TetMesh:
+    """Mesh of the corners of a quadratic mesh."""
+    corners, cells = np.unique(mesh.corners, return_inverse=True)
+    number = np.zeros(len(mesh.points), dtype=np.int64)
+    number[corners] = np.arange(len(corners))
+    patches = {name: number[facets] for name, facets in mesh.patches.items()}
+    return TetMesh(mesh.points[corners], cells.reshape(-1, 4), patches)
+
+
+def _filled(body: Body, folder: Path) -> TetMesh:
+    """Mesh of a surface or a planform."""
+    if body.surface is not None and body.edge_length is not None:
+        from ccfem.meshing import tetrahedralise
+
+        return tetrahedralise(read_surface(folder / body.surface, body.scale), body.edge_length)
+    import shapely
+
+    from ccfem.meshing import extrude
+
+    plan = from_table(_Planform, body.planform, "planform")
+    rings = []
+    for k, table in enumerate(plan.holes):
+        hole = from_table(_Hole, table, f"planform.holes[{k}]")
+        if hole.outline is not None:
+            rings.append(_polygon(hole.outline, f"planform.holes[{k}]"))
+        else:
+            rings.append(shapely.Point(hole.centre).buffer(hole.radius, quad_segs=32))
+    outline = _polygon(plan.outline, "planform")
+    for k, ring in enumerate(rings):
+        if not outline.contains_properly(ring):
+            raise InputError(f"planform.holes[{k}] must lie inside the outline: move or shrink it")
+    holes = shapely.union_all(rings)
+    return extrude(outline.difference(holes), plan.height, plan.edge_length)
+
+
+def _polygon(outline: tuple[tuple[float, float], ...], where: str) -> Any:
+    """Make a polygon of an outline that does not cut itself."""
+    import shapely
+
+    if len(outline) < 3:
+        raise InputError(f"{where}.outline needs at least 3 points; got {len(outline)}: add some")
+    polygon = shapely.Polygon(outline)
+    if not polygon.is_valid or not polygon.area > 0.0:
+        raise InputError(
+            f"{where}.outline is not a valid polygon: {shapely.is_valid_reason(polygon)}: go round "
+            "it without crossing"
+        )
+    return polygon

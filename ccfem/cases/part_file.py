@@ -1,0 +1,304 @@
+"""Part files: a part with its loads, described in TOML.
+
+Lengths are mm, forces N, stresses MPa. Paths are relative to the part file. Nothing in a part file
+is executed, and a key that is not listed here is an error. Directions are "x", "y", "z", one of
+them with a minus ("-z"), or three numbers.
+
+::
+
+    name = "hook"                     # default: the file's name
+    title = "Hook under 200 N"        # one line for tables and reports; default: the name
+    source = "..."                    # where the part comes from; default: nothing
+
+    # The body: exactly one of mesh, surface and planform.
+    mesh = "hook.msh"                 # tetrahedra: .tet .msh .vtu .inp .npz
+    surface = "hook.stl"              # closed surface (.stl .obj .ply), filled with tetrahedra ...
+    edge_length = 2.0                 # ... of this edge length
+    scale = 1.0                       # factor on the coordinates of either file; 1000 for metres
+    merge_nodes = false               # join pieces of a mesh where their nodes coincide
+    order = 1                         # 1 or 2, linear or quadratic cells; default: as the file has
+
+    [planform]                        # a flat part that stands on z = 0
+    outline = [[0, 0], [80, 0], [80, 30], [0, 30]]
+    holes = [{ centre = [15, 15], radius = 5 }, { outline = [[40, 10], [50, 10], [45, 20]] }]
+    height = 6.0
+    edge_length = 2.0
+
+    build = "z"                       # build direction; default z
+    layers = 12                       # fibre layers, spread evenly over the height; default 12
+    material = "pla"                  # a name of the table (ccfem.materials), or a table:
+
+    [material]                        # isotropic ...
+    modulus = 3500.0
+    poisson = 0.35
+    name = "PLA+"                     # optional; so are source, tensile_strength and
+                                      # compressive_strength
+    [material]                        # ... or transversely isotropic, the fibre along x
+    modulus_fibre = 60000.0
+    modulus_transverse = 4100.0
+    poisson_fibre = 0.33
+    shear_fibre = 2200.0
+    poisson_transverse = 0.45         # optional
+
+    # Patches: boundary facets chosen by a rule (ccfem.mesh.patches). Groups of a mesh file
+    # are patches already.
+    [patches.foot]
+    rule = "plane"                    # facets on a plane
+    normal = "z"
+    offset = "min"                    # distance along the normal, "min" or "max" ...
+    point = [0, 0, 0]                 # ... or, in place of offset, a point on the plane
+    tolerance = 0.1                   # optional
+
+    [patches.pin]
+    rule = "cylinder"                 # the walls of holes and pins up to this radius
+    point = [15, 15, 0]
+    axis = "z"
+    radius = 5.0
+    half = "-x"                       # optional: only the half on this side of the axis
+    tolerance = 0.1                   # optional
+
+    [patches.corner]
+    rule = "box"                      # facets inside a box; inf is allowed
+    lower = [0, 0, 0]
+    upper = [10, 10, inf]
+
+    [patches.tip]
+    rule = "nearest"                  # the facets nearest to a point
+    point = [80, 15, 3]
+    count = 4                         # how many (default 1), or radius = ...
+
+    [patches.grip]
+    rule = "group"                    # a group of the mesh file under another name
+    name = "Surface_12"
+
+    [[supports]]                      # at least one
+    patch = "foot"
+    components = "xyz"                # which are held; default all
+    value = [0, 0, 0]                 # displacement they take, mm; default none
+
+    [[loads.pull]]                    # at least one load of one load case, here "pull"
+    kind = "bearing"                  # total force, N, that a pin presses on a cylinder
+    patch = "pin"
+    vector = [200, 0, 0]
+
+    [[loads.pull]]                    # further loads of the same case
+    kind = "force"                    # total force, N, spread evenly: patch, vector
+    patch = "tip"                     # "traction", MPa: patch, vector
+    vector = [0, 0, -10]              # "pressure", MPa, inward: patch, magnitude
+                                      # "point", N at the nearest node: point, vector
+
+    [machine]                         # what differs from ccfem.machine.machine.Machine
+    minimum_length = 45.0
+
+    [machine.speeds]                  # fibre speed by curvature, length and angle of a path's
+    speed = [7, 15, 35]               # pieces (ccfem.machine.SpeedTable) in place of fibre_speed;
+    curvature = [0.2, 0.05]           # what is left out: Wang et al. 2021, table 2
+    length = [15, 25]
+    angle = [90, 135]
+
+    [machine.gcode]                   # what differs from ccfem.machine.gcode_profile.GcodeProfile
+    cut = ["M42 P4 S255", "G4 P{wait}", "M42 P4 S0"]
+    bed = [250, 210, 200]             # mm
+
+    [strategies.isocurve]             # parameters of a strategy on this part
+    cap = 90.0
+"""
+
+import os
+import tomllib
+from collections.abc import Callable, Mapping
+from dataclasses import dataclass, field
+from pathlib import Path
+from typing import Any
+
+from ccfem.cases.body import Body
+from ccfem.cases.case import Case
+from ccfem.elasticity.problem import (
+    Bearing,
+    Force,
+    Load,
+    PointForce,
+    Pressure,
+    Problem,
+    Support,
+    Traction,
+)
+from ccfem.errors import InputError
+from ccfem.io.toml import from_table
+from ccfem.io.whole import existing_file
+from ccfem.machine.machine import Machine
+from ccfem.materials import Material, isotropic, named_material, transversely_isotropic
+from ccfem.mesh.patches import (
+    Box,
+    Cylinder,
+    Group,
+    Nearest,
+    PatchRule,
+    Plane,
+    Vector,
+    patches_from_rules,
+    unit_vector,
+)
+
+__all__ = ["read_part"]
+
+_RULES: dict[str, Callable[..., PatchRule]] = {
+    "plane": Plane,
+    "box": Box,
+    "cylinder": Cylinder,
+    "nearest": Nearest,
+    "group": Group,
+}
+_LOADS: dict[str, Callable[..., Load]] = {
+    "force": Force,
+    "traction": Traction,
+    "pressure": Pressure,
+    "bearing": Bearing,
+    "point": PointForce,
+}
+
+
+@dataclass(frozen=True, kw_only=True)
+class _Part(Body):
+    """The keys of a part file."""
+
+    material: str | dict[str, Any]
+    supports: tuple[dict[str, Any], ...]
+    loads: dict[str, Any]
+    name: str = ""
+    title: str = ""
+    source: str = ""
+    build: str | Vector = "z"
+    layers: int = 12
+    patches: dict[str, Any] = field(default_factory=dict)
+    machine: dict[str, Any] = field(default_factory=dict)
+    strategies: dict[str, Any] = field(default_factory=dict)
+
+
+def read_part(path: str | os.PathLike[str]) -> Case:
+    """Read a part file (its keys are in the documentation of this module).
+
+    Parameters
+    ----------
+    path : path
+        A TOML file.
+
+    Returns
+    -------
+    Case
+        `Case.findings` says what was mended in the mesh.
+
+    Raises
+    ------
+    InputError
+        With the name of the file, what was expected, what came and the cure.
+    """
+    path = existing_file(path, "part file")
+    try:
+        with path.open("rb") as file:
+            content = tomllib.load(file)
+    except (tomllib.TOMLDecodeError, UnicodeDecodeError) as error:
+        raise InputError(f"{path} is not a TOML file: {error}: correct it") from None
+    try:
+        return _case(content, path)
+    except InputError as error:
+        message = str(error)
+        raise InputError(message if str(path) in message else f"{path}: {message}") from None
+
+
+def _case(content: Mapping[str, Any], path: Path) -> Case:
+    """Case of a part file's content."""
+    part = from_table(_Part, content, "the part file")
+    if not part.supports:
+        raise InputError("a part needs a support: add [[supports]] with its patch")
+    if part.layers < 1:
+        raise InputError(f"layers must be at least 1; got {part.layers}: correct it")
+    build = unit_vector(part.build, "build")
+    supports = tuple(
+        from_table(Support, table, f"supports[{k}]") for k, table in enumerate(part.supports)
+    )
+    loads = _loads(part.loads)
+    rules = {name: _rule(table, f"patches.{name}") for name, table in part.patches.items()}
+    machine = from_table(Machine, part.machine, "machine")
+    material = _material(part.material)
+    _check_strategies(part.strategies)
+    mesh, findings = part.read(path.parent)
+    mesh = patches_from_rules(mesh, rules)
+    for value in (*supports, *(load for case in loads.values() for load in case)):
+        if not isinstance(value, PointForce):
+            mesh.patch(value.patch)
+    name = part.name or path.stem
+    return Case(
+        name=name,
+        title=part.title or name,
+        problem=Problem(mesh, material, supports, loads),
+        build=(float(build[0]), float(build[1]), float(build[2])),
+        layers=part.layers,
+        machine=machine,
+        parameters=part.strategies,
+        source=part.source,
+        findings=findings,
+    )
+
+
+def _rule(table: object, where: str) -> PatchRule:
+    """Rule of a table with the key rule."""
+    name, rest = _named(table, "rule", _RULES, where)
+    make = _RULES[name]
+    if name == "plane" and "point" in rest:
+        make = Plane.through
+    return from_table(make, rest, where, infinite=name == "box")
+
+
+def _loads(cases: Mapping[str, Any]) -> dict[str, tuple[Load, ...]]:
+    """Read the loads of every load case."""
+    if not cases:
+        raise InputError("a part needs a load: add [[loads.NAME]] with its kind")
+    found = {}
+    for name, tables in cases.items():
+        if not isinstance(tables, list) or not tables:
+            raise InputError(
+                f"loads.{name} must be a list of tables; got {tables!r}: write [[loads.{name}]]"
+            )
+        loads = []
+        for k, table in enumerate(tables):
+            where = f"loads.{name}[{k}]"
+            kind, rest = _named(table, "kind", _LOADS, where)
+            loads.append(from_table(_LOADS[kind], rest, where))
+        found[name] = tuple(loads)
+    return found
+
+
+def _named(
+    table: object, key: str, known: Mapping[str, Any], where: str
+) -> tuple[str, dict[str, Any]]:
+    """Split a table into the name under a key, which must be known, and the rest."""
+    name = table.get(key) if isinstance(table, Mapping) else None
+    if not isinstance(table, Mapping) or not isinstance(name, str) or name not in known:
+        raise InputError(
+            f"{where} must be a table with {key} one of {', '.join(known)}; got "
+            f"{name if name is not None else table!r}: correct it"
+        )
+    return name, {k: value for k, value in table.items() if k != key}
+
+
+def _material(given: str | dict[str, Any]) -> Material:
+    """Material by name, or of its moduli."""
+    if isinstance(given, str):
+        return named_material(given)
+    make = transversely_isotropic if "modulus_fibre" in given else isotropic
+    return from_table(make, given, "material")
+
+
+def _check_strategies(tables: Mapping[str, Any]) -> None:
+    """Raise on an unknown strategy, or on parameters that it does not take."""
+    if not tables:
+        return
+    from ccfem.strategies import create
+
+    for name, parameters in tables.items():
+        if not isinstance(parameters, Mapping):
+            raise InputError(
+                f"strategies.{name} must be a table; got {parameters!r}: write [strategies.{name}]"
+            )
+        create(name, parameters)

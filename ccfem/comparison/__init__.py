@@ -1,0 +1,1 @@
+"""Comparison of strategies on one part: runs, ranking, pictures, report and files."""

@@ -1,0 +1,154 @@
+"""The headline of a comparison: the few indices that tables show first."""
+
+from collections.abc import Mapping
+from dataclasses import dataclass
+
+import numpy as np
+
+from ccfem.comparison.result import Run
+from ccfem.evaluation.column import Column
+
+__all__ = ["HEADLINE", "TEST_COLUMNS", "Headline", "cell_text", "headline_values"]
+
+
+_RATIO = "stiffness of the part with its fibres over that without"
+
+TEST_COLUMNS = (
+    Column(
+        "stiffness_ratio_tension",
+        "1",
+        f"The {_RATIO}, fibres in compression carrying nothing; default EA/E = 4 mm^2.",
+        ">= 1, higher is better; missing where there was no virtual test",
+    ),
+    Column(
+        "stiffness_ratio_low",
+        "1",
+        f"The {_RATIO}, tension only, at the lowest EA/E of the span (2 mm^2).",
+        "as stiffness_ratio_tension",
+    ),
+    Column(
+        "stiffness_ratio_high",
+        "1",
+        f"The {_RATIO}, tension only, at the highest EA/E of the span (6 mm^2).",
+        "as stiffness_ratio_tension",
+    ),
+    Column(
+        "stiffness_ratio_bonded",
+        "1",
+        f"The {_RATIO}, all fibres bonded and carrying tension and compression.",
+        "as stiffness_ratio_tension",
+    ),
+    Column(
+        "stiffness",
+        "N/mm",
+        "Size of the load squared over its work, fibres carrying tension only.",
+        "> 0, higher is better",
+    ),
+    Column(
+        "gain_per_metre",
+        "1/m",
+        "(stiffness_ratio_tension - 1) over the length of fibre inside the part.",
+        ">= 0, higher is better",
+    ),
+    Column(
+        "strain_energy",
+        "N mm",
+        "Strain energy of matrix and fibres under the load, fibres carrying tension only.",
+        "> 0, lower is better under forces",
+    ),
+    Column(
+        "first_failure_load",
+        "N",
+        "Load at which the matrix (von Mises stress averaged over a 2 mm ball, away from loads and "
+        "supports) or the fibre (99th percentile of the axial force by length) first reaches its "
+        "strength, fibres carrying tension only.",
+        "> 0, higher is better; missing where a strength is unknown",
+    ),
+)
+"""Indices of the virtual test, described as those of the evaluator are."""
+
+
+@dataclass(frozen=True)
+class Headline:
+    """One column of the headline table.
+
+    Attributes
+    ----------
+    column : str
+        Name of the index.
+    title : str
+        What tables print above it.
+    better : str
+        "high", "low", or "" where neither is better.
+    pattern : str
+        How a value is printed, for `str.format`.
+    """
+
+    column: str
+    title: str
+    better: str
+    pattern: str
+
+
+HEADLINE = (
+    Headline("stiffness_ratio_tension", "stiffness ×, tension only", "high", "{:.2f}"),
+    Headline("stiffness_ratio_bonded", "stiffness ×, bonded", "high", "{:.2f}"),
+    Headline("first_failure_load", "first failure, N", "high", "{:.0f}"),
+    Headline("fibre_per_layer", "fibre, mm a layer", "", "{:.0f}"),
+    Headline("efficiency", "efficiency", "high", "{:.3f}"),
+    Headline("aligned_stress_10", "within 10°, by stress", "high", "{:.1%}"),
+    Headline("coverage_top_20", "coverage of top 20 % stress", "high", "{:.1%}"),
+    Headline("curvature_95", "curvature 95 %, 1/mm", "low", "{:.3f}"),
+    Headline("paths_per_layer", "paths a layer", "low", "{:.1f}"),
+    Headline("spacing_below", "nearer than W", "low", "{:.1%}"),
+    Headline("outside_length", "outside, mm", "low", "{:.2f}"),
+    Headline("all_crossings", "crossings", "low", "{:.0f}"),
+)
+"""The columns of the headline table; those that no run has are left out."""
+
+
+def headline_values(run: Run) -> Mapping[str, float]:
+    """Every total index of a run, with some per layer; empty where it failed."""
+    if run.evaluation is None:
+        return {}
+    total, layers = run.evaluation.total, max(len(run.evaluation.layers), 1)
+    return {
+        **_test_values(run),
+        **total,
+        "fibre_per_layer": total["fibre_length"] / layers,
+        "paths_per_layer": total["paths"] / layers,
+        "all_crossings": total["crossings"] + total["self_crossings"],
+    }
+
+
+def _test_values(run: Run) -> dict[str, float]:
+    if run.tested is None:
+        return {}
+    tension, bonded = run.tested.bracket.tension, run.tested.bracket.bonded
+    values = {
+        "stiffness_ratio_tension": tension.ratio,
+        "stiffness_ratio_bonded": bonded.ratio,
+        "stiffness": tension.stiffness,
+        "gain_per_metre": tension.gain_per_metre,
+        "strain_energy": tension.solution.strain_energy,
+    }
+    if tension.span:
+        ratios = [ratio for _, ratio in tension.span]
+        values["stiffness_ratio_low"] = min(ratios)
+        values["stiffness_ratio_high"] = max(ratios)
+    if run.tested.failure is not None:
+        values["first_failure_load"] = run.tested.failure.load
+    return values
+
+
+def cell_text(run: Run, head: Headline) -> tuple[str, str]:
+    """Text of a cell of the headline table, and what to add to it in smaller letters."""
+    values = headline_values(run)
+    value, extra = values.get(head.column, np.nan), ""
+    if not np.isfinite(value):
+        return "–", ""
+    if head.column == "stiffness_ratio_tension" and "stiffness_ratio_low" in values:
+        extra = f"{values['stiffness_ratio_low']:.2f}–{values['stiffness_ratio_high']:.2f}"
+    if head.column == "first_failure_load" and run.tested is not None and run.tested.failure:
+        extra = run.tested.failure.what
+    return head.pattern.format(value), extra

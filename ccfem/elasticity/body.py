@@ -1,0 +1,96 @@
+"""What the equations ask of a mesh and of a problem, in space or in the plane."""
+
+from collections.abc import Mapping
+from typing import Protocol
+
+from ccfem.arrays import FloatArray, IntArray
+from ccfem.elasticity.problem import Load, Support
+
+__all__ = ["Cells", "LoadedBody", "SupportedProblem"]
+
+
+class Cells(Protocol):
+    """A mesh of d-dimensional cells, d = 2 or 3, with named patches of facets."""
+
+    @property
+    def points(self) -> FloatArray:
+        """Nodes, (n, d), mm."""
+        ...
+
+    @property
+    def cells(self) -> IntArray:
+        """Nodes of each cell, (m, q)."""
+        ...
+
+    @property
+    def corners(self) -> IntArray:
+        """Corner nodes of each cell."""
+        ...
+
+    @property
+    def neighbours(self) -> IntArray:
+        """Pairs of cells that share a facet, (f, 2)."""
+        ...
+
+    def patch(self, name: str) -> IntArray:
+        """Facets of a named patch by their corners."""
+        ...
+
+    def facet_nodes(self, facets: IntArray) -> IntArray:
+        """All nodes of facets: their corners, and the middles of their sides."""
+        ...
+
+
+class LoadedBody(Protocol):
+    """A mesh whose boundary facets have areas and outward normals, so that loads act on it."""
+
+    @property
+    def points(self) -> FloatArray:
+        """Nodes, (n, d), mm."""
+        ...
+
+    @property
+    def cells(self) -> IntArray:
+        """Nodes of each cell, (m, q)."""
+        ...
+
+    @property
+    def boundary(self) -> IntArray:
+        """Boundary facets by their corners, the part on their inner side."""
+        ...
+
+    def patch(self, name: str) -> IntArray:
+        """Facets of a named patch that can carry a load."""
+        ...
+
+    def facet_nodes(self, facets: IntArray) -> IntArray:
+        """All nodes of facets: their corners, and the middles of their sides."""
+        ...
+
+    def facet_areas(self, facets: IntArray) -> tuple[FloatArray, FloatArray]:
+        """Areas, mm^2, and unit normals of facets."""
+        ...
+
+
+class SupportedProblem(Protocol):
+    """A problem as supports and loads see it."""
+
+    @property
+    def mesh(self) -> Cells:
+        """The mesh that is held."""
+        ...
+
+    @property
+    def body(self) -> LoadedBody:
+        """The mesh with what loads act on."""
+        ...
+
+    @property
+    def supports(self) -> tuple[Support, ...]:
+        """What is held."""
+        ...
+
+    @property
+    def loads(self) -> Mapping[str, tuple[Load, ...]]:
+        """Loads of each load case by its name."""
+        ...

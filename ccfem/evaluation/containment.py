@@ -1,0 +1,108 @@
+"""Fibre outside the layer."""
+
+from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
+import shapely
+
+from ccfem.arrays import FloatArray
+from ccfem.evaluation.column import Column
+from ccfem.evaluation.plane_paths import PlanePaths
+from ccfem.geometry.places import TOLERANCE
+
+__all__ = ["COLUMNS", "ContainmentSamples", "containment_indices", "sample_containment"]
+
+COLUMNS = (
+    Column(
+        "outside_length",
+        "mm",
+        f"Length of fibre axis more than {TOLERANCE:g} mm outside the section of its layer, links "
+        "left out: see link_outside and link_over_void.",
+        ">= 0, 0 is best",
+    ),
+    Column(
+        "outside_depth",
+        "mm",
+        "Largest distance of a point of the fibre's axis, links left out, from the section of its "
+        "layer, to 0.0001 mm; 0 where outside_length is 0.",
+        ">= 0, 0 is best",
+    ),
+)
+
+
+@dataclass(frozen=True)
+class ContainmentSamples:
+    """Length outside (1,) and largest distance outside (1,) a layer, mm."""
+
+    length: FloatArray
+    depth: FloatArray
+
+
+def sample_containment(paths: PlanePaths) -> ContainmentSamples:
+    """Fibre of a layer, but links, that lies outside its polygon (the axis, without its width)."""
+    paths = paths.strands
+    if not len(paths):
+        return ContainmentSamples(np.zeros(1), np.zeros(1))
+    section = paths.layer.polygon
+    grown = section.buffer(TOLERANCE, quad_segs=2)
+    shapely.prepare(grown)
+    index = np.repeat(np.arange(len(paths)), np.diff(paths.offsets))
+    lines = shapely.linestrings(paths.points, indices=index)
+    # Segment by segment, since the difference of a whole path would merge what lies on itself.
+    segments = np.stack(_segments(lines[~shapely.covers(grown, lines)]), axis=1)
+    pieces = shapely.linestrings(segments) if len(segments) else np.zeros(0, dtype=object)
+    outside = shapely.difference(pieces[~shapely.covers(grown, pieces)], grown)
+    length = float(shapely.length(outside).sum())
+    return ContainmentSamples(np.array([length]), np.array([_depth(outside, section)]))
+
+
+def _depth(lines: Any, section: Any) -> float:
+    """Largest distance of lines outside a polygon from it, by bisection.
+
+    The distance from one edge of the polygon is convex along a line, so no point of a piece is
+    further from the polygon than the further end of the piece is from any chosen edge: the one
+    nearest to its middle. Pieces that cannot beat the largest distance found are dropped, the
+    others halved.
+    """
+    a, b = _segments(lines)
+    if not len(a):
+        return 0.0
+    start, end = _segments(shapely.boundary(section))
+    tree = shapely.STRtree(shapely.linestrings(np.stack([start, end], axis=1)))
+    best = 0.0
+    while len(a):
+        middle = 0.5 * (a + b)
+        edge = tree.nearest(shapely.points(middle))
+        near, far = start[edge], end[edge]
+        best = max(best, float(_to_edges(middle, near, far).max()))
+        bound = np.maximum(_to_edges(a, near, far), _to_edges(b, near, far))
+        left = bound > best + TOLERANCE
+        a, b = (
+            np.concatenate([a[left], middle[left]]),
+            np.concatenate([middle[left], b[left]]),
+        )
+    return best
+
+
+def _segments(lines: Any) -> tuple[FloatArray, FloatArray]:
+    """First and last points, (s, 2) each, of all segments of lines."""
+    points, index = shapely.get_coordinates(shapely.get_parts(lines), return_index=True)
+    same = index[1:] == index[:-1]
+    return points[:-1][same], points[1:][same]
+
+
+def _to_edges(points: FloatArray, start: FloatArray, end: FloatArray) -> FloatArray:
+    """Distance of each point (s, 2) from its own edge."""
+    along, to = end - start, points - start
+    square = np.maximum(np.einsum("ij,ij->i", along, along), 1e-300)
+    share = np.einsum("ij,ij->i", to, along) / square
+    return np.hypot(*(to - np.clip(share, 0.0, 1.0)[:, None] * along).T)
+
+
+def containment_indices(samples: ContainmentSamples) -> dict[str, float]:
+    """Values of `COLUMNS`."""
+    return {
+        "outside_length": float(samples.length.sum()),
+        "outside_depth": float(samples.depth.max()) if len(samples.depth) else 0.0,
+    }

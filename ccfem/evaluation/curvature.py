@@ -1,0 +1,164 @@
+"""How sharply the fibre turns: curvature by arc length, and kinks."""
+
+from dataclasses import dataclass
+
+import numpy as np
+import shapely
+
+from ccfem.arrays import FloatArray
+from ccfem.evaluation.column import Column
+from ccfem.evaluation.plane_paths import PlanePaths
+from ccfem.geometry.polylines import arc_lengths, resample, turning_angles
+from ccfem.machine.machine import Machine
+
+__all__ = ["COLUMNS", "CurvatureSamples", "curvature_indices", "sample_curvature"]
+
+_SIMPLIFY = 0.02
+"""Tolerance, over the step of the resampling, of the simplification before vertices are counted:
+points that lie straight between others are not the planner's turns."""
+
+_FORMULA = (
+    "of the curvature over the fibre's length: every path is resampled in equal steps h of about "
+    "one fibre width of arc length, and the curvature at a resampled point is the angle between "
+    "the chords before and behind it, over h. Links outside the section or over a void are left "
+    "out."
+)
+_RANGE = ">= 0, at most pi / h; NaN where no path has three resampled points"
+
+COLUMNS = (
+    Column("curvature_50", "1/mm", f"Median {_FORMULA}", _RANGE),
+    Column("curvature_80", "1/mm", f"80th percentile {_FORMULA}", _RANGE),
+    Column("curvature_95", "1/mm", f"95th percentile {_FORMULA}", _RANGE),
+    Column("curvature_max", "1/mm", f"Maximum {_FORMULA}", _RANGE),
+    Column(
+        "curvature_ok",
+        "1",
+        "Share of the curvature samples below 1 / the machine's minimum radius (0.26 1/mm for "
+        "3.85 mm).",
+        "0 to 1, 1 is best; NaN where no path has three resampled points",
+    ),
+    Column(
+        "curvature_ok_native",
+        "1",
+        "Share of the vertices of the paths as planned, simplified by Douglas and Peucker to a "
+        "fiftieth of a fibre width, at which the curvature is below 1 / the machine's minimum "
+        "radius: 2 sin(a / 2) over the mean length of the two steps between which the path turns "
+        "by a, of each of which no more than a fibre width counts. Links outside the section or "
+        "over a void are left out. It weighs tight turns more than curvature_ok does, for they "
+        "have more vertices (Wang et al. 2021 count points).",
+        "0 to 1, 1 is best; NaN where no path has an inner vertex",
+    ),
+    Column(
+        "turns_45",
+        "1/m",
+        "Points of the paths as planned, not resampled, at which they turn by more than 45 "
+        "degrees, per metre of fibre, links included.",
+        ">= 0; NaN without fibre",
+    ),
+    Column(
+        "turns_90",
+        "1/m",
+        "The same for more than 90 degrees.",
+        ">= 0; NaN without fibre",
+    ),
+)
+
+
+@dataclass(frozen=True)
+class CurvatureSamples:
+    """Curvature along the fibre of a layer.
+
+    Attributes
+    ----------
+    curvature : (s,) array, 1/mm
+        At points equally far apart.
+    native : (n,) array, 1/mm
+        At the vertices of the simplified paths.
+    turns : (v,) array, radians
+        Turning angles at the vertices as planned.
+    length : (1,) array, mm
+        Of the fibre.
+    """
+
+    curvature: FloatArray
+    native: FloatArray
+    turns: FloatArray
+    length: FloatArray
+
+
+def sample_curvature(paths: PlanePaths, step: float) -> CurvatureSamples:
+    """Curvature of the paths of a layer.
+
+    Parameters
+    ----------
+    paths : PlanePaths
+    step : float, mm
+        Wanted step h of the resampling; a path of length L gets ``max(1, round(L / h))`` equal
+        steps. On a circle of radius R the samples are 1 / R. Closed paths are also sampled where
+        they close; the ends of open paths have no curvature. The vertices as planned are first
+        simplified to a fiftieth of this.
+
+    Notes
+    -----
+    Curvature from the planned points themselves would depend on how densely they lie.
+    """
+    lines = paths.in_part
+    points, offsets = resample(lines.points, lines.offsets, step)
+    angle = turning_angles(points, offsets, lines.closed)
+    inner = np.ones(len(points), dtype=bool)
+    inner[offsets[:-1]] = lines.closed
+    inner[offsets[1:] - 1] = False
+    size = np.repeat(lines.lengths, np.diff(offsets)) / np.repeat(
+        np.maximum(np.diff(offsets) - 1, 1), np.diff(offsets)
+    )
+    return CurvatureSamples(
+        (angle / size)[inner],
+        _native(lines, step),
+        turning_angles(paths.points, paths.offsets, paths.closed),
+        np.array([paths.lengths.sum()]),
+    )
+
+
+def _native(paths: PlanePaths, longest: float) -> FloatArray:
+    """Curvature at the inner vertices of simplified paths, 1/mm.
+
+    ``2 sin(a / 2) / h`` (Wang et al. 2021) is the curvature of the circle through three vertices
+    that lie equally far apart. Steps count up to `longest`, so that a corner between straight lines
+    is one however long they are; arcs of up to six times that radius have shorter steps.
+    """
+    if not len(paths):
+        return np.zeros(0)
+    index = np.repeat(np.arange(len(paths)), np.diff(paths.offsets))
+    lines = shapely.linestrings(paths.points, indices=index)
+    simple = shapely.simplify(lines, _SIMPLIFY * longest, preserve_topology=False)
+    points = shapely.get_coordinates(simple)
+    offsets = np.concatenate([[0], np.cumsum(shapely.get_num_coordinates(simple))])
+    along = arc_lengths(points, offsets)
+    before = np.minimum(along - np.roll(along, 1), longest)
+    after = np.roll(before, -1)
+    first, last = offsets[:-1], offsets[1:] - 1
+    before[first] = before[last]
+    inner = np.ones(len(points), dtype=bool)
+    inner[first], inner[last] = paths.closed, False
+    step = 0.5 * (before + after)[inner]
+    angle = turning_angles(points, offsets, paths.closed)[inner]
+    return 2.0 * np.sin(0.5 * angle[step > 0.0]) / step[step > 0.0]
+
+
+def curvature_indices(samples: CurvatureSamples, machine: Machine) -> dict[str, float]:
+    """Values of `COLUMNS`."""
+    curvature, metres = samples.curvature, float(samples.length.sum()) / 1000.0
+    none = not len(curvature)
+    shares = [0.5, 0.8, 0.95, 1.0]
+    quantiles = [np.nan] * 4 if none else np.quantile(curvature, shares, method="inverted_cdf")
+    values = {
+        f"curvature_{name}": float(value)
+        for name, value in zip(("50", "80", "95", "max"), quantiles, strict=True)
+    }
+    for name, found in (("", curvature), ("_native", samples.native)):
+        ok = found * machine.minimum_radius < 1.0
+        values[f"curvature_ok{name}"] = float(ok.mean()) if len(ok) else np.nan
+    for degrees in (45, 90):
+        count = float((samples.turns > np.radians(degrees) + 1e-9).sum())
+        values[f"turns_{degrees}"] = count / metres if metres > 0.0 else np.nan
+    return values

@@ -1,0 +1,201 @@
+"""The evaluator: every index of a set of paths, for each layer and in total."""
+
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
+from types import MappingProxyType
+from typing import TYPE_CHECKING, Any, ClassVar
+
+import numpy as np
+
+from ccfem.arrays import FloatArray, IntArray, read_only
+from ccfem.elasticity.stress_field import StressField
+from ccfem.errors import InputError
+from ccfem.evaluation import (
+    alignment,
+    containment,
+    coverage,
+    crossings,
+    curvature,
+    links,
+    manufacture,
+    matching,
+    sinuosity,
+    spacing,
+    stiffness_alignment,
+)
+from ccfem.evaluation.column import Column
+from ccfem.evaluation.plane_paths import PlanePaths, plane_paths, pool
+from ccfem.layers.layer import Layer
+from ccfem.machine.machine import Machine
+from ccfem.toolpaths import Toolpaths
+
+if TYPE_CHECKING:
+    import pandas as pd
+
+__all__ = ["COLUMNS", "Evaluation", "evaluate"]
+
+COLUMNS: tuple[Column, ...] = (
+    *manufacture.COLUMNS,
+    *sinuosity.COLUMNS,
+    *curvature.COLUMNS,
+    *alignment.COLUMNS,
+    *matching.COLUMNS,
+    *stiffness_alignment.COLUMNS,
+    *spacing.COLUMNS,
+    *coverage.COLUMNS,
+    *containment.COLUMNS,
+    *links.COLUMNS,
+    *crossings.COLUMNS,
+)
+"""Every index in the order of the tables."""
+
+_ROUNDING = 1e-3
+"""Rounding, mm, of coordinates in path files."""
+
+
+@dataclass(frozen=True)
+class Evaluation:
+    """Every index of a set of paths.
+
+    Totals are computed from the samples of all layers together: they are no means of the layers.
+
+    Attributes
+    ----------
+    layers : (L,) int array
+        Index of each layer.
+    values : mapping of column name to (L + 1,) array
+        One value a layer, then the total. NaN only where `Column.range` says so.
+    columns : tuple of Column
+        What each value is: unit, formula, range.
+    """
+
+    layers: IntArray
+    values: Mapping[str, FloatArray]
+    columns: ClassVar[tuple[Column, ...]] = COLUMNS
+
+    def __post_init__(self) -> None:
+        object.__setattr__(self, "layers", read_only(self.layers, np.int64))
+        values = {name: read_only(column) for name, column in self.values.items()}
+        object.__setattr__(self, "values", MappingProxyType(values))
+
+    @property
+    def total(self) -> Mapping[str, float]:
+        """Each index of the whole part."""
+        return {name: float(column[-1]) for name, column in self.values.items()}
+
+    def of_layer(self, index: int) -> Mapping[str, float]:
+        """Each index of one layer.
+
+        Raises
+        ------
+        InputError
+            When the layer was not evaluated.
+        """
+        row = np.flatnonzero(self.layers == index)
+        if not len(row):
+            known = ", ".join(str(k) for k in self.layers)
+            raise InputError(f"no layer {index} was evaluated; there are: {known}")
+        return {name: float(column[row[0]]) for name, column in self.values.items()}
+
+    def to_frame(self) -> "pd.DataFrame":
+        """Table with one row a layer, then the row "total"; its index is named "layer".
+
+        ``frame.attrs["columns"]`` holds the description of each column: unit, formula, range.
+        """
+        import pandas as pd
+
+        index = pd.Index([*self.layers.tolist(), "total"], name="layer", dtype=object)
+        frame = pd.DataFrame(dict(self.values), index=index)
+        frame.attrs["columns"] = {
+            c.name: {"unit": c.unit, "formula": c.formula, "range": c.range} for c in COLUMNS
+        }
+        return frame
+
+
+def evaluate(
+    toolpaths: Toolpaths, layers: Sequence[Layer], stress: StressField, machine: Machine
+) -> Evaluation:
+    """Evaluate the fibre paths of a part.
+
+    Lengths at which things are sampled follow the fibre width of the machine.
+
+    Parameters
+    ----------
+    toolpaths : Toolpaths
+        Paths of other kinds than fibre count in the print time only.
+    layers : sequence of Layer
+        Flat layers, among them every layer that has a path.
+    stress : StressField
+    machine : Machine
+
+    Returns
+    -------
+    Evaluation
+
+    Raises
+    ------
+    InputError
+        When there is no layer, or a path lies on none of the layers.
+    """
+    layers = tuple(layers)
+    if not layers:
+        raise InputError("expected at least one layer to evaluate; got none: slice the part")
+    _check_layers(toolpaths, layers)
+    samples = [_sample(toolpaths.on_layer(k.index), k, stress, machine) for k in layers]
+    rows = [_indices(parts, machine) for parts in samples]
+    rows.append(_indices([pool(group) for group in zip(*samples, strict=True)], machine))
+    values = {column.name: np.array([row[column.name] for row in rows]) for column in COLUMNS}
+    return Evaluation(np.array([layer.index for layer in layers]), values)
+
+
+def _check_layers(toolpaths: Toolpaths, layers: Sequence[Layer]) -> None:
+    """Every path lies on a layer given, at its height."""
+    known = {layer.index: layer for layer in layers}
+    for index in np.unique(toolpaths.layer).tolist():
+        if index not in known:
+            raise InputError(
+                f"a path lies on layer {index}, but only layers {sorted(known)} were given: give "
+                "the layers that the paths were planned on"
+            )
+        layer = known[index]
+        apart = np.abs(toolpaths.on_layer(index).points @ layer.frame[2] - layer.height).max()
+        if apart > 0.5 * layer.thickness + _ROUNDING:
+            raise InputError(
+                f"a path of layer {index} lies {apart:.3g} mm above or below it: give the layers "
+                "that the paths were planned on"
+            )
+
+
+def _sample(toolpaths: Toolpaths, layer: Layer, stress: StressField, machine: Machine) -> list[Any]:
+    """Take the samples of one layer, in the order that `_indices` reads them."""
+    width = machine.fibre_width
+    paths: PlanePaths = plane_paths(toolpaths, layer)
+    on_layer = stress.on(layer)
+    return [
+        manufacture.sample_manufacture(paths, toolpaths, machine),
+        sinuosity.sample_sinuosity(paths, width),
+        curvature.sample_curvature(paths, width),
+        alignment.sample_alignment(paths, on_layer, width),
+        spacing.sample_spacing(paths, width),
+        coverage.sample_coverage(paths, on_layer, width),
+        containment.sample_containment(paths),
+        links.sample_links(paths),
+        crossings.sample_crossings(paths),
+    ]
+
+
+def _indices(samples: Sequence[Any], machine: Machine) -> dict[str, float]:
+    make, wind, turn, align, space, cover, contain, link, cross = samples
+    return {
+        **manufacture.manufacture_indices(make, machine),
+        **sinuosity.sinuosity_indices(wind),
+        **curvature.curvature_indices(turn, machine),
+        **alignment.alignment_indices(align),
+        **matching.matching_indices(align),
+        **stiffness_alignment.stiffness_alignment_indices(align),
+        **spacing.spacing_indices(space, machine),
+        **coverage.coverage_indices(cover),
+        **containment.containment_indices(contain),
+        **links.link_indices(link),
+        **crossings.crossing_indices(cross),
+    }

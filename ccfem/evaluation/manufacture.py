@@ -1,0 +1,127 @@
+"""How much fibre there is, in how many pieces, and how long it takes to print."""
+
+from dataclasses import dataclass
+
+import numpy as np
+
+from ccfem.arrays import FloatArray
+from ccfem.evaluation.column import Column
+from ccfem.evaluation.plane_paths import PlanePaths
+from ccfem.geometry.polylines import arc_lengths
+from ccfem.machine.machine import Machine
+from ccfem.machine.speeds import step_speeds
+from ccfem.toolpaths import FIBRE, TRAVEL, Toolpaths
+
+__all__ = ["COLUMNS", "ManufactureSamples", "manufacture_indices", "sample_manufacture"]
+
+_LENGTH = ">= 0; NaN without fibre"
+_SHARE = "0 to 1, 1 is best; NaN without fibre"
+
+COLUMNS = (
+    Column("fibre_length", "mm", "Sum of the lengths of the fibre paths.", ">= 0"),
+    Column("paths", "1", "Number of fibre paths that have a length.", ">= 0"),
+    Column("cuts", "1", "Number of cuts of the fibre: one at the end of every path.", ">= 0"),
+    Column("length_min", "mm", "Length of the shortest fibre path.", _LENGTH),
+    Column("length_median", "mm", "Median length of the fibre paths.", _LENGTH),
+    Column("length_max", "mm", "Length of the longest fibre path.", _LENGTH),
+    Column(
+        "long_enough_count",
+        "1",
+        "Share of the number of fibre paths that are at least as long as the machine's minimum.",
+        _SHARE,
+    ),
+    Column(
+        "long_enough_length",
+        "1",
+        "Share of the fibre's length that lies in paths at least as long as the machine's minimum.",
+        _SHARE,
+    ),
+    Column(
+        "print_time",
+        "s",
+        "Length of each step of the paths over its speed (by the machine's speed table for fibre, "
+        "else the speed of its kind), plus the straight way from the end of each path to the start "
+        "of the next one of its layer over the travel speed. Cutting, acceleration and what is not "
+        "among the paths given (such as matrix) cost nothing.",
+        ">= 0",
+    ),
+    Column(
+        "mean_speed",
+        "mm/s",
+        "Length of the fibre paths over the time that they take, ways between them left out.",
+        ">= 0; NaN without fibre",
+    ),
+)
+
+_ROUNDING = 1e-6
+"""A path short of the minimum length by no more than this share of it is long enough."""
+
+
+@dataclass(frozen=True)
+class ManufactureSamples:
+    """Lengths (k,), mm, of the fibre paths; time (1,), s, of all and of the fibre, a layer."""
+
+    length: FloatArray
+    seconds: FloatArray
+    fibre_seconds: FloatArray
+
+
+def sample_manufacture(
+    paths: PlanePaths, toolpaths: Toolpaths, machine: Machine
+) -> ManufactureSamples:
+    """Lengths of the fibre paths of a layer, and the time that all its paths take.
+
+    Parameters
+    ----------
+    paths : PlanePaths
+    toolpaths : Toolpaths
+        Every path of the same layer, of all kinds, in the order of printing.
+    machine : Machine
+    """
+    drawn = toolpaths.select(toolpaths.kind != TRAVEL)
+    starts, ends = drawn.points[drawn.offsets[:-1]], drawn.points[drawn.offsets[1:] - 1]
+    ways = float(np.linalg.norm(starts[1:] - ends[:-1], axis=1).sum())
+    # Travel that the paths spell out replaces the straight ways.
+    travel = toolpaths.of_kind(TRAVEL)
+    ways = float(travel.lengths.sum()) if len(travel) else ways
+    fibre, others = (drawn.select(wanted) for wanted in (drawn.kind == FIBRE, drawn.kind != FIBRE))
+    along = _duration(*_steps(fibre, machine))
+    seconds = along + _duration(*_steps(others, machine)) + _duration(ways, machine.travel_speed)
+    return ManufactureSamples(paths.lengths, np.array([seconds]), np.array([along]))
+
+
+def _steps(toolpaths: Toolpaths, machine: Machine) -> tuple[FloatArray, FloatArray]:
+    """Length, mm, and speed, mm/s, of the step that ends at each point."""
+    speed = step_speeds(toolpaths, machine)
+    length = np.diff(arc_lengths(toolpaths.points, toolpaths.offsets), prepend=0.0)
+    length[toolpaths.offsets[:-1]] = 0.0
+    return length, np.roll(speed, 1)
+
+
+def _duration(length: FloatArray | float, speed: FloatArray | float) -> float:
+    """Time, s; a speed of 0 takes forever unless there is nothing to draw."""
+    length, speed = np.broadcast_arrays(np.atleast_1d(length), np.atleast_1d(speed))
+    needed = length > 0.0
+    if (speed[needed] == 0.0).any():
+        return float("inf")
+    return float((length[needed] / speed[needed]).sum())
+
+
+def manufacture_indices(samples: ManufactureSamples, machine: Machine) -> dict[str, float]:
+    """Values of `COLUMNS`."""
+    length = samples.length
+    total = float(length.sum())
+    quantiles = np.quantile(length, [0.0, 0.5, 1.0]) if len(length) else np.full(3, np.nan)
+    enough = length >= machine.minimum_length * (1.0 - _ROUNDING)
+    return {
+        "fibre_length": total,
+        "paths": float(len(length)),
+        "cuts": float(len(length)),
+        "length_min": float(quantiles[0]),
+        "length_median": float(quantiles[1]),
+        "length_max": float(quantiles[2]),
+        "long_enough_count": float(enough.mean()) if len(length) else np.nan,
+        "long_enough_length": float(length[enough].sum()) / total if len(length) else np.nan,
+        "print_time": float(samples.seconds.sum()),
+        "mean_speed": total / float(samples.fibre_seconds.sum()) if total else np.nan,
+    }

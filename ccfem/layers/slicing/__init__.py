@@ -1,0 +1,1 @@
+"""Slicers: each turns a part into layers. One module a slicer."""

@@ -1,0 +1,101 @@
+"""Curves that run along a chosen boundary, and isocurves led into them [Chen et al. 2021, 4.4]."""
+
+from collections.abc import Sequence
+from typing import Any
+
+import numpy as np
+import shapely
+
+from ccfem.arrays import FloatArray
+from ccfem.linking.joining import Joint, join, ring_arc
+
+__all__ = ["lead_into", "parallel_curve"]
+
+
+def parallel_curve(boundary: Any, distance: float, section: Any) -> list[FloatArray]:
+    """Curve at a distance from a closed boundary, inside the section.
+
+    Parameters
+    ----------
+    boundary : shapely Polygon
+        The hole (or island) whose outline is followed.
+    distance : float, mm
+    section : shapely (Multi)Polygon
+
+    Returns
+    -------
+    list of (n, 2) arrays
+        One closed polyline, or several open ones where another boundary cuts the curve.
+    """
+    ring = shapely.buffer(boundary, distance, quad_segs=32).exterior
+    if shapely.covers(section, ring):
+        return [shapely.get_coordinates(ring)]
+    return _polylines(shapely.line_merge(shapely.intersection(ring, section)))
+
+
+def lead_into(
+    lines: Sequence[FloatArray], boundary: Any, distance: float, section: Any
+) -> list[FloatArray]:
+    """Cut lines back to a distance from a boundary and join the cut ends along it.
+
+    The ends lie on the curve at `distance`. Consecutive ones are joined pairwise along that curve;
+    of the ways of pairing them, the one with the smallest total length is taken.
+
+    Parameters
+    ----------
+    lines : sequence of (n_i, 2) arrays, mm
+    boundary : shapely Polygon
+    distance : float, mm
+    section : shapely (Multi)Polygon
+        A piece of the curve outside it joins nothing.
+
+    Returns
+    -------
+    list of (n, 2) arrays
+    """
+    zone = shapely.buffer(boundary, distance, quad_segs=32)
+    ring = zone.exterior
+    shapely.prepare(zone)
+    pieces: list[FloatArray] = []
+    for line in lines:
+        string = shapely.linestrings(line)
+        if not shapely.intersects(zone, string):
+            pieces.append(line)
+            continue
+        outside = shapely.difference(string, zone)
+        if outside.geom_type == "MultiLineString":
+            outside = shapely.line_merge(outside)
+        pieces += _polylines(outside)
+    ends = [
+        (float(shapely.line_locate_point(ring, shapely.points(point))), 2 * k + side)
+        for k, piece in enumerate(pieces)
+        for side, point in ((0, piece[0]), (1, piece[-1]))
+        if shapely.distance(ring, shapely.points(point)) < 1e-6
+        and not np.array_equal(piece[0], piece[-1])
+    ]
+    return join(pieces, _pairing(sorted(ends), ring, section))
+
+
+def _pairing(ends: list[tuple[float, int]], ring: Any, section: Any) -> list[Joint]:
+    """Joints of consecutive ends along the ring, of the smallest total length."""
+    count = len(ends)
+    if count < 2:
+        return []
+    position = np.array([p for p, _ in ends])
+    gap = np.mod(np.roll(position, -1) - position, ring.length)
+    # Even: two ways. Odd: one end stays free, in `count` ways.
+    starts = range(2) if count % 2 == 0 else range(count)
+    ways = [[(s + 2 * k) % count for k in range(count // 2)] for s in starts]
+    best = min(ways, key=lambda way: float(gap[way].sum()))
+    joints = []
+    for k in best:
+        arc = ring_arc(ring, position[k], gap[k])
+        if shapely.covers(section, shapely.linestrings(arc)):
+            joints.append(Joint(ends[k][1], ends[(k + 1) % count][1], arc[1:-1]))
+    return joints
+
+
+def _polylines(geometry: Any) -> list[FloatArray]:
+    parts = shapely.get_parts(geometry)
+    strings = parts[shapely.get_type_id(parts) == 1]
+    return [shapely.get_coordinates(part) for part in strings if part.length > 0.0]

@@ -1,0 +1,180 @@
+"""Order in which things with several ends are visited, so that what joins them costs least.
+
+A cluster is visited once: entered at one of its terminals, left at another. A strand is a cluster
+of two terminals; a group of strands that are laid together is one of all their ends. The order of
+the clusters and the terminals are found together: exactly by dynamic programming over sets of
+clusters where they are few (M. Held, R. M. Karp, A dynamic programming approach to sequencing
+problems, Journal of SIAM 10 (1962) 196), else by exchanging stretches of the order (2-opt, Or-opt),
+each judged by its best terminals.
+"""
+
+import numpy as np
+from numba import njit
+
+from ccfem.arrays import FloatArray, IntArray
+from ccfem.errors import InputError
+from ccfem.linking.exchanges import searched_order
+
+__all__ = ["costs_between_ends", "order_clusters", "strand_visits"]
+
+
+def strand_visits(count: int) -> FloatArray:
+    """Cost of visits for strands that are clusters of their own, (2 count, 2 count).
+
+    Terminals 2k and 2k + 1 are the ends of strand k: a visit from one to the other costs nothing.
+    """
+    visit = np.full((2 * count, 2 * count), np.inf)
+    ends = np.arange(2 * count)
+    visit[ends, ends ^ 1] = 0.0
+    return visit
+
+
+def order_clusters(
+    links: FloatArray,
+    visit: FloatArray,
+    offsets: IntArray,
+    first: int | None = None,
+    last: int | None = None,
+    exact: int = 12,
+    rounds: int = 30,
+    time_limit: float = 30.0,
+) -> IntArray:
+    """Order of clusters, and the terminals at which each is entered and left.
+
+    Parameters
+    ----------
+    links : (t, t) array
+        Cost >= 0 from leaving at a terminal to entering at another, of other clusters.
+    visit : (t, t) array
+        Cost >= 0 of entering a cluster at one terminal and leaving it at another; inf where that
+        cannot be.
+    offsets : (p + 1,) int array
+        Cluster c has the terminals ``offsets[c]`` up to ``offsets[c + 1]``.
+    first, last : int, optional
+        Terminal at which the whole way starts, and ends.
+    exact : int, default 12
+        Up to so many clusters the order is the best there is; the work is 2^p t^2.
+    rounds : int, default 30
+        Of the search above that: disturbances of the best order, each followed by exchanges until
+        none helps; fewer for more than fifty clusters. The same input gives the same order.
+    time_limit : float, s
+        No further round begins after this; meant for cases that nobody thought of.
+
+    Returns
+    -------
+    (p, 2) int array
+        Terminals entered and left, in order.
+
+    Raises
+    ------
+    InputError
+        For arrays that do not fit together, or where there is no way.
+    """
+    links, visit = (np.ascontiguousarray(cost, dtype=np.float64) for cost in (links, visit))
+    offsets = np.ascontiguousarray(offsets, dtype=np.int64)
+    count = len(offsets) - 1
+    size = (int(offsets[-1]), int(offsets[-1]))
+    if links.shape != size or visit.shape != size or not (np.diff(offsets) > 0).all():
+        raise InputError(
+            f"links and visit must have the shape {size} of the terminals in offsets, and every "
+            f"cluster a terminal; got {links.shape} and {visit.shape}"
+        )
+    if count == 0:
+        return np.zeros((0, 2), dtype=np.int64)
+    start = -1 if first is None else first
+    end = -1 if last is None else last
+    if count <= exact:
+        best = _costs_of_sets(links, visit, offsets, start)
+        return _traced(best, links, visit, offsets, start, end)
+    return searched_order(links, visit, offsets, start, end, rounds, time_limit)
+
+
+def costs_between_ends(
+    links: FloatArray, exact: int = 12, rounds: int = 5, time_limit: float = 30.0
+) -> FloatArray:
+    """Least cost of laying all strands of a group from one of their ends to another.
+
+    Parameters
+    ----------
+    links : (2k, 2k) array
+        Cost of the link between each two ends, the same both ways; strand i has the ends 2i and
+        2i + 1.
+    exact : int, default 12
+        Above so many strands only the pairs of ends that a search finds to be good have a cost.
+    rounds, time_limit
+        Of that search, as in `order_clusters`.
+
+    Returns
+    -------
+    (2k, 2k) array
+        inf where the strands cannot be laid so, as from an end to itself.
+    """
+    links = np.ascontiguousarray(links, dtype=np.float64)
+    count = len(links) // 2
+    visit, offsets = strand_visits(count), 2 * np.arange(count + 1)
+    if count <= exact:
+        return np.stack([_costs_of_sets(links, visit, offsets, a)[-1] for a in range(2 * count)])
+    table = np.full(links.shape, np.inf)
+    starts: list[int | None] = [None]
+    while starts:
+        ends = order_clusters(links, visit, offsets, starts.pop(0), None, exact, rounds, time_limit)
+        a, b = int(ends[0, 0]), int(ends[-1, 1])
+        cost = float(links[ends[:-1, 1], ends[1:, 0]].sum())
+        if not np.isfinite(table).any():
+            starts = [a ^ 1, b, b ^ 1]
+        table[a, b] = table[b, a] = min(cost, table[a, b])
+    return table
+
+
+@njit(cache=True, nogil=True)
+def _costs_of_sets(links, visit, offsets, first):  # type: ignore[no-untyped-def]
+    """Least cost of having visited a set of clusters and left at a terminal of it, (2^p, t)."""
+    count, terminals = len(offsets) - 1, len(links)
+    best = np.full((1 << count, terminals), np.inf)
+    entry = np.empty(terminals)
+    for done in range((1 << count) - 1):
+        for c in range(count):
+            if done >> c & 1:
+                continue
+            for a in range(offsets[c], offsets[c + 1]):
+                entry[a] = np.inf
+                if done == 0:
+                    entry[a] = 0.0 if first < 0 or first == a else np.inf
+                    continue
+                for d in range(count):
+                    if done >> d & 1:
+                        for t in range(offsets[d], offsets[d + 1]):
+                            entry[a] = min(entry[a], best[done, t] + links[t, a])
+            more = done | 1 << c
+            for a in range(offsets[c], offsets[c + 1]):
+                if entry[a] < np.inf:
+                    for b in range(offsets[c], offsets[c + 1]):
+                        best[more, b] = min(best[more, b], entry[a] + visit[a, b])
+    return best
+
+
+def _traced(
+    best: FloatArray,
+    links: FloatArray,
+    visit: FloatArray,
+    offsets: IntArray,
+    first: int,
+    last: int,
+) -> IntArray:
+    """Terminals entered and left on the best way, read from the costs of sets backward."""
+    cluster = np.repeat(np.arange(len(offsets) - 1), np.diff(offsets))
+    done = len(best) - 1
+    left = last if last >= 0 else int(np.argmin(best[done]))
+    if not np.isfinite(best[done, left]):
+        raise InputError("there is no way through all clusters: some visit must be possible")
+    way: list[tuple[int, int]] = []
+    while True:
+        own = np.arange(offsets[cluster[left]], offsets[cluster[left] + 1])
+        done &= ~(1 << int(cluster[left]))
+        if not done:
+            way.append((first if first >= 0 else int(own[np.argmin(visit[own, left])]), left))
+            return np.array(way[::-1])
+        through = best[done][:, None] + links[:, own] + visit[own, left]
+        t, a = np.unravel_index(int(np.argmin(through)), through.shape)
+        way.append((int(own[a]), left))
+        left = int(t)

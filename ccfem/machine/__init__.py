@@ -1,0 +1,8 @@
+"""The printer: what a path has to respect, how fast it is laid, and what its firmware is told."""
+
+from ccfem.machine.gcode_profile import GcodeProfile
+from ccfem.machine.machine import Machine
+from ccfem.machine.speed_table import SpeedTable
+from ccfem.machine.speeds import step_speeds
+
+__all__ = ["GcodeProfile", "Machine", "SpeedTable", "step_speeds"]

@@ -1,0 +1,96 @@
+"""The printer: what a path has to respect, and what it costs."""
+
+from dataclasses import dataclass, field
+
+from ccfem.errors import InputError
+from ccfem.machine.gcode_profile import GcodeProfile
+from ccfem.machine.speed_table import SpeedTable
+
+__all__ = ["Machine"]
+
+_CUTTER_DISTANCE = 42.0
+"""Chen et al. 2021, section 5.2, mm."""
+
+
+@dataclass(frozen=True)
+class Machine:
+    """A printer of continuous fibre.
+
+    The defaults are the machine of Chen et al. 2021 (section 5 and table 3). What the
+    paper does not give is marked "our choice".
+
+    Attributes
+    ----------
+    fibre_width : float, mm
+        W, the least distance between neighbouring strands.
+    deposited_width : float, mm
+        Width of a strand once pressed.
+    fibre_height : float, mm
+        Height of a fibre layer.
+    matrix_height : float, mm
+        Height of a matrix layer between two fibre layers.
+    filament_area : float, mm^2
+        Cross-section of one strand.
+    minimum_length : float, mm
+        Shortest strand that the cutter allows.
+    minimum_radius : float, mm
+        Tightest turn that a strand follows without folding; 0.26 1/mm in curvature.
+    fibre_speed, matrix_speed, travel_speed : float, mm/s
+        Travel: our choice.
+    fibre_temperature, matrix_temperature : float, degrees Celsius
+    speeds : SpeedTable, optional
+        Speed of the fibre by curvature, length and angle of a path's pieces, in place of
+        `fibre_speed`. Default: none.
+    cutter_distance : float, mm, optional
+        From the cutter to the tip of the fibre nozzle. Default: 42 mm, or `minimum_length` where
+        that is shorter (section 5.2: no shorter strand can be cut).
+    cut_wait : float, s
+        Standstill after a cut. Our choice.
+    matrix_width : float, mm
+        Width of a line of matrix.
+    matrix_diameter : float, mm
+        Of the matrix filament.
+    bed_temperature : float, degrees Celsius
+        Our choice, usual for PLA.
+    gcode : GcodeProfile
+        What its firmware wants to be told.
+    """
+
+    fibre_width: float = 1.0
+    deposited_width: float = 1.2
+    fibre_height: float = 0.05
+    matrix_height: float = 0.8
+    filament_area: float = 0.1075
+    minimum_length: float = 42.0
+    minimum_radius: float = 3.85
+    fibre_speed: float = 5.0
+    matrix_speed: float = 12.0
+    travel_speed: float = 80.0
+    fibre_temperature: float = 250.0
+    matrix_temperature: float = 200.0
+    speeds: SpeedTable | None = None
+    cutter_distance: float | None = None
+    cut_wait: float = 1.0
+    matrix_width: float = 0.8
+    matrix_diameter: float = 1.75
+    bed_temperature: float = 60.0
+    gcode: GcodeProfile = field(default_factory=GcodeProfile)
+
+    def __post_init__(self) -> None:
+        for name, value in vars(self).items():
+            if name in ("speeds", "gcode") or value is None:
+                continue
+            if not value >= 0.0 or value == float("inf"):
+                raise InputError(
+                    f"machine.{name} must be a finite number >= 0; got {value!r}: correct it"
+                )
+        for name in ("fibre_width", "matrix_width", "matrix_diameter"):
+            if getattr(self, name) == 0.0:
+                raise InputError(f"machine.{name} must be above 0; got 0: give the width in mm")
+
+    @property
+    def tail(self) -> float:
+        """Fibre that is still to be laid after a cut, mm."""
+        if self.cutter_distance is None:
+            return min(_CUTTER_DISTANCE, self.minimum_length)
+        return self.cutter_distance

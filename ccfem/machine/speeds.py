@@ -1,0 +1,154 @@
+"""Printing speed along a path: table 2 of Wang et al. 2021, or one speed for each kind of path."""
+
+import numpy as np
+
+from ccfem.arrays import BoolArray, FloatArray, IntArray
+from ccfem.geometry.polylines import arc_lengths, lengths, sample_at, turning_angles
+from ccfem.machine.machine import Machine
+from ccfem.machine.speed_table import SpeedTable
+from ccfem.toolpaths import FIBRE, Toolpaths
+
+__all__ = ["step_speeds", "table_speeds"]
+
+_DIGITS = 9
+"""Decimals that curvature, length and angle are rounded to: a right angle is one exactly."""
+
+_REACH = 2.0
+"""Least length over which curvature is taken, in fibre widths. Our choice: over less, the corners
+that a mesh gives to round borders and to isocurves count as turns, and paths fall into short slow
+pieces."""
+
+
+def step_speeds(toolpaths: Toolpaths, machine: Machine) -> FloatArray:
+    """Speed of the step from each point to the next one of its path.
+
+    Parameters
+    ----------
+    toolpaths : Toolpaths
+        Paths of any kind; the speed table is for fibre.
+    machine : Machine
+
+    Returns
+    -------
+    (P,) array, mm/s
+        Of no meaning at the last point of a path.
+    """
+    of_kind = np.array(
+        [machine.fibre_speed, machine.matrix_speed, machine.matrix_speed, machine.travel_speed]
+    )
+    sizes = np.diff(toolpaths.offsets)
+    speeds = np.repeat(of_kind[toolpaths.kind], sizes)
+    if machine.speeds is not None:
+        fibre = toolpaths.of_kind(FIBRE)
+        speeds[np.repeat(toolpaths.kind == FIBRE, sizes)] = table_speeds(
+            fibre.points, fibre.offsets, machine.speeds, _REACH * machine.fibre_width
+        )
+    return speeds
+
+
+def table_speeds(
+    points: FloatArray, offsets: IntArray, table: SpeedTable, shortest: float
+) -> FloatArray:
+    """Speed of every step of polylines by a table.
+
+    Polylines are cut into pieces at corners (angles below the table's last one), and where the
+    curvature of the steps changes from one row of the table to another. Both ends of a polyline
+    are ends of a piece, of a closed one too: there the machine starts and stops.
+
+    Parameters
+    ----------
+    points, offsets
+        The polylines, as in `ccfem.geometry.polylines`.
+    table : SpeedTable
+    shortest : float, mm
+        Curvature is taken over no less than this length on either side.
+
+    Returns
+    -------
+    (P,) array, mm/s
+        Speed of the step from each point to the next. Of no meaning at the last point of a
+        polyline and before a repeated one.
+
+    Notes
+    -----
+    Wang et al. 2021, section 3.2, give the curvature of a point by the angle between its two
+    direction vectors and their length. These are here the chords to the neighbouring points, or to
+    the points `shortest` before and behind where the neighbours are nearer; they do not reach
+    across corners. On a circle through the points it is that of the circle. A step has the larger
+    curvature of its two ends.
+    """
+    if not len(points):
+        return np.zeros(0)
+    moved = np.append(True, (np.diff(points, axis=0) != 0.0).any(axis=1))
+    starts = offsets[:-1][np.diff(offsets) > 0]
+    moved[starts] = True
+    place = np.cumsum(moved)
+    found = _speeds(points[moved], np.append(0, place)[offsets], table, shortest)
+    return found[place - 1]
+
+
+def _speeds(
+    points: FloatArray, offsets: IntArray, table: SpeedTable, shortest: float
+) -> FloatArray:
+    """As `table_speeds`, for polylines without repeated points."""
+    open_ended = np.zeros(len(offsets) - 1, dtype=bool)
+    turn = np.degrees(turning_angles(points, offsets, open_ended))
+    angle = (180.0 - turn).round(_DIGITS)
+    corner = angle < table.angle[1]
+    inner = np.ones(len(points), dtype=bool)
+    inner[offsets[1:] - 1] = False
+    start = np.flatnonzero(inner)
+    speeds = np.full(len(points), table.speed[0])
+    if not len(start):
+        return speeds
+    curvature = _step_curvatures(points, offsets, corner, shortest)
+    row = table.row_of(curvature)
+    new = corner[start]
+    new[0] = True
+    new[1:] |= (row[1:] != row[:-1]) | (np.diff(start) > 1)
+    piece = np.cumsum(new) - 1
+    first = np.flatnonzero(new)
+    last = np.append(first[1:], len(start)) - 1
+    length = np.bincount(piece, np.linalg.norm(points[start + 1] - points[start], axis=1))
+    least = np.minimum(angle[start[first]], angle[start[last] + 1])
+    speeds[start] = table.at(curvature[first], length, least)[piece]
+    return speeds
+
+
+def _step_curvatures(
+    points: FloatArray, offsets: IntArray, corner: BoolArray, shortest: float
+) -> FloatArray:
+    """Curvature of each step, in the order of the points they start from."""
+    # Pieces from corner to corner: corners are there twice, as the end and as the start of one.
+    index = np.repeat(np.arange(len(points)), 1 + corner)
+    ends = np.cumsum(1 + corner)
+    bounds = np.sort(np.concatenate([[0], ends[offsets[1:] - 1], ends[corner] - 1]))
+    pieces = points[index]
+    curvature = _curvatures(pieces, bounds, shortest)
+    inner = np.ones(len(index), dtype=bool)
+    inner[bounds[1:] - 1] = False
+    start = np.flatnonzero(inner)
+    return np.maximum(curvature[start], curvature[start + 1])
+
+
+def _curvatures(points: FloatArray, offsets: IntArray, shortest: float) -> FloatArray:
+    """Curvature at every point of smooth polylines; 0 at their ends."""
+    line = np.repeat(np.arange(len(offsets) - 1), np.diff(offsets))
+    along = arc_lengths(points, offsets)
+    total = lengths(points, offsets)[line]
+    inner = np.ones(len(points), dtype=bool)
+    inner[offsets[:-1]] = inner[offsets[1:] - 1] = False
+    k = np.flatnonzero(inner)
+    before = np.minimum(along[k] - shortest, along[k - 1])
+    after = np.maximum(along[k] + shortest, along[k + 1])
+    into = points[k] - sample_at(points, offsets, line[k], np.maximum(before, 0.0))[0]
+    out = sample_at(points, offsets, line[k], np.minimum(after, total[k]))[0] - points[k]
+    reach, on = np.linalg.norm(into, axis=1), np.linalg.norm(out, axis=1)
+    # |u - v| of the unit vectors along both chords is 2 sin(half the angle between them).
+    with np.errstate(divide="ignore", invalid="ignore"):
+        bend = np.linalg.norm(into / reach[:, None] - out / on[:, None], axis=1)
+        found = 2.0 * bend / (reach + on)
+    # A loop that closes within `shortest` has no chord: it is as tight as can be.
+    curvature = np.zeros(len(points))
+    curvature[k] = np.where(np.isnan(found), np.inf, found)
+    return curvature.round(_DIGITS)

@@ -1,0 +1,354 @@
+"""Rules that choose named patches of the boundary: plane, box, cylinder, nearest, group.
+
+A rule is a value; called with a mesh it returns the boundary facets that it chooses. A rule that
+chooses nothing is an error that names the nearest candidate.
+"""
+
+from collections.abc import Mapping
+from dataclasses import dataclass
+from typing import Protocol
+
+import numpy as np
+from numpy.typing import ArrayLike
+
+from ccfem.arrays import BoolArray, FloatArray, IntArray
+from ccfem.errors import InputError
+from ccfem.mesh.tet_mesh import TetMesh
+
+__all__ = [
+    "Box",
+    "Cylinder",
+    "Group",
+    "Nearest",
+    "PatchRule",
+    "Plane",
+    "facet_keys",
+    "match_boundary",
+    "patches_from_rules",
+    "unit_vector",
+]
+
+Vector = tuple[float, float, float]
+
+_AXES = {"x": (1.0, 0.0, 0.0), "y": (0.0, 1.0, 0.0), "z": (0.0, 0.0, 1.0)}
+_ALONG = np.cos(np.pi / 4)
+"""Cosine above which a facet's normal counts as along a direction."""
+_SURFACE = 1e-3
+"""Default tolerance of plane and cylinder, in diagonals of the part (pytetwild's envelope)."""
+
+
+class PatchRule(Protocol):
+    """Chooses boundary facets of a mesh."""
+
+    def __call__(self, mesh: TetMesh) -> IntArray:
+        """Boundary facets (k, 3), outward, k >= 1."""
+        ...
+
+
+@dataclass(frozen=True)
+class Plane:
+    """Boundary facets on a plane.
+
+    Attributes
+    ----------
+    normal : str or tuple of 3 floats
+        "x", "y", "z" (a minus in front turns it round) or a vector of any length.
+    offset : float or str, mm
+        The plane holds the points with ``point @ normal = offset`` (normal of length 1); "min"
+        and "max" are the ends of the part along the normal.
+    tolerance : float, mm, optional
+        How far the nodes of a facet may lie from the plane; default 1e-3 of the part's diagonal.
+    """
+
+    normal: str | Vector
+    offset: float | str
+    tolerance: float | None = None
+
+    def __post_init__(self) -> None:
+        unit_vector(self.normal, "plane normal")
+        _check_tolerance(self.tolerance)
+        if isinstance(self.offset, str) and self.offset not in ("min", "max"):
+            raise InputError(
+                f"plane offset must be a number, 'min' or 'max'; got '{self.offset}': correct it"
+            )
+
+    @classmethod
+    def through(
+        cls, point: Vector, normal: str | Vector, tolerance: float | None = None
+    ) -> "Plane":
+        """Plane through a point, mm."""
+        offset = float(np.asarray(point, dtype=float) @ unit_vector(normal, "plane normal"))
+        return cls(normal, offset, tolerance)
+
+    def __call__(self, mesh: TetMesh) -> IntArray:
+        """Boundary facets (k, 3) whose nodes lie on the plane."""
+        normal = unit_vector(self.normal, "plane normal")
+        height = mesh.points @ normal
+        on_part = mesh.boundary.ravel()
+        if self.offset == "min":
+            offset = float(height[on_part].min())
+        elif self.offset == "max":
+            offset = float(height[on_part].max())
+        else:
+            offset = float(self.offset)
+        missed = np.abs(height - offset)[mesh.boundary].max(axis=1)
+        facing = np.abs(_normals(mesh) @ normal) > _ALONG
+        tolerance = _default(self.tolerance, mesh)
+        return _choose(mesh, missed, tolerance, facing, f"plane {self.normal} at {offset:g} mm")
+
+
+@dataclass(frozen=True)
+class Box:
+    """Boundary facets with all their nodes in a box.
+
+    Attributes
+    ----------
+    lower, upper : tuple of 3 floats, mm
+        Opposite corners; infinite where the box has no end.
+    """
+
+    lower: Vector
+    upper: Vector
+
+    def __post_init__(self) -> None:
+        lower, upper = _vector(self.lower, "box lower"), _vector(self.upper, "box upper")
+        if not (lower <= upper).all():
+            raise InputError(
+                f"box lower must not exceed upper; got {self.lower} and {self.upper}: swap them"
+            )
+
+    def __call__(self, mesh: TetMesh) -> IntArray:
+        """Boundary facets (k, 3) in the box."""
+        beyond = np.maximum(np.array(self.lower) - mesh.points, mesh.points - np.array(self.upper))
+        missed = np.maximum(beyond.max(axis=1), 0.0)[mesh.boundary].max(axis=1)
+        everywhere = np.ones(len(missed), dtype=bool)
+        tolerance = 1e-9 * _diagonal(mesh)
+        return _choose(mesh, missed, tolerance, everywhere, f"box {self.lower} to {self.upper}")
+
+
+@dataclass(frozen=True)
+class Cylinder:
+    """The wall of a hole or a pin: not its flat ends.
+
+    Attributes
+    ----------
+    point : tuple of 3 floats, mm
+        A point on the axis, which goes through the whole part.
+    axis : str or tuple of 3 floats
+        Direction of the axis.
+    radius : float, mm
+        The nodes of a facet lie within `radius` + `tolerance` of the axis.
+    tolerance : float, mm, optional
+        Default 1e-3 of the part's diagonal.
+    half : str or tuple of 3 floats, optional
+        Keep only the facets whose centre lies on this side of the axis.
+    """
+
+    point: Vector
+    axis: str | Vector
+    radius: float
+    tolerance: float | None = None
+    half: str | Vector | None = None
+
+    def __post_init__(self) -> None:
+        _vector(self.point, "cylinder point")
+        axis = unit_vector(self.axis, "cylinder axis")
+        _check_tolerance(self.tolerance)
+        if not 0.0 < self.radius < np.inf:
+            raise InputError(f"cylinder radius must be above 0 mm; got {self.radius}: correct it")
+        if self.half is not None and abs(unit_vector(self.half, "cylinder half") @ axis) > 0.999:
+            raise InputError(
+                "cylinder half must be a direction across the axis; got one along it: turn it"
+            )
+
+    def __call__(self, mesh: TetMesh) -> IntArray:
+        """Facets (k, 3) of the cylinder's wall."""
+        axis = unit_vector(self.axis, "cylinder axis")
+        arm = mesh.points - np.array(self.point)
+        arm = arm - np.outer(arm @ axis, axis)
+        distance = np.linalg.norm(arm, axis=1)[mesh.boundary].max(axis=1)
+        missed = np.maximum(distance - self.radius, 0.0)
+        wall = np.abs(_normals(mesh) @ axis) < _ALONG
+        if self.half is not None:
+            side = unit_vector(self.half, "cylinder half")
+            side = side - (side @ axis) * axis
+            wall &= arm[mesh.boundary].mean(axis=1) @ side > 0.0
+        label = f"cylinder round {self.point} along {self.axis}, radius {self.radius:g} mm"
+        return _choose(mesh, missed, _default(self.tolerance, mesh), wall, label)
+
+
+@dataclass(frozen=True)
+class Nearest:
+    """The boundary facets whose centres are nearest to a point.
+
+    Attributes
+    ----------
+    point : tuple of 3 floats, mm
+    count : int, optional
+        How many facets; 1 when neither `count` nor `radius` is given.
+    radius : float, mm, optional
+        All facets with their centres within this distance.
+    """
+
+    point: Vector
+    count: int | None = None
+    radius: float | None = None
+
+    def __post_init__(self) -> None:
+        _vector(self.point, "nearest point")
+        if self.count is not None and self.radius is not None:
+            raise InputError("nearest takes count or radius; got both: drop one")
+        if self.count is not None and self.count < 1:
+            raise InputError(f"nearest count must be at least 1; got {self.count}: correct it")
+        if self.radius is not None and not self.radius > 0.0:
+            raise InputError(f"nearest radius must be above 0 mm; got {self.radius}: correct it")
+
+    def __call__(self, mesh: TetMesh) -> IntArray:
+        """Boundary facets (k, 3) nearest to the point."""
+        distance = np.linalg.norm(_centres(mesh) - np.array(self.point), axis=1)
+        if self.radius is None:
+            order = np.argsort(distance, kind="stable")[: self.count or 1]
+            return mesh.boundary[np.sort(order)]
+        everywhere = np.ones(len(distance), dtype=bool)
+        missed = np.maximum(distance - self.radius, 0.0)
+        label = f"radius {self.radius:g} mm round {self.point}"
+        return _choose(mesh, missed, 0.0, everywhere, label)
+
+
+@dataclass(frozen=True)
+class Group:
+    """A patch that came with the file: a physical group, node set or surface of that name."""
+
+    name: str
+
+    def __call__(self, mesh: TetMesh) -> IntArray:
+        """Facets (k, 3) of the group."""
+        if self.name not in mesh.patches:
+            raise InputError(
+                f"the mesh has no group '{self.name}'; it has: {_groups(mesh)}: name one of them "
+                "or use another rule"
+            )
+        return mesh.patches[self.name]
+
+
+def patches_from_rules(mesh: TetMesh, rules: Mapping[str, PatchRule]) -> TetMesh:
+    """Name patches of a mesh by rules.
+
+    Parameters
+    ----------
+    mesh : TetMesh
+    rules : mapping of patch name to rule
+
+    Returns
+    -------
+    TetMesh
+        The same mesh with these patches besides those it had.
+
+    Raises
+    ------
+    InputError
+        When a rule chooses no facet; the message names the patch and the nearest candidate.
+    """
+    patches = {}
+    for name, rule in rules.items():
+        try:
+            patches[name] = rule(mesh)
+        except InputError as error:
+            raise InputError(f"patch '{name}': {error}") from None
+    return mesh.with_patches(patches)
+
+
+def match_boundary(mesh: TetMesh, facets: IntArray) -> IntArray:
+    """Find the boundary facets, outward, that have the nodes of `facets` (k, 3) in any order.
+
+    Facets that are not on the boundary, and repeated ones, drop out; the order is that of
+    `TetMesh.boundary`.
+    """
+    if not len(facets):
+        return np.zeros((0, 3), dtype=np.int64)
+    return mesh.boundary[np.isin(facet_keys(mesh.boundary), facet_keys(facets))]
+
+
+def facet_keys(facets: IntArray) -> IntArray:
+    """One integer (...,) for the nodes of each facet (..., 3), whatever their order.
+
+    Node numbers must stay below 2^21 (two million).
+    """
+    a, b, c = np.moveaxis(np.sort(np.asarray(facets, dtype=np.int64), axis=-1), -1, 0)
+    return ((a << 21) + b << 21) + c
+
+
+def unit_vector(value: str | ArrayLike, what: str) -> FloatArray:
+    """Make a unit vector (3,) of "x", "-y", ... or of a vector that is not zero.
+
+    Raises
+    ------
+    InputError
+        That names `what`.
+    """
+    if isinstance(value, str):
+        if value.removeprefix("-") not in _AXES:
+            raise InputError(
+                f"{what} must be 'x', 'y', 'z', one of them with a minus, or 3 numbers; got "
+                f"'{value}': correct it"
+            )
+        sign = -1.0 if value.startswith("-") else 1.0
+        return sign * np.array(_AXES[value.removeprefix("-")])
+    vector = _vector(value, what)
+    length = np.linalg.norm(vector)
+    if not 0.0 < length < np.inf:
+        raise InputError(f"{what} must have a finite length above 0; got {value}: correct it")
+    return vector / length
+
+
+def _vector(value: ArrayLike, what: str) -> FloatArray:
+    try:
+        vector = np.asarray(value, dtype=np.float64)
+    except (TypeError, ValueError):
+        raise InputError(f"{what} must be 3 numbers; got {value!r}: correct it") from None
+    if vector.shape != (3,) or np.isnan(vector).any():
+        raise InputError(f"{what} must be 3 numbers; got {value!r}: correct it")
+    return vector
+
+
+def _check_tolerance(tolerance: float | None) -> None:
+    if tolerance is not None and not 0.0 <= tolerance < np.inf:
+        raise InputError(f"tolerance must be at least 0 mm; got {tolerance}: correct it")
+
+
+def _diagonal(mesh: TetMesh) -> float:
+    return float(np.linalg.norm(mesh.bounds[1] - mesh.bounds[0]))
+
+
+def _default(tolerance: float | None, mesh: TetMesh) -> float:
+    return _SURFACE * _diagonal(mesh) if tolerance is None else tolerance
+
+
+def _normals(mesh: TetMesh) -> FloatArray:
+    return mesh.facet_areas(mesh.boundary)[1]
+
+
+def _centres(mesh: TetMesh) -> FloatArray:
+    return mesh.points[mesh.boundary].mean(axis=1)
+
+
+def _groups(mesh: TetMesh) -> str:
+    return ", ".join(sorted(mesh.patches)) or "none"
+
+
+def _choose(
+    mesh: TetMesh, missed: FloatArray, tolerance: float, wanted: BoolArray, label: str
+) -> IntArray:
+    """Facets among the `wanted` that miss the rule by no more than the tolerance, mm."""
+    chosen = wanted & (missed <= tolerance)
+    if chosen.any():
+        return mesh.boundary[chosen]
+    candidates = np.where(wanted, missed, np.inf) if wanted.any() else missed
+    nearest = int(np.argmin(candidates))
+    facing = "" if wanted.any() else " (none faces or lies the right way)"
+    centre = ", ".join(f"{x:.4g}" for x in _centres(mesh)[nearest])
+    raise InputError(
+        f"{label} chooses no boundary facet{facing}; the nearest misses it by "
+        f"{missed[nearest]:.3g} mm, its centre at ({centre}) mm; groups in the mesh: "
+        f"{_groups(mesh)}: move the rule or widen it"
+    )

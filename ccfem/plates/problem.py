@@ -1,0 +1,78 @@
+"""The boundary value problem of a thin plate in its plane."""
+
+from collections.abc import Mapping
+from dataclasses import dataclass, field
+from functools import cached_property
+from types import MappingProxyType
+
+import numpy as np
+
+from ccfem.arrays import FloatArray, read_only
+from ccfem.elasticity.problem import Load, Pressure, Support
+from ccfem.errors import InputError
+from ccfem.plates.plane_mesh import PlaneMesh, Sheet
+
+__all__ = ["PlaneProblem"]
+
+
+@dataclass(frozen=True)
+class PlaneProblem:
+    """A linear elastic plate in plane stress with its supports and loads.
+
+    Attributes
+    ----------
+    mesh : PlaneMesh
+    stiffness : (m, 3, 3) array, MPa
+        Of each cell in the global axes, ``[s11, s22, s12] = Q @ [e11, e22, 2 e12]``; one (3, 3)
+        matrix stands for all cells. See `rotate_plane` and `stack_plane`.
+    thickness : (m,) array, mm
+        A float stands for all cells.
+    supports : tuple of Support
+        Their component z means nothing here.
+    loads : mapping of load case name to tuple of loads
+        With no component z.
+    """
+
+    mesh: PlaneMesh
+    stiffness: FloatArray
+    thickness: FloatArray | float
+    supports: tuple[Support, ...]
+    loads: Mapping[str, tuple[Load, ...]] = field(default_factory=dict)
+
+    def __post_init__(self) -> None:
+        m = len(self.mesh.cells)
+        object.__setattr__(self, "supports", tuple(self.supports))
+        loads = {name: tuple(case) for name, case in self.loads.items()}
+        object.__setattr__(self, "loads", MappingProxyType(loads))
+        stiffness, thickness = np.asarray(self.stiffness), np.asarray(self.thickness)
+        if stiffness.shape not in ((3, 3), (m, 3, 3)):
+            raise InputError(
+                f"plane stiffness must have shape (3, 3) or ({m}, 3, 3); got {stiffness.shape}: "
+                "give one matrix a cell"
+            )
+        if thickness.shape not in ((), (m,)) or not (thickness > 0.0).all():
+            raise InputError(
+                f"plane thickness must be positive, one for all or one a cell ({m}); got shape "
+                f"{thickness.shape}, least {thickness.min() if thickness.size else 'none'} mm"
+            )
+        if not np.isfinite(stiffness).all() or not np.isfinite(thickness).all():
+            raise InputError("plane stiffness and thickness must be finite; got NaN or infinity")
+        broad = np.broadcast_to(stiffness, (m, 3, 3))
+        object.__setattr__(self, "stiffness", read_only(broad))
+        object.__setattr__(self, "thickness", read_only(np.broadcast_to(thickness, (m,))))
+        for support in self.supports:
+            if not set(support.components) & set("xy") or support.value[2] != 0.0:
+                raise InputError(
+                    f"a plane problem knows x and y only; got {support}: hold x or y, with value "
+                    "z zero"
+                )
+        for load in (load for case in self.loads.values() for load in case):
+            if not isinstance(load, Pressure) and load.vector[2] != 0.0:
+                raise InputError(
+                    f"a plane problem is loaded in its plane; got {load}: give component z zero"
+                )
+
+    @cached_property
+    def body(self) -> Sheet:
+        """What loads act on: the mesh with its thickness."""
+        return Sheet(self.mesh, np.asarray(self.thickness))

@@ -1,0 +1,149 @@
+"""Equilibrium of the part with its fibres, bonded or carrying tension only."""
+
+from dataclasses import dataclass
+
+import numpy as np
+import scipy.sparse as sp
+
+from ccfem.arrays import BoolArray, FloatArray, read_only
+from ccfem.elasticity.solvers import preconditioned_cg
+from ccfem.errors import InputError, SolveError
+from ccfem.virtual_testing.bars import bar_matrix, strain_operator
+from ccfem.virtual_testing.specimen import Specimen
+from ccfem.virtual_testing.strands import Strands
+
+__all__ = ["BONDED", "MODES", "TENSION", "Equilibrium", "equilibrium"]
+
+BONDED, TENSION = MODES = ("bonded", "tension")
+
+_UPDATES = 30
+"""Updates of the displacement after which to give up."""
+
+_PROGRESS = 1e-2
+"""What each update leaves of the residual, as long as the set of carrying fibres may change."""
+
+
+@dataclass(frozen=True)
+class Equilibrium:
+    """Displacement of the part with its fibres.
+
+    Attributes
+    ----------
+    displacement : (n, 3) array, mm
+    matrix : bsr_array (3n, 3n), N/mm
+        Stiffness of part and carrying fibres.
+    strain : (s,) array
+        Along each piece of fibre.
+    carries : (s,) bool array
+        Which pieces lend their stiffness.
+    updates : int
+        Solves until the set of carrying fibres and the displacement were settled.
+    iterations : int
+        Of conjugate gradients, over all updates.
+    residual : float
+        ``|f - K(u) u| / |f|``, with the carrying set of u itself.
+    """
+
+    displacement: FloatArray
+    matrix: sp.bsr_array
+    strain: FloatArray
+    carries: BoolArray
+    updates: int
+    iterations: int
+    residual: float
+
+    def __post_init__(self) -> None:
+        object.__setattr__(self, "displacement", read_only(self.displacement))
+        object.__setattr__(self, "strain", read_only(self.strain))
+        object.__setattr__(self, "carries", read_only(self.carries, np.bool_))
+
+
+def equilibrium(
+    specimen: Specimen,
+    strands: Strands,
+    axial_stiffness: float,
+    mode: str = TENSION,
+    start: FloatArray | None = None,
+    slack: float = 0.0,
+    tolerance: float = 1e-8,
+) -> Equilibrium:
+    """Find the displacement of a part with fibres.
+
+    With fibres that carry tension only the energy is convex and piecewise quadratic; Newton's
+    method on it takes the fibres that the last displacement stretches, solves, and repeats until
+    the residual with the new set meets the tolerance. Each solve is a conjugate gradient with the
+    factorisation of the part without fibres as preconditioner.
+
+    Parameters
+    ----------
+    specimen : Specimen
+    strands : Strands
+    axial_stiffness : float, N
+        EA of one strand.
+    mode : str
+        "bonded" (all fibres carry) or "tension" (those that are stretched).
+    start : (n, 3) array, mm, optional
+        Where to start; default the part without fibres.
+    slack : float in [0, 1), default 0
+        Share of their stiffness that shortened fibres keep with "tension".
+    tolerance : float
+        Largest relative residual that is accepted.
+
+    Raises
+    ------
+    InputError
+        For an unknown mode or an impossible stiffness.
+    SolveError
+        When the residual stays above the tolerance.
+    """
+    if mode not in MODES:
+        raise InputError(f"no mode named '{mode}'; there are: {', '.join(MODES)}")
+    if not 0.0 <= axial_stiffness < np.inf or not 0.0 <= slack < 1.0:
+        raise InputError(
+            "expected an axial stiffness >= 0 N and 0 <= slack < 1; got "
+            f"{axial_stiffness} and {slack}"
+        )
+    held = specimen.system.held
+    u = specimen.unreinforced.displacement if start is None else start
+    x, total = held.restrict(u), 0
+    operator = strain_operator(strands, specimen.system.problem.mesh)
+    strain, carries = _state(operator, u, mode)
+    matrix = _reinforced(specimen, strands, axial_stiffness, np.where(carries, 1.0, slack))
+    reduced, rhs = held.reduce(matrix), held.right_hand_side(matrix, specimen.forces)
+    for update in range(_UPDATES):
+        rest = rhs - reduced @ x
+        residual = float(np.linalg.norm(rest) / np.linalg.norm(rhs))
+        if residual <= tolerance:
+            return Equilibrium(u, matrix, strain, carries, update, total, residual)
+        goal = max(0.5 * tolerance / residual, _PROGRESS if mode == TENSION else 0.0)
+        step = preconditioned_cg(reduced, rest, specimen.solver, tolerance=min(goal, 0.5))
+        total += step.iterations
+        x = x + step.values
+        u = held.expand(x)
+        before = carries
+        strain, carries = _state(operator, u, mode)
+        if (before != carries).any():
+            matrix = _reinforced(specimen, strands, axial_stiffness, np.where(carries, 1.0, slack))
+            reduced, rhs = held.reduce(matrix), held.right_hand_side(matrix, specimen.forces)
+    raise SolveError(
+        f"virtual test: relative residual {residual:.1e} after {_UPDATES} updates of the fibres "
+        f"that carry tension, above the tolerance {tolerance:.1e}"
+    )
+
+
+def _state(
+    operator: sp.csr_array, displacement: FloatArray, mode: str
+) -> tuple[FloatArray, BoolArray]:
+    """Strain (s,) of the pieces, and which of them carry."""
+    strain = operator @ displacement.reshape(-1)
+    return strain, strain > 0.0 if mode == TENSION else np.ones(len(strain), dtype=bool)
+
+
+def _reinforced(
+    specimen: Specimen, strands: Strands, axial_stiffness: float, share: FloatArray
+) -> sp.bsr_array:
+    """Stiffness matrix (3n, 3n), N/mm, of the part and its fibres."""
+    system = specimen.system
+    bars = bar_matrix(strands, system.problem.mesh, system.where, share)
+    data = specimen.matrix.data + axial_stiffness * bars.data
+    return sp.bsr_array((data, bars.indices, bars.indptr), shape=bars.shape)

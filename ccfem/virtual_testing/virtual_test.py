@@ -1,0 +1,221 @@
+"""The virtual test: stiffness of the part with its fibres, and the force in every strand."""
+
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
+from time import perf_counter
+
+import numpy as np
+
+from ccfem.arrays import FloatArray, read_only
+from ccfem.elasticity.stress_field import SolveRecord, StressField
+from ccfem.errors import InputError
+from ccfem.toolpaths import Toolpaths
+from ccfem.virtual_testing.equilibrium import BONDED, TENSION, equilibrium
+from ccfem.virtual_testing.specimen import Specimen
+from ccfem.virtual_testing.strand import RHO_SPAN, Strand
+from ccfem.virtual_testing.strands import Strands, cut_strands
+
+__all__ = ["Bracket", "VirtualTest", "virtual_bracket", "virtual_brackets", "virtual_test"]
+
+_SPAN_TOLERANCE = 1e-3
+"""Relative residual of the solves for the span; the ratio's error is of its square."""
+
+
+@dataclass(frozen=True)
+class VirtualTest:
+    """What a set of fibre paths does to a part under one load case.
+
+    Attributes
+    ----------
+    mode : str
+        "bonded" or "tension".
+    rho : float, mm^2
+        EA of a strand over Young's modulus of the matrix.
+    unreinforced : StressField
+        The part without fibres.
+    solution : StressField
+        The part with fibres: its stress is that of the matrix; its strain energy and reactions
+        are those of matrix and fibres together.
+    strands : Strands
+        Pieces of fibre.
+    axial_force : (s,) array, N
+        Force in the strand at each piece; tension is positive.
+    fibre_energy : float, N mm
+        Strain energy of the fibres.
+    force : float, N
+        Size of the load.
+    stiffness, unreinforced_stiffness : float, N/mm
+        Force squared over work of the load.
+    span : tuple of (rho, ratio)
+        Stiffness ratio at other values of rho, mm^2.
+    updates : int
+        Solves until the set of fibres in tension was settled.
+    """
+
+    mode: str
+    rho: float
+    unreinforced: StressField
+    solution: StressField
+    strands: Strands
+    axial_force: FloatArray
+    fibre_energy: float
+    force: float
+    stiffness: float
+    unreinforced_stiffness: float
+    span: tuple[tuple[float, float], ...]
+    updates: int
+
+    def __post_init__(self) -> None:
+        object.__setattr__(self, "axial_force", read_only(self.axial_force))
+
+    @property
+    def ratio(self) -> float:
+        """Stiffness over that of the unreinforced part; 1 without fibres."""
+        return self.stiffness / self.unreinforced_stiffness
+
+    @property
+    def gain_per_metre(self) -> float:
+        """Gain of the ratio per metre of fibre inside the part, 1/m."""
+        return (self.ratio - 1.0) / (1e-3 * self.strands.total)
+
+
+@dataclass(frozen=True)
+class Bracket:
+    """The two tests between which a printed part is expected to lie.
+
+    Attributes
+    ----------
+    tension, bonded : VirtualTest
+        Fibres that carry tension only, and fibres bonded in tension and compression.
+    """
+
+    tension: VirtualTest
+    bonded: VirtualTest
+
+
+def virtual_test(
+    fibres: Toolpaths | Strands,
+    part: StressField | Specimen,
+    strand: Strand | None = None,
+    mode: str = TENSION,
+    span: Sequence[float] = RHO_SPAN,
+    backend: str = "auto",
+) -> VirtualTest:
+    """Test a part with its fibres under the load case that it was solved for.
+
+    Fibres are axial bars in the cells of the mesh; the part is linear elastic. The load case
+    need not be the one that the paths were planned for: solve the same mesh under another one.
+
+    Parameters
+    ----------
+    fibres : Toolpaths or Strands
+        In the frame of the mesh; only fibre counts.
+    part : StressField or Specimen
+        The part without fibres; a specimen shares its factorisation among tests.
+    strand : Strand, optional
+        Stiffness of a strand; default rho = EA/E = 4 mm^2.
+    mode : str, default "tension"
+        "tension": fibres in compression carry nothing. "bonded": all fibres carry.
+    span : sequence of float, mm^2, default (2, 6)
+        Further values of rho to report the ratio at; () for none.
+    backend : str, default "auto"
+        Solver, where `part` is a StressField.
+
+    Returns
+    -------
+    VirtualTest
+
+    Raises
+    ------
+    InputError
+        For no fibre, or more than 1 % of it outside the mesh.
+    SolveError
+        When the solve misses its tolerance.
+    """
+    specimen = Specimen.of(part, backend) if isinstance(part, StressField) else part
+    before = specimen.unreinforced
+    strands = cut_strands(fibres, before.mesh) if isinstance(fibres, Toolpaths) else fibres
+    axial = (Strand() if strand is None else strand).stiffness(specimen.modulus)
+    started = perf_counter()
+    found = equilibrium(specimen, strands, axial, mode)
+    record = SolveRecord(
+        backend=specimen.solver.backend,
+        iterations=found.iterations,
+        residual=found.residual,
+        assembly_seconds=0.0,
+        solve_seconds=perf_counter() - started,
+        unknowns=before.record.unknowns,
+    )
+    after = specimen.system.field(before.case, found.displacement, found.matrix, record)
+    unreinforced = specimen.stiffness(before.displacement, before.strain_energy)
+    ratios = []
+    for rho in span:
+        other = equilibrium(
+            specimen,
+            strands,
+            rho * specimen.modulus,
+            mode,
+            start=found.displacement,
+            tolerance=_SPAN_TOLERANCE,
+        )
+        energy = 0.5 * float(
+            other.displacement.reshape(-1) @ (other.matrix @ other.displacement.reshape(-1))
+        )
+        ratios.append((float(rho), specimen.stiffness(other.displacement, energy) / unreinforced))
+    force = np.where(found.carries, axial * found.strain, 0.0)
+    return VirtualTest(
+        mode=mode,
+        rho=axial / specimen.modulus,
+        unreinforced=before,
+        solution=after,
+        strands=strands,
+        axial_force=force,
+        fibre_energy=0.5 * float(np.vdot(force * strands.length, found.strain)),
+        force=specimen.force(after.reactions),
+        stiffness=specimen.stiffness(after.displacement, after.strain_energy),
+        unreinforced_stiffness=unreinforced,
+        span=tuple(ratios),
+        updates=found.updates,
+    )
+
+
+def virtual_bracket(
+    fibres: Toolpaths | Strands,
+    part: StressField | Specimen,
+    strand: Strand | None = None,
+    span: Sequence[float] = RHO_SPAN,
+    backend: str = "auto",
+) -> Bracket:
+    """Both tests of `virtual_test`, with one factorisation; parameters as there."""
+    specimen = Specimen.of(part, backend) if isinstance(part, StressField) else part
+    mesh = specimen.unreinforced.mesh
+    strands = cut_strands(fibres, mesh) if isinstance(fibres, Toolpaths) else fibres
+    tension = virtual_test(strands, specimen, strand, TENSION, span)
+    return Bracket(tension, virtual_test(strands, specimen, strand, BONDED, span))
+
+
+def virtual_brackets(
+    fibres: Toolpaths | Strands,
+    parts: Mapping[str, StressField],
+    strand: Strand | None = None,
+    span: Sequence[float] = RHO_SPAN,
+    backend: str = "auto",
+) -> dict[str, Bracket]:
+    """Both tests under every load case of a solved problem, with one factorisation.
+
+    Parameters
+    ----------
+    parts : mapping of load case name to StressField
+        As `ccfem.elasticity.solve.solve` gives it.
+    """
+    if not parts:
+        raise InputError("a virtual test needs at least one load case; got none")
+    first: Specimen | None = None
+    result = {}
+    for name, field in parts.items():
+        specimen = Specimen.of(field, backend) if first is None else first.under(field)
+        first = specimen
+        if isinstance(fibres, Toolpaths):
+            fibres = cut_strands(fibres, field.mesh)
+        result[name] = virtual_bracket(fibres, specimen, strand, span)
+    return result

@@ -1,0 +1,353 @@
+"""The command line: what it prints and writes, and one line for everything that is wrong."""
+
+import csv
+import dataclasses
+import json
+import re
+import subprocess
+import sys
+
+import numpy as np
+import pytest
+
+from ccfem import __version__
+from ccfem.cli.commands import main
+from ccfem.comparison.files import staged
+from ccfem.export.waypoints import read_waypoints
+from ccfem.io import write_mesh
+from ccfem.mesh import TetMesh
+from ccfem.mesh.box import box_mesh
+from ccfem.strategies import named
+
+PART = """
+mesh = "body.npz"
+layers = 3
+[material]
+modulus = 3500.0
+poisson = 0.35
+tensile_strength = 33.0
+[machine]
+minimum_length = 20.0
+[[supports]]
+patch = "x_min"
+[[loads.pull]]
+kind = "force"
+patch = "x_max"
+vector = [1000, 0, 0]
+"""
+
+FILES = {
+    *(f"{name}_layer_{k:02d}.png" for name in ("isocurve", "zigzag") for k in range(3)),
+    *(f"{name}_force.png" for name in ("isocurve", "zigzag")),
+    *(f"{name}_waypoints.txt" for name in ("isocurve", "zigzag")),
+    "tension.png",
+    "overview.png",
+    "results.csv",
+    "results.json",
+    "paths.vtp",
+    "report.html",
+}
+
+CUBE = "v 0 0 0\nv 9 0 0\nv 9 9 0\nv 0 9 0\nv 0 0 9\nv 9 0 9\nv 9 9 9\nv 0 9 9\n" + "".join(
+    f"f {face}\n"
+    for face in ("1 4 3 2", "1 2 6 5", "2 3 7 6", "3 4 8 7", "4 1 5 8")  # the top is missing
+)
+
+
+@pytest.fixture(scope="module")
+def folder(tmp_path_factory):
+    """Folder with a strip, and with files that are wrong in one way each."""
+    folder = tmp_path_factory.mktemp("cli")
+    mesh = box_mesh((60.0, 24.0, 4.0), (20, 8, 2))
+    write_mesh(mesh, folder / "body.npz")
+    tetrahedron = "0 0 0\n9 0 0\n0 nan 0\n0 0 9\n4 0 1 2 3\n"
+    (folder / "nan.tet").write_text(f"4 vertices\n1 tets\n{tetrahedron}")
+    (folder / "part.toml").write_text(PART)
+    (folder / "junk.msh").write_text("this is no mesh\n")
+    (folder / "open.obj").write_text(CUBE)
+    return folder
+
+
+@pytest.fixture
+def ccfem(monkeypatch, capsys, folder):
+    """Call the command line in the folder: exit code, lines of stdout, lines of stderr."""
+
+    def call(*arguments):
+        monkeypatch.chdir(folder)
+        monkeypatch.setattr(sys, "argv", ["ccfem", *map(str, arguments)])
+        with pytest.raises(SystemExit) as ended:
+            main()
+        said = capsys.readouterr()
+        return ended.value.code, said.out, said.err
+
+    return call
+
+
+def test_compare_writes_everything(ccfem, folder):
+    code, out, err = ccfem(
+        "compare", "part.toml", "--strategies", "isocurve,zigzag", "--out", "results/new"
+    )
+    assert (code, err) == (0, "")
+    assert "isocurve" in out
+    where = folder / "results" / "new"
+    written = {path.name for path in where.iterdir()}
+    assert written == FILES
+    assert [p.name for p in folder.rglob(".ccfem*")] == []
+
+    about = json.loads((where / "results.json").read_text())
+    assert about["ccfem"] == __version__
+    assert about["command"].startswith("ccfem compare part.toml")
+    assert about["case"]["layers"] == 3
+    assert about["case"]["load"] == pytest.approx([1000.0, 0.0, 0.0], rel=1e-5)
+    assert "load case “pull”, in all (1000, 0, 0) N" in (where / "report.html").read_text()
+    assert about["solver"]["residual"] < 1e-8
+    assert about["versions"]["numpy"] == np.__version__
+    assert {"start", "mesh", "solve", "slice", "pictures"} <= set(about["seconds"])
+    runs = {run["name"]: run for run in about["strategies"]}
+    for run in runs.values():
+        assert set(run["seconds"]) == {"plan", "evaluate", "virtual test"}
+        assert run["total"]["stiffness_ratio_tension"] > 1.0
+        assert run["length_per_layer"] <= about["fibre_per_layer"] * (1.0 + 1e-9)
+
+    with (where / "results.csv").open() as file:
+        rows = list(csv.DictReader(file))
+    assert [(row["strategy"], row["layer"]) for row in rows] == [
+        (name, layer) for name in ("isocurve", "zigzag") for layer in ("0", "1", "2", "total")
+    ]
+    for row in rows:
+        if row["layer"] == "total":
+            total = runs[row["strategy"]]["total"]
+            for column in ("fibre_length", "efficiency", "stiffness_ratio_bonded"):
+                assert float(row[column]) == pytest.approx(total[column], rel=1e-12)
+
+    for name, run in runs.items():
+        waypoints = read_waypoints(where / f"{name}_waypoints.txt", np.eye(3))
+        assert len(waypoints) == run["total"]["paths"]
+        assert waypoints.lengths.sum() == pytest.approx(run["total"]["fibre_length"], rel=1e-5)
+
+    import pyvista
+
+    paths = pyvista.read(where / "paths.vtp")
+    for number, name in enumerate(runs):
+        length = paths.cell_data["length"][paths.cell_data["strategy"] == number].sum()
+        assert length == pytest.approx(runs[name]["total"]["fibre_length"], rel=1e-9)
+
+
+def test_the_report_needs_no_other_file(ccfem, folder):
+    ccfem("plan", "part.toml", "--strategy", "zigzag", "--set", "angle=0", "--layers", 1,
+          "--no-virtual-test", "--out", "one")  # fmt: skip
+    page = (folder / "one" / "report.html").read_text()
+    assert "http" not in page
+    assert "src=" in page
+    assert page.count("src=") == page.count('src="data:image/png;base64,')
+    assert "angle = 0" in page
+    assert "ccfem plan part.toml --strategy zigzag --set angle=0" in page
+    assert {p.name for p in (folder / "one").glob("*layer*")} == {"zigzag_layer_00.png"}
+
+
+@pytest.mark.parametrize("name", ["angle", "zigzag.angle"])
+def test_plan_takes_a_parameter_with_and_without_its_strategy(ccfem, folder, name):
+    code, _, err = ccfem("plan", "part.toml", "--strategy", "zigzag", "--set", f"{name}=30",
+                         "--layers", 1, "--no-virtual-test", "--out", "prefix")  # fmt: skip
+    assert (code, err) == (0, "")
+    (run,) = json.loads((folder / "prefix" / "results.json").read_text())["strategies"]
+    assert run["parameters"]["angle"] == 30.0
+
+
+def test_plan_refuses_a_parameter_of_another_strategy(ccfem, folder):
+    message = r"parameter of zigzag.*; got 'grid\.angle=30': write angle=VALUE or zigzag\.angle="
+    refused(ccfem, folder, message,
+            "plan", "part.toml", "--strategy", "zigzag", "--set", "grid.angle=30")  # fmt: skip
+
+
+def test_a_second_run_leaves_nothing_of_the_first(ccfem, folder):
+    plan = ("plan", "part.toml", "--set", "angle=0", "--no-virtual-test", "--out", "twice")
+    ccfem(*plan, "--strategy", "zigzag", "--layers", 2)
+    where = folder / "twice"
+    assert (where / "zigzag_layer_01.png").exists()
+    (where / "zigzag.gcode").write_text("; not of this program\n")
+    assert ccfem(*plan, "--strategy", "contour_zigzag", "--layers", 1)[0] == 0
+    names = {path.name for path in where.iterdir()}
+    assert names >= {"contour_zigzag_layer_00.png", "report.html", "results.json", "zigzag.gcode"}
+    assert not [name for name in names - {"zigzag.gcode"} if name.startswith("zigzag")]
+    files = json.loads((where / "results.json").read_text())["files"]
+    assert set(files) == names - {"zigzag.gcode"}
+
+
+@pytest.mark.parametrize("files", ['["../kept.txt", 3]', '"kept.txt"', "{}", "nonsense"])
+def test_only_files_of_the_folder_are_removed(tmp_path, files):
+    where = tmp_path / "results"
+    where.mkdir()
+    (tmp_path / "kept.txt").write_text("kept")
+    (where / "results.json").write_text('{"files": ' + files + "}")
+    with staged(where) as new:
+        (new / "report.html").write_text("new")
+    assert (tmp_path / "kept.txt").exists()
+    assert (where / "report.html").read_text() == "new"
+    assert (where / "results.json").exists()
+
+
+def test_a_failed_strategy_is_shown(ccfem, folder):
+    (folder / "push.toml").write_text(PUSH)
+    code, out, _ = ccfem("compare", "push.toml", "--strategies", "isocurve,zigzag", "--layers", 1)
+    assert code == 0
+    assert "isocurve: failed: expected tension" in " ".join(out.split())
+    page = (folder / "results" / "push" / "report.html").read_text()
+    assert "failed: expected tension" in page
+    rows = list(csv.DictReader((folder / "results" / "push" / "results.csv").open()))
+    assert rows[0]["strategy"] == "isocurve"
+    assert rows[0]["failure"].startswith("expected tension")
+    assert rows[0]["fibre_length"] == ""
+
+
+def test_what_was_found_in_the_mesh_is_printed(ccfem, folder):
+    mesh = box_mesh((60.0, 24.0, 4.0), (10, 4, 2))
+    write_mesh(TetMesh(mesh.points, mesh.cells[:, [1, 0, 2, 3]], mesh.patches), folder / "in.npz")
+    (folder / "inside.toml").write_text(PART.replace("body.npz", "in.npz"))
+    _, out, _ = ccfem("plan", "inside.toml", "--strategy", "zigzag", "--no-virtual-test")
+    assert f"mesh: {len(mesh.cells)} cells were inside out: turned" in out
+
+
+def test_lists(ccfem):
+    code, out, _ = ccfem("cases")
+    assert code == 0
+    for name in ("loop", "bar", "open_hole"):
+        assert name in out
+    code, out, _ = ccfem("strategies")
+    assert code == 0
+    for name in ("isocurve", "concentric", "zigzag", "contour_zigzag", "spacing", "cap"):
+        assert name in out
+    assert "one of 'polyline', 'raster'" in " ".join(out.split())
+    code, out, _ = ccfem()
+    assert code == 0
+    assert "compare" in out
+
+
+@pytest.mark.parametrize("name", sorted(named()))
+def test_every_parameter_of_a_strategy_is_explained(ccfem, monkeypatch, name):
+    monkeypatch.setenv("COLUMNS", "1000")
+    code, out, _ = ccfem("strategies", name)
+    assert code == 0
+    rows = [[cell.strip() for cell in re.split(r" {2,}", line.strip())] for line in out.split("\n")]
+    found = {row[0]: row[1:] for row in rows if len(row) == 4}
+    for field in dataclasses.fields(named()[name]):
+        default, kind, meaning = found[field.name]
+        assert default == repr(field.default)
+        assert kind
+        assert len(meaning) > 15
+        assert not meaning.startswith("As in")
+
+
+def test_a_parameter_is_explained_in_the_words_of_its_class(ccfem, monkeypatch, folder):
+    monkeypatch.setenv("COLUMNS", "1000")
+    _, out, _ = ccfem("strategies", "contour_zigzag")
+    assert "Direction of the lines on layer 0 to the first axis of the layer." in out
+    assert "float, degrees" in out
+    assert "It sets the amount of fibre: 1 most, 20 least." in out
+    refused(ccfem, folder, "did you mean 'zigzag'", "strategies", "zigzga")
+
+
+def test_it_is_a_module_too():
+    done = subprocess.run(
+        [sys.executable, "-m", "ccfem", "--version"], capture_output=True, text=True, check=True
+    )
+    assert done.stdout == f"ccfem {__version__}\n"
+
+
+ROLLERS = """
+[[supports]]
+patch = "x_min"
+components = "x"
+[[supports]]
+patch = "y_min"
+components = "y"
+[[supports]]
+patch = "z_min"
+components = "z"
+"""
+SUPPORT = '[[supports]]\npatch = "x_min"\n'
+PUSH = PART.replace(SUPPORT, ROLLERS).replace("[1000, 0, 0]", "[-1000, 0, 0]")
+HOLE = '[patches.pin]\nrule = "cylinder"\npoint = [30, 12, 0]\naxis = "z"\nradius = 3.0\n'
+
+
+@pytest.mark.parametrize(
+    ("text", "message"),
+    [
+        (PART.replace("body.npz", "gone.npz"), "gone.npz does not exist: check its name"),
+        (PART.replace("body.npz", "junk.msh"), "junk.msh is not a Gmsh mesh"),
+        (
+            PART.replace("body.npz", "part.toml"),
+            "cannot tell the format of mesh file part.toml: its name must end in",
+        ),
+        (
+            PART.replace('mesh = "body.npz"', 'surface = "open.obj"\nedge_length = 3'),
+            "open.obj: the surface is open: .*close the holes",
+        ),
+        (PART.replace(SUPPORT, ""), "support"),
+        (PART.replace('patch = "x_min"', 'patch = "x_min"\ncomponents = "x"'), "free"),
+        (PART + HOLE, "nearest"),
+        (PART.replace('"x_max"', '"end"'), "no patch named 'end'; the mesh has: x_max, x_min"),
+        (PART.replace("body.npz", "nan.tet"), "NaN"),
+        (PART.replace("[1000,", "[nan,"), "nan"),
+        (PART.replace("[1000,", "[0,"), "zero"),
+        (PUSH, "expected tension.*the largest tensile stress found is"),
+        (PART + "[strategies.isocurf]\na = 1\n", "no strategy named 'isocurf'; there are: "),
+        (PART.replace("layers = 3", "layer = 3"), "no key 'layer'; .*did you mean 'layers'"),
+        (PART + "[strategies.isocurve]\nkap = 1\n", "no parameter 'kap'; it has: .*cap"),
+        (PART.replace("layers = 3", "layers = 0"), "layers must be at least 1; got 0"),
+        (PART.replace("poisson = 0.35", "poisson = 0.5"), "poisson"),
+        ("mesh = ", "is not a TOML file"),
+    ],
+)
+def test_bad_parts_end_in_one_line(ccfem, folder, text, message):
+    (folder / "bad.toml").write_text(text)
+    refused(ccfem, folder, message, "plan", "bad.toml", "--strategy", "isocurve", "--out", "bad")
+
+
+@pytest.mark.parametrize(
+    ("arguments", "message"),
+    [
+        (["gone.toml"], "part file gone.toml does not exist: check its name and folder"),
+        (["lop"], "no case named 'lop'; there are: bar, bracket, bridge, cantilever, l_shape"),
+        (["part.toml", "--strategies", "zigzag,spiral"], "no strategy named 'spiral'; there are:"),
+        (["lop"], r"suspension: did you mean 'loop'\? \(or name a part file"),
+        (["part.toml", "--strategies", "isocurv"], "zigzag: did you mean 'isocurve'"),
+        (["part.toml", "--set", "zigzag.spacin=2"], "turn: did you mean 'spacing'"),
+        (["part.toml", "--set", "zigzga.turn=2"], "contour_zigzag: did you mean 'zigzag'"),
+        (["bar", "--set-case", "element_siz=1"], "did you mean 'element_size'"),
+        (["part.toml", "--strategies", ","], "at least one strategy"),
+        (["part.toml", "--set", "zigzag.pitch=2"], "'zigzag' has no parameter 'pitch'; it has:"),
+        (["part.toml", "--set", "zigzag.spacing=wide"], "must be a number; got 'wide'"),
+        (["part.toml", "--set", "zigzag.spacing=0.5"], "at least 1 fibre width; got 0.5"),
+        (["part.toml", "--set", "spacing=2"], "expects STRATEGY.NAME=VALUE; got 'spacing=2'"),
+        (["part.toml", "--set", "zigzag.spacing"], "expected NAME=VALUE"),
+        (["part.toml", "--set-case", "force=1"], "'part.toml' is a part file"),
+        (["bar", "--set-case", "length=1"], "case 'bar' has no parameter 'length'; it has:"),
+        (["part.toml", "--layers", "0"], "number of layers must be at least 1; got 0"),
+        (["part.toml", "--layers", "many"], "--layers"),
+        (["part.toml", "--heights", "1,2,9"], "height 9 mm lies outside the part.* from 0 to 4 mm"),
+        (["part.toml", "--heights", "1,x"], "expected numbers"),
+        (["part.toml", "--layers", "2", "--heights", "1"], "not both"),
+        (["part.toml", "--fibre-per-layer", "-3"], "above 0 mm; got -3"),
+        (["part.toml", "--fibre-per-layer", "9", "--natural"], "not both"),
+        (["part.toml", "--load-case", "twist"], "no load case named 'twist'; the case has: pull"),
+        (["part.toml", "--backend", "magic"], "magic"),
+        (["part.toml", "--out", "part.toml/results"], "cannot write results to part.toml/results"),
+        (["part.toml", "--ouput", "x"], "No such option"),
+        ([], "Missing argument"),
+    ],
+)
+def test_bad_arguments_end_in_one_line(ccfem, folder, arguments, message):
+    refused(ccfem, folder, message, "compare", *arguments)
+
+
+def refused(ccfem, folder, message, *arguments):
+    before = {path: path.stat().st_mtime_ns for path in folder.rglob("*") if path.is_file()}
+    code, out, err = ccfem(*arguments)
+    assert (code, out) == (2, "")
+    assert err.startswith("ccfem: error: ")
+    assert err.count("\n") == 1
+    assert re.search(message, err), err
+    after = {path: path.stat().st_mtime_ns for path in folder.rglob("*") if path.is_file()}
+    assert after == before
+    assert not list(folder.rglob(".ccfem*"))

@@ -1,0 +1,267 @@
+"""Comparison: equal fibre, nobody dropped, and the order by the virtual test."""
+
+import re
+from dataclasses import dataclass, replace
+from typing import ClassVar
+
+import numpy as np
+import pytest
+
+from ccfem.cases.case import Case
+from ccfem.comparison.compare import compare, create_all
+from ccfem.comparison.headline import headline_values
+from ccfem.comparison.pictures import caption
+from ccfem.comparison.ranking import best_values, ranking
+from ccfem.comparison.remarks import remarks, verdict
+from ccfem.elasticity.problem import Force, Problem, Support
+from ccfem.errors import InputError
+from ccfem.evaluation import evaluate
+from ccfem.machine import Machine
+from ccfem.materials import isotropic
+from ccfem.mesh.box import box_mesh
+from ccfem.planning.equal_fibre import length_per_layer
+from ccfem.strategies import create, plan
+from ccfem.toolpaths import Toolpaths
+
+SIZE = (60.0, 24.0, 4.0)
+
+
+def strip(force=1000.0):
+    """A strip along x that is free to contract: uniform stress."""
+    mesh = box_mesh(SIZE, (20, 8, 2))
+    supports = (Support("x_min", "x"), Support("y_min", "y"), Support("z_min", "z"))
+    problem = Problem(
+        mesh,
+        isotropic(3500.0, 0.35, tensile_strength=50.0),
+        supports,
+        {"pull": (Force("x_max", (force, 0.0, 0.0)),), "push": (Force("x_max", (-1.0, 0.0, 0.0)),)},
+    )
+    return Case("strip", "Strip", problem, layers=4, machine=Machine(minimum_length=20.0))
+
+
+@pytest.fixture(scope="module")
+def compared():
+    return compare(strip())
+
+
+def test_strategies_lay_the_same_length(compared):
+    natural = {
+        run.name: length_per_layer(
+            plan(create(run.name), compared.layers, compared.stress, compared.case.machine),
+            compared.layers,
+        )
+        for run in compared.runs
+    }
+    assert compared.fibre_per_layer == min(natural.values())
+    for run in compared.runs:
+        assert not run.failure
+        assert run.length_per_layer <= compared.fibre_per_layer * (1.0 + 1e-9)
+        assert run.length_per_layer >= 0.99 * compared.fibre_per_layer or "of" in run.note
+        assert set(run.seconds) == {"plan", "evaluate", "virtual test"}
+
+
+def test_natural_amounts_are_those_of_the_strategies():
+    strategies = {"zigzag": create("zigzag", {"spacing": 3.0}), "concentric": create("concentric")}
+    result = compare(strip(), strategies, natural=True, strand=None)
+    assert result.fibre_per_layer is None
+    for run in result.runs:
+        paths = plan(strategies[run.name], result.layers, result.stress, result.case.machine)
+        np.testing.assert_array_equal(run.toolpaths.points, paths.points)
+        assert run.strategy == strategies[run.name]
+        assert run.tested is None
+
+
+def test_fibre_along_the_pull_wins_by_the_rule_of_mixtures():
+    strategies = {
+        "across": create("zigzag", {"angle": 90.0, "turn": 0.0, "spacing": 2.0}),
+        "along": create("zigzag", {"angle": 0.0, "turn": 0.0, "spacing": 2.0}),
+    }
+    result = compare(strip(), strategies, fibre_per_layer=700.0)
+    assert [run.name for run in ranking(result)] == ["along", "across"]
+    along = headline_values(result.runs[1])
+    # EA of the strands over E of the matrix is 4 mm^2: n strands add 4 n to the area. The turns of
+    # the zigzag run across, and its strands end half a width inside the strip.
+    strands = along["fibre_length"] / SIZE[0]
+    mixtures = 1.0 + 4.0 * strands / (SIZE[1] * SIZE[2])
+    assert along["stiffness_ratio_tension"] == pytest.approx(mixtures, rel=0.1)
+    assert verdict(result).startswith("along makes the stiffest part, at 700 mm of fibre per layer")
+    best = best_values(result)
+    assert best["stiffness_ratio_tension"] == along["stiffness_ratio_tension"]
+    assert best["efficiency"] == along["efficiency"]
+
+
+def test_opposite_orders_are_undecided(compared):
+    first, second = ranking(compared)[:2]
+    bracket = second.tested.bracket
+    stiffer = replace(bracket.bonded, stiffness=10.0 * bracket.bonded.stiffness)
+    tested = replace(second.tested, bracket=replace(bracket, bonded=stiffer))
+    turned = replace(compared, runs=(first, replace(second, tested=tested)))
+    assert verdict(turned).startswith(f"Undecided between {first.name} and {second.name}")
+    assert any(f"{first.name}: undecided against" in line for line in remarks(turned))
+    same = replace(compared, runs=(first, second))
+    assert not any("undecided" in line for line in remarks(same))
+    assert verdict(same).startswith(f"{first.name} makes the stiffest part")
+
+
+def test_what_cannot_be_thinned_leaves_layers_out():
+    strategies = {
+        "rings": create("contour_zigzag", {"contours": 4}),
+        "zigzag": create("zigzag", {"spacing": 8.0}),
+    }
+    result = compare(strip(), strategies, strand=None)
+    rings, zigzag = result.runs
+    assert result.fibre_per_layer == zigzag.length_per_layer
+    assert 0.0 < rings.length_per_layer <= result.fibre_per_layer
+    assert re.search(r"spacing = 20 on \d of 4 layers, no fibre on the others", rings.note)
+    whole = plan(rings.strategy, result.layers, result.stress, result.case.machine)
+    for layer in result.layers:
+        mine = rings.toolpaths.on_layer(layer.index).points
+        assert not len(mine) or np.array_equal(mine, whole.on_layer(layer.index).points)
+
+
+def test_more_fibre_than_wanted_comes_last():
+    strategies = {
+        "rings": create("contour_zigzag", {"contours": 4}),
+        "zigzag": create("zigzag", {"turn": 0.0}),
+    }
+    result = compare(strip(), strategies, layers=1, fibre_per_layer=300.0)
+    rings, zigzag = result.runs
+    assert rings.length_per_layer > 330.0
+    assert rings.tested.bracket.tension.ratio > zigzag.tested.bracket.tension.ratio
+    assert ranking(result) == (zigzag, rings)
+    assert any("rings: lays" in line and "placed last" in line for line in remarks(result))
+    assert "stiffness_ratio_tension" not in best_values(result)
+    assert verdict(result) == ""
+
+
+def test_unequal_fibre_is_in_the_verdict():
+    strategies = {
+        "thin": create("zigzag", {"angle": 90.0, "turn": 0.0, "spacing": 6.0}),
+        "dense": create("zigzag", {"angle": 0.0, "turn": 0.0, "spacing": 2.0}),
+    }
+    result = compare(strip(), strategies, natural=True)
+    dense = result.runs[1].length_per_layer / result.runs[0].length_per_layer - 1.0
+    assert "each with its own amount of fibre" in verdict(result)
+    assert f"{dense:.0%} more fibre than thin" in verdict(replace(result, fibre_per_layer=1e4))
+
+
+def test_a_strategy_that_fails_stays_with_its_reason():
+    result = compare(strip(), ["isocurve", "zigzag"], load_case="push")
+    isocurve, zigzag = result.runs
+    assert "expected tension" in isocurve.failure
+    assert isocurve.evaluation is None
+    assert not zigzag.failure
+    assert ranking(result) == (zigzag, isocurve)
+    assert any(line.startswith("isocurve: failed: expected tension") for line in remarks(result))
+
+
+@dataclass(frozen=True)
+class Joined:
+    """Two strands, and a link of 23 mm of which 20 mm lie outside the part."""
+
+    def __call__(self, layer, stress, machine):
+        line = np.array([[1.0, 9.0], [58, 9], [68, 9], [68, 5], [59, 5], [1, 5]])
+        return Toolpaths.from_plane([line], layer, link=[np.isin(np.arange(6), [1, 2, 3])])
+
+
+def test_links_outside_the_part_are_reported_and_carry_nothing():
+    result = compare(strip(), {"joined": Joined()}, natural=True)
+    (run,) = result.runs
+    assert not run.untested
+    total = run.evaluation.total
+    assert total["link_outside"] == pytest.approx(4 * 20.0, rel=1e-3)
+    assert total["outside_length"] == 0.0
+    inside = run.tested.bracket.tension.strands.total
+    assert inside == pytest.approx(total["fibre_length"] - total["link_outside"], rel=1e-4)
+    assert "joined: 80 mm of links lie outside the part, to be cut off" in remarks(result)
+    assert not any("voids" in line for line in remarks(result))
+
+
+@dataclass(frozen=True)
+class Woven:
+    """Three strands along a strip and two across it: six crossings, on layers of even number."""
+
+    crosses: ClassVar[bool] = True
+
+    def __call__(self, layer, stress, machine):
+        along = [np.array([[1.0, y], [59.0, y]]) for y in (6.0, 12.0, 18.0)]
+        across = [np.array([[x, 1.0], [x, 23.0]]) for x in (20.0, 40.0)]
+        return Toolpaths.from_plane(along if layer.index % 2 else along + across, layer)
+
+
+def test_strands_that_cross_by_intention_are_reported():
+    result = compare(strip(), {"woven": Woven()}, natural=True)
+    said = "woven: strands cross in the joints: 12 crossings on 2 of 4 layers, thicker there"
+    assert f"{said}; the bound does not hold for strands laid over each other" in remarks(result)
+    assert said in remarks(replace(result, bound=None))
+
+
+def test_the_bound_says_that_it_is_not_one_of_bonded_fibres(compared):
+    best = ranking(compared)[0]
+    assert "(fibres carrying tension only): " in remarks(compared)[-1]
+    bracket = best.tested.bracket
+    stiff = replace(bracket.bonded, stiffness=10.0 * bracket.bonded.stiffness)
+    tested = replace(best.tested, bracket=replace(bracket, bonded=stiff))
+    more = replace(compared, runs=(replace(best, tested=tested),))
+    assert "tension only; bonded fibres are not bounded): " in remarks(more)[-1]
+
+
+def test_thin_fibre_is_reported_not_dropped():
+    strategies = {"zigzag": create("zigzag", {"spacing": 20.0})}
+    case = replace(strip(), machine=Machine(minimum_length=5000.0))
+    (run,) = compare(case, strategies, natural=True).runs
+    assert run.failure.startswith("laid no fibre")
+
+
+@pytest.mark.parametrize(
+    ("arguments", "message"),
+    [
+        ({"strategies": ["isocurf"]}, "no strategy named 'isocurf'; there are: concentric,"),
+        ({"strategies": []}, "at least one strategy"),
+        ({"strategies": ["zigzag", "zigzag"]}, "'zigzag' more than once"),
+        ({"layers": 0}, "at least 1; got 0"),
+        ({"fibre_per_layer": -1.0}, "above 0 mm; got -1"),
+        ({"fibre_per_layer": 10.0, "natural": True}, "not both"),
+        ({"load_case": "twist"}, "no load case named 'twist'; the case has: pull, push"),
+    ],
+)
+def test_bad_input(arguments, message):
+    with pytest.raises(InputError, match=message):
+        compare(strip(), **arguments)
+
+
+def test_parameters_of_the_case_come_before_defaults_and_after_given_ones():
+    case = replace(strip(), parameters={"zigzag": {"angle": 10.0, "turn": 5.0}})
+    (zigzag,) = create_all(case, ["zigzag"], {"zigzag": {"turn": 7.0}}).values()
+    assert (zigzag.angle, zigzag.turn) == (10.0, 7.0)
+    with pytest.raises(InputError, match="'isocurve', which is not among"):
+        create_all(case, ["zigzag"], {"isocurve": {"cap": 80.0}})
+
+
+def test_no_run_exceeds_the_bound(compared):
+    ratios = [run.tested.bracket.tension.ratio for run in compared.runs]
+    assert 1.0 < max(ratios) <= compared.bound.ratio
+    # uniform pull and straight fibre of rho 4 mm^2: the rule of mixtures
+    length = max(float(run.toolpaths.lengths.sum()) for run in compared.runs)
+    area = SIZE[1] * SIZE[2]
+    assert compared.bound.ratio == pytest.approx(1.0 + 4.0 * length / SIZE[0] / area, rel=2e-2)
+    assert f"more than {compared.bound.ratio:.2f} times" in remarks(compared)[-1]
+
+
+def test_strands_that_overlap_may_exceed_the_bound(compared):
+    best = ranking(compared)[0]
+    ratio = 0.5 * (1.0 + best.tested.bracket.tension.ratio)
+    beaten = replace(compared, bound=replace(compared.bound, ratio=ratio))
+    said = remarks(beaten)[-1]
+    assert said.startswith(f"only where strands overlap, as those of {best.name} do, paths of ")
+    assert f"more than {ratio:.2f} times as stiff" in said
+
+
+def test_captions_of_pictures_count_paths(compared):
+    layer, machine = compared.layers[0], compared.case.machine
+    line = np.array([[0.0, 10.0], [60.0, 10.0]])
+    for count, said in ((0, "no fibre"), (1, "60 mm in 1 path,"), (2, "120 mm in 2 paths,")):
+        lines = [line + np.array([0.0, 3.0 * k]) for k in range(count)]
+        paths = Toolpaths.from_plane(lines, layer)
+        found = evaluate(paths, compared.layers, compared.stress, machine)
+        assert caption(replace(compared.runs[0], evaluation=found), layer).startswith(said)

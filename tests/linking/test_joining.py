@@ -1,0 +1,141 @@
+"""Joining, linking, conformal curves and clearance, on pieces made by hand."""
+
+import numpy as np
+import pytest
+import shapely
+from hypothesis import given, settings
+from hypothesis import strategies as st
+
+from ccfem.linking.clearance import trim_to_clearance
+from ccfem.linking.conformal import lead_into, parallel_curve
+from ccfem.linking.finishing import close_short_ring
+from ccfem.linking.joining import Joint, join, link_ends
+
+SQUARE = shapely.box(0.0, 0.0, 20.0, 20.0)
+
+
+def vertical(x: float, low: float = 0.0, high: float = 20.0) -> np.ndarray:
+    y = np.linspace(low, high, 41)
+    return np.column_stack([np.full(41, x), y])
+
+
+def length(line: np.ndarray) -> float:
+    return float(np.linalg.norm(np.diff(line, axis=0), axis=1).sum())
+
+
+def test_join_follows_the_joints_whatever_the_direction() -> None:
+    a, b, c = vertical(0.0), vertical(1.0), vertical(2.0)
+    joined = join([a, b, c], [Joint(1, 3, np.zeros((0, 2))), Joint(2, 4, np.zeros((0, 2)))])
+    assert len(joined) == 1
+    assert length(joined[0]) == pytest.approx(3 * 20.0 + 2.0)
+
+
+def test_join_closes_a_ring() -> None:
+    a, b = vertical(0.0), vertical(1.0)
+    (ring,) = join([a, b], [Joint(0, 2, np.zeros((0, 2))), Joint(1, 3, np.zeros((0, 2)))])
+    np.testing.assert_array_equal(ring[0], ring[-1])
+    assert length(ring) == pytest.approx(42.0)
+
+
+@pytest.mark.parametrize("along_boundary", [True, False])
+def test_parallel_strands_become_one_meander(along_boundary: bool) -> None:
+    lines = [vertical(x) for x in (2.0, 4.0, 6.0, 8.0)]
+    (path,) = link_ends(lines, SQUARE, 3.0, 1.0, along_boundary=along_boundary)
+    assert length(path) == pytest.approx(4 * 20.0 + 3 * 2.0, abs=3.1)
+    assert shapely.LineString(path).is_simple
+    assert shapely.covers(SQUARE, shapely.LineString(path))
+
+
+def test_links_do_not_cross_strands_holes_or_the_limit() -> None:
+    lines = [vertical(2.0), vertical(4.0)]
+    assert len(link_ends(lines, SQUARE, 1.5, 1.0)) == 2
+    between = np.array([[3.0, -10.0], [3.0, 30.0]])
+    assert len(link_ends([*lines, between], shapely.box(0, -12, 20, 32), 2.5, 1.0)) == 3
+    holed = SQUARE.difference(shapely.box(2.5, -1.0, 3.5, 21.0))
+    assert len(link_ends(lines, holed, 2.5, 1.0)) == 2
+
+
+@settings(max_examples=25, deadline=None)
+@given(seed=st.integers(0, 10**6))
+def test_links_stay_inside_and_cross_nothing(seed: int) -> None:
+    random = np.random.default_rng(seed)
+    disc = shapely.Point(0, 0).buffer(10.0).difference(shapely.Point(2, 0).buffer(3.0))
+    lines = []
+    for x in np.arange(-9.0, 9.0, 1.1 + random.random()):
+        piece = shapely.intersection(shapely.LineString([(x, -20), (x, 20)]), disc)
+        lines += [shapely.get_coordinates(p) for p in shapely.get_parts(piece)]
+    paths = link_ends(lines, disc, random.uniform(1.0, 6.0), 1.0)
+    assert len(paths) <= len(lines)
+    strings = [shapely.LineString(path) for path in paths]
+    assert all(shapely.covers(disc.buffer(1e-9), string) for string in strings)
+    assert all(string.is_simple for string in strings)
+    assert not any(a.crosses(b) for i, a in enumerate(strings) for b in strings[:i])
+
+
+def test_parallel_curve_of_a_round_hole_is_a_circle() -> None:
+    hole = shapely.Point(10, 10).buffer(3.0, quad_segs=64)
+    (ring,) = parallel_curve(hole, 1.5, SQUARE.difference(hole))
+    np.testing.assert_allclose(np.hypot(*(ring - 10.0).T), 4.5, atol=0.01)
+    np.testing.assert_array_equal(ring[0], ring[-1])
+
+
+def test_lines_are_led_round_the_hole() -> None:
+    hole = shapely.Point(10, 10).buffer(3.0, quad_segs=64)
+    section = SQUARE.difference(hole)
+    pieces = []
+    for x in (9.0, 11.0):
+        parts = shapely.get_parts(section.intersection(shapely.LineString([(x, 0), (x, 20)])))
+        pieces += [shapely.get_coordinates(part) for part in parts]
+    led = lead_into(pieces, hole, 2.5, section)
+    assert len(led) == 2
+    for line in led:
+        assert shapely.distance(shapely.LineString(line), hole) == pytest.approx(2.5, abs=0.01)
+
+
+def test_the_shorter_of_two_close_strands_is_cut() -> None:
+    long, short = vertical(5.0, 0.0, 20.0), vertical(5.5, 5.0, 15.0)
+    kept = trim_to_clearance([short, long], 1.0, 2.0)
+    assert len(kept) == 1
+    np.testing.assert_array_equal(kept[0], long)
+    slanted = np.column_stack([np.linspace(5.2, 9.0, 60), np.linspace(1.0, 14.0, 60)])
+    kept = trim_to_clearance([slanted, long], 1.0, 2.0)
+    assert len(kept) == 2
+    assert shapely.distance(*[shapely.LineString(line) for line in kept]) >= 1.0
+
+
+@settings(max_examples=25, deadline=None)
+@given(seed=st.integers(0, 10**6))
+def test_trimmed_strands_keep_the_clearance(seed: int) -> None:
+    random = np.random.default_rng(seed)
+    lines = []
+    for _ in range(8):
+        angle = random.uniform(0, np.pi) + np.linspace(0, random.uniform(-1, 1), 80)
+        step = 0.3 * np.column_stack([np.cos(angle), np.sin(angle)])
+        lines.append(random.uniform(0, 20, 2) + np.cumsum(step, axis=0))
+    kept = trim_to_clearance(lines, 1.0, 3.0)
+    strings = [shapely.LineString(line) for line in kept]
+    of = [
+        next(k for k, line in enumerate(lines) if (line == piece[1]).all(1).any()) for piece in kept
+    ]
+    # pieces of one strand follow each other, with a gap where a part of it was cut out
+    nearest = [
+        a.distance(b)
+        for i, a in enumerate(strings)
+        for j, b in enumerate(strings[:i])
+        if of[i] != of[j]
+    ]
+    # vertices keep the clearance exactly; between them a step of 0.3 mm can cut the corner
+    assert min([*nearest, 1.0]) >= np.sqrt(1.0 - 0.15**2) - 1e-9
+    assert all(string.length >= 3.0 for string in strings)
+
+
+def test_a_short_ring_runs_on_over_its_start() -> None:
+    angle = np.linspace(0.0, 2 * np.pi, 65)
+    ring = 6.5 * np.column_stack([np.cos(angle), np.sin(angle)])
+    ring[-1] = ring[0]
+    assert length(ring) == pytest.approx(40.8, abs=0.1)
+    longer = close_short_ring(ring, 42.0)
+    assert length(longer) == pytest.approx(42.0)
+    assert length(longer) >= 42.0
+    assert close_short_ring(ring, 50.0) is ring
+    assert close_short_ring(ring, 40.0) is ring

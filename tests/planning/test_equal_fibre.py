@@ -1,0 +1,177 @@
+"""Planning to a wanted length: never more, as near as the strategy's steps allow, and honest."""
+
+import re
+from dataclasses import dataclass
+from typing import ClassVar
+
+import numpy as np
+import pytest
+
+from ccfem.elasticity.problem import Force, Problem, Support
+from ccfem.elasticity.solve import solve
+from ccfem.errors import InputError
+from ccfem.layers import slice_planar
+from ccfem.machine import Machine
+from ccfem.materials import isotropic
+from ccfem.mesh.box import box_mesh
+from ccfem.planning.equal_fibre import Planned, length_per_layer, plan_to_length
+from ccfem.strategies import Amount, plan
+from ccfem.toolpaths import Toolpaths
+
+LENGTH, WIDTH = 60.0, 40.0
+MACHINE = Machine()
+
+
+@dataclass(frozen=True)
+class Lines:
+    """``int(WIDTH / spacing)`` lines along the plate: its length changes in steps of a line."""
+
+    spacing: float = 1.0
+    amount: ClassVar[Amount] = Amount("spacing", most=1.0, least=20.0)
+
+    def __call__(self, layer, stress, machine):
+        count = int(WIDTH / self.spacing + 1e-9)
+        ys = (np.arange(count) + 0.5) * self.spacing
+        return Toolpaths.from_plane([np.array([[0.0, y], [LENGTH, y]]) for y in ys], layer)
+
+
+@dataclass(frozen=True)
+class OneLine:
+    """One line whose length is a curved function of the parameter and of the layer."""
+
+    share: float = 50.0
+    amount: ClassVar[Amount] = Amount("share", most=0.0, least=100.0)
+
+    def __call__(self, layer, stress, machine):
+        x = LENGTH * np.sqrt(1.0 - self.share / 100.0) * (0.5 + 0.1 * (layer.index % 3)) + 1e-3
+        return Toolpaths.from_plane([np.array([[0.0, 1.0], [x, 1.0]])], layer)
+
+
+@pytest.fixture(scope="module")
+def plate():
+    mesh = box_mesh((LENGTH, WIDTH, 4.0), (6, 4, 2))
+    problem = Problem(
+        mesh, isotropic(3500.0, 0.35), (Support("x_min"),), {"pull": (Force("x_max", (1e3, 0, 0)),)}
+    )
+    return solve(problem)["pull"], slice_planar(mesh, count=8)
+
+
+@pytest.mark.parametrize("wanted", [2400.0, 1730.0, 1000.0, 600.0, 130.0])
+def test_steps_of_a_line(plate, wanted):
+    """Layers are brought to the wanted mean by one line more on as many as it takes."""
+    stress, layers = plate
+    planned = plan_to_length(Lines(), layers, stress, MACHINE, wanted)
+    lines = int(wanted * len(layers) / LENGTH)
+    assert planned.length_per_layer == pytest.approx(lines * LENGTH / len(layers))
+    on_each = [len(planned.toolpaths.on_layer(layer.index)) for layer in layers]
+    assert max(on_each) - min(on_each) <= 1
+    more = on_each.count(max(on_each)) if max(on_each) > min(on_each) else 0
+    assert (f"on {more} of 8 layers" in planned.note) == bool(more)
+
+
+def test_mixed_layers_are_those_of_the_two_values(plate):
+    stress, layers = plate
+    planned = plan_to_length(Lines(), layers, stress, MACHINE, 1000.0)
+    other = float(re.match(r"spacing = (\S+) on", planned.note)[1])
+    both = [
+        plan(Lines(value), layers, stress, MACHINE) for value in (planned.strategy.spacing, other)
+    ]
+    matched = 0
+    for layer in layers:
+        mine, less, more = (
+            paths.on_layer(layer.index).points for paths in (planned.toolpaths, *both)
+        )
+        same = more if len(mine) == len(more) else less
+        np.testing.assert_allclose(mine, same, atol=1e-3)
+        matched += same is more
+    assert f"on {matched} of 8 layers" in planned.note
+
+
+@pytest.mark.parametrize("wanted", [30.0, 20.0, 10.0, 3.0, 1.0])
+def test_a_length_that_can_be_met_is_met(plate, wanted):
+    stress, layers = plate
+    planned = plan_to_length(OneLine(), layers, stress, MACHINE, wanted)
+    assert 0.99 * wanted <= planned.length_per_layer <= wanted
+    assert planned.note == ""
+    again = plan(planned.strategy, layers, stress, MACHINE)
+    np.testing.assert_array_equal(again.points, planned.toolpaths.points)
+    assert length_per_layer(again, layers) == planned.length_per_layer
+
+
+def test_more_than_the_most_is_said(plate):
+    stress, layers = plate
+    most = plan_to_length(Lines(), layers, stress, MACHINE, 9000.0)
+    assert most.length_per_layer == pytest.approx(40 * LENGTH)
+    assert "its most, at spacing = 1" in most.note
+
+
+def test_where_the_least_is_too_much_layers_stay_empty(plate):
+    stress, layers = plate
+    least = plan_to_length(Lines(), layers, stress, MACHINE, 61.0)
+    assert least.length_per_layer == pytest.approx(LENGTH)
+    assert least.note.startswith("spacing = 20 on 4 of 8 layers, no fibre on the others")
+    filled = np.unique(least.toolpaths.layer)
+    assert len(filled) == 4
+    assert np.diff(filled).max() <= 3
+    single = plan_to_length(Lines(), layers[:1], stress, MACHINE, 61.0)
+    assert single.length_per_layer == pytest.approx(2 * LENGTH)
+    assert "its least, at spacing = 20" in single.note
+
+
+@dataclass(frozen=True)
+class Counted:
+    """One line of a length in proportion to the parameter; counts how often it plans."""
+
+    share: float = 50.0
+    amount: ClassVar[Amount] = Amount("share", most=100.0, least=1.0)
+    planned: ClassVar[list[int]] = []
+
+    def __call__(self, layer, stress, machine):
+        self.planned.append(layer.index)
+        x = 0.01 * self.share * LENGTH
+        return Toolpaths.from_plane([np.array([[0.0, 1.0], [x, 1.0]])], layer)
+
+
+def test_a_known_plan_saves_the_search(plate):
+    """Where lengths are in proportion one more plan has to do: a strategy may take a minute."""
+    stress, layers = plate
+    toolpaths = plan(Counted(), layers, stress, MACHINE)
+    natural = Planned(Counted(), toolpaths, length_per_layer(toolpaths, layers))
+    Counted.planned.clear()
+    result = plan_to_length(Counted(), layers, stress, MACHINE, 12.0, start=natural)
+    assert 0.99 * 12.0 <= result.length_per_layer <= 12.0
+    assert len(Counted.planned) == len(layers)
+
+
+@dataclass(frozen=True)
+class Ragged:
+    """One line that jumps in length between 41 and 43 % of the plate, whatever the parameter."""
+
+    share: float = 50.0
+    amount: ClassVar[Amount] = Amount("share", most=100.0, least=1.0)
+    planned: ClassVar[list[int]] = []
+
+    def __call__(self, layer, stress, machine):
+        self.planned.append(layer.index)
+        share = self.share if abs(self.share - 42.0) > 1.0 else np.where(self.share < 42, 41, 43)
+        return Toolpaths.from_plane([np.array([[0.0, 1.0], [0.01 * share * LENGTH, 1.0]])], layer)
+
+
+def test_close_plans_on_either_side_are_shared_out_without_a_search(plate):
+    """A length that no parameter gives: three plans of the stack, the first one counted."""
+    stress, layers = plate
+    Ragged.planned.clear()
+    toolpaths = plan(Ragged(43.2), layers, stress, MACHINE)
+    natural = Planned(Ragged(43.2), toolpaths, length_per_layer(toolpaths, layers))
+    wanted = 0.425 * LENGTH
+    result = plan_to_length(Ragged(43.2), layers, stress, MACHINE, wanted, start=natural)
+    assert 0.99 * wanted <= result.length_per_layer <= wanted
+    assert re.match(r"share = \S+ on [1-7] of 8 layers$", result.note)
+    assert len(Ragged.planned) <= 3 * len(layers)
+
+
+@pytest.mark.parametrize("wanted", [0.0, -5.0, float("nan"), float("inf")])
+def test_no_length_is_refused(plate, wanted):
+    stress, layers = plate
+    with pytest.raises(InputError, match="above 0 mm"):
+        plan_to_length(Lines(), layers, stress, MACHINE, wanted)
