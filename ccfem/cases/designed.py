@@ -20,6 +20,7 @@ from ccfem.cases.filament import printed_pla
 from ccfem.cases.stored import mesh_of_case, stored_outline
 from ccfem.elasticity.problem import Force, Problem, Support
 from ccfem.errors import InputError
+from ccfem.layers.slicing.planar import Planar
 from ccfem.machine.machine import Machine
 from ccfem.machine.speed_table import SpeedTable
 from ccfem.materials import plane_stress
@@ -322,7 +323,7 @@ def designed_case(
         name=plate.name,
         title=f"{plate.title}, {what}",
         problem=problem,
-        layers=_LAYERS,
+        slicing=Planar(count=_LAYERS),
         machine=prepreg_printer(),
         source=f"{SOURCE}: size and loading; what it does not state is assumed",
     )

@@ -13,15 +13,19 @@ from ccfem.elasticity.stress_field import StressField
 from ccfem.errors import InputError, SolveError, known_names
 from ccfem.evaluation import evaluate
 from ccfem.fibre_aware.upper_bound import upper_bound
-from ccfem.layers import Layer, slice_planar
+from ccfem.layers import Layer
+from ccfem.layers.slicer import Slicer
+from ccfem.layers.slicing import as_slicer
 from ccfem.planning.equal_fibre import (
     Planned,
     check_wanted,
     length_per_layer,
     plan_to_length,
 )
+from ccfem.planning.plan import plan
+from ccfem.planning.strategy import Strategy
 from ccfem.progress import Progress, silent
-from ccfem.strategies import Strategy, create, plan
+from ccfem.strategies import create
 from ccfem.toolpaths import Toolpaths
 from ccfem.virtual_testing.equilibrium import BONDED, TENSION
 from ccfem.virtual_testing.specimen import Specimen
@@ -79,7 +83,7 @@ def create_all(
 
 def solve_and_slice(
     case: Case,
-    layers: int | Sequence[float] | None = None,
+    layers: int | Sequence[float] | str | Slicer | None = None,
     load_case: str | None = None,
     backend: str = "auto",
 ) -> tuple[StressField, tuple[Layer, ...], dict[str, float]]:
@@ -88,8 +92,9 @@ def solve_and_slice(
     Parameters
     ----------
     case : Case
-    layers : int or sequence of float, optional
-        Number of layers instead of the case's own, or their heights along the build direction, mm.
+    layers : int, sequence of float, str or Slicer, optional
+        Instead of the case's own slicing: a number of flat layers, their heights along the build
+        direction in mm, the name of a slicer, or a slicer.
     load_case : str, optional
         By default the first one.
     backend : str, default "auto"
@@ -105,16 +110,15 @@ def solve_and_slice(
     with _timed(seconds, "solve"):
         stress = solve(case.problem, backend=backend)[name]
     with _timed(seconds, "slice"):
-        chosen = case.layers if layers is None else layers
-        count, heights = (chosen, None) if isinstance(chosen, int) else (None, chosen)
-        stack = slice_planar(case.problem.mesh, case.build, count=count, heights=heights)
+        slicer = case.slicing if layers is None else as_slicer(layers)
+        stack = slicer(stress, case.build, case.machine)
     return stress, stack, seconds
 
 
 def compare(
     case: Case,
     strategies: Mapping[str, Strategy] | Sequence[str] = STRATEGIES,
-    layers: int | Sequence[float] | None = None,
+    layers: int | Sequence[float] | str | Slicer | None = None,
     fibre_per_layer: float | None = None,
     natural: bool = False,
     strand: Strand | None = DEFAULT_STRAND,
@@ -134,8 +138,9 @@ def compare(
     case : Case
     strategies : mapping of name to Strategy, or sequence of names
         Named ones take the parameters of the case.
-    layers : int or sequence of float, optional
-        Number of layers instead of the case's own, or their heights along the build direction, mm.
+    layers : int, sequence of float, str or Slicer, optional
+        Instead of the case's own slicing: a number of flat layers, their heights along the build
+        direction in mm, the name of a slicer, or a slicer.
     fibre_per_layer : float, mm, optional
         Length that every strategy is held to, mean over the layers.
     natural : bool, default False

@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING, Any, ClassVar
 import numpy as np
 
 from ccfem.arrays import FloatArray, IntArray, read_only
-from ccfem.elasticity.stress_field import StressField
+from ccfem.elasticity.part_stress import PartStress
 from ccfem.errors import InputError
 from ccfem.evaluation import (
     alignment,
@@ -26,6 +26,7 @@ from ccfem.evaluation import (
 from ccfem.evaluation.column import Column
 from ccfem.evaluation.plane_paths import PlanePaths, plane_paths, pool
 from ccfem.layers.layer import Layer
+from ccfem.layers.layer_stress import stress_on
 from ccfem.machine.machine import Machine
 from ccfem.toolpaths import Toolpaths
 
@@ -113,7 +114,7 @@ class Evaluation:
 
 
 def evaluate(
-    toolpaths: Toolpaths, layers: Sequence[Layer], stress: StressField, machine: Machine
+    toolpaths: Toolpaths, layers: Sequence[Layer], stress: PartStress, machine: Machine
 ) -> Evaluation:
     """Evaluate the fibre paths of a part.
 
@@ -125,7 +126,7 @@ def evaluate(
         Paths of other kinds than fibre count in the print time only.
     layers : sequence of Layer
         Flat layers, among them every layer that has a path.
-    stress : StressField
+    stress : PartStress
     machine : Machine
 
     Returns
@@ -158,7 +159,9 @@ def _check_layers(toolpaths: Toolpaths, layers: Sequence[Layer]) -> None:
                 "the layers that the paths were planned on"
             )
         layer = known[index]
-        apart = np.abs(toolpaths.on_layer(index).points @ layer.frame[2] - layer.height).max()
+        apart = np.abs(
+            toolpaths.on_layer(index).points @ layer.plane.frame[2] - layer.plane.height
+        ).max()
         if apart > 0.5 * layer.thickness + _ROUNDING:
             raise InputError(
                 f"a path of layer {index} lies {apart:.3g} mm above or below it: give the layers "
@@ -166,11 +169,11 @@ def _check_layers(toolpaths: Toolpaths, layers: Sequence[Layer]) -> None:
             )
 
 
-def _sample(toolpaths: Toolpaths, layer: Layer, stress: StressField, machine: Machine) -> list[Any]:
+def _sample(toolpaths: Toolpaths, layer: Layer, stress: PartStress, machine: Machine) -> list[Any]:
     """Take the samples of one layer, in the order that `_indices` reads them."""
     width = machine.fibre_width
     paths: PlanePaths = plane_paths(toolpaths, layer)
-    on_layer = stress.on(layer)
+    on_layer = stress_on(layer, stress)
     return [
         manufacture.sample_manufacture(paths, toolpaths, machine),
         sinuosity.sample_sinuosity(paths, width),

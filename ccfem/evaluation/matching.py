@@ -18,7 +18,6 @@ import numpy as np
 import shapely
 
 from ccfem.arrays import FloatArray, read_only
-from ccfem.elasticity.stress_field import LayerStress
 from ccfem.errors import InputError
 from ccfem.evaluation.alignment import AlignmentSamples, sample_alignment
 from ccfem.evaluation.column import Column
@@ -26,6 +25,7 @@ from ccfem.evaluation.plane_paths import PlanePaths, plane_paths, pool
 from ccfem.evaluation.stiffness_alignment import strongest
 from ccfem.geometry.places import INSIDE, section_places
 from ccfem.geometry.polylines import subdivide
+from ccfem.layers.layer_stress import LayerStress
 from ccfem.tensor import in_plane, largest_in_plane
 from ccfem.toolpaths import Toolpaths
 
@@ -200,12 +200,12 @@ def _stress_vectors(stress: LayerStress) -> tuple[FloatArray, FloatArray, FloatA
     The stress is the nodal one, at the centroid.
     """
     layer = stress.layer
-    plane = in_plane(stress.nodal, layer.frame)[layer.triangles].mean(axis=1)
+    plane = in_plane(stress.nodal, layer.plane.frame)[layer.triangles].mean(axis=1)
     largest, smallest, angle = largest_in_plane(plane)
     across, defined = strongest(largest, smallest)
     direction = angle + 0.5 * np.pi * across
     size = np.maximum(np.abs(largest), np.abs(smallest))
-    centres = layer.plane_points[layer.triangles].mean(axis=1)
+    centres = layer.plane.points[layer.triangles].mean(axis=1)
     return centres[defined], direction[defined], size[defined], layer.areas[defined]
 
 
@@ -216,7 +216,7 @@ def _pieces(paths: PlanePaths, longest: float) -> tuple[FloatArray, FloatArray]:
     follows[offsets[1:] - 1] = False
     first = np.flatnonzero(follows)
     starts, ends = points[first], points[first + 1]
-    inside = section_places(0.5 * (starts + ends), paths.layer.polygon) == INSIDE
+    inside = section_places(0.5 * (starts + ends), paths.layer.plane.polygon) == INSIDE
     return starts[inside], ends[inside]
 
 

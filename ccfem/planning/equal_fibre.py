@@ -11,11 +11,12 @@ from typing import Any
 
 import numpy as np
 
-from ccfem.elasticity.stress_field import StressField
+from ccfem.elasticity.part_stress import PartStress
 from ccfem.errors import InputError
 from ccfem.layers.layer import Layer
 from ccfem.machine.machine import Machine
-from ccfem.planning.strategy import Amount, Strategy, plan
+from ccfem.planning.plan import plan
+from ccfem.planning.strategy import Amount, Strategy
 from ccfem.toolpaths import FIBRE, Toolpaths
 
 __all__ = ["TOLERANCE", "Planned", "check_wanted", "length_per_layer", "plan_to_length"]
@@ -74,7 +75,7 @@ def check_wanted(wanted: float) -> None:
 def plan_to_length(
     strategy: Strategy,
     layers: Sequence[Layer],
-    stress: StressField,
+    stress: PartStress,
     machine: Machine,
     wanted: float,
     tolerance: float = TOLERANCE,
@@ -96,7 +97,7 @@ def plan_to_length(
     strategy : Strategy
         Its own value is where the search starts.
     layers : sequence of Layer
-    stress : StressField
+    stress : PartStress
     machine : Machine
     wanted : float, mm
         Fibre per layer: mean over the stack.
@@ -132,7 +133,7 @@ class _Trials:
 
     strategy: Strategy
     layers: Sequence[Layer]
-    stress: StressField
+    stress: PartStress
     machine: Machine
     wanted: float
     tolerance: float
