@@ -16,6 +16,7 @@ from ccfem.comparison.remarks import remarks, verdict
 from ccfem.elasticity.problem import Force, Problem, Support
 from ccfem.errors import InputError
 from ccfem.evaluation import evaluate
+from ccfem.layers.slicing import Planar
 from ccfem.machine import Machine
 from ccfem.materials import isotropic
 from ccfem.mesh.box import box_mesh
@@ -37,7 +38,8 @@ def strip(force=1000.0):
         supports,
         {"pull": (Force("x_max", (force, 0.0, 0.0)),), "push": (Force("x_max", (-1.0, 0.0, 0.0)),)},
     )
-    return Case("strip", "Strip", problem, layers=4, machine=Machine(minimum_length=20.0))
+    machine = Machine(minimum_length=20.0)
+    return Case("strip", "Strip", problem, slicing=Planar(count=4), machine=machine)
 
 
 @pytest.fixture(scope="module")

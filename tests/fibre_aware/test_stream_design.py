@@ -152,7 +152,7 @@ def test_axes_turn_with_the_part(bent_beam):
         mesh, stress.problem.material, (Support("x_min"),), {"t": (Force("x_max", force),)}
     )
     field = solve(turned, tolerance=1e-10)["t"]
-    other = SmearedPart.of(field, Planar(count=4).cut(mesh)[0].frame)
+    other = SmearedPart.of(field, Planar(count=4).cut(mesh)[0].plane.frame)
     centre_2, axes_2 = plane_axes(other, np.linalg.norm(field.stress, axis=(1, 2)) ** 2)
     np.testing.assert_allclose(centre_2, turn @ centre, atol=1e-6)
     assert abs(axes_2[0] @ (turn @ axes[0])) == pytest.approx(1.0, abs=1e-9)

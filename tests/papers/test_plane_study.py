@@ -1,5 +1,7 @@
 """Plates with the fibre as laid: sensitivity, agreement, energies, printing."""
 
+from types import SimpleNamespace
+
 import numpy as np
 import pytest
 import shapely
@@ -47,11 +49,10 @@ def holed():
 def paths(*lines, section=None, closed=None):
     """Paths on a section, without a layer behind it."""
 
-    class Section:
-        polygon = section
+    layer = SimpleNamespace(plane=SimpleNamespace(polygon=section))
 
     packed = pack([np.array(line, dtype=float) for line in lines])
-    return PlanePaths(Section(), *packed, np.array(closed or [False] * len(lines)))
+    return PlanePaths(layer, *packed, np.array(closed or [False] * len(lines)))
 
 
 @pytest.mark.parametrize("name", TABLE_5)

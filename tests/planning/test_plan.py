@@ -52,5 +52,5 @@ def test_strategies_that_solve_again_say_what_they_need(field, name):
 def test_given_stress_must_fit_its_mesh(field):
     with pytest.raises(InputError, match=r"stress must have shape \(\d+, 3, 3\), one tensor for"):
         GivenStress(MESH, field.stress[:-1], field.nodal)
-    with pytest.raises(InputError, match=r"nodal must have shape .* from_voigt"):
+    with pytest.raises(InputError, match=r"nodal must have shape .* use tensor.from_voigt"):
         GivenStress(MESH, field.stress, np.zeros((len(MESH.points), 6)))

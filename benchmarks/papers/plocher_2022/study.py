@@ -41,9 +41,10 @@ from ccfem.layers.layer_stress import stress_on
 from ccfem.linking.print_order import nearest_end_order
 from ccfem.machine import Machine
 from ccfem.materials import named_material
+from ccfem.planning import plan
 from ccfem.plates.solve import solve_plane
 from ccfem.raster.plan import RasterPlan
-from ccfem.strategies import create, mps, plan
+from ccfem.strategies import create, mps
 from ccfem.toolpaths import FIBRE, Toolpaths
 
 __all__ = [

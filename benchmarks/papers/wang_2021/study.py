@@ -223,16 +223,17 @@ def run_part(case: Case, patterns: Sequence[str], tested: bool) -> PartStudy:
     (layer,) = Planar(count=1).cut(case.problem.mesh)
     stress = stress_on(layer, field)
     specimen = Specimen.of(field) if tested else None
-    found = {p: _run_pattern(p, layer, stress, machine, specimen) for p in patterns}
+    found = {p: _run_pattern(p, layer, field, machine, specimen) for p in patterns}
     return PartStudy(case, machine, field, layer, stress, MappingProxyType(found))
 
 
 def _run_pattern(
-    name: str, layer: Layer, stress: LayerStress, machine: Machine, specimen: Specimen | None
+    name: str, layer: Layer, field: StressField, machine: Machine, specimen: Specimen | None
 ) -> PatternStudy:
     strategy, parameters = PATTERNS[name]
+    stress = stress_on(layer, field)
     begun = perf_counter()
-    toolpaths = plan(create(strategy, parameters), (layer,), stress.part, machine)
+    toolpaths = plan(create(strategy, parameters), (layer,), field, machine)
     seconds = perf_counter() - begun
     width = machine.fibre_width
     rates = {
@@ -242,7 +243,7 @@ def _run_pattern(
     paths = plane_paths(toolpaths, layer)
     whole = PlanePaths(layer, paths.points, paths.offsets, paths.closed)
     places, curvature = curvature_along(whole)
-    total = evaluate(toolpaths, (layer,), stress.part, machine).total
+    total = evaluate(toolpaths, (layer,), field, machine).total
     return PatternStudy(
         toolpaths,
         paths,
