@@ -19,7 +19,7 @@ from ccfem.machine.machine import Machine
 from ccfem.planning.strategy import Amount
 from ccfem.raster.bitmap import bitmap
 from ccfem.raster.patterns import grid_regions
-from ccfem.raster.plan import RasterPlan, raster_plan
+from ccfem.raster.raster_plan import RasterPlan, raster_plan
 from ccfem.toolpaths import Toolpaths
 
 __all__ = ["Grid"]

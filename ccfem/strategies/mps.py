@@ -27,7 +27,7 @@ from ccfem.planning.strategy import Amount
 from ccfem.raster.bitmap import bitmap
 from ccfem.raster.guides import stress_guides
 from ccfem.raster.patterns import inside_shells, stress_regions
-from ccfem.raster.plan import RasterPlan, raster_plan
+from ccfem.raster.raster_plan import RasterPlan, raster_plan
 from ccfem.tensor import in_plane
 from ccfem.toolpaths import Toolpaths
 

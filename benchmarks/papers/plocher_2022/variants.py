@@ -18,7 +18,7 @@ from ccfem.materials import named_material
 from ccfem.planning import plan
 from ccfem.plates.solve import PlaneField
 from ccfem.raster.patterns import concentric_regions, medial_regions
-from ccfem.raster.plan import raster_plan
+from ccfem.raster.raster_plan import raster_plan
 from ccfem.strategies import create
 from ccfem.tensor import largest_in_plane
 
