@@ -26,8 +26,7 @@ from ccfem.materials import plane_stress
 from ccfem.mesh.patches import Cylinder, Plane, patches_from_rules
 from ccfem.mesh.tet_mesh import TetMesh
 from ccfem.meshing import extrude
-from ccfem.plates.plane_mesh import PlaneMesh, raster_mesh
-from ccfem.plates.problem import PlaneProblem
+from ccfem.plates import PlaneMesh, PlaneProblem, raster_mesh
 from ccfem.progress import Progress, silent
 from ccfem.topopt.design import Design
 from ccfem.topopt.outline import solid

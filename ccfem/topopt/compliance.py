@@ -16,7 +16,8 @@ from ccfem.elasticity.solve import System, prepare
 from ccfem.elasticity.solvers import LARGEST_DIRECT, Solver, choose_direct, direct_backend
 from ccfem.errors import InputError
 from ccfem.plates.problem import PlaneProblem
-from ccfem.plates.solve import PlaneSystem, prepare_plane
+from ccfem.plates.solve import PlaneSystem
+from ccfem.plates.solve import prepare as prepare_plane
 
 __all__ = ["GroupedCompliance", "Loaded", "PlaneCompliance", "TetCompliance", "compliance_of"]
 

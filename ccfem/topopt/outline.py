@@ -10,8 +10,8 @@ from ccfem.arrays import BoolArray, FloatArray
 from ccfem.elasticity.problem import PointForce
 from ccfem.errors import InputError
 from ccfem.geometry.isocontours import isocontours
-from ccfem.plates.plane_mesh import raster_image
 from ccfem.plates.problem import PlaneProblem
+from ccfem.plates.raster_mesh import raster_image
 from ccfem.topopt.design import Design
 
 __all__ = ["outline", "solid"]

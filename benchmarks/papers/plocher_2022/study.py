@@ -40,7 +40,7 @@ from ccfem.layers.layer import Layer
 from ccfem.linking.print_order import nearest_end_order
 from ccfem.machine import Machine
 from ccfem.materials import named_material
-from ccfem.plates.solve import solve_plane
+from ccfem.plates import solve_plane
 from ccfem.raster.plan import RasterPlan
 from ccfem.strategies import create, mps, plan
 from ccfem.toolpaths import FIBRE, Toolpaths
