@@ -28,9 +28,7 @@ from ccfem.mesh.tet_mesh import TetMesh
 from ccfem.meshing import extrude
 from ccfem.plates import PlaneMesh, PlaneProblem, raster_mesh
 from ccfem.progress import Progress, silent
-from ccfem.topopt.design import Design
-from ccfem.topopt.outline import solid
-from ccfem.topopt.somp import somp
+from ccfem.topopt import Design, Somp, part_shape
 
 __all__ = [
     "ELEMENT_SIZE",
@@ -182,17 +180,12 @@ class DesignPlate:
         rims = shapely.union_all([hole.disc(hole.rim) for hole in self.holes if hole.rim > 0.0])
         return np.asarray(shapely.contains_xy(rims, x, y))
 
-    def design(self, iterations: int = 200, progress: Progress = silent) -> Design:
-        """Density and material axis of least compliance, by `somp`."""
-        return somp(
-            self.problem,
-            LAMINATE,
-            self.volume_fraction,
-            radius=self.radius * self.pixel,
-            solid=self.rims,
-            iterations=iterations,
-            progress=progress,
+    def design(self, max_iterations: int = 200, progress: Progress = silent) -> Design:
+        """Density and material axis of least compliance, by `Somp`."""
+        method = Somp(
+            self.volume_fraction, radius=self.radius * self.pixel, max_iterations=max_iterations
         )
+        return method(self.problem, LAMINATE, solid=self.rims, progress=progress)
 
     def outline(self, design: Design) -> Any:
         """Part that a design of this plate stands for: a shapely Polygon, mm."""
@@ -206,7 +199,7 @@ class DesignPlate:
         if self.mirror:
             density = 0.5 * (density + density[self._mirrored])
         smooth = replace(design, density=density)
-        return solid(smooth, self.volume_fraction, domain=self.domain)
+        return part_shape(smooth, self.volume_fraction, domain=self.domain)
 
     @property
     def _mirrored(self) -> IntArray:

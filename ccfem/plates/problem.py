@@ -8,7 +8,7 @@ from types import MappingProxyType
 import numpy as np
 
 from ccfem.arrays import FloatArray, read_only
-from ccfem.elasticity.problem import Load, Pressure, Support
+from ccfem.elasticity.problem import Load, Pressure, Support, patches_in_use
 from ccfem.errors import InputError
 from ccfem.plates.mesh import PlaneMesh, Sheet
 
@@ -71,6 +71,11 @@ class PlaneProblem:
                 raise InputError(
                     f"a plane problem is loaded in its plane; got {load}: give component z zero"
                 )
+
+    @property
+    def held_or_loaded(self) -> tuple[str, ...]:
+        """Names of the patches that carry a support or a load, sorted."""
+        return patches_in_use(self.supports, self.loads)
 
     @cached_property
     def volumes(self) -> FloatArray:
