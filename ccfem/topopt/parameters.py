@@ -1,14 +1,15 @@
 """The parameters that SIMP and SOMP share."""
 
 from dataclasses import dataclass
+from typing import Literal, get_args
 
 import numpy as np
 
 from ccfem.errors import InputError
 
-__all__ = ["FILTERS", "Parameters"]
+__all__ = ["Parameters"]
 
-FILTERS = ("sensitivity", "density")
+_Filter = Literal["sensitivity", "density"]
 
 
 @dataclass(frozen=True)
@@ -18,7 +19,7 @@ class Parameters:
     volume_fraction: float
     penalty: float = 3.0
     radius: float = 2.5
-    filter: str = "sensitivity"
+    filter: _Filter = "sensitivity"
     minimum_stiffness: float = 1e-9
     move: float = 0.2
     tolerance: float = 0.01
@@ -31,7 +32,7 @@ class Parameters:
             "volume_fraction": (0.0 < self.volume_fraction < 1.0, "in (0, 1)"),
             "penalty": (1.0 <= self.penalty < np.inf, "at least 1"),
             "radius": (0.0 < self.radius < np.inf, "above 0 mm"),
-            "filter": (self.filter in FILTERS, f"one of {', '.join(FILTERS)}"),
+            "filter": (self.filter in get_args(_Filter), f"one of {', '.join(get_args(_Filter))}"),
             "minimum_stiffness": (0.0 < self.minimum_stiffness < 1.0, "in (0, 1)"),
             "move": (0.0 < self.move <= 1.0, "in (0, 1]"),
             "tolerance": (self.tolerance >= 0.0, "at least 0"),

@@ -2,6 +2,7 @@
 
 from collections.abc import Mapping
 from dataclasses import dataclass, replace
+from typing import Literal, get_args
 
 import numpy as np
 
@@ -25,9 +26,9 @@ from ccfem.topopt.orientation import (
 from ccfem.topopt.parameters import Parameters
 from ccfem.topopt.parametrisation import Parametrisation
 
-__all__ = ["ORIENTATIONS", "Somp"]
+__all__ = ["Somp"]
 
-ORIENTATIONS = ("principal", "gradient", "fixed")
+_Orientation = Literal["principal", "gradient", "fixed"]
 
 
 @dataclass(frozen=True)
@@ -57,14 +58,15 @@ class Somp(Parameters):
     """
 
     minimum_stiffness: float = 1e-3
-    orientation: str = "principal"
+    orientation: _Orientation = "principal"
     relaxation: float = 0.5
 
     def __post_init__(self) -> None:
         super().__post_init__()
-        if self.orientation not in ORIENTATIONS:
+        known = get_args(_Orientation)
+        if self.orientation not in known:
             raise InputError(
-                f"orientation must be one of {', '.join(ORIENTATIONS)}; got "
+                f"orientation must be one of {', '.join(known)}; got "
                 f"{self.orientation!r}: correct it"
             )
         if not 0.0 < self.relaxation <= 1.0:

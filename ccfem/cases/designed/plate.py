@@ -1,10 +1,6 @@
-"""Plates that topology optimisation designs: the parts of Wang et al. 2021.
+"""A plate that topology optimisation designs: its problem, its design, and the part of that."""
 
-A plate is given by its border, holes, supports and load. From these come the problem that is
-optimised, the part that the optimum stands for, and the case of either part.
-"""
-
-from collections.abc import Callable, Mapping
+from collections.abc import Mapping
 from dataclasses import dataclass, replace
 from functools import cached_property
 from types import MappingProxyType
@@ -14,93 +10,24 @@ import numpy as np
 import shapely
 from scipy.spatial import cKDTree
 
-from ccfem.arrays import BoolArray, FloatArray, IntArray
-from ccfem.cases.case import Case
-from ccfem.cases.filament import printed_pla
-from ccfem.cases.stored import mesh_of_case, stored_outline
-from ccfem.elasticity.problem import Force, Problem, Support
+from ccfem.arrays import BoolArray, IntArray
+from ccfem.cases.designed.border import NEAR, Hole, Stretch
+from ccfem.cases.stored.files import stored_outline
+from ccfem.elasticity.problem import Force, Support
 from ccfem.errors import InputError
-from ccfem.machine.machine import Machine
-from ccfem.machine.speed_table import SpeedTable
 from ccfem.materials import plane_stress
 from ccfem.mesh.patches import Cylinder, Plane, patches_from_rules
 from ccfem.mesh.tet_mesh import TetMesh
 from ccfem.meshing import extrude
-from ccfem.plates import PlaneMesh, PlaneProblem, raster_mesh
+from ccfem.plates import PlaneProblem, raster_mesh
 from ccfem.progress import Progress, silent
 from ccfem.topopt import Design, Somp, part_shape
 
-__all__ = [
-    "ELEMENT_SIZE",
-    "LAMINATE",
-    "SOURCE",
-    "THICKNESS",
-    "DesignPlate",
-    "Hole",
-    "Stretch",
-    "case_of",
-    "designed_case",
-    "prepreg_printer",
-]
-
-ELEMENT_SIZE = 1.2
-THICKNESS = 1.0
-"""Of the plates, mm; that of the printed parts is not stated."""
-SOURCE = "Wang et al. 2021 (Composites Part A 140, 106181)"
+__all__ = ["LAMINATE", "DesignPlate"]
 
 LAMINATE = plane_stress(18300.0, 19800.0, 0.17, 5150.0)
-"""Stiffness of the laminate of the paper, MPa; Poisson's ratio 21 follows from the moduli."""
-
-_LAYERS = 2
-_NEAR = 1e-6
-"""How far a node may lie from the line that it is on, mm."""
-
-
-@dataclass(frozen=True)
-class Stretch:
-    """A straight stretch of the border of a plate, between two points (x, y), mm."""
-
-    start: tuple[float, float]
-    end: tuple[float, float]
-
-    def edges(self, mesh: PlaneMesh) -> IntArray:
-        """Boundary edges (k, 2) of a plane mesh with their middles on it."""
-        middles = mesh.points[mesh.boundary].mean(axis=1)
-        return mesh.boundary[self._holds(middles)]
-
-    def __call__(self, mesh: TetMesh) -> IntArray:
-        """Walls (k, 3) of an extruded plate with all their nodes on it."""
-        _, normal = mesh.facet_areas(mesh.boundary)
-        walls = mesh.boundary[np.abs(normal[:, 2]) < 0.5]
-        chosen = self._holds(mesh.points[walls][..., :2]).all(axis=1)
-        if not chosen.any():
-            raise InputError(f"no wall of the part lies between {self.start} and {self.end} mm")
-        return walls[chosen]
-
-    def _holds(self, points: FloatArray) -> BoolArray:
-        line = shapely.LineString([self.start, self.end])
-        return np.asarray(shapely.dwithin(shapely.points(points), line, _NEAR))
-
-
-@dataclass(frozen=True)
-class Hole:
-    """A round hole.
-
-    Attributes
-    ----------
-    x, y, radius : float, mm
-    rim : float, mm
-        Width of the ring about it that the optimisation keeps solid.
-    """
-
-    x: float
-    y: float
-    radius: float
-    rim: float = 0.0
-
-    def disc(self, more: float = 0.0) -> Any:
-        """Area of the hole, wider by `more`, mm: a shapely Polygon."""
-        return shapely.Point(self.x, self.y).buffer(self.radius + more, quad_segs=32)
+"""Stiffness of the laminate of Wang et al. 2021, MPa; Poisson's ratio 21 follows from the moduli.
+"""
 
 
 @dataclass(frozen=True)
@@ -225,96 +152,8 @@ class DesignPlate:
         ends = [end for each in stretches.values() for end in (each.start, each.end)]
         mesh = extrude(polygon, thickness, element_size, 1, np.array(ends))
         holes = {
-            f"hole_{k}": Cylinder((hole.x, hole.y, 0.0), "z", hole.radius, _NEAR)
+            f"hole_{k}": Cylinder((hole.x, hole.y, 0.0), "z", hole.radius, NEAR)
             for k, hole in enumerate(self.holes, start=1)
-            if polygon.distance(hole.disc()) <= _NEAR
+            if polygon.distance(hole.disc()) <= NEAR
         }
-        return patches_from_rules(mesh, {**stretches, **holes, "bottom": Plane("z", "min", _NEAR)})
-
-
-def prepreg_printer() -> Machine:
-    """Printer of the prepreg filament, with the speeds of table 2 of the paper.
-
-    Strands 0.9 mm wide, no shorter than 10 mm, and turns of 1.5 mm radius are assumed: the paper
-    does not state them.
-    """
-    return Machine(
-        fibre_width=0.9,
-        deposited_width=0.9,
-        minimum_length=10.0,
-        minimum_radius=1.5,
-        speeds=SpeedTable(),
-    )
-
-
-def case_of(plate: Callable[..., DesignPlate], title: str) -> Callable[..., Case]:
-    """Make the case of a plate: a function of the parameters that all of them share.
-
-    Parameters
-    ----------
-    plate : callable
-        Makes the plate, of its `force`.
-    title : str
-        What it is, for the list of cases.
-    """
-
-    def case(
-        optimised: bool = True,
-        element_size: float = ELEMENT_SIZE,
-        order: int = 1,
-        force: float = 100.0,
-        thickness: float = THICKNESS,
-    ) -> Case:
-        return designed_case(plate(force=force), optimised, element_size, order, thickness)
-
-    case.__doc__ = f"""{title}: optimised, or the full plate.
-
-    It is printed of plain matrix, so that the virtual test adds the fibre, and stands on its face
-    at z = 0 without friction, so that it stays plane.
-
-    Parameters
-    ----------
-    optimised : bool, default True
-        Whether to take the optimised part, or the full plate.
-    element_size : float, mm
-        Edge length of the cells aimed at.
-    order : {{1, 2}}
-        Linear or quadratic cells.
-    force : float, N
-    thickness : float, mm
-    """
-    return case
-
-
-def designed_case(
-    plate: DesignPlate,
-    optimised: bool = True,
-    element_size: float = ELEMENT_SIZE,
-    order: int = 1,
-    thickness: float = THICKNESS,
-) -> Case:
-    """Make the case of one plate; parameters as those of the functions that `case_of` makes."""
-    polygon = None if optimised else plate.domain
-    key = plate.name if optimised and thickness == THICKNESS else ""
-
-    def make(size: float) -> TetMesh:
-        return plate.mesh(plate.part if polygon is None else polygon, size, thickness)
-
-    problem = Problem(
-        mesh_of_case(key, element_size, order, make),
-        printed_pla(),
-        (
-            *(Support(name, held) for name, (_, held) in plate.supports.items()),
-            Support("bottom", "z"),
-        ),
-        {"down": (Force("load", (0.0, -plate.force, 0.0)),)},
-    )
-    what = "optimised" if optimised else "full plate"
-    return Case(
-        name=plate.name,
-        title=f"{plate.title}, {what}",
-        problem=problem,
-        layers=_LAYERS,
-        machine=prepreg_printer(),
-        source=f"{SOURCE}: size and loading; what it does not state is assumed",
-    )
+        return patches_from_rules(mesh, {**stretches, **holes, "bottom": Plane("z", "min", NEAR)})
