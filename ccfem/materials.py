@@ -14,6 +14,7 @@ __all__ = [
     "material_names",
     "named_material",
     "plane_stress",
+    "printed_pla",
     "transversely_isotropic",
 ]
 
@@ -219,3 +220,19 @@ def named_material(name: str) -> Material:
     if name not in _TABLE:
         raise InputError(f"no material named '{name}'; there are: {', '.join(material_names())}")
     return _TABLE[name]()
+
+
+def printed_pla() -> Material:
+    """PLA+ with the modulus taken for the parts of Chen et al. 2021: 3500 MPa, nu 0.35.
+
+    Both are assumed, as for a dense print; the strengths are those of ``pla_plus`` in the table.
+    """
+    table = named_material("pla_plus")
+    return isotropic(
+        3500.0,
+        0.35,
+        "PLA+",
+        table.tensile_strength,
+        table.compressive_strength,
+        f"assumed: modulus and Poisson's ratio; strengths: {table.source}",
+    )

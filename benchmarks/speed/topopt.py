@@ -26,7 +26,7 @@ from ccfem.materials import isotropic, plane_stress
 from ccfem.mesh.box import box_mesh
 from ccfem.mesh.patches import Box, patches_from_rules
 from ccfem.plates import PlaneProblem, raster_mesh
-from ccfem.topopt import as_problem, simp, somp
+from ccfem.topopt import Simp, Somp, as_problem
 
 UNIT = plane_stress(1.0, 1.0, 0.3, 1.0 / 2.6)
 WANG = plane_stress(18300.0, 19800.0, 0.17, 5150.0)
@@ -76,9 +76,9 @@ def bridge_of_tets() -> tuple[Problem, IntArray]:
 def bridges(iterations: int) -> None:
     """Bridge of tetrahedra beside the bridge of quadrilaterals: their designs and their speed."""
     problem, columns = bridge_of_tets()
-    options = {"iterations": iterations, "tolerance": 0.0, "objective_tolerance": 0.0}
-    plate, *first = timed(lambda: somp(bridge(), WANG, 0.4, **options))
-    tets, *second = timed(lambda: somp(problem, WANG, 0.4, groups=columns, **options))
+    method = Somp(0.4, tolerance=0.0, objective_tolerance=0.0, max_iterations=iterations)
+    plate, *first = timed(lambda: method(bridge(), WANG))
+    tets, *second = timed(lambda: method(problem, WANG, groups=columns))
     ours = tets.filled(0.4)[::6].reshape(50, 185)[::-1].reshape(-1)
     theirs = plate.filled(0.4)
     overlap = (ours & theirs).sum() / (ours | theirs).sum()
@@ -137,17 +137,17 @@ def pymoto_mbb(columns: int, rows: int, iterations: int) -> float:
 
 
 def against_pymoto(columns: int, rows: int, iterations: int, repeats: int) -> None:
+    method = Simp(
+        0.5,
+        radius=2.4,
+        filter="density",
+        tolerance=0.0,
+        objective_tolerance=0.0,
+        max_iterations=iterations,
+    )
+
     def ours() -> float:
-        design = simp(
-            mbb(columns, rows),
-            0.5,
-            radius=2.4,
-            filter="density",
-            tolerance=0.0,
-            objective_tolerance=0.0,
-            iterations=iterations,
-        )
-        return float(design.compliance[-1])
+        return float(method(mbb(columns, rows)).compliance[-1])
 
     rows_of_times = []
     for _ in range(repeats):
@@ -204,19 +204,18 @@ def block_against_pymoto(iterations: int, repeats: int) -> None:
     """Compare iterations in space: tetrahedra, six a brick, and pyMOTO's bricks, of equal nodes."""
     problem = block()
     columns = np.arange(len(problem.mesh.cells)) // 6
-    options = {"least": 1e-6, "tolerance": 0.0, "objective_tolerance": 0.0}
+    method = Simp(
+        0.3,
+        radius=1.8,
+        filter="density",
+        minimum_stiffness=1e-6,
+        tolerance=0.0,
+        objective_tolerance=0.0,
+        max_iterations=iterations - 1,  # as many solves as the peer
+    )
 
     def ours() -> float:
-        design = simp(
-            problem,
-            0.3,
-            radius=1.8,
-            filter="density",
-            groups=columns,
-            iterations=iterations - 1,  # as many solves as the peer
-            **options,
-        )
-        return float(design.compliance[-1])
+        return float(method(problem, groups=columns).compliance[-1])
 
     found = []
     for _ in range(repeats):
@@ -233,22 +232,22 @@ def block_against_pymoto(iterations: int, repeats: int) -> None:
 
 
 def main(repeats: int = 3, iterations: int = 100) -> None:
-    simp(mbb(12, 4), 0.5, iterations=2)  # compile
+    Simp(0.5, max_iterations=2)(mbb(12, 4))  # compile
     for name, radius, filter in (
         ("sensitivity 1.5", 1.5, "sensitivity"),
         ("sensitivity 2.4", 2.4, "sensitivity"),
         ("density 2.4", 2.4, "density"),
     ):
         design, wall, processor = timed(
-            lambda radius=radius, filter=filter: simp(mbb(60, 20), 0.5, 3.0, radius, filter)
+            lambda radius=radius, filter=filter: Simp(0.5, 3.0, radius, filter)(mbb(60, 20))
         )
         typer.echo(
             f"MBB 60 x 20, {name}: {design.compliance[-1]:.2f} in {design.iterations} iterations, "
             f"{wall:.2f} s wall, {processor:.2f} s processor"
         )
     for name, work in (
-        ("SIMP, bridge 185 x 50", lambda: simp(bridge(), 0.4, least=1e-3)),
-        ("SOMP, bridge 185 x 50", lambda: somp(bridge(), WANG, 0.4)),
+        ("SIMP, bridge 185 x 50", lambda: Simp(0.4, minimum_stiffness=1e-3)(bridge())),
+        ("SOMP, bridge 185 x 50", lambda: Somp(0.4)(bridge(), WANG)),
     ):
         design, wall, processor = timed(work)
         typer.echo(

@@ -7,14 +7,14 @@ import shapely
 
 from ccfem.arrays import BoolArray
 from ccfem.cases.case import Case
-from ccfem.cases.filament import printed_pla
 from ccfem.cases.stored import mesh_of_case
 from ccfem.elasticity.problem import Bearing, Force, Problem, Support
+from ccfem.materials import printed_pla
 from ccfem.mesh.patches import Cylinder, patches_from_rules
 from ccfem.mesh.tet_mesh import TetMesh
 from ccfem.meshing import extrude
 from ccfem.progress import Progress, silent
-from ccfem.topopt import Design, as_problem, simp
+from ccfem.topopt import Design, Simp, as_problem
 
 __all__ = [
     "bracket",
@@ -79,28 +79,26 @@ def _rims(mesh: TetMesh) -> BoolArray:
 
 
 def bracket_design(
-    element_size: float = ELEMENT_SIZE, iterations: int = 150, progress: Progress = silent
+    element_size: float = ELEMENT_SIZE, max_iterations: int = 150, progress: Progress = silent
 ) -> Design:
     """Densities of least compliance of both load cases together, 30 % of the domain filled.
 
     Parameters
     ----------
     element_size : float, mm
-    iterations : int
-        Most iterations; it stops when the compliance stands still.
+    max_iterations : int
+        It stops before when the compliance stands still.
     progress : callable, optional
     """
     problem = bracket_problem(element_size)
-    return simp(
-        problem,
+    method = Simp(
         VOLUME_FRACTION,
         radius=max(3.0, 1.6 * element_size),
-        solid=_rims(problem.mesh),
-        least=1e-6,
+        minimum_stiffness=1e-6,
         tolerance=0.0,
-        iterations=iterations,
-        progress=progress,
+        max_iterations=max_iterations,
     )
+    return method(problem, solid=_rims(problem.mesh), progress=progress)
 
 
 def bracket_mesh(element_size: float) -> TetMesh:

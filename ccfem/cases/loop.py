@@ -7,9 +7,9 @@ import shapely
 
 from ccfem.arrays import FloatArray
 from ccfem.cases.case import Case
-from ccfem.cases.filament import printed_pla
 from ccfem.cases.stored import mesh_of_case
 from ccfem.elasticity.problem import Force, Problem, Support
+from ccfem.materials import printed_pla
 from ccfem.mesh.patches import Cylinder, patches_from_rules
 from ccfem.mesh.tet_mesh import TetMesh
 from ccfem.meshing import extrude

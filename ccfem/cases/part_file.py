@@ -116,8 +116,8 @@ from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Any
 
-from ccfem.cases.body import Body
 from ccfem.cases.case import Case
+from ccfem.cases.part_body import Body
 from ccfem.elasticity.problem import (
     Bearing,
     Force,

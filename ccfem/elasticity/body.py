@@ -9,7 +9,7 @@ from ccfem.elasticity.problem import Load, Support
 __all__ = ["Cells", "LoadedBody", "SupportedProblem"]
 
 
-class Cells(Protocol):
+class Patched(Protocol):
     """A mesh of d-dimensional cells, d = 2 or 3, with named patches of facets."""
 
     @property
@@ -22,6 +22,18 @@ class Cells(Protocol):
         """Nodes of each cell, (m, q)."""
         ...
 
+    def patch(self, name: str) -> IntArray:
+        """Facets of a named patch by their corners."""
+        ...
+
+    def facet_nodes(self, facets: IntArray) -> IntArray:
+        """All nodes of facets: their corners, and the middles of their sides."""
+        ...
+
+
+class Cells(Patched, Protocol):
+    """A mesh whose cells hang together through facets, so that supports hold it."""
+
     @property
     def corners(self) -> IntArray:
         """Corner nodes of each cell."""
@@ -32,39 +44,13 @@ class Cells(Protocol):
         """Pairs of cells that share a facet, (f, 2)."""
         ...
 
-    def patch(self, name: str) -> IntArray:
-        """Facets of a named patch by their corners."""
-        ...
 
-    def facet_nodes(self, facets: IntArray) -> IntArray:
-        """All nodes of facets: their corners, and the middles of their sides."""
-        ...
-
-
-class LoadedBody(Protocol):
+class LoadedBody(Patched, Protocol):
     """A mesh whose boundary facets have areas and outward normals, so that loads act on it."""
-
-    @property
-    def points(self) -> FloatArray:
-        """Nodes, (n, d), mm."""
-        ...
-
-    @property
-    def cells(self) -> IntArray:
-        """Nodes of each cell, (m, q)."""
-        ...
 
     @property
     def boundary(self) -> IntArray:
         """Boundary facets by their corners, the part on their inner side."""
-        ...
-
-    def patch(self, name: str) -> IntArray:
-        """Facets of a named patch that can carry a load."""
-        ...
-
-    def facet_nodes(self, facets: IntArray) -> IntArray:
-        """All nodes of facets: their corners, and the middles of their sides."""
         ...
 
     def facet_areas(self, facets: IntArray) -> tuple[FloatArray, FloatArray]:

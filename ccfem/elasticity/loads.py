@@ -17,7 +17,7 @@ from ccfem.elasticity.problem import (
 )
 from ccfem.errors import InputError
 
-__all__ = ["load_case", "nodal_forces"]
+__all__ = ["load_case", "load_cases", "nodal_forces"]
 
 
 def _facets(mesh: LoadedBody, name: str) -> IntArray:
@@ -174,3 +174,16 @@ def load_case(problem: SupportedProblem, name: str) -> FloatArray:
             f"load case '{name}' is zero and no support moves: nothing to solve for; give a load"
         )
     return total
+
+
+def load_cases(problem: SupportedProblem) -> dict[str, FloatArray]:
+    """Nodal forces of every load case of a problem: see `load_case`.
+
+    Raises
+    ------
+    InputError
+        For a bad load, and for a problem without one.
+    """
+    if not problem.loads:
+        raise InputError("the part has no load case: give at least one load")
+    return {name: load_case(problem, name) for name in problem.loads}

@@ -20,6 +20,7 @@ __all__ = [
     "Problem",
     "Support",
     "Traction",
+    "patches_in_use",
 ]
 
 
@@ -153,7 +154,14 @@ class Problem:
     @property
     def held_or_loaded(self) -> tuple[str, ...]:
         """Names of the patches that carry a support or a load, sorted."""
-        names = {support.patch for support in self.supports}
-        for case in self.loads.values():
-            names |= {load.patch for load in case if not isinstance(load, PointForce)}
-        return tuple(sorted(names))
+        return patches_in_use(self.supports, self.loads)
+
+
+def patches_in_use(
+    supports: tuple[Support, ...], loads: Mapping[str, tuple[Load, ...]]
+) -> tuple[str, ...]:
+    """Names of the patches that carry a support or a load, sorted."""
+    names = {support.patch for support in supports}
+    for case in loads.values():
+        names |= {load.patch for load in case if not isinstance(load, PointForce)}
+    return tuple(sorted(names))

@@ -2,7 +2,7 @@
 
 from collections.abc import Callable
 from dataclasses import dataclass, replace
-from functools import cached_property
+from functools import cached_property, partial
 from time import perf_counter
 from typing import Protocol, TypeVar
 
@@ -11,7 +11,7 @@ import scipy.sparse as sp
 
 from ccfem.arrays import FloatArray, IntArray
 from ccfem.elasticity.assembly import Pattern, assemble, pattern
-from ccfem.elasticity.loads import load_case
+from ccfem.elasticity.loads import load_cases
 from ccfem.elasticity.problem import Problem
 from ccfem.elasticity.recovery import cell_stress, nodal_stress
 from ccfem.elasticity.solvers import LARGEST_DIRECT, Solver, direct_backend, factorise
@@ -24,7 +24,6 @@ from ccfem.tensor import rotate_stiffness
 
 __all__ = ["System", "cell_stiffness", "prepare", "solve", "solve_system"]
 
-ProblemT = TypeVar("ProblemT")
 FieldT = TypeVar("FieldT", covariant=True)
 
 
@@ -118,8 +117,6 @@ def prepare(problem: Problem) -> System:
     InputError
         For supports or loads that nothing sensible can follow from.
     """
-    if not problem.loads:
-        raise InputError("the part has no load case: give at least one load")
     if not np.isfinite(problem.mesh.points).all():
         raise InputError("the mesh has points that are NaN or infinite: correct its coordinates")
     if not problem.mesh.volumes.min() > 0.0:
@@ -127,7 +124,7 @@ def prepare(problem: Problem) -> System:
             f"cell {problem.mesh.volumes.argmin()} of the mesh has volume "
             f"{problem.mesh.volumes.min():.3g} mm^3: repair flat and inverted cells first"
         )
-    forces = {name: load_case(problem, name) for name in problem.loads}
+    forces = load_cases(problem)
     return System(problem, pattern(problem.mesh), held(problem), forces)
 
 
@@ -159,7 +156,7 @@ def solve(
         When a relative residual stays above the tolerance; very flat cells are named.
     """
     try:
-        return solve_system(prepare, problem, backend, tolerance)
+        return solve_system(partial(prepare, problem), backend, tolerance)
     except SolveError as error:
         slivers = about_slivers(problem.mesh)
         if not slivers:
@@ -186,14 +183,11 @@ class _Equations(Protocol[FieldT]):
 
 
 def solve_system(
-    prepare: Callable[[ProblemT], _Equations[FieldT]],
-    problem: ProblemT,
-    backend: str,
-    tolerance: float,
+    prepare: Callable[[], _Equations[FieldT]], backend: str, tolerance: float
 ) -> dict[str, FieldT]:
     """Prepare a problem and solve it for all its load cases: see `solve`."""
     started = perf_counter()
-    system = prepare(problem)
+    system = prepare()
     matrix = system.assemble()
     assembled = perf_counter()
     solver = system.factorise(matrix, backend, len(system.forces))

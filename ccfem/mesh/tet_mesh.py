@@ -10,7 +10,7 @@ import numpy as np
 from ccfem.arrays import FloatArray, IntArray, read_only
 from ccfem.errors import InputError
 
-__all__ = ["TetMesh"]
+__all__ = ["TetMesh", "signed_volumes"]
 
 _FACES = np.array([[1, 2, 3], [0, 3, 2], [0, 1, 3], [0, 2, 1]])
 """Corner nodes of the face opposite to each corner, outward for a positive cell."""
@@ -72,8 +72,7 @@ class TetMesh:
     @cached_property
     def volumes(self) -> FloatArray:
         """Signed volume of each (straight-sided) cell, (m,), mm^3."""
-        a, b, c, d = np.moveaxis(self.points[self.corners], 1, 0)
-        return read_only(np.einsum("ij,ij->i", np.cross(b - a, c - a), d - a) / 6.0)
+        return read_only(signed_volumes(self.points, self.corners))
 
     @cached_property
     def aspects(self) -> FloatArray:
@@ -189,3 +188,9 @@ class TetMesh:
         return TetMesh(
             np.concatenate([self.points, middle]), np.hstack([self.cells, extra]), self.patches
         )
+
+
+def signed_volumes(points: FloatArray, cells: IntArray) -> FloatArray:
+    """Signed volume (m,), mm^3, of straight-sided tetrahedra (m, 4) between points (n, 3), mm."""
+    a, b, c, d = np.moveaxis(points[cells], 1, 0)
+    return np.asarray(np.einsum("ij,ij->i", np.cross(b - a, c - a), d - a) / 6.0)

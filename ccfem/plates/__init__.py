@@ -1,8 +1,10 @@
 """Plane stress: thin plates of triangles or quadrilaterals, cell by cell of any stiffness."""
 
-from ccfem.plates.plane_mesh import PlaneMesh, raster_mesh
+from ccfem.plates.field import PlaneField
+from ccfem.plates.mesh import PlaneMesh
 from ccfem.plates.problem import PlaneProblem
-from ccfem.plates.solve import PlaneField, solve_plane
+from ccfem.plates.raster_mesh import raster_mesh
+from ccfem.plates.solve import solve_plane
 from ccfem.plates.stiffness import rotate_plane, stack_plane
 
 __all__ = [

@@ -8,7 +8,7 @@ import scipy.sparse as sp
 
 from ccfem.arrays import FloatArray, IntArray, read_only
 from ccfem.elasticity.assembly import Pattern, pattern
-from ccfem.plates.plane_mesh import PlaneMesh
+from ccfem.plates.mesh import PlaneMesh
 
 __all__ = ["PlaneElements", "strain_matrices"]
 

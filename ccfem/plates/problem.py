@@ -8,9 +8,9 @@ from types import MappingProxyType
 import numpy as np
 
 from ccfem.arrays import FloatArray, read_only
-from ccfem.elasticity.problem import Load, Pressure, Support
+from ccfem.elasticity.problem import Load, Pressure, Support, patches_in_use
 from ccfem.errors import InputError
-from ccfem.plates.plane_mesh import PlaneMesh, Sheet
+from ccfem.plates.mesh import PlaneMesh, Sheet
 
 __all__ = ["PlaneProblem"]
 
@@ -71,6 +71,16 @@ class PlaneProblem:
                 raise InputError(
                     f"a plane problem is loaded in its plane; got {load}: give component z zero"
                 )
+
+    @property
+    def held_or_loaded(self) -> tuple[str, ...]:
+        """Names of the patches that carry a support or a load, sorted."""
+        return patches_in_use(self.supports, self.loads)
+
+    @cached_property
+    def volumes(self) -> FloatArray:
+        """Volume of each cell, (m,), mm^3."""
+        return read_only(self.mesh.areas * self.thickness)
 
     @cached_property
     def body(self) -> Sheet:

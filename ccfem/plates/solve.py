@@ -1,115 +1,24 @@
-"""Plane stress: the solve of a thin plate, cell by cell of any stiffness."""
+"""The solve of a thin plate: from a problem to the plane stress of every load case."""
 
 from dataclasses import dataclass
-from functools import cached_property
+from functools import cached_property, partial
 
 import numpy as np
 import scipy.sparse as sp
 
-from ccfem.arrays import FloatArray, read_only
-from ccfem.elasticity.loads import load_case
+from ccfem.arrays import FloatArray
+from ccfem.elasticity.loads import load_cases
 from ccfem.elasticity.solve import solve_system
 from ccfem.elasticity.solvers import DIRECT, Solver, choose_direct, factorise
 from ccfem.elasticity.stress_field import SolveRecord
 from ccfem.elasticity.supports import Held, held
 from ccfem.errors import InputError
 from ccfem.plates.assembly import PlaneElements
-from ccfem.plates.plane_mesh import PlaneMesh, raster_mesh
+from ccfem.plates.field import PlaneField
+from ccfem.plates.mesh import PlaneMesh
 from ccfem.plates.problem import PlaneProblem
-from ccfem.plates.stiffness import (
-    plane_harmonics,
-    rotate_plane,
-    stack_plane,
-    strain_in_axes,
-    stress_in_axes,
-)
 
-__all__ = [
-    "PlaneField",
-    "PlaneMesh",
-    "PlaneProblem",
-    "PlaneSystem",
-    "plane_harmonics",
-    "prepare_plane",
-    "raster_mesh",
-    "rotate_plane",
-    "solve_plane",
-    "stack_plane",
-]
-
-
-@dataclass(frozen=True)
-class PlaneField:
-    """Displacement, strain and stress of one load case of a plate.
-
-    Attributes
-    ----------
-    problem : PlaneProblem
-    case : str
-        Name of the load case.
-    displacement : (n, 2) array, mm
-    strain : (m, 3) array
-        [e11, e22, 2 e12] at the centre of each cell, in the global axes.
-    stress : (m, 3) array, MPa
-        [s11, s22, s12] there; of layers stacked in one cell, their mean.
-    cell_energy : (m,) array, N mm
-        Strain energy of each cell.
-    reactions : (n, 2) array, N
-        Force that the supports put on the plate; zero away from them.
-    record : SolveRecord
-    """
-
-    problem: PlaneProblem
-    case: str
-    displacement: FloatArray
-    strain: FloatArray
-    stress: FloatArray
-    cell_energy: FloatArray
-    reactions: FloatArray
-    record: SolveRecord
-
-    def __post_init__(self) -> None:
-        for name in ("displacement", "strain", "stress", "cell_energy", "reactions"):
-            object.__setattr__(self, name, read_only(getattr(self, name)))
-
-    @property
-    def mesh(self) -> PlaneMesh:
-        """Mesh of the problem."""
-        return self.problem.mesh
-
-    @property
-    def strain_energy(self) -> float:
-        """Strain energy of the plate, N mm."""
-        return float(self.cell_energy.sum())
-
-    @property
-    def energy_density(self) -> FloatArray:
-        """Strain energy of each cell over its volume, (m,), MPa."""
-        return self.cell_energy / (self.mesh.areas * self.problem.thickness)
-
-    def stress_in(self, angle: FloatArray, stiffness: FloatArray | None = None) -> FloatArray:
-        """Stress at the centre of each cell in its material axes.
-
-        Parameters
-        ----------
-        angle : (m,) array or float, radians
-            From global axis x to material axis 1.
-        stiffness : (3, 3) or (m, 3, 3) array, MPa, optional
-            In material axes: of the one layer that the stress is wanted in. By default the mean
-            stress of the cell is turned.
-
-        Returns
-        -------
-        (m, 3) array, MPa
-            [s11, s22, s12].
-        """
-        if stiffness is None:
-            return stress_in_axes(self.stress, angle)
-        return np.einsum("...ij,...j->...i", stiffness, self.strain_in(angle))
-
-    def strain_in(self, angle: FloatArray) -> FloatArray:
-        """Strain [e11, e22, 2 e12] (m, 3) at the centres in axes turned by (m,) angles, radians."""
-        return strain_in_axes(self.strain, angle)
+__all__ = ["PlaneSystem", "prepare", "solve_plane"]
 
 
 @dataclass(frozen=True)
@@ -117,7 +26,7 @@ class PlaneSystem:
     """The equations of a plate: everything that stays when only the stiffness changes.
 
     For many solves on one mesh keep one system and call ``system.assemble(matrices)`` with
-    ``matrices = thickness * system.elements.matrices(stiffness)``.
+    ``matrices = system.matrices_of(stiffness)``.
 
     Attributes
     ----------
@@ -136,8 +45,12 @@ class PlaneSystem:
     @cached_property
     def matrices(self) -> FloatArray:
         """Element matrices of the problem, (m, 2q, 2q), N/mm."""
+        return self.matrices_of(self.problem.stiffness)
+
+    def matrices_of(self, stiffness: FloatArray) -> FloatArray:
+        """Element matrices (m, 2q, 2q), N/mm, of another stiffness (m, 3, 3), MPa."""
         thickness = np.asarray(self.problem.thickness)[:, None, None]
-        return thickness * self.elements.matrices(self.problem.stiffness)
+        return thickness * self.elements.matrices(stiffness)
 
     def assemble(self, matrices: FloatArray | None = None) -> sp.bsr_array:
         """Stiffness matrix (2n, 2n), N/mm, of the problem or of other element matrices."""
@@ -174,7 +87,7 @@ class PlaneSystem:
         )
 
 
-def prepare_plane(problem: PlaneProblem, elements: PlaneElements | None = None) -> PlaneSystem:
+def prepare(problem: PlaneProblem, elements: PlaneElements | None = None) -> PlaneSystem:
     """Check a plate and collect what its solves share.
 
     Parameters
@@ -186,11 +99,9 @@ def prepare_plane(problem: PlaneProblem, elements: PlaneElements | None = None) 
     Raises
     ------
     InputError
-        For a mesh, supports or loads that nothing sensible can follow from.
+        For an invalid mesh, stiffness, support or load.
     """
     mesh = problem.mesh
-    if not problem.loads:
-        raise InputError("the plate has no load case: give at least one load")
     if not np.isfinite(mesh.points).all():
         raise InputError("the mesh has points that are NaN or infinite: correct its coordinates")
     least = _least_corner(mesh)
@@ -208,7 +119,7 @@ def prepare_plane(problem: PlaneProblem, elements: PlaneElements | None = None) 
             f"plane stiffness must be symmetric and positive definite; cell {bad[0]} and "
             f"{len(bad) - 1} more are not: give void cells a small positive stiffness"
         )
-    forces = {name: load_case(problem, name) for name in problem.loads}
+    forces = load_cases(problem)
     elements = PlaneElements(mesh) if elements is None else elements
     if elements.mesh is not mesh:
         raise ValueError("elements must be of the problem's own mesh")
@@ -252,12 +163,8 @@ def solve_plane(
     Raises
     ------
     InputError
-        For a mesh, supports, loads or a backend that nothing sensible can follow from.
+        For an invalid mesh, stiffness, support, load or backend.
     SolveError
         When a relative residual stays above the tolerance.
     """
-
-    def prepare(problem: PlaneProblem) -> PlaneSystem:
-        return prepare_plane(problem, elements)
-
-    return solve_system(prepare, problem, backend, tolerance)
+    return solve_system(partial(prepare, problem, elements), backend, tolerance)

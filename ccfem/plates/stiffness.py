@@ -1,5 +1,7 @@
 """Stiffness of fibre layers in the plane: turned, and stacked."""
 
+from collections.abc import Callable
+
 import numpy as np
 from numpy.typing import ArrayLike
 
@@ -7,6 +9,7 @@ from ccfem.arrays import FloatArray
 from ccfem.errors import InputError
 
 __all__ = [
+    "fitted_harmonics",
     "plane_harmonics",
     "rotate_plane",
     "stack_plane",
@@ -56,9 +59,19 @@ def plane_harmonics(stiffness: FloatArray) -> FloatArray:
         Constant, cos 2a, sin 2a, cos 4a, sin 4a; for an orthotropic sheet the invariants U1 to U5
         of Tsai and Pagano (1968).
     """
+    return fitted_harmonics(lambda angle: rotate_plane(stiffness, angle))
+
+
+def fitted_harmonics(turned: Callable[[FloatArray], FloatArray]) -> FloatArray:
+    """Five matrices (5, k, k) that `turned_by` combines to a stiffness turned about z.
+
+    Parameters
+    ----------
+    turned : callable
+        Stiffness (a, k, k) at angles (a,), radians.
+    """
     angles = np.asarray(np.arange(5) * np.pi / 5.0, dtype=np.float64)
-    inverse = np.linalg.inv(turned_by(angles))
-    return np.tensordot(inverse, rotate_plane(stiffness, angles), axes=1)
+    return np.tensordot(np.linalg.inv(turned_by(angles)), turned(angles), axes=1)
 
 
 def turned_by(angle: FloatArray, derivative: bool = False) -> FloatArray:

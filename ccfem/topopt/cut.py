@@ -6,7 +6,7 @@ import numpy as np
 
 from ccfem.arrays import BoolArray, FloatArray, IntArray
 from ccfem.mesh.patches import facet_keys
-from ccfem.mesh.tet_mesh import TetMesh
+from ccfem.mesh.tet_mesh import TetMesh, signed_volumes
 
 __all__ = ["CutMesh", "cut_mesh", "volume_above"]
 
@@ -107,8 +107,7 @@ def cut_mesh(mesh: TetMesh, values: FloatArray, level: float) -> CutMesh:
     points = (1.0 - share) * mesh.points[ends[:, 0]] + share * mesh.points[ends[:, 1]]
     cells = _cells(mesh, inside, keys)
     points = np.concatenate([mesh.points, points])
-    a, b, c, d = np.moveaxis(points[cells], 1, 0)
-    turned = np.einsum("ij,ij->i", np.cross(b - a, c - a), d - a) < 0.0
+    turned = signed_volumes(points, cells) < 0.0
     cells[turned] = cells[turned][:, [0, 2, 1, 3]]
     used, number = np.unique(cells, return_inverse=True)
     found = TetMesh(points[used], number.reshape(-1, 4))

@@ -3,13 +3,21 @@
 from dataclasses import dataclass, replace
 
 import numpy as np
+from scipy.spatial import cKDTree
 
 from ccfem.arrays import BoolArray, FloatArray, read_only
 from ccfem.elasticity.problem import Problem
 from ccfem.errors import InputError
 from ccfem.plates.problem import PlaneProblem
+from ccfem.topopt.material_axes import axes_about_z
 
-__all__ = ["Design"]
+__all__ = ["FALLS_APART", "Design"]
+
+FALLS_APART = (
+    "the design falls apart between its loads and supports: raise the volume fraction or the "
+    "filter radius"
+)
+"""What is wrong with a design whose part joins not all of them, and the cure."""
 
 
 @dataclass(frozen=True)
@@ -60,9 +68,8 @@ class Design:
     @property
     def volumes(self) -> FloatArray:
         """Volume of each cell, (m,), mm^3."""
-        if isinstance(self.full, PlaneProblem):
-            return self.full.mesh.areas * self.full.thickness
-        return self.full.mesh.volumes
+        full = self.full
+        return full.volumes if isinstance(full, PlaneProblem) else full.mesh.volumes
 
     @property
     def volume_fraction(self) -> float:
@@ -81,6 +88,17 @@ class Design:
             return replace(self.full, stiffness=self.factor[:, None, None] * self.full.stiffness)
         return replace(self.full, density=self.factor)
 
+    def axes_at(self, points: FloatArray) -> FloatArray | None:
+        """Material axes (k, 3, 3), as columns, of the cells nearest to points (k, 3), mm.
+
+        None where the design has no angles.
+        """
+        if self.angle is None:
+            return None
+        mesh = self.full.mesh
+        centres = mesh.points[mesh.cells].mean(axis=1)
+        return axes_about_z(self.angle[cKDTree(centres).query(points[:, : centres.shape[1]])[1]])
+
     def filled(self, volume_fraction: float | None = None) -> BoolArray:
         """Densest cells that make up a share of the volume.
 
@@ -95,7 +113,7 @@ class Design:
         """
         share = self.volume_fraction if volume_fraction is None else volume_fraction
         if not 0.0 < share <= 1.0:
-            raise InputError(f"a share of the volume must lie in (0, 1]; got {share}")
+            raise InputError(f"volume_fraction must lie in (0, 1]; got {share}: correct it")
         order = np.argsort(-self.density, kind="stable")
         reached = np.cumsum(self.volumes[order])
         count = int(np.searchsorted(reached, share * reached[-1] * (1.0 + 1e-12), side="right"))

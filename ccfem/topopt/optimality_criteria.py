@@ -12,11 +12,9 @@ def optimality_criteria(
     gradient: FloatArray,
     volume: FloatArray,
     target: float,
-    move: float = 0.2,
-    lower: FloatArray | float = 0.0,
-    upper: FloatArray | float = 1.0,
+    move: float,
 ) -> FloatArray:
-    """Densities that balance gain and volume (Bendsoe, Struct. Optim. 1 (1989) 193).
+    """Densities in [0, 1] that balance gain and volume (Bendsoe, Struct. Optim. 1 (1989) 193).
 
     Parameters
     ----------
@@ -27,10 +25,8 @@ def optimality_criteria(
         Of the total volume by each density, positive.
     target : float
         Wanted ``volume @ density``.
-    move : float, default 0.2
+    move : float
         Largest change of a density.
-    lower, upper : (m,) arrays or floats
-        Bounds of each density.
 
     Returns
     -------
@@ -38,8 +34,8 @@ def optimality_criteria(
         ``clip(density * sqrt(-gradient / (multiplier * volume)))`` with the multiplier found by
         bisection; on the nearest bound where the target is out of reach.
     """
-    low = np.maximum(lower, density - move)
-    high = np.minimum(upper, density + move)
+    low = np.maximum(0.0, density - move)
+    high = np.minimum(1.0, density + move)
     gain = np.maximum(0.0, -gradient) / volume
     root = density * np.sqrt(gain)
     largest = float(np.sqrt(gain.max()))

@@ -7,15 +7,14 @@ import numpy as np
 import shapely
 
 from ccfem.arrays import BoolArray, FloatArray
-from ccfem.elasticity.problem import PointForce
 from ccfem.errors import InputError
 from ccfem.geometry.isocontours import isocontours
-from ccfem.plates.plane_mesh import raster_image
-from ccfem.plates.problem import PlaneProblem
-from ccfem.topopt.design import Design
+from ccfem.topopt.design import FALLS_APART
 
-__all__ = ["outline", "solid"]
+__all__ = ["outline"]
 
+_PASSES = 10
+"""Of the smoothing."""
 _RINGS = 4
 """Rings of pixels that the density is carried on outside its domain before it falls to zero."""
 
@@ -72,7 +71,7 @@ def _contour(nodes: FloatArray, threshold: float, size: float) -> list[FloatArra
     return found.lines()
 
 
-def _smoothed(ring: FloatArray, step: float, passes: int) -> FloatArray:
+def _smoothed(ring: FloatArray, step: float) -> FloatArray:
     """Resample a closed ring and smooth it by Taubin's passes 0.5 and -0.53, which keep its area.
 
     Taubin, Curve and surface smoothing without shrinkage, ICCV 1995.
@@ -81,7 +80,7 @@ def _smoothed(ring: FloatArray, step: float, passes: int) -> FloatArray:
     count = max(8, round(along[-1] / step))
     at = along[-1] * np.arange(count) / count
     points = np.stack([np.interp(at, along, column) for column in ring.T], axis=1)
-    for _ in range(passes):
+    for _ in range(_PASSES):
         for factor in (0.5, -0.53):
             mean = 0.5 * (np.roll(points, 1, axis=0) + np.roll(points, -1, axis=0))
             points = points + factor * (mean - points)
@@ -125,7 +124,6 @@ def outline(
     inside: BoolArray | None = None,
     keep: FloatArray | None = None,
     least_hole: float = 4.0,
-    passes: int = 10,
 ) -> Any:
     """Outline of a design on a raster.
 
@@ -149,8 +147,6 @@ def outline(
         is the part.
     least_hole : float, default 4
         Holes below this many pixels are closed.
-    passes : int, default 10
-        Of the smoothing.
 
     Returns
     -------
@@ -160,7 +156,8 @@ def outline(
     Raises
     ------
     InputError
-        When nothing is left, and when the points to keep lie on different pieces.
+        For a share or threshold out of its range, when nothing is left, and when the points to
+        keep lie on different pieces.
     """
     density = np.asarray(density, dtype=np.float64)
     known = np.ones(density.shape, dtype=bool) if inside is None else np.asarray(inside, dtype=bool)
@@ -169,6 +166,10 @@ def outline(
             f"an outline needs an (H, W) image of densities and a pixel size > 0; got shape "
             f"{density.shape} and size {size}"
         )
+    if volume_fraction is not None and not 0.0 < volume_fraction <= 1.0:
+        raise InputError(f"volume_fraction must lie in (0, 1]; got {volume_fraction}: correct it")
+    if threshold is not None and not 0.0 < threshold < 1.0:
+        raise InputError(f"threshold must lie in (0, 1); got {threshold}: correct it")
     if domain is None:
         domain = _domain(known, size)
     nodes = np.pad(_over_nodes(np.pad(density, _RINGS + 1), np.pad(known, _RINGS + 1)), 1)
@@ -176,7 +177,7 @@ def outline(
 
     def region(level: float) -> Any:
         rings = [ring - shift for ring in _contour(nodes, level, size)]
-        return _region([_smoothed(ring, 0.5 * size, passes) for ring in rings])
+        return _region([_smoothed(ring, 0.5 * size) for ring in rings])
 
     if threshold is None:
         share = float(density[known].mean()) if volume_fraction is None else volume_fraction
@@ -192,10 +193,7 @@ def outline(
     for piece in pieces:
         if (shapely.distance(piece, anchors) <= 1.5 * size).all():
             return piece
-    raise InputError(
-        "the design falls apart between its loads and supports: raise the volume fraction or the "
-        "filter radius"
-    )
+    raise InputError(FALLS_APART)
 
 
 def _domain(inside: BoolArray, size: float) -> Any:
@@ -222,64 +220,3 @@ def _with_area(region: Any, domain: Any, area: float) -> Any:
             break
         low, high = (middle, high) if excess > 0.0 else (low, middle)
     return found
-
-
-def _anchors(problem: PlaneProblem, density: FloatArray) -> FloatArray:
-    """Densest node of every loaded and held patch, and the points of point forces: (k, 2), mm."""
-    mesh = problem.mesh
-    dense = np.zeros(len(mesh.points))
-    np.maximum.at(dense, mesh.cells, density[:, None])
-    patches = {support.patch for support in problem.supports}
-    points = []
-    for load in (load for case in problem.loads.values() for load in case):
-        if isinstance(load, PointForce):
-            points.append(mesh.points[mesh.nearest_nodes(load.point[:2])[0]])
-        else:
-            patches.add(load.patch)
-    for name in sorted(patches):
-        nodes = np.unique(mesh.patch(name))
-        points.append(mesh.points[nodes[dense[nodes].argmax()]])
-    return np.array(points)
-
-
-def solid(
-    design: Design,
-    volume_fraction: float | None = None,
-    threshold: float | None = None,
-    domain: Any = None,
-) -> Any:
-    """Outline of a design of squares: the part that its densities stand for.
-
-    Parameters
-    ----------
-    design : Design
-        Of a plate on a raster.
-    volume_fraction, threshold, domain
-        As in `outline`; by default the outline holds the volume of the design.
-
-    Returns
-    -------
-    shapely Polygon, mm
-        The piece that joins all loads and supports.
-
-    Raises
-    ------
-    InputError
-        When no piece joins them, and for a mesh that is no raster.
-    """
-    if not isinstance(design.full, PlaneProblem):
-        raise InputError("an outline is that of a plate; this design is of tetrahedra")
-    raster = raster_image(design.full.mesh, design.density)
-    region = None
-    if domain is not None:
-        region = shapely.transform(domain, lambda points: points - raster.origin)
-    found = outline(
-        raster.image,
-        raster.size,
-        volume_fraction,
-        threshold,
-        region,
-        raster.inside,
-        _anchors(design.full, design.density) - raster.origin,
-    )
-    return shapely.transform(found, lambda points: points + raster.origin)

@@ -10,14 +10,13 @@ from ccfem.io.surface import Surface
 from ccfem.materials import Material
 from ccfem.plates.problem import PlaneProblem
 from ccfem.topopt.design import Design
-from ccfem.topopt.outline import solid as plate_outline
-from ccfem.topopt.plate_part import plate_part
+from ccfem.topopt.plate_part import plate_outline, plate_part
 from ccfem.topopt.tet_part import part_mesh, tet_part
 
-__all__ = ["as_problem", "solid"]
+__all__ = ["as_problem", "part_shape"]
 
 
-def solid(
+def part_shape(
     design: Design,
     volume_fraction: float | None = None,
     threshold: float | None = None,
@@ -81,7 +80,7 @@ def as_problem(
     else holds it: plane stress, as in the design.
 
     The part of tetrahedra is cut out of their mesh, so that its patches are what is left of those
-    of the design; supports and loads stay. ``tetrahedralise(solid(design), edge_length)`` is
+    of the design; supports and loads stay. ``tetrahedralise(part_shape(design), edge_length)`` is
     another mesh of the same shape.
 
     Parameters

@@ -14,17 +14,12 @@ from ccfem.materials import Material
 from ccfem.mesh.tet_mesh import TetMesh
 from ccfem.topopt.cut import cut_mesh, volume_above
 from ccfem.topopt.cut_smoothing import relaxed
-from ccfem.topopt.design import Design
-from ccfem.topopt.material_axes import axes_about_z
+from ccfem.topopt.design import FALLS_APART, Design
 
 __all__ = ["part_mesh", "tet_part"]
 
 _LEAST_VOID = 30.0
 """Enclosed voids below this many cells are filled."""
-_FALLS_APART = (
-    "the design falls apart between its loads and supports: raise the volume fraction or the "
-    "filter radius"
-)
 
 
 class _Field(NamedTuple):
@@ -77,14 +72,16 @@ def part_mesh(
     problem = design.full
     assert isinstance(problem, Problem)
     field = _field(problem, design.density)
+    if threshold is not None and not 0.0 < threshold < 1.0:
+        raise InputError(f"threshold must lie in (0, 1); got {threshold}: correct it")
     if threshold is None:
         share = design.volume_fraction if volume_fraction is None else volume_fraction
         if not 0.0 < share <= 1.0:
-            raise InputError(f"a share of the volume must lie in (0, 1]; got {share}")
+            raise InputError(f"volume_fraction must lie in (0, 1]; got {share}: correct it")
         threshold = _level(field, share * float(problem.mesh.volumes.sum()))
     cleaned = _cleaned(field, threshold)
     if cleaned is None:
-        raise InputError(_FALLS_APART)
+        raise InputError(FALLS_APART)
     return relaxed(cut_mesh(problem.mesh, cleaned, threshold))
 
 
@@ -93,11 +90,7 @@ def tet_part(design: Design, material: Material, volume_fraction: float | None) 
     problem = design.full
     assert isinstance(problem, Problem)
     mesh = part_mesh(design, volume_fraction)
-    axes = None
-    if design.angle is not None:
-        whole = problem.mesh
-        centres = (part.points[part.corners].mean(axis=1) for part in (whole, mesh))
-        axes = axes_about_z(design.angle[cKDTree(next(centres)).query(next(centres))[1]])
+    axes = design.axes_at(mesh.points[mesh.corners].mean(axis=1))
     return Problem(mesh, material, problem.supports, problem.loads, axes)
 
 
@@ -162,5 +155,5 @@ def _level(field: _Field, volume: float) -> float:
             return middle
         low, high = (middle, high) if found > volume else (low, middle)
     if abs(found - volume) > 0.02 * volume:
-        raise InputError(_FALLS_APART)
+        raise InputError(FALLS_APART)
     return middle

@@ -8,9 +8,9 @@ import pytest
 import shapely
 
 from ccfem.cases import create_case
-from ccfem.cases.build_data import DESIGNED
 from ccfem.cases.designed import LAMINATE, DesignPlate, Stretch
-from ccfem.cases.stored import manifest
+from ccfem.cases.stored.build import DESIGNED
+from ccfem.cases.stored.files import manifest
 from ccfem.elasticity import solve
 from ccfem.errors import InputError
 from ccfem.materials import plane_stress

@@ -22,8 +22,7 @@ from ccfem.evaluation.sensitivity import ANGLES, OffAxis
 from ccfem.geometry.polylines import pack
 from ccfem.linking.print_order import nearest_end_order
 from ccfem.materials import isotropic, named_material, plane_stress
-from ccfem.plates import PlaneProblem, raster_mesh
-from ccfem.plates.solve import solve_plane
+from ccfem.plates import PlaneProblem, raster_mesh, solve_plane
 
 TABLE_5 = {
     "c_fram": (73200.0, 4100.0, 0.33, 2200.0),

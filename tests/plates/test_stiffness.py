@@ -6,7 +6,7 @@ from hypothesis import strategies as st
 from ccfem.errors import InputError
 from ccfem.materials import plane_stress
 from ccfem.plates.assembly import PlaneElements
-from ccfem.plates.plane_mesh import raster_mesh
+from ccfem.plates.raster_mesh import raster_mesh
 from ccfem.plates.stiffness import (
     plane_harmonics,
     rotate_plane,

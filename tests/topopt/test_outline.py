@@ -8,7 +8,7 @@ from ccfem.elasticity import PointForce, Support
 from ccfem.errors import InputError
 from ccfem.materials import plane_stress
 from ccfem.plates import PlaneProblem, raster_mesh
-from ccfem.topopt import outline, simp, solid
+from ccfem.topopt import Simp, outline, part_shape
 
 
 def disc(shape, x, y, radius):
@@ -84,19 +84,23 @@ def test_share_of_the_volume(share):
 def test_bad_images_are_refused():
     with pytest.raises(InputError, match=r"\(H, W\) image"):
         outline(np.ones(5))
+    with pytest.raises(InputError, match=r"volume_fraction must lie in \(0, 1\]; got 1.5"):
+        outline(np.ones((5, 5)), volume_fraction=1.5)
+    with pytest.raises(InputError, match=r"threshold must lie in \(0, 1\); got 0.0"):
+        outline(np.ones((5, 5)), threshold=0.0)
     with pytest.raises(InputError, match="outline is empty"):
         outline(np.zeros((5, 5)), threshold=0.5)
 
 
-def test_solid_of_a_design_on_part_of_a_raster():
+def test_shape_of_a_design_on_part_of_a_raster():
     mask = np.ones((20, 40), dtype=bool)
     mask[:6, :6] = False
     mesh = raster_mesh(mask, 0.5, (100.0, -50.0))
     loads = {"tip": (PointForce((120.0, -45.0, 0.0), (0.0, -1.0, 0.0)),)}
     stiffness = plane_stress(1.0, 1.0, 0.3, 1.0 / 2.6)
     problem = PlaneProblem(mesh, stiffness, 1.0, (Support("x_min"),), loads)
-    design = simp(problem, 0.5, radius=0.8, iterations=60)
-    part = solid(design)
+    design = Simp(0.5, radius=0.8, max_iterations=60)(problem)
+    part = part_shape(design)
     assert part.geom_type == "Polygon"
     assert part.area == pytest.approx(0.5 * mesh.areas.sum(), rel=0.03)
     x, y = mesh.centres.T
@@ -106,7 +110,7 @@ def test_solid_of_a_design_on_part_of_a_raster():
     assert part.distance(shapely.Point(120.0, -45.0)) < 0.75
     assert part.bounds[0] == pytest.approx(100.0, abs=1e-6)
     exact = shapely.box(100.0, -50.0, 120.0, -40.0) - shapely.box(100.0, -43.0, 103.0, -40.0)
-    assert solid(design, domain=exact).symmetric_difference(part).area < 0.01 * part.area
+    assert part_shape(design, domain=exact).symmetric_difference(part).area < 0.01 * part.area
 
 
 def test_a_design_that_falls_apart_is_refused():
@@ -115,6 +119,6 @@ def test_a_design_that_falls_apart_is_refused():
     stiffness = plane_stress(1.0, 1.0, 0.3, 1.0 / 2.6)
     problem = PlaneProblem(mesh, stiffness, 1.0, (Support("x_min"),), loads)
     gap = np.abs(mesh.centres[:, 0] - 20.0) < 3.0
-    design = simp(problem, 0.5, radius=1.5, void=gap, iterations=3, least=1e-6)
+    design = Simp(0.5, radius=1.5, max_iterations=3, minimum_stiffness=1e-6)(problem, void=gap)
     with pytest.raises(InputError, match="falls apart"):
-        solid(design)
+        part_shape(design)

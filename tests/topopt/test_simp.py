@@ -8,8 +8,8 @@ from ccfem.errors import InputError
 from ccfem.materials import isotropic, plane_stress
 from ccfem.mesh.box import box_mesh
 from ccfem.plates import PlaneMesh, PlaneProblem, raster_mesh, rotate_plane, solve_plane
-from ccfem.topopt import compliance_of, simp, simp_factor
-from ccfem.topopt.parametrisation import parametrise
+from ccfem.topopt import Compliance, Simp
+from ccfem.topopt.parametrisation import Parametrisation
 
 UNIT = plane_stress(1.0, 1.0, 0.3, 1.0 / 2.6)
 
@@ -29,7 +29,7 @@ def mbb(nx, ny, stiffness=UNIT):
 )
 def test_mbb_beam_of_the_88_lines(filter, radius, compliance):
     # Andreassen et al., Struct. Multidisc. Optim. 43 (2011) 1; f 0.5, p 3, change below 0.01.
-    design = simp(mbb(60, 20), 0.5, 3.0, radius, filter)
+    design = Simp(0.5, 3.0, radius, filter)(mbb(60, 20))
     assert design.compliance[-1] == pytest.approx(compliance, rel=0.005)
     assert design.converged == "change"
     assert design.volume_fraction == pytest.approx(0.5, abs=1e-6)
@@ -71,18 +71,20 @@ def plates():
 def test_sensitivities_by_finite_differences(k, filter):
     problem = tets() if k == 3 else plates()[k]
     weights = {name: 0.5 + i for i, name in enumerate(problem.loads)}
-    model = compliance_of(problem, weights, "superlu")
+    model = Compliance(problem, weights, "superlu")
     m = len(model.volumes)
     rng = np.random.default_rng(k)
     solid, void = np.arange(m) == 3, np.arange(m) == 7
-    space = parametrise(model, 0.5, 3.0, 2.3, filter, solid, void, 1e-3)
+    parameters = Simp(0.5, 3.0, 2.3, filter, minimum_stiffness=1e-3)
+    space = Parametrisation.of_model(parameters, model, solid, void)
     x = rng.uniform(0.2, 0.9, m)
 
     def compliance(x):
-        return model(simp_factor(space.density(x), 3.0, 1e-3)[0]).compliance
+        return model(space.factor(space.density(x))).compliance
 
     density = space.density(x)
-    energy = model(simp_factor(density, 3.0, 1e-3)[0]).energy
+    np.testing.assert_allclose(space.factor(density), 1e-3 + density**3 * (1.0 - 1e-3))
+    energy = model(space.factor(density)).energy
     gradient = space.gradient(density, energy)
     step = 1e-5
     for cell in rng.choice(m, 8, replace=False):
@@ -96,7 +98,7 @@ def test_sensitivities_by_finite_differences(k, filter):
 
 
 def test_compliance_falls_and_beats_the_uniform_plate():
-    design = simp(mbb(30, 10), 0.5, radius=1.5)
+    design = Simp(0.5, radius=1.5)(mbb(30, 10))
     uniform = design.compliance[0]
     assert design.compliance[-1] < 0.25 * uniform
     assert design.density.min() >= 0.0
@@ -110,7 +112,9 @@ def test_passive_cells_stay(filter):
     centre = problem.mesh.centres
     void = np.hypot(centre[:, 0] - 12.0, centre[:, 1] - 5.0) < 2.5
     solid = centre[:, 1] > 9.0
-    design = simp(problem, 0.5, radius=1.5, filter=filter, solid=solid, void=void, iterations=30)
+    design = Simp(0.5, radius=1.5, filter=filter, max_iterations=30)(
+        problem, solid=solid, void=void
+    )
     assert (design.density[solid] == 1.0).all()
     assert (design.density[void] == 0.0).all()
     assert design.volume_fraction == pytest.approx(0.5, abs=1e-6)
@@ -120,11 +124,11 @@ def test_load_cases_are_weighted():
     problem = mbb(20, 10)
     other = {"other": (PointForce((20.0, 10.0, 0.0), (0.0, -1.0, 0.0)),)}
     both = replace(problem, loads={**problem.loads, **other})
-    first = simp(problem, 0.5, radius=1.5, iterations=20)
-    only = simp(both, 0.5, radius=1.5, iterations=20, weights={"load": 1.0, "other": 0.0})
+    first = Simp(0.5, radius=1.5, max_iterations=20)(problem)
+    only = Simp(0.5, radius=1.5, max_iterations=20)(both, weights={"load": 1.0, "other": 0.0})
     np.testing.assert_allclose(only.density, first.density, atol=1e-6)
-    shared = simp(both, 0.5, radius=1.5, iterations=20)
-    again = simp(both, 0.5, radius=1.5, iterations=20, weights={"load": 2.0, "other": 2.0})
+    shared = Simp(0.5, radius=1.5, max_iterations=20)(both)
+    again = Simp(0.5, radius=1.5, max_iterations=20)(both, weights={"load": 2.0, "other": 2.0})
     np.testing.assert_allclose(again.density, shared.density, atol=1e-6)
     np.testing.assert_allclose(again.compliance, 2.0 * shared.compliance, rtol=1e-6)
     assert np.abs(shared.density - first.density).max() > 0.5
@@ -135,21 +139,21 @@ def test_mirrored_problem_gives_the_mirrored_design():
     mesh = problem.mesh
     flipped = replace(mesh, points=mesh.points * [-1.0, 1.0], cells=mesh.cells[:, ::-1])
     loads = {"load": (PointForce((0.0, 8.0, 0.0), (0.0, -1.0, 0.0)),)}
-    other = simp(replace(problem, mesh=flipped, loads=loads), 0.5, radius=1.5, iterations=15)
-    first = simp(problem, 0.5, radius=1.5, iterations=15)
+    other = Simp(0.5, radius=1.5, max_iterations=15)(replace(problem, mesh=flipped, loads=loads))
+    first = Simp(0.5, radius=1.5, max_iterations=15)(problem)
     np.testing.assert_allclose(other.density, first.density, atol=1e-6)
 
 
 def test_a_run_goes_on_where_it_stopped():
     problem = mbb(20, 10)
-    whole = simp(problem, 0.5, radius=1.5, filter="density", iterations=12)
-    part = simp(problem, 0.5, radius=1.5, filter="density", iterations=5)
-    rest = simp(problem, 0.5, radius=1.5, filter="density", iterations=7, start=part.variables)
+    whole = Simp(0.5, radius=1.5, filter="density", max_iterations=12)(problem)
+    part = Simp(0.5, radius=1.5, filter="density", max_iterations=5)(problem)
+    rest = Simp(0.5, radius=1.5, filter="density", max_iterations=7)(problem, start=part.variables)
     np.testing.assert_allclose(rest.density, whole.density, atol=1e-9)
 
 
 def test_it_stops_when_the_objective_stands_still():
-    design = simp(mbb(30, 10), 0.5, radius=1.5, tolerance=0.0, objective_tolerance=1e-3)
+    design = Simp(0.5, radius=1.5, tolerance=0.0, objective_tolerance=1e-3)(mbb(30, 10))
     assert design.converged == "objective"
     recent = design.compliance[-11:]
     assert np.ptp(recent) < 2e-3 * recent[-1]
@@ -157,7 +161,7 @@ def test_it_stops_when_the_objective_stands_still():
 
 def test_progress_is_told():
     told = []
-    simp(mbb(12, 6), 0.5, radius=1.5, iterations=4, progress=lambda *a: told.append(a))
+    Simp(0.5, radius=1.5, max_iterations=4)(mbb(12, 6), progress=lambda *a: told.append(a))
     assert [share for _, share in told] == [0.25, 0.5, 0.75, 1.0]
     assert "compliance" in told[0][0]
     assert "volume 0.5000" in told[0][0]
@@ -165,7 +169,7 @@ def test_progress_is_told():
 
 def test_tetrahedra_get_stiffer_too():
     problem = tets()
-    design = simp(problem, 0.5, radius=1.2, iterations=25, backend="superlu")
+    design = Simp(0.5, radius=1.2, max_iterations=25, backend="superlu")(problem)
     assert design.compliance[-1] < 0.6 * design.compliance[0]
     assert design.volume_fraction == pytest.approx(0.5, abs=1e-6)
     fields = solve(design.problem)
@@ -199,8 +203,8 @@ def plate_of_tets(nx, ny):
 
 def test_a_plate_of_tetrahedra_by_columns_is_the_plate_of_quadrilaterals():
     part, column = plate_of_tets(30, 10)
-    solid = simp(part, 0.5, radius=1.5, groups=column, backend="superlu", iterations=60)
-    plane = simp(mbb(30, 10), 0.5, radius=1.5, iterations=60)
+    solid = Simp(0.5, radius=1.5, backend="superlu", max_iterations=60)(part, groups=column)
+    plane = Simp(0.5, radius=1.5, max_iterations=60)(mbb(30, 10))
     assert np.ptp([solid.density[column == k] for k in range(300)], axis=1).max() == 0.0
     density = np.array([solid.density[column == k][0] for k in range(300)])
     # Linear tetrahedra are stiffer than quadrilaterals, here with ten of them through the depth.
@@ -212,11 +216,11 @@ def test_a_plate_of_tetrahedra_by_columns_is_the_plate_of_quadrilaterals():
 
 def test_groups_of_one_cell_change_nothing():
     problem = mbb(20, 10)
-    alone = simp(problem, 0.5, radius=1.5, iterations=10)
+    alone = Simp(0.5, radius=1.5, max_iterations=10)(problem)
     order = np.random.default_rng(0).permutation(200)
-    grouped = simp(problem, 0.5, radius=1.5, iterations=10, groups=7 * order)
+    grouped = Simp(0.5, radius=1.5, max_iterations=10)(problem, groups=7 * order)
     np.testing.assert_allclose(grouped.density, alone.density, atol=1e-9)
-    pairs = simp(problem, 0.5, radius=1.5, iterations=10, groups=np.arange(200) // 2)
+    pairs = Simp(0.5, radius=1.5, max_iterations=10)(problem, groups=np.arange(200) // 2)
     np.testing.assert_array_equal(pairs.density[::2], pairs.density[1::2])
 
 
@@ -227,15 +231,15 @@ def test_filters_prevent_checkerboards():
         return np.abs(rho[1:, 1:] - rho[1:, :-1] - rho[:-1, 1:] + rho[:-1, :-1]).mean() / 4.0
 
     # Below the distance of the cells nothing is averaged.
-    none = simp(mbb(30, 10), 0.5, radius=0.9, iterations=40)
-    some = simp(mbb(30, 10), 0.5, radius=1.5, iterations=40)
+    none = Simp(0.5, radius=0.9, max_iterations=40)(mbb(30, 10))
+    some = Simp(0.5, radius=1.5, max_iterations=40)(mbb(30, 10))
     assert board(none, 10, 30) > 0.1
     assert board(some, 10, 30) < 0.4 * board(none, 10, 30)
     assert none.grey < 0.2
 
 
 def test_filled_cells_have_the_volume():
-    design = simp(mbb(30, 10), 0.5, radius=1.5, iterations=20)
+    design = Simp(0.5, radius=1.5, max_iterations=20)(mbb(30, 10))
     filled = design.filled(0.4)
     assert filled.sum() == 120
     assert design.density[filled].min() >= design.density[~filled].max()
@@ -244,27 +248,50 @@ def test_filled_cells_have_the_volume():
 @pytest.mark.parametrize(
     ("more", "message"),
     [
-        ({"volume_fraction": 1.0}, "0 < volume fraction < 1"),
-        ({"penalty": 0.5}, "penalty >= 1"),
-        ({"filter": "none"}, "there are: sensitivity, density"),
-        ({"radius": 0.0}, "filter radius must be positive"),
-        ({"radius": 1e9, "problem": mbb(120, 100)}, "give a smaller one"),
+        ({"volume_fraction": 1.0}, r"volume_fraction must be in \(0, 1\); got 1.0: correct it"),
+        ({"penalty": 0.5}, "penalty must be at least 1; got 0.5"),
+        ({"filter": "none"}, "filter must be one of sensitivity, density; got 'none'"),
+        ({"radius": 0.0}, "radius must be above 0 mm; got 0.0"),
+        ({"minimum_stiffness": 0.0}, r"minimum_stiffness must be in \(0, 1\); got 0.0"),
+        ({"move": 0.0}, r"move must be in \(0, 1\]; got 0.0"),
+        ({"tolerance": -1.0}, "tolerance must be at least 0; got -1.0"),
+        ({"objective_tolerance": float("nan")}, "objective_tolerance must be at least 0; got nan"),
+        ({"max_iterations": 0}, "max_iterations must be at least 1; got 0"),
+    ],
+)
+def test_bad_parameters_are_refused(more, message):
+    with pytest.raises(InputError, match=message):
+        Simp(**{"volume_fraction": 0.5, **more})
+
+
+@pytest.mark.parametrize(
+    ("more", "message"),
+    [
         ({"weights": {"other": 1.0}}, "one number >= 0 for each load case"),
         ({"weights": {"load": 0.0}}, "give one a weight"),
         ({"solid": np.ones(60, dtype=bool)}, "cannot be met"),
-        ({"void": np.ones(5, dtype=bool)}, r"shape \(60,\)"),
-        ({"start": np.full(60, 2.0)}, r"densities in \[0, 1\]"),
-        ({"iterations": 0}, "at least one iteration"),
+        ({"solid": np.arange(60) < 2, "void": np.arange(60) < 1}, "both solid and void"),
+        ({"void": np.ones(5, dtype=bool)}, r"void must have shape \(60,\), one entry a cell"),
+        ({"void": np.zeros(60)}, "void must be bool arrays; got bool and float64"),
+        ({"start": np.full(60, 2.0)}, r"densities in \[0, 1\]; got 2.0 to 2.0"),
         ({"groups": np.zeros(3, dtype=int)}, "groups must be 60 integers"),
-        ({"groups": np.arange(60), "start": np.full(5, 0.5)}, "start must have one entry a cell"),
-        ({"move": 0.0}, "0 < move"),
+        (
+            {"groups": np.arange(60), "start": np.full(5, 0.5)},
+            r"start must have shape \(60,\), one entry a cell; got \(5,\)",
+        ),
         (
             {"problem": replace(mbb(10, 6), supports=(Support("x_min", "xy", (1.0, 0.0, 0.0)),))},
             "supports at rest",
         ),
         ({"problem": replace(tets(), mesh=tets().mesh.quadratic())}, "linear tetrahedra"),
+        ({"problem": replace(tets(), density=np.full(144, 0.5))}, "has a density already"),
     ],
 )
-def test_bad_parameters_are_refused(more, message):
+def test_bad_data_are_refused(more, message):
     with pytest.raises(InputError, match=message):
-        simp(**{"problem": mbb(10, 6), "volume_fraction": 0.5, "radius": 1.5, **more})
+        Simp(0.5, radius=1.5)(**{"problem": mbb(10, 6), **more})
+
+
+def test_a_filter_that_reaches_most_cells_is_refused():
+    with pytest.raises(InputError, match="give a smaller one"):
+        Simp(0.5, radius=1e9)(mbb(120, 100))

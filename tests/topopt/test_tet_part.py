@@ -11,7 +11,7 @@ from ccfem.io.surface import Surface
 from ccfem.materials import isotropic, transversely_isotropic
 from ccfem.mesh.box import box_mesh
 from ccfem.mesh.check import check_mesh
-from ccfem.topopt import Design, as_problem, simp, solid
+from ccfem.topopt import Design, Simp, as_problem, part_shape
 from ccfem.topopt import cut as cut_module
 from ccfem.topopt.cut import cut_mesh, volume_above
 from ccfem.topopt.cut_smoothing import relaxed
@@ -126,17 +126,19 @@ def cantilever():
         "side": (Force("tip", (0.0, 40.0, 0.0)),),
     }
     problem = Problem(mesh.with_patches({"tip": tip}), PLA, (Support("x_min"),), loads)
-    return simp(problem, 0.35, radius=2.6, iterations=30)
+    return Simp(0.35, radius=2.6, max_iterations=30)(problem)
 
 
 def test_a_design_becomes_a_closed_part(cantilever):
-    surface = solid(cantilever)
+    surface = part_shape(cantilever)
     assert surface.volume == pytest.approx(0.35 * 24 * 8 * 12, rel=0.03)
     assert all(each <= 2 and each % 2 == 0 for each in euler(surface.triangles))
     assert surface.points.min() >= -1e-9
     assert (surface.points.max(axis=0) <= np.array([24.0, 8.0, 12.0]) + 1e-9).all()
-    assert solid(cantilever, 0.45).volume == pytest.approx(0.45 * 24 * 8 * 12, rel=0.03)
-    assert solid(cantilever, threshold=0.3).volume > solid(cantilever, threshold=0.6).volume
+    assert part_shape(cantilever, 0.45).volume == pytest.approx(0.45 * 24 * 8 * 12, rel=0.03)
+    assert (
+        part_shape(cantilever, threshold=0.3).volume > part_shape(cantilever, threshold=0.6).volume
+    )
 
 
 def test_the_part_is_a_problem_as_stiff_as_the_design(cantilever):
@@ -168,10 +170,10 @@ def test_a_design_in_pieces_is_refused_with_the_cure():
     apart = made_up(np.where(np.abs(x - 10.0) < 3.0, 0.0, 1.0))
     for options in ({}, {"threshold": 0.5}):
         with pytest.raises(InputError, match=r"falls apart .* raise the volume fraction"):
-            solid(apart, **options)
+            part_shape(apart, **options)
     # The piece without load is left out where the rest holds together.
     held = made_up(np.where(np.abs(x - 10.0) < 3.0, 0.0, 1.0), point=(0.0, 10.0, 10.0))
-    assert solid(held, threshold=0.5).points[:, 0].max() < 8.5
+    assert part_shape(held, threshold=0.5).points[:, 0].max() < 8.5
 
 
 def test_small_voids_are_filled_and_large_ones_stay():
@@ -180,7 +182,7 @@ def test_small_voids_are_filled_and_large_ones_stay():
     node = np.linalg.norm(BOX.points - [6.25, 5.0, 5.0], axis=1).argmin()
     small = (BOX.cells == node).any(axis=1)
     large = np.linalg.norm(centre - [12.0, 12.0, 10.0], axis=1) < 5.0
-    surface = solid(made_up(np.where(small | large, 0.0, 1.0)), threshold=0.5)
+    surface = part_shape(made_up(np.where(small | large, 0.0, 1.0)), threshold=0.5)
     assert euler(surface.triangles) == [2, 2]
     assert 8000.0 - surface.volume == pytest.approx(4 / 3 * np.pi * 125.0, rel=0.2)
 
@@ -198,5 +200,7 @@ def test_axes_follow_the_angles():
 def test_options_of_plates_are_refused():
     with pytest.raises(InputError, match="thickness, edge_length: for plates only"):
         as_problem(made_up(np.ones(len(BOX.cells))), PLA, 2.0, 1.0)
-    with pytest.raises(InputError, match=r"share of the volume must lie in \(0, 1\]"):
-        solid(made_up(np.ones(len(BOX.cells))), 1.5)
+    with pytest.raises(InputError, match=r"volume_fraction must lie in \(0, 1\]; got 1.5"):
+        part_shape(made_up(np.ones(len(BOX.cells))), 1.5)
+    with pytest.raises(InputError, match=r"threshold must lie in \(0, 1\); got 1.0"):
+        part_shape(made_up(np.ones(len(BOX.cells))), threshold=1.0)

@@ -17,9 +17,10 @@ from ccfem.mesh.box import box_mesh
 from ccfem.mesh.patches import Box
 from ccfem.plates import PlaneProblem, raster_mesh, rotate_plane
 from ccfem.tensor import rotate_stiffness
-from ccfem.topopt import compliance_of, simp, somp
-from ccfem.topopt.compliance import GroupedCompliance
-from ccfem.topopt.material_axes import OrientedCompliance, harmonics, sheet
+from ccfem.topopt import Compliance, Simp, Somp
+from ccfem.topopt.groups import GroupedCompliance
+from ccfem.topopt.material_axes import harmonics, sheet
+from ccfem.topopt.orientation import OrientedCompliance
 
 FIBRE = plane_stress(50000.0, 4000.0, 0.3, 2500.0)
 WANG = plane_stress(18300.0, 19800.0, 0.17, 5150.0)
@@ -58,18 +59,18 @@ def test_angle_sensitivities_by_finite_differences(grouped):
     more = {"side": (Force("y_max", (5.0, 20.0, 0.0)),)}
     part = replace(part, loads={**part.loads, **more})
     solid = transversely_isotropic(50000.0, 4000.0, 0.3, 2500.0).stiffness
-    model = compliance_of(part, {"down": 1.0, "side": 0.5}, "superlu")
+    model = Compliance(part, {"down": 1.0, "side": 0.5}, "superlu")
     model = GroupedCompliance(model, columns) if grouped else model
     m = len(model.volumes)
     rng = np.random.default_rng(0)
     factor, angle = rng.uniform(0.1, 1.0, m), rng.uniform(-1.5, 1.5, m)
-    first = OrientedCompliance(model, solid, angle)
+    first = OrientedCompliance(model, harmonics(solid), angle)
     gradient = first.angle_gradient(first(factor), factor)
     step = 1e-5
     for cell in rng.choice(m, 6, replace=False):
         move = step * (np.arange(m) == cell)
         up, down = (
-            OrientedCompliance(model, solid, angle + sign * move)(factor).compliance
+            OrientedCompliance(model, harmonics(solid), angle + sign * move)(factor).compliance
             for sign in (1.0, -1.0)
         )
         assert gradient[cell] == pytest.approx(
@@ -99,8 +100,8 @@ def bridges():
     )
     loads = {"down": (Force("top", (0.0, -100.0 * h, 0.0)),)}
     quads = PlaneProblem(mesh, WANG, h, supports, loads)
-    tets = somp(part, WANG, 0.4, radius=10.0, groups=columns, iterations=45)
-    return tets, somp(quads, WANG, 0.4, radius=10.0, iterations=45)
+    tets = Somp(0.4, radius=10.0, max_iterations=45)(part, WANG, groups=columns)
+    return tets, Somp(0.4, radius=10.0, max_iterations=45)(quads, WANG)
 
 
 def image(values):
@@ -116,7 +117,7 @@ def test_bridge_of_tetrahedra_is_that_of_quadrilaterals(bridges):
     # Linear tetrahedra of this size are stiffer by some percent: so the design is what is compared,
     # with its angles, on the quadrilaterals.
     assert 0.97 < tets.compliance[-1] / quads.compliance[-1] < 1.0
-    model = OrientedCompliance(compliance_of(quads.full), WANG, image(tets.angle))
+    model = OrientedCompliance(Compliance(quads.full), harmonics(WANG), image(tets.angle))
     again = model(image(tets.factor)).compliance
     assert again == pytest.approx(quads.compliance[-1], rel=0.005)
 
@@ -130,7 +131,9 @@ def test_a_sheet_and_a_solid_held_on_its_bottom_answer_alike(bridges):
     np.testing.assert_allclose(inverse, WANG, rtol=1e-9, atol=1e-6)
     free = tuple(support for support in tets.full.supports if support.patch != "z_max")
     found = [
-        OrientedCompliance(compliance_of(problem), material, tets.angle)(tets.factor).compliance
+        OrientedCompliance(Compliance(problem), harmonics(material), tets.angle)(
+            tets.factor
+        ).compliance
         for problem, material in (
             (tets.full, sheet(WANG)),
             (replace(tets.full, supports=free), laminate),
@@ -165,17 +168,12 @@ def test_a_bar_takes_its_axis_along_the_pull():
     )
     solid = np.ones(150, dtype=bool)
     solid[:6] = False
-    design = somp(
+    design = Somp(0.99, radius=1.5, max_iterations=40, tolerance=0.0, objective_tolerance=0.0)(
         replace(part, mesh=mesh, loads={"pull": loads}),
         FIBRE,
-        0.99,
-        radius=1.5,
         solid=solid,
         groups=columns,
         angle=-0.2,
-        iterations=40,
-        tolerance=0.0,
-        objective_tolerance=0.0,
     )
     assert np.degrees(np.abs(design.angle - np.pi / 6).max()) < 3.0
 
@@ -187,11 +185,12 @@ def test_passive_cells_stay(filter):
     # By columns: whole bricks.
     i, j = np.floor(x), np.floor(y)
     solid, void = j == 7, (np.abs(i - 9) < 3) & (np.abs(j - 3) < 2)
-    options = {"radius": 1.5, "filter": filter, "solid": solid, "void": void, "iterations": 12}
+    parameters = {"radius": 1.5, "filter": filter, "max_iterations": 12}
+    passive = {"solid": solid, "void": void}
     for design in (
-        simp(part, 0.5, groups=columns, **options),
-        simp(part, 0.5, **options),
-        somp(part, FIBRE, 0.5, groups=columns, **options),
+        Simp(0.5, **parameters)(part, groups=columns, **passive),
+        Simp(0.5, **parameters)(part, **passive),
+        Somp(0.5, **parameters)(part, FIBRE, groups=columns, **passive),
     ):
         assert (design.density[solid] == 1.0).all()
         assert (design.density[void] == 0.0).all()
@@ -202,14 +201,14 @@ def test_passive_cells_stay(filter):
 def test_load_cases_are_weighted():
     part, columns = plate(16, 8)
     both = replace(part, loads={**part.loads, "side": (Force("y_max", (90.0, 0.0, 0.0)),)})
-    options = {"radius": 1.5, "groups": columns, "iterations": 12}
-    first = simp(part, 0.5, **options)
-    only = simp(both, 0.5, weights={"down": 1.0, "side": 0.0}, **options)
+    method = Simp(0.5, radius=1.5, max_iterations=12)
+    first = method(part, groups=columns)
+    only = method(both, groups=columns, weights={"down": 1.0, "side": 0.0})
     np.testing.assert_allclose(only.density, first.density, atol=1e-6)
-    shared = simp(both, 0.5, weights={"down": 1.0, "side": 3.0}, **options)
+    shared = method(both, groups=columns, weights={"down": 1.0, "side": 3.0})
     assert np.abs(shared.density - first.density).max() > 0.5
     # The objective is the weighted sum of the works of the loads of the final design.
-    work = compliance_of(shared.full, backend="superlu")(shared.factor).cases
+    work = Compliance(shared.full, backend="superlu")(shared.factor).cases
     assert shared.compliance[-1] == pytest.approx(work["down"] + 3.0 * work["side"], rel=1e-6)
 
 
@@ -221,18 +220,11 @@ def test_sixty_iterations_are_thirty_and_thirty_more(kind):
         mesh = raster_mesh(np.ones((5, 10), dtype=bool))
         loads = {"down": (Force("x_max", (0.0, -9.0, 0.0)),)}
         problem, groups = PlaneProblem(mesh, FIBRE, 1.0, (Support("x_min"),), loads), None
-    options = {
-        "radius": 1.5,
-        "groups": groups,
-        "backend": "superlu",
-        "tolerance": 0.0,
-        "objective_tolerance": 0.0,
-    }
-    whole = somp(problem, FIBRE, 0.5, iterations=60, **options)
-    half = somp(problem, FIBRE, 0.5, iterations=30, **options)
-    rest = somp(
-        problem, FIBRE, 0.5, iterations=30, start=half.variables, angle=half.angle, **options
-    )
+    parameters = {"radius": 1.5, "backend": "superlu", "tolerance": 0.0, "objective_tolerance": 0.0}
+    thirty = Somp(0.5, max_iterations=30, **parameters)
+    whole = replace(thirty, max_iterations=60)(problem, FIBRE, groups=groups)
+    half = thirty(problem, FIBRE, groups=groups)
+    rest = thirty(problem, FIBRE, groups=groups, start=half.variables, angle=half.angle)
     np.testing.assert_allclose(rest.density, whole.density, atol=1e-6)
     np.testing.assert_allclose(
         np.concatenate([half.compliance, rest.compliance[1:]]), whole.compliance, rtol=1e-8
@@ -242,14 +234,8 @@ def test_sixty_iterations_are_thirty_and_thirty_more(kind):
 def test_progress_tells_compliance_volume_and_change():
     part, columns = plate(6, 4)
     told = []
-    design = somp(
-        part,
-        FIBRE,
-        0.5,
-        radius=1.5,
-        groups=columns,
-        iterations=3,
-        progress=lambda *a: told.append(a),
+    design = Somp(0.5, radius=1.5, max_iterations=3)(
+        part, FIBRE, groups=columns, progress=lambda *a: told.append(a)
     )
     assert [share for _, share in told] == pytest.approx([1 / 3, 2 / 3, 1.0])
     assert told[1][0] == (
@@ -263,10 +249,10 @@ def test_bad_parameters_are_refused():
     tilted = np.eye(6) * 1e3
     tilted[0, 3] = tilted[3, 0] = 100.0
     with pytest.raises(InputError, match="alike on both sides of the x-y plane"):
-        somp(part, tilted, 0.5)
+        Somp(0.5)(part, tilted)
     with pytest.raises(InputError, match=r"shape \(6, 6\) here; got \(2, 2\)"):
-        somp(part, np.eye(2), 0.5)
+        Somp(0.5)(part, np.eye(2))
     with pytest.raises(InputError, match="solid must be the same in all cells of a group"):
-        somp(part, FIBRE, 0.5, groups=columns, solid=np.arange(72) == 5)
+        Somp(0.5)(part, FIBRE, groups=columns, solid=np.arange(72) == 5)
     with pytest.raises(InputError, match="angle must be the same in all cells of a group"):
-        somp(part, FIBRE, 0.5, groups=columns, angle=np.linspace(0.0, 1.0, 72))
+        Somp(0.5)(part, FIBRE, groups=columns, angle=np.linspace(0.0, 1.0, 72))

@@ -15,8 +15,8 @@ from ccfem.evaluation.sinuosity import LONG
 from ccfem.evaluation.stiffness_alignment import Reading, agreement, performance_index, strongest
 from ccfem.linking.print_order import nearest_end_order
 from ccfem.materials import Material
-from ccfem.plates import PlaneProblem, rotate_plane, stack_plane
-from ccfem.plates.solve import PlaneField, prepare_plane, solve_plane
+from ccfem.plates import PlaneField, PlaneProblem, rotate_plane, solve_plane, stack_plane
+from ccfem.plates.solve import prepare
 from ccfem.tensor import largest_in_plane
 
 __all__ = [
@@ -136,7 +136,7 @@ def turned_energies(
         symmetric plate in mirrored senses.
     angles : sequence of floats, degrees
     """
-    elements = prepare_plane(problem).elements
+    elements = prepare(problem).elements
     energies = []
     for angle in angles:
         turned = rotate_plane(stiffness, direction + np.radians(angle) * side)

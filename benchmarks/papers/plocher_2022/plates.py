@@ -24,8 +24,7 @@ from ccfem.layers.slicing.planar import Planar
 from ccfem.materials import isotropic, plane_stress
 from ccfem.mesh import TetMesh
 from ccfem.meshing import extrude
-from ccfem.plates import PlaneMesh, PlaneProblem, raster_mesh
-from ccfem.plates.solve import PlaneField, solve_plane
+from ccfem.plates import PlaneField, PlaneMesh, PlaneProblem, raster_mesh, solve_plane
 
 __all__ = ["Plate", "five_holes", "optimised_beam", "plates", "single_hole"]
 

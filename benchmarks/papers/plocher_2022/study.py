@@ -42,7 +42,7 @@ from ccfem.linking.print_order import nearest_end_order
 from ccfem.machine import Machine
 from ccfem.materials import named_material
 from ccfem.planning import plan
-from ccfem.plates.solve import solve_plane
+from ccfem.plates import solve_plane
 from ccfem.raster.raster_plan import RasterPlan
 from ccfem.strategies import create, mps
 from ccfem.toolpaths import FIBRE, Toolpaths

@@ -10,9 +10,7 @@ from ccfem.arrays import BoolArray, FloatArray, read_only
 from ccfem.elasticity.problem import PointForce, Support
 from ccfem.materials import plane_stress
 from ccfem.plates import PlaneProblem, raster_mesh
-from ccfem.topopt.design import Design
-from ccfem.topopt.outline import outline
-from ccfem.topopt.simp import simp
+from ccfem.topopt import Design, Simp, outline
 
 __all__ = ["BendingBeam", "three_point_bending", "three_point_bending_problem"]
 
@@ -97,13 +95,10 @@ def three_point_bending(size: float = 0.8, volume_fraction: float = 0.6) -> Bend
     volume_fraction : float, default 0.6
     """
     problem = three_point_bending_problem(_TIMES * size)
-    design = simp(
-        problem,
-        volume_fraction,
-        radius=1.5 * _TIMES * size,
-        objective_tolerance=0.0,
-        iterations=120,
+    method = Simp(
+        volume_fraction, radius=1.5 * _TIMES * size, objective_tolerance=0.0, max_iterations=120
     )
+    design = method(problem)
     coarse = design.density.reshape(_ROWS, _COLUMNS)
     coarse = 0.5 * (coarse + coarse[:, ::-1])
     fine = ndimage.zoom(coarse, _TIMES, order=1, mode="nearest", grid_mode=True)

@@ -16,7 +16,7 @@ from ccfem.evaluation.stiffness_alignment import agreement, strongest
 from ccfem.geometry.polylines import pack
 from ccfem.materials import named_material
 from ccfem.planning import plan
-from ccfem.plates.solve import PlaneField
+from ccfem.plates import PlaneField
 from ccfem.raster.patterns import concentric_regions, medial_regions
 from ccfem.raster.raster_plan import raster_plan
 from ccfem.strategies import create

@@ -16,8 +16,8 @@ import numpy as np
 
 from ccfem.arrays import FloatArray
 from ccfem.cases import Case, create_case
-from ccfem.cases.build_data import DESIGNED
 from ccfem.cases.designed import ELEMENT_SIZE, DesignPlate
+from ccfem.cases.stored.build import DESIGNED
 from ccfem.elasticity import StressField, solve
 from ccfem.evaluation import evaluate
 from ccfem.evaluation.curvature import sample_curvature

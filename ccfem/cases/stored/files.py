@@ -1,4 +1,4 @@
-"""Meshes and outlines of the cases that come with ccfem, so that a first run does not wait.
+"""Files of the stored meshes and outlines: where they are, and how they are read and written.
 
 ``data/manifest.toml`` says what each file is, which command made it, and its SHA-256.
 """
@@ -26,13 +26,13 @@ __all__ = [
     "write_outline",
 ]
 
-COMMAND = "python -m ccfem.cases.build_data"
+COMMAND = "python -m ccfem.cases.stored.build"
 """The command that makes the files."""
 
 
 def data_folder() -> Path:
     """Folder of the stored meshes: in the installed package, else in the repository."""
-    package = Path(__file__).resolve().parent.parent
+    package = Path(__file__).resolve().parents[2]
     packaged = package / "data"
     return packaged if (packaged / "manifest.toml").exists() else package.parent / "data"
 

@@ -5,7 +5,8 @@ from hypothesis import strategies as st
 from hypothesis.extra.numpy import arrays
 
 from ccfem.errors import InputError
-from ccfem.plates.plane_mesh import PlaneMesh, Sheet, raster_image, raster_mesh
+from ccfem.plates.mesh import PlaneMesh, Sheet
+from ccfem.plates.raster_mesh import raster_image, raster_mesh
 
 MASKS = arrays(bool, st.tuples(st.integers(1, 6), st.integers(1, 6))).filter(lambda a: a.any())
 
@@ -68,35 +69,6 @@ def test_top_row_of_the_image_is_the_upper_side():
     np.testing.assert_array_equal(values, [[3, 3, 3], [0, 1, 0]])
 
 
-def test_triangles_have_areas_and_neighbours():
-    mesh = PlaneMesh([[0, 0], [2, 0], [2, 1], [0, 1]], [[0, 1, 2], [0, 2, 3]])
-    np.testing.assert_allclose(mesh.areas, 1.0)
-    np.testing.assert_array_equal(mesh.neighbours, [[0, 1]])
-    assert len(mesh.boundary) == 4
-    assert not mesh.congruent
-    np.testing.assert_array_equal(mesh.nearest_nodes([[1.9, 0.9], [0, 0.1]]), [2, 0])
-
-
-@pytest.mark.parametrize(
-    ("points", "cells", "patches", "message"),
-    [
-        (np.zeros((3, 3)), [[0, 1, 2]], {}, r"shape \(n, 2\)"),
-        (np.zeros((3, 2)), [[0, 1]], {}, r"\(m, 3\) or \(m, 4\)"),
-        (np.zeros((3, 2)), [[0, 1, 3]], {}, "nodes 0 to 2"),
-        (np.zeros((3, 2)), [[0, 1, 2]], {"a": [0, 1]}, "edges by their ends"),
-    ],
-)
-def test_bad_meshes_are_refused(points, cells, patches, message):
-    with pytest.raises(InputError, match=message):
-        PlaneMesh(points, cells, patches)
-
-
-def test_bad_rasters_and_inner_edges_are_refused():
+def test_a_raster_needs_a_pixel():
     with pytest.raises(InputError, match="true pixel"):
         raster_mesh(np.zeros((2, 2), dtype=bool))
-    mesh = raster_mesh(np.ones((2, 2), dtype=bool))
-    centre = mesh.nearest_nodes([[1.0, 1.0], [1.0, 0.0]])
-    with pytest.raises(InputError, match="inside the part"):
-        Sheet(mesh, np.ones(4)).facet_areas(centre[None])
-    with pytest.raises(InputError, match="no patch named 'left'"):
-        mesh.patch("left")

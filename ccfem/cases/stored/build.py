@@ -1,4 +1,4 @@
-"""Make the stored meshes and outlines of the cases: ``python -m ccfem.cases.build_data``."""
+"""Make the stored meshes and outlines of the cases: ``python -m ccfem.cases.stored.build``."""
 
 import hashlib
 import importlib
@@ -6,7 +6,8 @@ import sys
 from collections.abc import Sequence
 from pathlib import Path
 
-from ccfem.cases.stored import COMMAND, data_folder, write_outline
+from ccfem.cases.designed import ELEMENT_SIZE, THICKNESS
+from ccfem.cases.stored.files import COMMAND, data_folder, write_outline
 from ccfem.io import whole_file, write_mesh
 from ccfem.mesh.tet_mesh import TetMesh
 
@@ -52,8 +53,6 @@ def _meshed(folder: Path, name: str) -> str:
 
 def _designed(folder: Path, name: str) -> str:
     """Optimise a plate, make its outline and the mesh of the part; their entries."""
-    from ccfem.cases.designed import ELEMENT_SIZE, THICKNESS
-
     plate = getattr(importlib.import_module(f"ccfem.cases.{name}"), f"{name}_plate")()
     design = plate.design()
     outline = plate.outline(design)

@@ -67,7 +67,7 @@ def test_the_design_pays(case):
 
 
 def test_a_coarse_design_holds_its_rims_and_its_volume():
-    design = bracket_design(4.5, iterations=6)
+    design = bracket_design(4.5, max_iterations=6)
     assert design.volume_fraction == pytest.approx(0.3, abs=1e-6)
     assert design.compliance[-1] < 0.5 * design.compliance[0]
     centre = design.full.mesh.points[design.full.mesh.cells].mean(axis=1)[:, :2]

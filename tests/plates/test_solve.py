@@ -11,7 +11,7 @@ from ccfem.materials import isotropic, plane_stress
 from ccfem.mesh.box import box_mesh
 from ccfem.plates import PlaneMesh, PlaneProblem, raster_mesh, rotate_plane, stack_plane
 from ccfem.plates.assembly import PlaneElements
-from ccfem.plates.solve import prepare_plane, solve_plane
+from ccfem.plates.solve import prepare, solve_plane
 
 C_FRAM = (73200.0, 4100.0, 0.33, 2200.0)
 STEEL = plane_stress(200000.0, 200000.0, 0.3, 200000.0 / 2.6)
@@ -138,7 +138,7 @@ def test_energy_work_and_reactions_balance(corners, shake):
         "press": (Pressure("y_max", 0.3),),
     }
     problem = PlaneProblem(mesh, STEEL, thickness, (Support("x_min", "xy"),), loads)
-    forces = prepare_plane(problem).forces
+    forces = prepare(problem).forces
     fields = solve_plane(problem, tolerance=1e-11)
     for name, field in fields.items():
         total = field.reactions + forces[name]
@@ -323,7 +323,7 @@ def test_a_pin_presses_on_half_of_a_hole():
     )
     loads = {"pin": (Bearing("hole", (3.0, 0.0, 0.0)),)}
     problem = PlaneProblem(mesh, STEEL, 0.5, (Support("rim"),), loads)
-    forces = prepare_plane(problem).forces["pin"]
+    forces = prepare(problem).forces["pin"]
     np.testing.assert_allclose(forces.sum(axis=0), [3.0, 0.0], atol=1e-9)
     assert not forces[inner.nonzero()[0][np.cos(angle) < -0.1]].any()
     # The pressure is a cosine: 4 F / (pi d t) at its middle.

@@ -8,7 +8,7 @@ from ccfem.elasticity import Force, PointForce, Support, solve
 from ccfem.errors import InputError
 from ccfem.materials import isotropic, plane_stress, transversely_isotropic
 from ccfem.plates import PlaneProblem, raster_mesh, rotate_plane, solve_plane
-from ccfem.topopt import Design, as_problem, simp, solid
+from ccfem.topopt import Design, Simp, as_problem, part_shape
 
 PLA = isotropic(3000.0, 0.35)
 SHEET = plane_stress(3000.0, 3000.0, 0.35, 3000.0 / 2.7)
@@ -63,18 +63,14 @@ def cantilever():
         "point": (PointForce((40.0, 10.0, 0.0), (0.0, -100.0, 0.0)),),
     }
     supports = (Support("high", "xy"), Support("low", "xy"))
-    return simp(
-        PlaneProblem(mesh.with_patches(sides), SHEET, 1.5, supports, loads),
-        0.5,
-        radius=1.5,
-        least=1e-3,
-        iterations=40,
+    return Simp(0.5, radius=1.5, minimum_stiffness=1e-3, max_iterations=40)(
+        PlaneProblem(mesh.with_patches(sides), SHEET, 1.5, supports, loads)
     )
 
 
 def test_patches_lie_where_they_were(cantilever):
     part = as_problem(cantilever, PLA, edge_length=1.3)
-    mesh, rim = part.mesh, solid(cantilever).boundary
+    mesh, rim = part.mesh, part_shape(cantilever).boundary
     for name, x, low, high in (("high", 0, 15, 20), ("low", 0, 0, 5), ("tip", 40, 7, 13)):
         facets = mesh.patch(name)
         held = rim.intersection(shapely.LineString([(x, low), (x, high)]).buffer(1e-6)).length
@@ -88,7 +84,7 @@ def test_patches_lie_where_they_were(cantilever):
 
 def test_the_part_is_as_stiff_as_its_outline_on_a_fine_raster(cantilever):
     part = as_problem(cantilever, PLA, edge_length=1.0)
-    polygon, h = solid(cantilever), 0.2
+    polygon, h = part_shape(cantilever), 0.2
     y, x = h * (np.mgrid[:100, :200] + 0.5)
     mesh = raster_mesh(shapely.contains_xy(polygon, x, y)[::-1], h)
     x, y = mesh.points.T

@@ -1,0 +1,109 @@
+"""The case of a designed plate: printed of prepreg filament, as the parts of Wang et al. 2021."""
+
+from collections.abc import Callable
+
+from ccfem.cases.case import Case
+from ccfem.cases.designed.plate import DesignPlate
+from ccfem.cases.stored.files import mesh_of_case
+from ccfem.elasticity.problem import Force, Problem, Support
+from ccfem.layers.slicing.planar import Planar
+from ccfem.machine.machine import Machine
+from ccfem.machine.speed_table import SpeedTable
+from ccfem.materials import printed_pla
+from ccfem.mesh.tet_mesh import TetMesh
+
+__all__ = ["ELEMENT_SIZE", "THICKNESS", "case_of", "designed_case", "prepreg_printer"]
+
+ELEMENT_SIZE = 1.2
+THICKNESS = 1.0
+"""Of the plates, mm; that of the printed parts is not stated."""
+_SOURCE = "Wang et al. 2021 (Composites Part A 140, 106181)"
+_LAYERS = 2
+
+
+def prepreg_printer() -> Machine:
+    """Printer of the prepreg filament, with the speeds of table 2 of the paper.
+
+    Strands 0.9 mm wide, no shorter than 10 mm, and turns of 1.5 mm radius are assumed: the paper
+    does not state them.
+    """
+    return Machine(
+        fibre_width=0.9,
+        deposited_width=0.9,
+        minimum_length=10.0,
+        minimum_radius=1.5,
+        speeds=SpeedTable(),
+    )
+
+
+def case_of(plate: Callable[..., DesignPlate], title: str) -> Callable[..., Case]:
+    """Make the case of a plate: a function of the parameters that all of them share.
+
+    Parameters
+    ----------
+    plate : callable
+        Makes the plate, of its `force`.
+    title : str
+        What it is, for the list of cases.
+    """
+
+    def case(
+        optimised: bool = True,
+        element_size: float = ELEMENT_SIZE,
+        order: int = 1,
+        force: float = 100.0,
+        thickness: float = THICKNESS,
+    ) -> Case:
+        return designed_case(plate(force=force), optimised, element_size, order, thickness)
+
+    case.__doc__ = f"""{title}: optimised, or the full plate.
+
+    It is printed of plain matrix, so that the virtual test adds the fibre, and stands on its face
+    at z = 0 without friction, so that it stays plane.
+
+    Parameters
+    ----------
+    optimised : bool, default True
+        Whether to take the optimised part, or the full plate.
+    element_size : float, mm
+        Edge length of the cells aimed at.
+    order : {{1, 2}}
+        Linear or quadratic cells.
+    force : float, N
+    thickness : float, mm
+    """
+    return case
+
+
+def designed_case(
+    plate: DesignPlate,
+    optimised: bool = True,
+    element_size: float = ELEMENT_SIZE,
+    order: int = 1,
+    thickness: float = THICKNESS,
+) -> Case:
+    """Make the case of one plate; parameters as those of the functions that `case_of` makes."""
+    polygon = None if optimised else plate.domain
+    key = plate.name if optimised and thickness == THICKNESS else ""
+
+    def make(size: float) -> TetMesh:
+        return plate.mesh(plate.part if polygon is None else polygon, size, thickness)
+
+    problem = Problem(
+        mesh_of_case(key, element_size, order, make),
+        printed_pla(),
+        (
+            *(Support(name, held) for name, (_, held) in plate.supports.items()),
+            Support("bottom", "z"),
+        ),
+        {"down": (Force("load", (0.0, -plate.force, 0.0)),)},
+    )
+    what = "optimised" if optimised else "full plate"
+    return Case(
+        name=plate.name,
+        title=f"{plate.title}, {what}",
+        problem=problem,
+        slicing=Planar(count=_LAYERS),
+        machine=prepreg_printer(),
+        source=f"{_SOURCE}: size and loading; what it does not state is assumed",
+    )
