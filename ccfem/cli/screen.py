@@ -19,7 +19,7 @@ from ccfem.comparison.ranking import best_values, ranking
 from ccfem.comparison.remarks import remarks, verdict
 from ccfem.comparison.result import Comparison
 from ccfem.errors import InputError, known_names
-from ccfem.virtual_testing.verdict import HONEST_PROMISE
+from ccfem.virtual_testing.stiffer import HONEST_PROMISE
 
 if typing.TYPE_CHECKING:
     from ccfem.strategies import Strategy
