@@ -204,8 +204,9 @@ def plan(
     parameters = {strategy: parameters_of(strategy, set_ or ())}
     options = _options(layers, heights, fibre_per_layer, virtual_test, load_case, backend)
     options["natural"] = fibre_per_layer is None
+    options["print_plans"] = gcode
     load = partial(_load, case, set_case)
-    _run(load, f"-{strategy}", (strategy,), parameters, out, options, calibration, gcode)
+    _run(load, f"-{strategy}", (strategy,), parameters, out, options, calibration)
 
 
 @app.command()
@@ -298,20 +299,16 @@ def _run(
     out: Path | None,
     options: dict[str, Any],
     calibration: Path | None,
-    gcode: bool = False,
 ) -> None:
     """Compare and write; a failure leaves nothing behind."""
     from ccfem.cli.screen import print_comparison
     from ccfem.comparison.compare import compare as run_comparison
     from ccfem.comparison.compare import create_all
     from ccfem.comparison.files import staged, write_results
-    from ccfem.export.print_plan import check_machine
 
     imported = time.perf_counter()
     case = load()
     seconds = {"start": imported - _STARTED, "mesh": time.perf_counter() - imported}
-    if gcode:
-        check_machine(case.machine)
     if calibration is not None:
         from ccfem.virtual_testing.calibration import read_calibration
 
@@ -326,8 +323,11 @@ def _run(
         if not comparison.succeeded:
             reasons = "; ".join(f"{run.name}: {run.failure}" for run in comparison.runs)
             raise InputError(f"no strategy could plan '{case.name}': {reasons}")
+        for run in comparison.runs:
+            if run.unprinted:
+                raise InputError(run.unprinted)
         command = shlex.join(["ccfem", *sys.argv[1:]])
-        write_results(comparison, folder, command, seconds, _part(progress, 0.75, 1.0), gcode)
+        write_results(comparison, folder, command, seconds, _part(progress, 0.75, 1.0))
     print_comparison(comparison, where, time.perf_counter() - _STARTED)
 
 
