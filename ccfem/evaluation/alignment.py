@@ -4,7 +4,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from ccfem.arrays import FloatArray
+from ccfem.arrays import FloatArray, read_only
 from ccfem.evaluation.column import Column
 from ccfem.evaluation.plane_paths import PlanePaths
 from ccfem.geometry.locate import locate
@@ -97,6 +97,10 @@ class AlignmentSamples:
     largest: FloatArray
     smallest: FloatArray
     along: FloatArray
+
+    def __post_init__(self) -> None:
+        for name, values in vars(self).items():
+            object.__setattr__(self, name, read_only(values))
 
 
 def sample_alignment(paths: PlanePaths, stress: LayerStress, step: float) -> AlignmentSamples:

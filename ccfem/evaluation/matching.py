@@ -35,6 +35,7 @@ __all__ = [
     "THRESHOLDS",
     "MatchingSamples",
     "Reading",
+    "along_fibre",
     "matching_curve",
     "matching_indices",
     "matching_rate",
@@ -168,7 +169,7 @@ def sample_matching(
         raise InputError(f"no reading '{reading}' of the rate; there are: {', '.join(READINGS)}")
     lines = paths.in_part if links else paths.strands
     if reading in ("path", "energy"):
-        return _along_fibre(sample_alignment(lines, stress, step))
+        return along_fibre(sample_alignment(lines, stress, step))
     points, direction, size, area = _stress_vectors(stress)
     starts, ends = _pieces(lines, max(step, reach))
     angle = np.full(len(points), np.inf)
@@ -186,7 +187,7 @@ def sample_matching(
     return MatchingSamples(angle, area, size)
 
 
-def _along_fibre(samples: AlignmentSamples) -> MatchingSamples:
+def along_fibre(samples: AlignmentSamples) -> MatchingSamples:
     """Angles at samples along the fibre, where the stress has a direction."""
     across, defined = strongest(samples.largest, samples.smallest)
     angle = np.degrees(np.where(across, 0.5 * np.pi - samples.angle, samples.angle))
@@ -239,7 +240,7 @@ def matching_curve(
 
 def matching_indices(samples: AlignmentSamples) -> dict[str, float]:
     """Values of `COLUMNS`."""
-    found = _along_fibre(samples)
+    found = along_fibre(samples)
     limits = np.array(_ANGLES, dtype=np.float64)
     return {
         f"matching_{reading}_{angle}": float(value)

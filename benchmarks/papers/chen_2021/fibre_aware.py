@@ -30,9 +30,9 @@ from ccfem.strategies.isocurve import Isocurve
 from ccfem.strategies.stream_function import StreamFunction
 from ccfem.toolpaths import Toolpaths
 from ccfem.virtual_testing.specimen import Specimen
+from ccfem.virtual_testing.stiffer import HONEST_PROMISE
 from ccfem.virtual_testing.strands import cut_strands
 from ccfem.virtual_testing.strength import first_failure
-from ccfem.virtual_testing.verdict import HONEST_PROMISE
 from ccfem.virtual_testing.virtual_test import virtual_bracket, virtual_test
 
 __all__ = ["LAYER_COUNTS", "LENGTH", "Tested", "bound", "designs", "loop", "sliced", "tested"]
