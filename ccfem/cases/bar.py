@@ -7,6 +7,7 @@ import shapely
 from ccfem.cases.case import Case
 from ccfem.cases.stored import mesh_of_case
 from ccfem.elasticity.problem import Force, Problem, Support
+from ccfem.layers.slicing.planar import Planar
 from ccfem.materials import printed_pla
 from ccfem.mesh.patches import Plane, patches_from_rules
 from ccfem.mesh.tet_mesh import TetMesh
@@ -75,7 +76,7 @@ def bar(element_size: float = ELEMENT_SIZE, order: int = 1, force: float = 1000.
         name="bar",
         title="Tensile bar, 125 x 25 x 5 mm, pulled at its ends",
         problem=problem,
-        layers=10,
+        slicing=Planar(count=10),
         source="size of the tensile bar of Chen et al. 2021 (Additive Manufacturing 49, 102470); "
         "own outline of lines and quarter circles",
     )

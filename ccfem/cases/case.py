@@ -6,6 +6,8 @@ from types import MappingProxyType
 from typing import Any
 
 from ccfem.elasticity.problem import Problem
+from ccfem.layers.slicer import Slicer
+from ccfem.layers.slicing.planar import Planar
 from ccfem.machine.machine import Machine
 
 __all__ = ["Case"]
@@ -23,8 +25,8 @@ class Case:
     problem : Problem
     build : tuple of 3 floats, default z
         Build direction in the frame of the mesh.
-    layers : int
-        Number of fibre layers, spread evenly over the height.
+    slicing : Slicer, default 12 flat layers
+        Cuts the part into layers of fibre.
     machine : Machine
     parameters : mapping of strategy name to parameters
         Where a strategy should not use its defaults on this part.
@@ -38,7 +40,7 @@ class Case:
     title: str
     problem: Problem
     build: tuple[float, float, float] = (0.0, 0.0, 1.0)
-    layers: int = 12
+    slicing: Slicer = field(default_factory=Planar)
     machine: Machine = field(default_factory=Machine)
     parameters: Mapping[str, Mapping[str, Any]] = field(default_factory=dict)
     source: str = ""

@@ -13,6 +13,8 @@ from ccfem.io.toml import from_table
 
 __all__ = ["create_case", "named_cases"]
 
+_PACKAGE = "ccfem.cases"
+
 
 def named_cases() -> Mapping[str, Callable[..., Case]]:
     """Every case by name: the modules of this package, and entry points ``ccfem.cases``.
@@ -20,11 +22,9 @@ def named_cases() -> Mapping[str, Callable[..., Case]]:
     A module that holds a function of its own name that returns a `Case` is one; its parameters
     have defaults.
     """
-    import ccfem.cases as package
-
     found: dict[str, Callable[..., Case]] = {}
-    for info in pkgutil.iter_modules(package.__path__):
-        module = importlib.import_module(f"{package.__name__}.{info.name}")
+    for info in pkgutil.iter_modules(importlib.import_module(_PACKAGE).__path__):
+        module = importlib.import_module(f"{_PACKAGE}.{info.name}")
         make = getattr(module, info.name, None)
         if callable(make) and get_type_hints(make).get("return") is Case:
             found[info.name] = make

@@ -7,6 +7,7 @@ import shapely
 from ccfem.cases.case import Case
 from ccfem.cases.stored import mesh_of_case
 from ccfem.elasticity.problem import Force, Problem, Support
+from ccfem.layers.slicing.planar import Planar
 from ccfem.materials import printed_pla
 from ccfem.mesh.patches import Cylinder, PatchRule, Plane, patches_from_rules
 from ccfem.mesh.tet_mesh import TetMesh
@@ -56,6 +57,6 @@ def open_hole(element_size: float = ELEMENT_SIZE, order: int = 1, force: float =
         name="open_hole",
         title="Plate 200 x 36 x 4 mm with a hole of radius 6 mm, in tension",
         problem=problem,
-        layers=8,
+        slicing=Planar(count=8),
         source="open-hole tension of laminates; the plate of ASTM D5766 with a hole twice as wide",
     )

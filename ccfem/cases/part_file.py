@@ -25,7 +25,8 @@ them with a minus ("-z"), or three numbers.
     edge_length = 2.0
 
     build = "z"                       # build direction; default z
-    layers = 12                       # fibre layers, spread evenly over the height; default 12
+    layers = 12                       # flat layers of fibre, spread evenly over the height ...
+    heights = [0.5, 1.0, 3.5]         # ... or their heights along the build direction; or [slicing]
     material = "pla"                  # a name of the table (ccfem.materials), or a table:
 
     [material]                        # isotropic ...
@@ -39,6 +40,10 @@ them with a minus ("-z"), or three numbers.
     poisson_fibre = 0.33
     shear_fibre = 2200.0
     poisson_transverse = 0.45         # optional
+
+    [slicing]                         # in place of layers and heights: a slicer (ccfem slicers)
+    method = "planar"                 # and its parameters; default: 12 flat layers
+    thickness = 0.4
 
     # Patches: boundary facets chosen by a rule (ccfem.mesh.patches). Groups of a mesh file
     # are patches already.
@@ -126,6 +131,9 @@ from ccfem.elasticity.problem import (
 from ccfem.errors import InputError
 from ccfem.io.toml import from_table
 from ccfem.io.whole import existing_file
+from ccfem.layers import slicing as slicers
+from ccfem.layers.slicer import Slicer
+from ccfem.layers.slicing.planar import Planar
 from ccfem.machine.machine import Machine
 from ccfem.materials import Material, isotropic, named_material, transversely_isotropic
 from ccfem.mesh.patches import (
@@ -169,7 +177,9 @@ class _Part(Body):
     title: str = ""
     source: str = ""
     build: str | Vector = "z"
-    layers: int = 12
+    layers: int | None = None
+    heights: tuple[float, ...] | None = None
+    slicing: dict[str, Any] | None = None
     patches: dict[str, Any] = field(default_factory=dict)
     machine: dict[str, Any] = field(default_factory=dict)
     strategies: dict[str, Any] = field(default_factory=dict)
@@ -211,8 +221,7 @@ def _case(content: Mapping[str, Any], path: Path) -> Case:
     part = from_table(_Part, content, "the part file")
     if not part.supports:
         raise InputError("a part needs a support: add [[supports]] with its patch")
-    if part.layers < 1:
-        raise InputError(f"layers must be at least 1; got {part.layers}: correct it")
+    slicing = _slicing(part)
     build = unit_vector(part.build, "build")
     supports = tuple(
         from_table(Support, table, f"supports[{k}]") for k, table in enumerate(part.supports)
@@ -233,12 +242,27 @@ def _case(content: Mapping[str, Any], path: Path) -> Case:
         title=part.title or name,
         problem=Problem(mesh, material, supports, loads),
         build=(float(build[0]), float(build[1]), float(build[2])),
-        layers=part.layers,
+        slicing=slicing,
         machine=machine,
         parameters=part.strategies,
         source=part.source,
         findings=findings,
     )
+
+
+def _slicing(part: _Part) -> Slicer:
+    """Slicer of a part file: of its number of layers, their heights, or the table slicing."""
+    given = [key for key in ("layers", "heights", "slicing") if getattr(part, key) is not None]
+    if len(given) > 1:
+        raise InputError(
+            f"a part needs one of layers, heights and slicing; got {' and '.join(given)}: choose "
+            "one"
+        )
+    if part.slicing is not None:
+        known = slicers.named()
+        name, parameters = _named(part.slicing, "method", known, "slicing")
+        return slicers.create(name, parameters)
+    return Planar(count=part.layers, heights=part.heights)
 
 
 def _rule(table: object, where: str) -> PatchRule:

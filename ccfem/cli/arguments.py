@@ -6,7 +6,7 @@ from typing import Any
 
 from ccfem.errors import InputError
 
-__all__ = ["assignment", "names_of", "numbers_of", "parameters_of"]
+__all__ = ["assignment", "names_of", "numbers_of", "parameters_by_strategy", "parameters_of"]
 
 
 def names_of(text: str) -> tuple[str, ...]:
@@ -31,6 +31,24 @@ def assignment(text: str) -> tuple[str, Any]:
         return name, tomllib.loads(f"value = {value}")["value"]
     except tomllib.TOMLDecodeError:
         return name, value
+
+
+def parameters_by_strategy(texts: Sequence[str]) -> dict[str, dict[str, Any]]:
+    """Parameters of several strategies, each as ``strategy.name=value``.
+
+    Raises
+    ------
+    InputError
+        When a text names no strategy, or has no ``=``.
+    """
+    found: dict[str, dict[str, Any]] = {}
+    for text in texts:
+        path, value = assignment(text)
+        strategy, dot, name = path.partition(".")
+        if not dot:
+            raise InputError(f"--set expects STRATEGY.NAME=VALUE; got '{text}'")
+        found.setdefault(strategy, {})[name] = value
+    return found
 
 
 def parameters_of(strategy: str, texts: Sequence[str]) -> dict[str, Any]:

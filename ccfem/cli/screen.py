@@ -5,6 +5,7 @@ import inspect
 import os
 import re
 import typing
+from collections.abc import Mapping, Sequence
 from pathlib import Path
 
 import numpy as np
@@ -17,12 +18,12 @@ from ccfem.cli.docstring import about, attributes
 from ccfem.comparison.headline import HEADLINE, cell_text, headline_values
 from ccfem.comparison.ranking import best_values, ranking
 from ccfem.comparison.remarks import remarks, verdict
-from ccfem.comparison.result import Comparison
+from ccfem.comparison.result import Comparison, Run
 from ccfem.errors import InputError, known_names
-from ccfem.virtual_testing.verdict import HONEST_PROMISE
+from ccfem.virtual_testing.stiffer import HONEST_PROMISE
 
 if typing.TYPE_CHECKING:
-    from ccfem.strategies import Strategy
+    from ccfem.planning.strategy import Strategy
 
 __all__ = ["print_cases", "print_comparison", "print_strategies", "print_strategy"]
 
@@ -73,14 +74,6 @@ def print_strategy(name: str) -> None:
         there = known_names(name, sorted(known))
         raise InputError(f"no strategy named '{name}'; there are: {there}")
     strategy, by_class = known[name], {each.__name__: each for each in known.values()}
-
-    def meaning(of: type, parameter: str) -> str:
-        text = attributes(of)[parameter].meaning if parameter in attributes(of) else ""
-        same = re.match(r"As in `(\w+)`", text)
-        if same is None or same[1] not in by_class:
-            return text
-        return meaning(by_class[same[1]], parameter).rstrip(".") + text[same.end() :]
-
     console = Console(highlight=False)
     console.print(f"[bold]{name}[/bold]")
     for paragraph in about(strategy):
@@ -92,9 +85,19 @@ def print_strategy(name: str) -> None:
     for field in dataclasses.fields(strategy):  # type: ignore[arg-type]
         kind = said[field.name].kind if field.name in said else ""
         note = _amount(strategy, field.name)
-        text = f"{meaning(strategy, field.name)} {note and f'It {note}.'}".strip()
+        meaning = _meaning(strategy, field.name, by_class)
+        text = f"{meaning} {note and f'It {note}.'}".strip()
         table.add_row(*map(escape, (field.name, repr(field.default), kind, text)))
     console.print(table)
+
+
+def _meaning(of: type, parameter: str, by_class: Mapping[str, type]) -> str:
+    """Say what a parameter means: "As in `Zigzag`" in the words of that class."""
+    text = attributes(of)[parameter].meaning if parameter in attributes(of) else ""
+    same = re.match(r"As in `(\w+)`", text)
+    if same is None or same[1] not in by_class:
+        return text
+    return _meaning(by_class[same[1]], parameter, by_class).rstrip(".") + text[same.end() :]
 
 
 def _amount(strategy: "type[Strategy]", parameter: str) -> str:
@@ -119,27 +122,11 @@ def _first_line(what: object) -> str:
 def print_comparison(comparison: Comparison, where: Path, seconds: float) -> None:
     """Print the headline table, the best of each row in bold, and where the results are."""
     console = Console(highlight=False)
-    best = best_values(comparison)
     runs = [run for run in ranking(comparison) if run.evaluation is not None]
-    values = [headline_values(run) for run in runs]
     if not console.is_terminal and "COLUMNS" not in os.environ:
         console.width = max(console.width, _TITLES + _NUMBERS * len(runs))
     console.print(comparison.case.title, style="bold", markup=False)
-    table = Table(header_style="bold", box=box.SIMPLE_HEAD)
-    table.add_column("")
-    for run in runs:
-        table.add_column(run.name, justify="right", overflow="fold")
-    for head in HEADLINE:
-        if not any(head.column in found for found in values):
-            continue
-        cells = []
-        for run, found in zip(runs, values, strict=True):
-            text, extra = cell_text(run, head)
-            if found.get(head.column) == best.get(head.column, np.nan):
-                text = f"[bold green]{text}[/]"
-            cells.append(f"{text} [dim]({extra})[/]" if extra else text)
-        table.add_row(head.title, *cells)
-    console.print(table)
+    console.print(_headline_table(runs, best_values(comparison)))
     for line in comparison.case.findings:
         console.print(f"mesh: {line}", style="dim", markup=False)
     for line in remarks(comparison):
@@ -150,3 +137,23 @@ def print_comparison(comparison: Comparison, where: Path, seconds: float) -> Non
     if any(run.tested is not None for run in runs):
         console.print(HONEST_PROMISE, style="dim", markup=False)
     console.print(f"{where / 'report.html'}  ({seconds:.1f} s)", markup=False, soft_wrap=True)
+
+
+def _headline_table(runs: Sequence[Run], best: Mapping[str, float]) -> Table:
+    """One column a run, one row an index; indices that no run has are left out."""
+    table = Table(header_style="bold", box=box.SIMPLE_HEAD)
+    table.add_column("")
+    for run in runs:
+        table.add_column(run.name, justify="right", overflow="fold")
+    values = [headline_values(run) for run in runs]
+    for head in HEADLINE:
+        if not any(head.column in found for found in values):
+            continue
+        cells = []
+        for run, found in zip(runs, values, strict=True):
+            text, extra = cell_text(run, head)
+            if found.get(head.column) == best.get(head.column, np.nan):
+                text = f"[bold green]{text}[/]"
+            cells.append(f"{text} [dim]({extra})[/]" if extra else text)
+        table.add_row(head.title, *cells)
+    return table

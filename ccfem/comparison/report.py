@@ -13,7 +13,7 @@ from ccfem.comparison.ranking import best_values, ranking, stiffness_ratios
 from ccfem.comparison.remarks import remarks, verdict
 from ccfem.comparison.result import Comparison
 from ccfem.evaluation import COLUMNS, Column
-from ccfem.virtual_testing.verdict import HONEST_PROMISE
+from ccfem.virtual_testing.stiffer import HONEST_PROMISE
 
 __all__ = ["report_html"]
 
@@ -69,7 +69,7 @@ def report_html(
     ----------
     comparison : Comparison
     record : mapping
-        What `ccfem.comparison.files.record` returns.
+        What `ccfem.comparison.record.record` returns.
     pictures : Pictures
 
     Returns
@@ -183,7 +183,7 @@ def _against_each_other(comparison: Comparison) -> str:
 
 def _pictures(comparison: Comparison, pictures: Pictures) -> str:
     runs = [run for run in ranking(comparison) if run.evaluation is not None]
-    heights = {layer.index: layer.height for layer in comparison.layers}
+    heights = {layer.index: layer.plane.height for layer in comparison.layers}
 
     def row(index: int) -> str:
         figures = [

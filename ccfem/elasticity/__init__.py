@@ -1,6 +1,7 @@
 """Linear elasticity on tetrahedra: problem, assembly, solvers, recovery."""
 
 from ccfem.elasticity.assembly import add_blocks, assemble, cell_gradients, pattern
+from ccfem.elasticity.part_stress import GivenStress, PartStress
 from ccfem.elasticity.problem import (
     Bearing,
     Force,
@@ -14,14 +15,15 @@ from ccfem.elasticity.problem import (
 from ccfem.elasticity.recovery import cell_stress, nodal_stress
 from ccfem.elasticity.solve import System, prepare, solve
 from ccfem.elasticity.solvers import BACKENDS, Solver, factorise, preconditioned_cg
-from ccfem.elasticity.stress_field import LayerStress, SolveRecord, StressField
+from ccfem.elasticity.stress_field import SolveRecord, StressField
 
 __all__ = [
     "BACKENDS",
     "Bearing",
     "Force",
-    "LayerStress",
+    "GivenStress",
     "Load",
+    "PartStress",
     "PointForce",
     "Pressure",
     "Problem",

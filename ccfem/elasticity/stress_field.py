@@ -5,13 +5,13 @@ from dataclasses import dataclass
 import numpy as np
 
 from ccfem.arrays import FloatArray, read_only
+from ccfem.elasticity.part_stress import PartStress
 from ccfem.elasticity.problem import Problem
 from ccfem.errors import InputError
 from ccfem.geometry.locate import locate_tets
-from ccfem.layers.layer import Layer
 from ccfem.mesh.tet_mesh import TetMesh
 
-__all__ = ["LayerStress", "SolveRecord", "StressField"]
+__all__ = ["SolveRecord", "StressField", "solved"]
 
 
 @dataclass(frozen=True)
@@ -76,6 +76,11 @@ class StressField:
         """Mesh of the problem."""
         return self.problem.mesh
 
+    @property
+    def held_or_loaded(self) -> tuple[str, ...]:
+        """Names of the patches that carry a support or a load."""
+        return self.problem.held_or_loaded
+
     def at(self, points: FloatArray, tolerance: float = 1e-3) -> FloatArray:
         """Recovered stress at any points of the part.
 
@@ -104,27 +109,18 @@ class StressField:
             )
         return np.einsum("qk,qkij->qij", weights, self.nodal[self.mesh.corners[cell]])
 
-    def on(self, layer: Layer) -> "LayerStress":
-        """Stress on one layer of the part."""
-        return LayerStress(layer, self.stress[layer.cell], layer.interpolate(self.nodal), part=self)
 
+def solved(stress: PartStress, purpose: str) -> StressField:
+    """Return the stress as the result of a solve, for what has to solve the part again.
 
-@dataclass(frozen=True)
-class LayerStress:
-    """Stress on a layer.
-
-    Attributes
-    ----------
-    layer : Layer
-    cell : (t, 3, 3) array, MPa
-        Stress of the tetrahedron that each triangle was cut from.
-    nodal : (n, 3, 3) array, MPa
-        Recovered stress at the layer's points.
-    part : StressField
-        The field of the whole part.
+    Raises
+    ------
+    InputError
+        When the stress was given; `purpose` says what cannot be done then.
     """
-
-    layer: Layer
-    cell: FloatArray
-    nodal: FloatArray
-    part: StressField
+    if not isinstance(stress, StressField):
+        raise InputError(
+            f"{purpose} solves the part again and needs its problem; got stress without one: solve "
+            "the part with ccfem.solve, or choose another strategy"
+        )
+    return stress

@@ -4,12 +4,12 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from ccfem.arrays import FloatArray
-from ccfem.elasticity.stress_field import LayerStress
+from ccfem.arrays import FloatArray, read_only
 from ccfem.evaluation.column import Column
 from ccfem.evaluation.plane_paths import PlanePaths
 from ccfem.geometry.locate import locate
 from ccfem.geometry.polylines import sample_midpoints
+from ccfem.layers.layer_stress import LayerStress
 from ccfem.tensor import in_plane, largest_in_plane
 
 __all__ = ["COLUMNS", "AlignmentSamples", "alignment_indices", "sample_alignment"]
@@ -98,6 +98,10 @@ class AlignmentSamples:
     smallest: FloatArray
     along: FloatArray
 
+    def __post_init__(self) -> None:
+        for name, values in vars(self).items():
+            object.__setattr__(self, name, read_only(values))
+
 
 def sample_alignment(paths: PlanePaths, stress: LayerStress, step: float) -> AlignmentSamples:
     """Stress along the paths of a layer, links in the part included.
@@ -115,9 +119,9 @@ def sample_alignment(paths: PlanePaths, stress: LayerStress, step: float) -> Ali
     layer = paths.layer
     lines = paths.in_part
     points, tangents, length, _ = sample_midpoints(lines.points, lines.offsets, step)
-    triangle, weights = locate(layer.plane_points, layer.triangles, points, _ROUNDING)
+    triangle, weights = locate(layer.plane.points, layer.triangles, points, _ROUNDING)
     inside = triangle >= 0
-    corners = in_plane(stress.nodal, layer.frame)[layer.triangles[triangle[inside]]]
+    corners = in_plane(stress.nodal, layer.plane.frame)[layer.triangles[triangle[inside]]]
     s = np.einsum("qk,qkc->qc", weights[inside], corners)
     t = tangents[inside]
     largest, smallest, direction = largest_in_plane(s)

@@ -5,7 +5,7 @@ from dataclasses import dataclass
 import numpy as np
 import shapely
 
-from ccfem.arrays import FloatArray
+from ccfem.arrays import FloatArray, read_only
 from ccfem.evaluation.column import Column
 from ccfem.evaluation.plane_paths import PlanePaths
 from ccfem.geometry.polylines import arc_lengths, resample, turning_angles
@@ -84,6 +84,10 @@ class CurvatureSamples:
     native: FloatArray
     turns: FloatArray
     length: FloatArray
+
+    def __post_init__(self) -> None:
+        for name, values in vars(self).items():
+            object.__setattr__(self, name, read_only(values))
 
 
 def sample_curvature(paths: PlanePaths, step: float) -> CurvatureSamples:

@@ -8,8 +8,8 @@ from ccfem.arrays import FloatArray
 from ccfem.evaluation.column import Column
 from ccfem.evaluation.plane_paths import PlanePaths
 from ccfem.geometry.polylines import arc_lengths
+from ccfem.linking.print_speed import step_speeds
 from ccfem.machine.machine import Machine
-from ccfem.machine.speeds import step_speeds
 from ccfem.toolpaths import FIBRE, TRAVEL, Toolpaths
 
 __all__ = ["COLUMNS", "ManufactureSamples", "manufacture_indices", "sample_manufacture"]

@@ -18,7 +18,6 @@ import numpy as np
 import shapely
 
 from ccfem.arrays import FloatArray, read_only
-from ccfem.elasticity.stress_field import LayerStress
 from ccfem.errors import InputError
 from ccfem.evaluation.alignment import AlignmentSamples, sample_alignment
 from ccfem.evaluation.column import Column
@@ -26,6 +25,7 @@ from ccfem.evaluation.plane_paths import PlanePaths, plane_paths, pool
 from ccfem.evaluation.stiffness_alignment import strongest
 from ccfem.geometry.places import INSIDE, section_places
 from ccfem.geometry.polylines import subdivide
+from ccfem.layers.layer_stress import LayerStress
 from ccfem.tensor import in_plane, largest_in_plane
 from ccfem.toolpaths import Toolpaths
 
@@ -35,6 +35,7 @@ __all__ = [
     "THRESHOLDS",
     "MatchingSamples",
     "Reading",
+    "along_fibre",
     "matching_curve",
     "matching_indices",
     "matching_rate",
@@ -168,7 +169,7 @@ def sample_matching(
         raise InputError(f"no reading '{reading}' of the rate; there are: {', '.join(READINGS)}")
     lines = paths.in_part if links else paths.strands
     if reading in ("path", "energy"):
-        return _along_fibre(sample_alignment(lines, stress, step))
+        return along_fibre(sample_alignment(lines, stress, step))
     points, direction, size, area = _stress_vectors(stress)
     starts, ends = _pieces(lines, max(step, reach))
     angle = np.full(len(points), np.inf)
@@ -186,7 +187,7 @@ def sample_matching(
     return MatchingSamples(angle, area, size)
 
 
-def _along_fibre(samples: AlignmentSamples) -> MatchingSamples:
+def along_fibre(samples: AlignmentSamples) -> MatchingSamples:
     """Angles at samples along the fibre, where the stress has a direction."""
     across, defined = strongest(samples.largest, samples.smallest)
     angle = np.degrees(np.where(across, 0.5 * np.pi - samples.angle, samples.angle))
@@ -200,12 +201,12 @@ def _stress_vectors(stress: LayerStress) -> tuple[FloatArray, FloatArray, FloatA
     The stress is the nodal one, at the centroid.
     """
     layer = stress.layer
-    plane = in_plane(stress.nodal, layer.frame)[layer.triangles].mean(axis=1)
+    plane = in_plane(stress.nodal, layer.plane.frame)[layer.triangles].mean(axis=1)
     largest, smallest, angle = largest_in_plane(plane)
     across, defined = strongest(largest, smallest)
     direction = angle + 0.5 * np.pi * across
     size = np.maximum(np.abs(largest), np.abs(smallest))
-    centres = layer.plane_points[layer.triangles].mean(axis=1)
+    centres = layer.plane.points[layer.triangles].mean(axis=1)
     return centres[defined], direction[defined], size[defined], layer.areas[defined]
 
 
@@ -216,7 +217,7 @@ def _pieces(paths: PlanePaths, longest: float) -> tuple[FloatArray, FloatArray]:
     follows[offsets[1:] - 1] = False
     first = np.flatnonzero(follows)
     starts, ends = points[first], points[first + 1]
-    inside = section_places(0.5 * (starts + ends), paths.layer.polygon) == INSIDE
+    inside = section_places(0.5 * (starts + ends), paths.layer.plane.polygon) == INSIDE
     return starts[inside], ends[inside]
 
 
@@ -239,7 +240,7 @@ def matching_curve(
 
 def matching_indices(samples: AlignmentSamples) -> dict[str, float]:
     """Values of `COLUMNS`."""
-    found = _along_fibre(samples)
+    found = along_fibre(samples)
     limits = np.array(_ANGLES, dtype=np.float64)
     return {
         f"matching_{reading}_{angle}": float(value)

@@ -8,8 +8,8 @@ from ccfem.arrays import BoolArray, FloatArray
 from ccfem.errors import InputError
 from ccfem.evaluation.alignment import AlignmentSamples
 from ccfem.evaluation.column import Column
-from ccfem.evaluation.sensitivity import Curve, OffAxis, acute, plane_compliance
-from ccfem.materials import Material, named_material
+from ccfem.evaluation.sensitivity import OffAxis, acute, plane_compliance
+from ccfem.materials import named_material
 
 __all__ = [
     "COLUMNS",
@@ -131,21 +131,10 @@ def performance_index(
     return float(np.average(factor, weights=weight * (1.0 + relative**3)))
 
 
-def stiffness_alignment_indices(
-    samples: AlignmentSamples, material: Material | None = None, curve: Curve | None = None
-) -> dict[str, float]:
-    """Values of `COLUMNS`.
-
-    Parameters
-    ----------
-    samples : AlignmentSamples
-    material : Material, optional
-        Default c_fram.
-    curve : callable, optional
-        f of angles (s,), radians; default that of uniform tension of the material.
-    """
-    material = named_material("c_fram") if material is None else material
-    curve = OffAxis(material) if curve is None else curve
+def stiffness_alignment_indices(samples: AlignmentSamples) -> dict[str, float]:
+    """Values of `COLUMNS`."""
+    material = named_material("c_fram")
+    curve = OffAxis(material)
     across, defined = strongest(samples.largest, samples.smallest)
     if not defined.any():
         return {column.name: float("nan") for column in COLUMNS}

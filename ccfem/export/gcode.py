@@ -18,8 +18,8 @@ from ccfem.arrays import FloatArray
 from ccfem.export.print_plan import COORDINATE_DIGITS, PrintPlan
 from ccfem.geometry.polylines import arc_lengths, point_at, subdivide
 from ccfem.io.whole import whole_file
+from ccfem.linking.print_speed import step_speeds
 from ccfem.machine.machine import Machine
-from ccfem.machine.speeds import step_speeds
 from ccfem.toolpaths import FIBRE, KINDS, MATRIX
 
 __all__ = ["gcode", "write_gcode"]

@@ -11,7 +11,8 @@ from ccfem.errors import InputError
 from ccfem.geometry.hatch import zigzag
 from ccfem.geometry.offsets import offset_rings
 from ccfem.geometry.polylines import merge_repeated, pack
-from ccfem.layers import Layer, slice_planar
+from ccfem.layers import Layer
+from ccfem.layers.slicing.planar import Planar
 from ccfem.linking.print_order import nearest_end_order
 from ccfem.machine.machine import Machine
 from ccfem.mesh.tet_mesh import TetMesh
@@ -119,7 +120,7 @@ def plan_print(
     """
     fibre = toolpaths.of_kind(FIBRE)
     _check_fibre(fibre, layers, machine)
-    frame = layers[0].frame
+    frame = layers[0].plane.frame
     corners = mesh.points[np.unique(mesh.corners)] @ frame.T
     lowest, highest = corners.min(axis=0), corners.max(axis=0)
     laid = [layer for layer in layers if layer.index in fibre.layer]
@@ -166,12 +167,12 @@ def _slabs(layers: Sequence[Layer], bottom: float, top: float, machine: Machine)
     """All layers to print, from the bottom to the top."""
     slabs: list[_Slab] = []
     level = bottom
-    for layer in sorted(layers, key=lambda one: one.height):
-        lower = layer.height - 0.5 * machine.fibre_height
-        upper = layer.height + 0.5 * machine.fibre_height
+    for layer in sorted(layers, key=lambda one: one.plane.height):
+        lower = layer.plane.height - 0.5 * machine.fibre_height
+        upper = layer.plane.height + 0.5 * machine.fibre_height
         if lower < level - _SAME or upper > top + _SAME:
             raise InputError(
-                f"fibre layer {layer.index} at {layer.height:g} mm does not fit with a fibre "
+                f"fibre layer {layer.index} at {layer.plane.height:g} mm does not fit with a fibre "
                 f"height of {machine.fibre_height:g} mm between {level:g} and {top:g} mm: move it "
                 "with --heights, or take fewer layers"
             )
@@ -196,7 +197,7 @@ def _matrix_lines(
     """Lines (n, 2) of each matrix layer in the plane of `frame`: a contour, a zigzag inside it."""
     width, profile = machine.matrix_width, machine.gcode
     middles = [0.5 * (slab.lower + slab.upper) for slab in slabs]
-    found = slice_planar(mesh, frame[2], heights=middles) if middles else ()
+    found = Planar(heights=tuple(middles)).cut(mesh, frame[2]) if middles else ()
     sections = {layer.index: layer for layer in found}
     for number in range(len(slabs)):
         if number not in sections:
@@ -204,10 +205,10 @@ def _matrix_lines(
             continue
         section = sections[number]
         angle = np.radians(profile.matrix_angle + profile.matrix_turn * number)
-        contours = offset_rings(section.polygon, 0.5 * width, width, width, 1)
-        inside = zigzag(section.polygon, (1.5 - _OVERLAP) * width, width, width, float(angle))
+        contours = offset_rings(section.plane.polygon, 0.5 * width, width, width, 1)
+        inside = zigzag(section.plane.polygon, (1.5 - _OVERLAP) * width, width, width, float(angle))
         lines = [ring for level in contours for ring in level] + inside
-        yield [section.to_space(line) @ frame[:2].T for line in lines]
+        yield [section.plane.to_space(line) @ frame[:2].T for line in lines]
 
 
 def _printed(lines: list[FloatArray], height: float, number: int, kind: int) -> Toolpaths:

@@ -42,8 +42,6 @@ def prune(
     machine: Machine,
     strand: Strand | None = None,
     rounds: int = 2,
-    cut_cost: float = 20.0,
-    backend: str = "auto",
 ) -> Toolpaths:
     """Take the least valuable fibre off until no more than a wanted length is left.
 
@@ -65,10 +63,6 @@ def prune(
         Stiffness of a strand; default rho = EA/E = 4 mm^2.
     rounds : int, default 2
         Virtual tests, at least 1.
-    cut_cost : float, mm, default 20
-        A path is parted only where that saves more than so much of the least valuable fibre.
-    backend : str, default "auto"
-        Solver, where `part` is a StressField.
 
     Returns
     -------
@@ -80,15 +74,14 @@ def prune(
     InputError
         When the length is not positive, `rounds` is below 1, or there is no fibre.
     """
-    if not 0.0 < length < np.inf or rounds < 1 or not 0.0 <= cut_cost < np.inf:
+    if not 0.0 < length < np.inf or rounds < 1:
         raise InputError(
-            "prune expects a length above 0 mm, at least 1 round and a cut cost >= 0 mm; got "
-            f"{length}, {rounds} and {cut_cost}"
+            f"prune expects a length above 0 mm and at least 1 round; got {length} and {rounds}"
         )
     laid = _fibre_length(toolpaths)
     if laid <= length:
         return toolpaths
-    specimen = Specimen.of(part, backend) if isinstance(part, StressField) else part
+    specimen = Specimen.of(part) if isinstance(part, StressField) else part
     axial = (Strand() if strand is None else strand).stiffness(specimen.modulus)
     displacement = None
     for k in range(rounds):
@@ -98,7 +91,7 @@ def prune(
         value = np.where(found.carries, found.strain, 0.0) ** 2
         wanted = length if k == rounds - 1 else length + 0.5 * (laid - length)
         along = profiles(toolpaths, strands, value)
-        toolpaths = shorten(toolpaths, along, wanted, machine.minimum_length, cut_cost)
+        toolpaths = shorten(toolpaths, along, wanted, machine.minimum_length)
         laid = _fibre_length(toolpaths)
         if laid <= length:
             break

@@ -8,12 +8,13 @@ import scipy.sparse as sp
 from ccfem.arrays import FloatArray
 from ccfem.elasticity.stress_field import StressField
 from ccfem.fibre_aware.smeared import SmearedPart
-from ccfem.fibre_aware.stream_design import StreamProblem
+from ccfem.fibre_aware.stream_design import DENSEST, StreamProblem
 from ccfem.fields.fill import fill_screened
 from ccfem.fields.layer_elements import Surface, positive_definite
 from ccfem.fields.layer_tension import SampledTension, layer_tension
 from ccfem.fields.orientation import orient
 from ccfem.layers.layer import Layer
+from ccfem.layers.layer_stress import stress_on
 
 __all__ = ["plane_axes", "start_field"]
 
@@ -76,7 +77,7 @@ def start_field(
     (c,) array
         Coefficients; zero for a group without tension.
     """
-    tensions = [layer_tension(stress.on(layer)) for layer in layers]
+    tensions = [layer_tension(stress_on(layer, stress)) for layer in layers]
     values = np.concatenate([np.where(t.defined, t.stress, 0.0) for t in tensions])
     weight = np.concatenate([layer.areas for layer in layers])
     order = np.argsort(values, kind="stable")
@@ -103,7 +104,7 @@ def _fit(problem: StreamProblem, layer: Layer, tension: SampledTension, top: flo
         surface, tension.direction, tension.stress, confidence, _FILL_LENGTH
     )
     direction = orient(direction, surface.neighbours, confidence)
-    density = problem.densest * np.clip(size / top, 0.0, 1.0)
+    density = DENSEST * np.clip(size / top, 0.0, 1.0)
     weight = np.maximum(confidence, _LEAST_WEIGHT) * surface.areas
     weight = weight / weight.sum()
     x, y = grid.slopes(surface.points[surface.triangles].mean(axis=1))
@@ -120,10 +121,10 @@ def _fit(problem: StreamProblem, layer: Layer, tension: SampledTension, top: flo
 def _to_budget(problem: StreamProblem, field: FloatArray) -> FloatArray:
     """Field times the factor that uses the budget where the density stays below its bound."""
     size = np.hypot(*(slope @ field for slope in problem.slopes))
-    most = _FULLEST * problem.densest * float(problem.room.sum())
+    most = _FULLEST * DENSEST * float(problem.room.sum())
     low, high = 1e-2, 1e2
     for _ in range(60):
         middle = float(np.sqrt(low * high))
-        length = problem.room @ np.minimum(middle * size, problem.densest)
+        length = problem.room @ np.minimum(middle * size, DENSEST)
         low, high = (middle, high) if length < min(problem.budget, most) else (low, middle)
     return low * field

@@ -117,7 +117,7 @@ def upper_bound(
         )
     if mode not in MODES:
         raise InputError(f"no mode named '{mode}'; there are: {', '.join(MODES)}")
-    part = SmearedPart.of(stress, layers[0].frame)
+    part = SmearedPart.of(stress, layers[0].plane.frame)
     axial = (Strand() if strand is None else strand).stiffness(part.modulus)
     most = fibre_capacity(part, layers, machine)
     volume = part.mesh.volumes

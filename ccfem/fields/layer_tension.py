@@ -6,11 +6,12 @@ from typing import Literal
 import numpy as np
 
 from ccfem.arrays import BoolArray, FloatArray
-from ccfem.elasticity.stress_field import LayerStress, StressField
+from ccfem.elasticity.part_stress import PartStress
 from ccfem.fields.compatibility import Incompatible, incompatible
 from ccfem.fields.orientation import orient
 from ccfem.fields.tensile import UNDEFINED, Tension, plane_tension, spatial_tension
 from ccfem.layers.layer import Layer
+from ccfem.layers.layer_stress import LayerStress
 from ccfem.tensor import in_plane
 
 __all__ = ["MeshTension", "SampledTension", "layer_tension", "mesh_tension"]
@@ -60,7 +61,7 @@ def layer_tension(
     """
     layer = stress.layer
     tensors = stress.cell if source == "cell" else stress.nodal[layer.triangles].mean(axis=1)
-    plane = in_plane(tensors, layer.frame)
+    plane = in_plane(tensors, layer.plane.frame)
     tension = plane_tension(plane, compression_limit)
     if sense == "absolute":
         tension = _absolute(tension, plane)
@@ -96,7 +97,7 @@ class MeshTension:
 
     def on(self, layer: Layer) -> SampledTension:
         """Project to a layer: each triangle takes the vector and stress of its tetrahedron."""
-        plane = self.direction[layer.cell] @ layer.frame[:2].T
+        plane = self.direction[layer.cell] @ layer.plane.frame[:2].T
         length = np.linalg.norm(plane, axis=1)
         defined = self.defined[layer.cell] & (length > 1e-6)
         unit = plane / np.maximum(length, 1e-300)[:, None]
@@ -105,7 +106,7 @@ class MeshTension:
 
 
 def mesh_tension(
-    stress: StressField,
+    stress: PartStress,
     source: Literal["nodal", "cell"] = "cell",
     sense: Literal["tensile", "absolute"] = "tensile",
     compression_limit: float = 3.0,

@@ -12,6 +12,8 @@ from ccfem.fields.layer_elements import Surface, positive_definite
 __all__ = ["fit_cone", "fit_constrained", "fit_literal", "fit_weighted"]
 
 _REGULARISATION = 1e-10
+_ITERATIONS = 20
+"""Of the alternating direction method: see `fit_constrained`."""
 _PENALTY = 1.0
 """Penalty of the alternating direction method, in units of the spacing weight."""
 _RELAXATION = 1.7
@@ -77,7 +79,6 @@ def fit_constrained(
     weight: FloatArray,
     width: float,
     spacing_weight: float = 0.1,
-    iterations: int = 20,
 ) -> FloatArray:
     """As `fit_weighted`, subject to ``|grad s| <= 1 / width`` on every triangle.
 
@@ -96,7 +97,6 @@ def fit_constrained(
     density : (t,) array, 1/mm
         Wanted number of isocurves per mm; capped at ``1 / width``.
     width : float, mm
-    iterations : int, default 20
 
     Returns
     -------
@@ -112,7 +112,7 @@ def fit_constrained(
     bounded = np.zeros((len(target), 2))
     dual = np.zeros_like(bounded)
     values = np.zeros(len(source))
-    for _ in range(iterations):
+    for _ in range(_ITERATIONS):
         values = solver.solve(source + divergence @ (bounded - dual).ravel())
         steep = (gradient @ values).reshape(-1, 2)
         free = _RELAXATION * steep + (1.0 - _RELAXATION) * bounded + dual

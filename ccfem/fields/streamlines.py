@@ -9,6 +9,9 @@ from ccfem.geometry.locate import locate
 
 __all__ = ["direction_at", "streamline_step", "streamlines", "triangle_neighbours"]
 
+_LONGEST = 10.0
+"""Length at which a line stops in either sense, in diagonals of the points."""
+
 _SHARPEST = 0.5
 """Cosine of the largest turn of the direction within one step: beyond 60 degrees two families of
 principal directions take turns."""
@@ -21,7 +24,6 @@ def streamlines(
     starts: FloatArray,
     step: float,
     least: float = 0.02,
-    longest: float | None = None,
 ) -> list[FloatArray]:
     """Lines that follow the direction of the principal stress of the largest size.
 
@@ -43,9 +45,6 @@ def streamlines(
     least : float in [0, 1), default 0.02
         A line stops where the difference of the two principal stresses, or the larger of their
         sizes, is below this share of the largest size on the layer.
-    longest : float, mm, optional
-        Length at which a line stops in either sense; by default ten times the diagonal of the
-        points.
 
     Returns
     -------
@@ -64,9 +63,8 @@ def streamlines(
     size = float((np.abs(field[:, 0]) + np.hypot(field[:, 1], field[:, 2])).max())
     corners = np.ascontiguousarray(points[triangles])
     beside = triangle_neighbours(triangles, len(points))
-    if longest is None:
-        longest = 10.0 * float(np.linalg.norm(points.max(axis=0) - points.min(axis=0)))
-    steps = int(np.ceil(longest / step))
+    diagonal = float(np.linalg.norm(points.max(axis=0) - points.min(axis=0)))
+    steps = int(np.ceil(_LONGEST * diagonal / step))
     home, _ = locate(points, triangles, starts, 1e-6)
     values = np.ascontiguousarray(field[triangles])
     lines = []

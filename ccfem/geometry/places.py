@@ -35,23 +35,21 @@ class Pieces(NamedTuple):
     place: IntArray
 
 
-def section_places(points: FloatArray, section: Any, tolerance: float = TOLERANCE) -> IntArray:
-    """Place of points about a section.
+def section_places(points: FloatArray, section: Any) -> IntArray:
+    """Place of points about a section; those up to `TOLERANCE` from it are inside.
 
     Parameters
     ----------
     points : (n, 2) array, mm
     section : Polygon or MultiPolygon
         Such as `Layer.polygon`.
-    tolerance : float, mm
-        Points no further than this from the section are inside.
 
     Returns
     -------
     (n,) int array
         INSIDE, VOID or OUTSIDE.
     """
-    return _places(points, shapely.buffer(section, tolerance, quad_segs=2))
+    return _places(points, shapely.buffer(section, TOLERANCE, quad_segs=2))
 
 
 def _places(points: FloatArray, section: Any) -> IntArray:

@@ -1,12 +1,11 @@
-"""Polylines as arrays: arc length, resampling, turning, splitting.
+"""Polylines as arrays: arc length, resampling, turning.
 
 Many polylines at once are held as in CSR: ``points`` (P, d) with ``offsets`` (K + 1,), polyline k
 being ``points[offsets[k]:offsets[k + 1]]``, in d = 2 or 3 dimensions. A closed polyline repeats its
 first point at its end.
 """
 
-from collections.abc import Iterable, Sequence
-from itertools import pairwise
+from collections.abc import Sequence
 
 import numpy as np
 
@@ -22,7 +21,6 @@ __all__ = [
     "resample",
     "sample_at",
     "sample_midpoints",
-    "split",
     "subdivide",
     "turning_angles",
 ]
@@ -243,10 +241,3 @@ def between(line: FloatArray, start: float, end: float) -> FloatArray:
     along = arc_lengths(line, np.array([0, len(line)]))
     inside = (along > start) & (along < end)
     return np.concatenate([[point_at(line, start)], line[inside], [point_at(line, end)]])
-
-
-def split(line: FloatArray, positions: Iterable[float]) -> list[FloatArray]:
-    """Cut one open polyline (n, d) at arc lengths strictly inside it; the pieces in order."""
-    total = float(lengths(line, np.array([0, len(line)]))[0])
-    cuts = [0.0, *sorted({float(p) for p in positions if 0.0 < p < total}), total]
-    return [between(line, a, b) for a, b in pairwise(cuts)]

@@ -77,7 +77,6 @@ def concentric(
     closest: float,
     first: float | None = None,
     count: int | None = None,
-    middle: bool = True,
     walls: bool = True,
 ) -> list[FloatArray]:
     """Fill a section with rings parallel to its border.
@@ -94,8 +93,6 @@ def concentric(
         Distance of the first ring to the border; default half a pitch.
     count : int, optional
         Number of rings; by default as many as fit.
-    middle : bool, default True
-        Whether to lay `middle_lines` in what the rings leave.
     walls : bool, default True
         Whether the border is that of the part, which no strand oversteps. The border of other
         strands may be overlapped where the section is narrower than a pitch.
@@ -103,7 +100,7 @@ def concentric(
     Returns
     -------
     list of (k, 2) arrays, mm
-        Closed rings from the border inward, then open lines.
+        Closed rings from the border inward, then `middle_lines` in what they leave.
     """
     first = 0.5 * pitch if first is None else first
     section = corners_only(section)
@@ -117,7 +114,7 @@ def concentric(
             break
         lines += found
         level += 1
-    if not middle or (count is not None and not _narrow(section, first, pitch, closest, count)):
+    if count is not None and not _narrow(section, first, pitch, closest, count):
         return lines
     axis = medial_axis(section, 0.5 * min(pitch, 2.0 * first))
     return lines + middle_lines(axis, lines, pitch, closest, first, count, walls)

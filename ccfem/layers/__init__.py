@@ -1,6 +1,8 @@
-"""Layers, and slicing."""
+"""Layers, flat or curved, the stress on them, and slicers that make them."""
 
 from ccfem.layers.layer import Layer
-from ccfem.layers.slicing.planar import plane_frame, slice_heights, slice_planar
+from ccfem.layers.layer_stress import LayerStress, stress_on
+from ccfem.layers.plane import Plane, plane_frame
+from ccfem.layers.slicer import Slicer
 
-__all__ = ["Layer", "plane_frame", "slice_heights", "slice_planar"]
+__all__ = ["Layer", "LayerStress", "Plane", "Slicer", "plane_frame", "stress_on"]

@@ -25,7 +25,7 @@ def holes_on(layer: Layer, patches: Iterable[str]) -> list[Any]:
             known = ", ".join(sorted(layer.patches)) or "none"
             raise InputError(f"no patch named '{name}' for conformal curves; there are: {known}")
         touched |= set(layer.patches[name].ravel().tolist())
-    rings = [shapely.Polygon(layer.plane_points[loop]) for loop in layer.loops if len(loop) > 2]
+    rings = [shapely.Polygon(layer.plane.points[loop]) for loop in layer.loops if len(loop) > 2]
     loops = [loop for loop in layer.loops if len(loop) > 2]
     return [
         ring

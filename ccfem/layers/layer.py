@@ -10,20 +10,22 @@ import numpy as np
 import shapely
 
 from ccfem.arrays import FloatArray, IntArray, read_only
+from ccfem.errors import InputError
+from ccfem.layers.plane import Plane
 
-__all__ = ["Layer"]
+__all__ = ["FlatLayer", "Layer"]
 
 
 @dataclass(frozen=True)
 class Layer:
-    """A layer of the part. A flat layer is just a layer.
+    """A layer of the part, flat or curved.
 
     Attributes
     ----------
     points : (n, 3) array, mm
         In the frame of the mesh.
     triangles : (t, 3) int array
-        Counter-clockwise seen against `frame[2]`.
+        Counter-clockwise seen from above, that is against the normals.
     cell : (t,) int array
         Tetrahedron that each triangle was cut from.
     nodes : (n, 2) int array
@@ -32,16 +34,15 @@ class Layer:
         ``points = (1 - weights) * mesh.points[nodes[:, 0]] + weights * mesh.points[nodes[:, 1]]``.
     loops : tuple of (k,) int arrays
         Boundary loops as point indices, material on the left, first point not repeated.
-    patches : mapping of name to (k, 2) int arrays
-        Boundary edges (point indices) that lie on each named patch of the mesh.
-    frame : (3, 3) array
-        Rows: the two in-plane unit vectors and the normal (build direction), right-handed.
-    height : float, mm
-        ``points @ frame[2]`` of a flat layer.
     index : int
         Position in the stack, 0 at the bottom.
     thickness : float, mm
         Share of the part's height that this layer stands for.
+    patches : mapping of name to (k, 2) int arrays
+        Boundary edges (point indices) that lie on each named patch of the mesh.
+    flat : Plane, optional
+        The plane that all points lie in; none where the layer is curved. What works in a plane
+        takes the flat view `plane`.
     """
 
     points: FloatArray
@@ -50,11 +51,10 @@ class Layer:
     nodes: IntArray
     weights: FloatArray
     loops: tuple[IntArray, ...]
-    frame: FloatArray
-    height: float
     index: int
     thickness: float
     patches: Mapping[str, IntArray] = field(default_factory=dict)
+    flat: Plane | None = None
 
     def __post_init__(self) -> None:
         for name, dtype in (
@@ -63,42 +63,81 @@ class Layer:
             ("cell", np.int64),
             ("nodes", np.int64),
             ("weights", np.float64),
-            ("frame", np.float64),
         ):
             object.__setattr__(self, name, read_only(getattr(self, name), dtype))
         object.__setattr__(self, "loops", tuple(read_only(x, np.int64) for x in self.loops))
         patches = {name: read_only(edges, np.int64) for name, edges in self.patches.items()}
         object.__setattr__(self, "patches", MappingProxyType(patches))
 
+    def __repr__(self) -> str:
+        shape = "curved" if self.flat is None else f"flat at {self.flat.height:.6g} mm"
+        return (
+            f"Layer {self.index}, {shape}: {len(self.points)} points, {len(self.triangles)} "
+            f"triangles, {len(self.loops)} boundary loops"
+        )
+
     def interpolate(self, nodal: FloatArray) -> FloatArray:
         """Values at the layer's points, (n, ...), of a field given at the mesh nodes."""
         w = self.weights.reshape((-1,) + (1,) * (nodal.ndim - 1))
         return (1.0 - w) * nodal[self.nodes[:, 0]] + w * nodal[self.nodes[:, 1]]
 
-    def to_plane(self, points: FloatArray) -> FloatArray:
-        """Plane coordinates (..., 2) of points (..., 3), mm."""
-        return points @ self.frame[:2].T
-
-    def to_space(self, plane: FloatArray) -> FloatArray:
-        """Points (..., 3) of plane coordinates (..., 2) on a flat layer, mm."""
-        return plane @ self.frame[:2] + self.height * self.frame[2]
-
     @cached_property
-    def plane_points(self) -> FloatArray:
-        """Plane coordinates of the layer's points, (n, 2), mm."""
-        return read_only(self.to_plane(self.points))
+    def _across(self) -> FloatArray:
+        """Cross product of two sides of each triangle, (t, 3): twice its area, along its normal."""
+        a, b, c = np.moveaxis(self.points[self.triangles], 1, 0)
+        return np.cross(b - a, c - a)
 
     @cached_property
     def areas(self) -> FloatArray:
         """Area of each triangle, (t,), mm^2."""
-        a, b, c = np.moveaxis(self.plane_points[self.triangles], 1, 0)
-        u, v = b - a, c - a
-        return read_only(0.5 * (u[:, 0] * v[:, 1] - u[:, 1] * v[:, 0]))
+        return read_only(0.5 * np.linalg.norm(self._across, axis=1))
+
+    @cached_property
+    def normals(self) -> FloatArray:
+        """Unit normal of each triangle, (t, 3), up; zero where a triangle has no area."""
+        return read_only(self._across / np.maximum(2.0 * self.areas, 1e-300)[:, None])
+
+    @cached_property
+    def plane(self) -> "FlatLayer":
+        """The layer seen in its plane.
+
+        Raises
+        ------
+        InputError
+            When the layer is curved.
+        """
+        if self.flat is None:
+            raise InputError(
+                f"layer {self.index} is curved and lies in no plane: choose a planar slicing, or "
+                "what works on curved layers"
+            )
+        points = self.flat.project(self.points)
+        return FlatLayer(self.flat.frame, self.flat.height, points, self.loops)
+
+
+@dataclass(frozen=True)
+class FlatLayer(Plane):
+    """A flat layer in the coordinates of its plane.
+
+    Attributes
+    ----------
+    points : (n, 2) array, mm
+        Plane coordinates of the layer's points.
+    loops : tuple of (k,) int arrays
+        Boundary loops of the layer.
+    """
+
+    points: FloatArray
+    loops: tuple[IntArray, ...]
+
+    def __post_init__(self) -> None:
+        super().__post_init__()
+        object.__setattr__(self, "points", read_only(self.points))
 
     @cached_property
     def polygon(self) -> Any:
-        """Section of a flat layer in plane coordinates: a valid (Multi)Polygon with holes, mm."""
-        rings = [shapely.Polygon(self.plane_points[loop]) for loop in self.loops if len(loop) > 2]
+        """Section: a valid (Multi)Polygon with holes, mm."""
+        rings = [shapely.Polygon(self.points[loop]) for loop in self.loops if len(loop) > 2]
         outer = [ring for ring in rings if ring.exterior.is_ccw]
         holes = [ring for ring in rings if not ring.exterior.is_ccw]
         section = shapely.union_all([shapely.make_valid(ring) for ring in outer])

@@ -3,6 +3,5 @@
 from ccfem.machine.gcode_profile import GcodeProfile
 from ccfem.machine.machine import Machine
 from ccfem.machine.speed_table import SpeedTable
-from ccfem.machine.speeds import step_speeds
 
-__all__ = ["GcodeProfile", "Machine", "SpeedTable", "step_speeds"]
+__all__ = ["GcodeProfile", "Machine", "SpeedTable"]

@@ -1,49 +1,15 @@
-"""Printing speed along a path: table 2 of Wang et al. 2021, or one speed for each kind of path."""
+"""Speed of every step of polylines by a table of curvature, length and angle."""
 
 import numpy as np
 
 from ccfem.arrays import BoolArray, FloatArray, IntArray
 from ccfem.geometry.polylines import arc_lengths, lengths, sample_at, turning_angles
-from ccfem.machine.machine import Machine
 from ccfem.machine.speed_table import SpeedTable
-from ccfem.toolpaths import FIBRE, Toolpaths
 
-__all__ = ["step_speeds", "table_speeds"]
+__all__ = ["table_speeds"]
 
 _DIGITS = 9
 """Decimals that curvature, length and angle are rounded to: a right angle is one exactly."""
-
-_REACH = 2.0
-"""Least length over which curvature is taken, in fibre widths. Our choice: over less, the corners
-that a mesh gives to round borders and to isocurves count as turns, and paths fall into short slow
-pieces."""
-
-
-def step_speeds(toolpaths: Toolpaths, machine: Machine) -> FloatArray:
-    """Speed of the step from each point to the next one of its path.
-
-    Parameters
-    ----------
-    toolpaths : Toolpaths
-        Paths of any kind; the speed table is for fibre.
-    machine : Machine
-
-    Returns
-    -------
-    (P,) array, mm/s
-        Of no meaning at the last point of a path.
-    """
-    of_kind = np.array(
-        [machine.fibre_speed, machine.matrix_speed, machine.matrix_speed, machine.travel_speed]
-    )
-    sizes = np.diff(toolpaths.offsets)
-    speeds = np.repeat(of_kind[toolpaths.kind], sizes)
-    if machine.speeds is not None:
-        fibre = toolpaths.of_kind(FIBRE)
-        speeds[np.repeat(toolpaths.kind == FIBRE, sizes)] = table_speeds(
-            fibre.points, fibre.offsets, machine.speeds, _REACH * machine.fibre_width
-        )
-    return speeds
 
 
 def table_speeds(

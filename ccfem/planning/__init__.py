@@ -1,1 +1,16 @@
 """Planning: what a strategy is, the paths of a whole part, and equal length of fibre."""
+
+from ccfem.planning.equal_fibre import Planned, length_per_layer, plan_to_length
+from ccfem.planning.plan import plan
+from ccfem.planning.strategy import Amount, LayerStrategy, PartStrategy, Strategy
+
+__all__ = [
+    "Amount",
+    "LayerStrategy",
+    "PartStrategy",
+    "Planned",
+    "Strategy",
+    "length_per_layer",
+    "plan",
+    "plan_to_length",
+]

@@ -11,11 +11,12 @@ from typing import Any
 
 import numpy as np
 
-from ccfem.elasticity.stress_field import StressField
+from ccfem.elasticity.part_stress import PartStress
 from ccfem.errors import InputError
 from ccfem.layers.layer import Layer
 from ccfem.machine.machine import Machine
-from ccfem.planning.strategy import Amount, Strategy, plan
+from ccfem.planning.plan import plan
+from ccfem.planning.strategy import Amount, Strategy
 from ccfem.toolpaths import FIBRE, Toolpaths
 
 __all__ = ["TOLERANCE", "Planned", "check_wanted", "length_per_layer", "plan_to_length"]
@@ -74,10 +75,9 @@ def check_wanted(wanted: float) -> None:
 def plan_to_length(
     strategy: Strategy,
     layers: Sequence[Layer],
-    stress: StressField,
+    stress: PartStress,
     machine: Machine,
     wanted: float,
-    tolerance: float = TOLERANCE,
     start: Planned | None = None,
 ) -> Planned:
     """Plan with the value of the amount parameter that lays at most the wanted fibre.
@@ -96,13 +96,11 @@ def plan_to_length(
     strategy : Strategy
         Its own value is where the search starts.
     layers : sequence of Layer
-    stress : StressField
+    stress : PartStress
     machine : Machine
     wanted : float, mm
-        Fibre per layer: mean over the stack.
-    tolerance : float, default 0.01
-        The search stops within this share below `wanted`. A strategy may miss it: `Planned.note`
-        says so.
+        Fibre per layer: mean over the stack. The search stops within the share `TOLERANCE` below
+        it. A strategy may miss that: `Planned.note` says so.
     start : Planned, optional
         The strategy's plan with its own value, where there is one already.
 
@@ -116,7 +114,7 @@ def plan_to_length(
         When `wanted` is not a positive number, or whatever the strategy raises.
     """
     check_wanted(wanted)
-    trials = _Trials(strategy, layers, stress, machine, wanted, tolerance)
+    trials = _Trials(strategy, layers, stress, machine, wanted)
     own = getattr(strategy, strategy.amount.parameter)
     if start is not None and own is not None:
         trials.tried[float(own)] = start
@@ -132,10 +130,9 @@ class _Trials:
 
     strategy: Strategy
     layers: Sequence[Layer]
-    stress: StressField
+    stress: PartStress
     machine: Machine
     wanted: float
-    tolerance: float
     tried: dict[float, Planned] = field(default_factory=dict)
     sampled: dict[float, float] = field(default_factory=dict)
 
@@ -161,11 +158,11 @@ class _Trials:
         return self.sampled[value]
 
     def meets(self, length: float) -> bool:
-        return (1.0 - self.tolerance) * self.wanted <= length <= self.wanted
+        return (1.0 - TOLERANCE) * self.wanted <= length <= self.wanted
 
     def guess(self) -> Planned | None:
         """Plan from one known plan of the stack, a few times at most; None where that fails."""
-        target = self.wanted * (1.0 - 0.5 * self.tolerance)
+        target = self.wanted * (1.0 - 0.5 * TOLERANCE)
         for _ in range(_GUESSES):
             lengths = {value: one.length_per_layer for value, one in self.tried.items()}
             value = _by_power(lengths, self.strategy.amount, target)
@@ -185,20 +182,20 @@ class _Trials:
         ratio = self._ratio()
         for _ in range(1 if self.few is self.layers else _ROUNDS):
             target = wanted * (1.0 - margin) / ratio
-            value = _search(self.sample, self.sampled, value, amount, target, self.tolerance)
+            value = _search(self.sample, self.sampled, value, amount, target)
             if value in tried:
                 break
             tried[value] = self.planned(value, self.layers)
             length = tried[value].length_per_layer
             if self.meets(length) or not self.sampled[value] > 0.0:
                 break
-            ratio, margin = length / self.sampled[value], 0.3 * self.tolerance
+            ratio, margin = length / self.sampled[value], 0.3 * TOLERANCE
         best = _best(list(tried.values()), wanted)
         if best.length_per_layer > wanted * (1.0 + 1e-9):
             best = _mixed(replace(best, toolpaths=Toolpaths.empty()), best, self.layers, wanted)
-        elif best.length_per_layer < (1.0 - self.tolerance) * wanted:
+        elif best.length_per_layer < (1.0 - TOLERANCE) * wanted:
             best = self._raised(best, ratio)
-        return replace(best, note=_note(best, amount, wanted, self.tolerance))
+        return replace(best, note=_note(best, amount, wanted))
 
     def _ratio(self) -> float:
         """Length on the stack over that on the few layers, where a plan is known."""
@@ -268,9 +265,9 @@ def _best(tried: list[Planned], wanted: float) -> Planned:
     return min(tried, key=lambda one: one.length_per_layer)
 
 
-def _note(best: Planned, amount: Amount, wanted: float, tolerance: float) -> str:
+def _note(best: Planned, amount: Amount, wanted: float) -> str:
     length, value = best.length_per_layer, getattr(best.strategy, amount.parameter)
-    if (1.0 - tolerance) * wanted <= length <= wanted * (1.0 + 1e-9):
+    if (1.0 - TOLERANCE) * wanted <= length <= wanted * (1.0 + 1e-9):
         return best.note
     mixed = f"{best.note}; " if best.note else ""
     reached = f"{mixed}lays {length:.0f} of {wanted:.0f} mm per layer"
@@ -287,7 +284,6 @@ def _search(
     start: float,
     amount: Amount,
     target: float,
-    tolerance: float,
 ) -> float:
     """Value whose length is at most the target and within the tolerance, or the nearest found.
 
@@ -295,7 +291,7 @@ def _search(
     known length on either side; while one side is unknown, a guess by proportion.
     """
     ends = min(amount.least, amount.most), max(amount.least, amount.most)
-    enough = (1.0 - 0.5 * tolerance) * target
+    enough = (1.0 - 0.5 * TOLERANCE) * target
     value = float(np.clip(start, *ends))
     for step in range(_STEPS):
         if value not in known and enough <= length(value) <= target:

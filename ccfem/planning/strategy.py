@@ -1,27 +1,16 @@
-"""What a strategy is, and how strategies are found by name."""
+"""What a strategy is."""
 
-import dataclasses
-import importlib
-import os
-import pkgutil
-from collections.abc import Mapping, Sequence
-from concurrent.futures import ThreadPoolExecutor
+from collections.abc import Sequence
 from dataclasses import dataclass
-from importlib.metadata import entry_points
-from typing import Any, ClassVar, Protocol, runtime_checkable
+from typing import ClassVar, Protocol, runtime_checkable
 
-from ccfem.elasticity.stress_field import LayerStress, StressField
-from ccfem.errors import InputError, known_names
-from ccfem.io.toml import from_table
+from ccfem.elasticity.part_stress import PartStress
 from ccfem.layers.layer import Layer
+from ccfem.layers.layer_stress import LayerStress
 from ccfem.machine.machine import Machine
 from ccfem.toolpaths import Toolpaths
 
-__all__ = ["Amount", "LayerStrategy", "Strategy", "create", "named", "plan"]
-
-
-_MOST_THREADS = 4
-"""Layers that are planned at a time; much of the work waits for the interpreter's lock."""
+__all__ = ["Amount", "LayerPlanner", "LayerStrategy", "PartStrategy", "Strategy"]
 
 
 @dataclass(frozen=True)
@@ -41,7 +30,7 @@ class Amount:
     least: float
 
 
-class LayerStrategy(Protocol):
+class LayerPlanner(Protocol):
     """Plans the paths of one layer."""
 
     def __call__(self, layer: Layer, stress: LayerStress, machine: Machine) -> Toolpaths:
@@ -50,11 +39,11 @@ class LayerStrategy(Protocol):
 
 
 @runtime_checkable
-class Strategy(Protocol):
-    """A frozen dataclass whose fields are the parameters, called with data.
+class LayerStrategy(Protocol):
+    """A frozen dataclass whose fields are the parameters, called for each layer with data.
 
-    A strategy that has to see the whole part before its layers also has
-    ``for_part(stress, layers, machine) -> LayerStrategy``; `plan` calls it once a part.
+    A strategy that works in the plane of a layer has a class variable ``flat_layers_only = True``:
+    `plan` refuses curved layers before any work.
     """
 
     amount: ClassVar[Amount]
@@ -64,77 +53,17 @@ class Strategy(Protocol):
         ...
 
 
-def named() -> Mapping[str, type[Strategy]]:
-    """Every strategy by name: the modules of this package, and entry points ``ccfem.strategies``.
+@runtime_checkable
+class PartStrategy(Protocol):
+    """A frozen dataclass like a `LayerStrategy` that sees the whole part before its layers."""
 
-    The name of a module is the name of its strategy: ``contour_zigzag`` holds ``ContourZigzag``.
-    """
-    import ccfem.strategies as package
+    amount: ClassVar[Amount]
 
-    found: dict[str, type[Strategy]] = {}
-    for info in pkgutil.iter_modules(package.__path__):
-        if info.name == "strategy":
-            continue
-        module = importlib.import_module(f"{package.__name__}.{info.name}")
-        found[info.name] = getattr(module, info.name.title().replace("_", ""))
-    for entry in entry_points(group="ccfem.strategies"):
-        found[entry.name] = entry.load()
-    return found
+    def for_part(
+        self, stress: PartStress, layers: Sequence[Layer], machine: Machine
+    ) -> LayerPlanner:
+        """Prepare what all layers share; what is returned plans each of them."""
+        ...
 
 
-def create(name: str, parameters: Mapping[str, Any] | None = None) -> Strategy:
-    """Make a strategy from its name and parameters.
-
-    Raises
-    ------
-    InputError
-        For an unknown strategy or parameter, the known ones listed; for a value of a wrong type.
-    """
-    known = named()
-    if name not in known:
-        raise InputError(
-            f"no strategy named '{name}'; there are: {known_names(name, sorted(known))}"
-        )
-    fields = {f.name for f in dataclasses.fields(known[name])}  # type: ignore[arg-type]
-    for parameter in parameters or {}:
-        if parameter not in fields:
-            raise InputError(
-                f"strategy '{name}' has no parameter '{parameter}'; it has: "
-                f"{known_names(parameter, sorted(fields))}"
-            )
-    table = {
-        key: list(value) if isinstance(value, tuple) else value
-        for key, value in (parameters or {}).items()
-    }
-    return from_table(known[name], table, f"strategies.{name}")
-
-
-def plan(
-    strategy: Strategy,
-    layers: Sequence[Layer],
-    stress: StressField,
-    machine: Machine,
-) -> Toolpaths:
-    """Plan the paths of a whole part, several layers at a time.
-
-    Parameters
-    ----------
-    strategy : Strategy
-        Called from several threads at once, each with a layer of its own.
-    layers : sequence of Layer
-    stress : StressField
-    machine : Machine
-
-    Returns
-    -------
-    Toolpaths
-        The paths of all layers, in their order.
-    """
-    for_part = getattr(strategy, "for_part", None)
-    planner: LayerStrategy = for_part(stress, layers, machine) if for_part else strategy
-
-    def planned(layer: Layer) -> Toolpaths:
-        return planner(layer, stress.on(layer), machine)
-
-    with ThreadPoolExecutor(min(os.cpu_count() or 1, _MOST_THREADS)) as pool:
-        return Toolpaths.concatenate(pool.map(planned, layers))
+Strategy = LayerStrategy | PartStrategy

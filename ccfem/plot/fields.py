@@ -1,15 +1,14 @@
-"""Pictures of the fields on a layer: the tension that paths follow, and scalar fields."""
+"""Picture of the tension in a layer, which paths follow."""
 
-from collections.abc import Sequence
 from typing import TYPE_CHECKING
 
 import numpy as np
 
 from ccfem.arrays import BoolArray, FloatArray
-from ccfem.elasticity.stress_field import LayerStress
 from ccfem.layers.layer import Layer
+from ccfem.layers.layer_stress import LayerStress
 from ccfem.plot.canvas import colour_bar, extents_of, new_figure, scale_bar, title
-from ccfem.plot.colours import INK, scale
+from ccfem.plot.colours import INK
 from ccfem.plot.paths import draw_section, draw_stress, tension_limit
 from ccfem.tensor import in_plane, largest_in_plane
 
@@ -17,7 +16,7 @@ if TYPE_CHECKING:
     from matplotlib.axes import Axes
     from matplotlib.figure import Figure
 
-__all__ = ["draw_directions", "scalar_picture", "tension_picture"]
+__all__ = ["draw_directions", "tension_picture"]
 
 _STROKES = 45
 """Strokes across the larger extent of a section."""
@@ -37,11 +36,11 @@ def tension_picture(
         End of the colour scale; default `plot.paths.tension_limit`.
     """
     layer = stress.layer
-    figure, (axes,) = new_figure(extents_of(layer.plane_points))
+    figure, (axes,) = new_figure(extents_of(layer.plane.points))
     end = tension_limit(stress) if limit is None else limit
     draw_section(axes, layer, filled=False)
     colours = draw_stress(axes, stress, end)
-    plane = in_plane(stress.nodal[layer.triangles].mean(axis=1), layer.frame)
+    plane = in_plane(stress.nodal[layer.triangles].mean(axis=1), layer.plane.frame)
     largest, _, angle = largest_in_plane(plane)
     draw_directions(
         axes, layer, np.stack([np.cos(angle), np.sin(angle)], axis=1), largest > 0.02 * end
@@ -68,8 +67,8 @@ def draw_directions(
     """
     from matplotlib.collections import LineCollection
 
-    middle = layer.plane_points[layer.triangles].mean(axis=1)
-    size = float(np.ptp(layer.plane_points, axis=0).max()) / _STROKES
+    middle = layer.plane.points[layer.triangles].mean(axis=1)
+    size = float(np.ptp(layer.plane.points, axis=0).max()) / _STROKES
     kept = np.flatnonzero(np.ones(len(middle), dtype=bool) if shown is None else shown)
     # One triangle for each field of a grid: the one nearest to the middle of the field.
     field = np.floor(middle[kept] / size)
@@ -82,52 +81,3 @@ def draw_directions(
     axes.add_collection(
         LineCollection(list(strokes), colors=INK, linewidths=0.8, zorder=2.0), autolim=False
     )
-
-
-def scalar_picture(
-    layer: Layer,
-    values: FloatArray,
-    isocurves: Sequence[FloatArray] = (),
-    label: str = "",
-    heading: str = "",
-    caption: str = "",
-) -> "Figure":
-    """Picture of a scalar field on a layer, with curves on it.
-
-    Parameters
-    ----------
-    layer : Layer
-    values : (n,) array
-        At the layer's points, or (t,) on its triangles.
-    isocurves : sequence of (k, 2) arrays, mm
-        In plane coordinates.
-    label : str
-        Quantity and unit.
-    heading, caption : str
-    """
-    from matplotlib.collections import LineCollection
-
-    figure, (axes,) = new_figure(extents_of(layer.plane_points))
-    draw_section(axes, layer, filled=False)
-    colours = scale("field")
-    limits = (float(values.min()), float(values.max()))
-    per_point = len(values) == len(layer.points)
-    axes.tripcolor(
-        *layer.plane_points.T,
-        layer.triangles,
-        *([values] if per_point else []),
-        facecolors=None if per_point else values,
-        shading="gouraud" if per_point else "flat",
-        cmap=colours,
-        vmin=limits[0],
-        vmax=limits[1],
-        rasterized=True,
-        zorder=1.0,
-    )
-    axes.add_collection(
-        LineCollection(list(isocurves), colors=INK, linewidths=0.9, zorder=2.0), autolim=False
-    )
-    colour_bar(axes, colours, limits, label)
-    scale_bar(axes)
-    title(axes, heading, caption)
-    return figure

@@ -1,5 +1,29 @@
 """Strategies: each turns the stress on a layer into fibre paths. One module a strategy."""
 
-from ccfem.planning.strategy import Amount, LayerStrategy, Strategy, create, named, plan
+from collections.abc import Mapping
+from typing import Any
 
-__all__ = ["Amount", "LayerStrategy", "Strategy", "create", "named", "plan"]
+from ccfem import plugins
+from ccfem.planning.strategy import Strategy
+
+__all__ = ["create", "named"]
+
+
+def named() -> Mapping[str, type[Strategy]]:
+    """Every strategy by name: modules of this package, and entry points ``ccfem.strategies``."""
+    return plugins.found(__name__, "ccfem.strategies")
+
+
+def create(name: str, parameters: Mapping[str, Any] | None = None) -> Strategy:
+    """Make a strategy from its name and parameters.
+
+    Raises
+    ------
+    InputError
+        For an unknown strategy or parameter, the known ones listed; for a value of a wrong type.
+    """
+    return plugins.create("strategy", named(), name, parameters)
+
+
+def __getattr__(name: str) -> Any:
+    return plugins.by_class(__name__, name)

@@ -5,16 +5,16 @@ from typing import ClassVar, Literal
 
 import numpy as np
 
-from ccfem.elasticity.stress_field import LayerStress
 from ccfem.errors import InputError
 from ccfem.geometry.offsets import join_rings, offset_rings
 from ccfem.geometry.shells import concentric
 from ccfem.layers.layer import Layer
+from ccfem.layers.layer_stress import LayerStress
 from ccfem.machine.machine import Machine
 from ccfem.planning.strategy import Amount
 from ccfem.raster.bitmap import bitmap
 from ccfem.raster.patterns import concentric_regions
-from ccfem.raster.plan import RasterPlan, raster_plan
+from ccfem.raster.raster_plan import RasterPlan, raster_plan
 from ccfem.toolpaths import Toolpaths
 
 __all__ = ["Concentric"]
@@ -62,6 +62,7 @@ class Concentric:
     mode: Literal["polyline", "raster"] = "polyline"
 
     amount: ClassVar[Amount] = Amount("spacing", most=1.0, least=20.0)
+    flat_layers_only: ClassVar[bool] = True
 
     def __post_init__(self) -> None:
         if self.mode not in ("polyline", "raster"):
@@ -91,12 +92,12 @@ class Concentric:
         width = machine.fibre_width
         spacing = self.spacing * width
         if self.filled:
-            lines = concentric(layer.polygon, spacing, _CLOSEST, 0.5 * width, self.rings)
+            lines = concentric(layer.plane.polygon, spacing, _CLOSEST, 0.5 * width, self.rings)
         else:
-            levels = offset_rings(layer.polygon, 0.5 * width, spacing, width, self.rings)
+            levels = offset_rings(layer.plane.polygon, 0.5 * width, spacing, width, self.rings)
             lines = [ring for level in levels for ring in level]
             if self.joined and levels:
-                first = layer.plane_points[layer.loops[0][:2]].mean(axis=0)
+                first = layer.plane.points[layer.loops[0][:2]].mean(axis=0)
                 start = first if self.start is None else np.asarray(self.start, dtype=np.float64)
                 lines = join_rings(levels, start, spacing, width)
         paths = Toolpaths.from_plane(lines, layer)
@@ -105,5 +106,5 @@ class Concentric:
 
     def raster(self, layer: Layer, stress: LayerStress, machine: Machine) -> RasterPlan:
         """Plan one layer on a bitmap of pixels a spacing wide, whatever the mode."""
-        image = bitmap(layer.polygon, self.spacing * machine.fibre_width)
+        image = bitmap(layer.plane.polygon, self.spacing * machine.fibre_width)
         return raster_plan(image, concentric_regions(image.mask, rings=self.rings))

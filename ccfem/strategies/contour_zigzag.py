@@ -5,10 +5,10 @@ from typing import ClassVar
 
 import numpy as np
 
-from ccfem.elasticity.stress_field import LayerStress
 from ccfem.errors import InputError
 from ccfem.geometry.hatch import zigzag
 from ccfem.layers.layer import Layer
+from ccfem.layers.layer_stress import LayerStress
 from ccfem.machine.machine import Machine
 from ccfem.planning.strategy import Amount
 from ccfem.strategies.concentric import Concentric
@@ -44,6 +44,7 @@ class ContourZigzag:
     joined: bool = True
 
     amount: ClassVar[Amount] = Amount("spacing", most=1.0, least=20.0)
+    flat_layers_only: ClassVar[bool] = True
     direction: ClassVar[str] = "angle"
 
     def __post_init__(self) -> None:
@@ -71,7 +72,7 @@ class ContourZigzag:
             (self.contours + 0.5) * width,
             np.radians(self.angle + self.turn * layer.index),
         )
-        lines = zigzag(layer.polygon, inside, width, self.spacing * width, angle)
+        lines = zigzag(layer.plane.polygon, inside, width, self.spacing * width, angle)
         inner = Toolpaths.from_plane(lines, layer)
         inner = inner.select(inner.lengths >= machine.minimum_length)
         return Toolpaths.concatenate([contours, inner])

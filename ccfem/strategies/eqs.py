@@ -12,11 +12,11 @@ import numpy as np
 import shapely
 
 from ccfem.arrays import FloatArray
-from ccfem.elasticity.stress_field import LayerStress
 from ccfem.errors import InputError
 from ccfem.fields.streamlines import streamlines
 from ccfem.geometry.parallel_strands import open_lines
 from ccfem.layers.layer import Layer
+from ccfem.layers.layer_stress import LayerStress
 from ccfem.machine.machine import Machine
 from ccfem.planning.strategy import Amount
 from ccfem.tensor import in_plane
@@ -58,6 +58,7 @@ class Eqs:
     minimum_length: float | None = None
 
     amount: ClassVar[Amount] = Amount("spacing", most=1.0, least=20.0)
+    flat_layers_only: ClassVar[bool] = True
 
     def __post_init__(self) -> None:
         if not 1.0 <= self.spacing < float("inf"):
@@ -72,7 +73,7 @@ class Eqs:
     def __call__(self, layer: Layer, stress: LayerStress, machine: Machine) -> Toolpaths:
         """Plan the paths of one layer; none where the section is thinner than a fibre."""
         width = machine.fibre_width
-        region = shapely.buffer(layer.polygon, -0.5 * width)
+        region = shapely.buffer(layer.plane.polygon, -0.5 * width)
         seed = self._seed_line(layer, stress, region, _STEP * width)
         if len(seed) < 2:
             return Toolpaths.empty()
@@ -83,16 +84,16 @@ class Eqs:
 
     def _seed_line(self, layer: Layer, stress: LayerStress, region: Any, step: float) -> FloatArray:
         """Longest candidate (n, 2); empty where no candidate lies in the region."""
-        plane = in_plane(stress.nodal, layer.frame)
+        plane = in_plane(stress.nodal, layer.plane.frame)
         if self.seed is None:
             s11, s22, s12 = plane[layer.triangles].mean(axis=1).T
             size = np.abs(0.5 * (s11 + s22)) + np.hypot(0.5 * (s11 - s22), s12)
-            middles = layer.plane_points[layer.triangles].mean(axis=1)
+            middles = layer.plane.points[layer.triangles].mean(axis=1)
             order = np.argsort(-size, kind="stable")
             starts = middles[order[shapely.contains_xy(region, middles[order])]][:_CANDIDATES]
         else:
             starts = np.array([self.seed])
-        lines = streamlines(layer.plane_points, layer.triangles, plane, starts, step)
+        lines = streamlines(layer.plane.points, layer.triangles, plane, starts, step)
         if not lines:
             return np.zeros((0, 2))
         return lines[int(np.argmax([len(line) for line in lines]))]

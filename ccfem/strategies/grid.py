@@ -10,16 +10,16 @@ from typing import ClassVar, Literal
 
 import numpy as np
 
-from ccfem.elasticity.stress_field import LayerStress
 from ccfem.errors import InputError
 from ccfem.geometry.hatch import hatch
 from ccfem.geometry.shells import shells
 from ccfem.layers.layer import Layer
+from ccfem.layers.layer_stress import LayerStress
 from ccfem.machine.machine import Machine
 from ccfem.planning.strategy import Amount
 from ccfem.raster.bitmap import bitmap
 from ccfem.raster.patterns import grid_regions
-from ccfem.raster.plan import RasterPlan, raster_plan
+from ccfem.raster.raster_plan import RasterPlan, raster_plan
 from ccfem.toolpaths import Toolpaths
 
 __all__ = ["Grid"]
@@ -64,6 +64,7 @@ class Grid:
     mode: Literal["polyline", "raster"] = "polyline"
 
     amount: ClassVar[Amount] = Amount("spacing", most=1.0, least=20.0)
+    flat_layers_only: ClassVar[bool] = True
     direction: ClassVar[str] = "angle"
 
     def __post_init__(self) -> None:
@@ -97,7 +98,7 @@ class Grid:
             return plan.toolpaths(layer, machine, self.minimum_length)
         pitch = self.spacing * machine.fibre_width
         lines, interior = shells(
-            layer.polygon, machine.fibre_width, pitch, self.shells, self.closest
+            layer.plane.polygon, machine.fibre_width, pitch, self.shells, self.closest
         )
         turns = (0, 1) if self.families == "both" else (layer.index,)
         for number in turns:
@@ -112,7 +113,7 @@ class Grid:
 
     def raster(self, layer: Layer, stress: LayerStress, machine: Machine) -> RasterPlan:
         """Plan one layer on a bitmap of pixels a spacing wide, whatever the mode."""
-        image = bitmap(layer.polygon, self.spacing * machine.fibre_width)
+        image = bitmap(layer.plane.polygon, self.spacing * machine.fibre_width)
         angle = np.radians(self.angle + self.turn * layer.index)
         every = self.lines == "paper"
         return raster_plan(image, grid_regions(image.mask, angle, self.shells, every))

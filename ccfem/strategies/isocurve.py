@@ -15,7 +15,7 @@ import numpy as np
 from scipy.spatial import cKDTree
 
 from ccfem.arrays import BoolArray, FloatArray
-from ccfem.elasticity.stress_field import LayerStress, StressField
+from ccfem.elasticity.part_stress import PartStress
 from ccfem.errors import InputError
 from ccfem.fields.compatibility import Incompatible
 from ccfem.fields.crease import orient_along
@@ -28,12 +28,13 @@ from ccfem.fields.scalar import fit_cone, fit_constrained, fit_literal, fit_weig
 from ccfem.geometry.isocontours import Isocontours
 from ccfem.layers.holes import holes_on
 from ccfem.layers.layer import Layer
+from ccfem.layers.layer_stress import LayerStress, stress_on
 from ccfem.linking.clearance import trim_to_clearance
 from ccfem.linking.conformal import lead_into, parallel_curve
 from ccfem.linking.finishing import keep_off_border, linked_paths
 from ccfem.linking.spiral import spiral
 from ccfem.machine.machine import Machine
-from ccfem.planning.strategy import Amount, LayerStrategy
+from ccfem.planning.strategy import Amount, LayerPlanner
 from ccfem.toolpaths import Toolpaths
 
 __all__ = ["Isocurve"]
@@ -139,6 +140,7 @@ class Isocurve:
     inset: float = 0.0
 
     amount: ClassVar[Amount] = Amount("density", most=4.0, least=0.05)
+    flat_layers_only: ClassVar[bool] = True
 
     def __post_init__(self) -> None:
         choices = {
@@ -191,8 +193,8 @@ class Isocurve:
         )
 
     def for_part(
-        self, stress: StressField, layers: Sequence[Layer], machine: Machine
-    ) -> LayerStrategy:
+        self, stress: PartStress, layers: Sequence[Layer], machine: Machine
+    ) -> LayerPlanner:
         """Orient the field of the whole part, and check that there is any tension.
 
         Raises
@@ -206,7 +208,9 @@ class Isocurve:
                 stress, self.stress, self.sense, self.compression_limit, self.incompatible
             )
         planner = _Planner(self, part)
-        if not any(planner.tension(layer, stress.on(layer)).defined.any() for layer in layers):
+        if not any(
+            planner.tension(layer, stress_on(layer, stress)).defined.any() for layer in layers
+        ):
             largest = float(np.linalg.eigvalsh(stress.stress).max())
             raise InputError(
                 "expected tension along which to lay fibre; the largest tensile stress found is "
@@ -214,10 +218,6 @@ class Isocurve:
                 "sense = 'absolute'"
             )
         return planner
-
-    def __call__(self, layer: Layer, stress: LayerStress, machine: Machine) -> Toolpaths:
-        """Plan one layer by itself."""
-        return self.for_part(stress.part, [layer], machine)(layer, stress, machine)
 
 
 @dataclass(frozen=True)
@@ -239,7 +239,7 @@ class _Planner:
             return Toolpaths.empty()
         surface = Surface.of(layer)
         lines = self.isocurves(surface, tension, machine.fibre_width)
-        lines = self.connected(lines, layer, tension, stress.part, machine)
+        lines = self.connected(lines, layer, tension, stress.held_or_loaded, machine)
         return Toolpaths.from_plane(lines, layer)
 
     def isocurves(
@@ -303,13 +303,13 @@ class _Planner:
         lines: list[FloatArray],
         layer: Layer,
         tension: SampledTension,
-        part: StressField,
+        patches: tuple[str, ...],
         machine: Machine,
     ) -> list[FloatArray]:
         """Curves round the chosen holes, isocurves led into them, ends linked, the rest dropped."""
-        s, width, section = self.strategy, machine.fibre_width, layer.polygon
+        s, width, section = self.strategy, machine.fibre_width, layer.plane.polygon
         rings: list[FloatArray] = []
-        names = part.problem.held_or_loaded if s.conformal == "loaded" else s.conformal
+        names = patches if s.conformal == "loaded" else s.conformal
         for hole in holes_on(layer, names) if s.rings else []:
             for distance in s.rings[:-1]:
                 rings += parallel_curve(hole, distance * width, section)
@@ -330,7 +330,7 @@ class _Planner:
 
 def _nearest(layer: Layer, values: FloatArray) -> Callable[[FloatArray], FloatArray]:
     """Return a function that gives points (k, 2) the value of the nearest triangle."""
-    tree = cKDTree(layer.plane_points[layer.triangles].mean(axis=1))
+    tree = cKDTree(layer.plane.points[layer.triangles].mean(axis=1))
     return lambda points: values[tree.query(points)[1]]
 
 

@@ -8,16 +8,16 @@ guidelines and investigation into the influence of infill patterns, Rapid Protot
 from dataclasses import dataclass
 from typing import ClassVar, Literal
 
-from ccfem.elasticity.stress_field import LayerStress
 from ccfem.errors import InputError
 from ccfem.geometry.medial_fill import medial_fill
 from ccfem.geometry.shells import shells
 from ccfem.layers.layer import Layer
+from ccfem.layers.layer_stress import LayerStress
 from ccfem.machine.machine import Machine
 from ccfem.planning.strategy import Amount
 from ccfem.raster.bitmap import bitmap
 from ccfem.raster.patterns import medial_regions
-from ccfem.raster.plan import RasterPlan, raster_plan
+from ccfem.raster.raster_plan import RasterPlan, raster_plan
 from ccfem.toolpaths import Toolpaths
 
 __all__ = ["Mat"]
@@ -52,6 +52,7 @@ class Mat:
     mode: Literal["polyline", "raster"] = "polyline"
 
     amount: ClassVar[Amount] = Amount("spacing", most=1.0, least=20.0)
+    flat_layers_only: ClassVar[bool] = True
 
     def __post_init__(self) -> None:
         if self.mode not in ("polyline", "raster"):
@@ -74,7 +75,7 @@ class Mat:
             return plan.toolpaths(layer, machine, self.minimum_length)
         pitch = self.spacing * machine.fibre_width
         lines, interior = shells(
-            layer.polygon, machine.fibre_width, pitch, self.shells, self.closest
+            layer.plane.polygon, machine.fibre_width, pitch, self.shells, self.closest
         )
         lines += medial_fill(interior, pitch, self.closest)
         paths = Toolpaths.from_plane(lines, layer)
@@ -83,5 +84,5 @@ class Mat:
 
     def raster(self, layer: Layer, stress: LayerStress, machine: Machine) -> RasterPlan:
         """Plan one layer on a bitmap of pixels a spacing wide, whatever the mode."""
-        image = bitmap(layer.polygon, self.spacing * machine.fibre_width)
+        image = bitmap(layer.plane.polygon, self.spacing * machine.fibre_width)
         return raster_plan(image, medial_regions(image.mask, self.shells))

@@ -13,7 +13,6 @@ import numpy as np
 import shapely
 
 from ccfem.arrays import FloatArray, read_only
-from ccfem.elasticity.stress_field import LayerStress
 from ccfem.errors import InputError
 from ccfem.fields.streamlines import streamlines
 from ccfem.geometry.guide_fit import fitted_guides
@@ -22,12 +21,13 @@ from ccfem.geometry.medial_axis import medial_axis
 from ccfem.geometry.parallel_strands import grow, lengthened
 from ccfem.geometry.shells import shells
 from ccfem.layers.layer import Layer
+from ccfem.layers.layer_stress import LayerStress
 from ccfem.machine.machine import Machine
 from ccfem.planning.strategy import Amount
 from ccfem.raster.bitmap import bitmap
 from ccfem.raster.guides import stress_guides
 from ccfem.raster.patterns import inside_shells, stress_regions
-from ccfem.raster.plan import RasterPlan, raster_plan
+from ccfem.raster.raster_plan import RasterPlan, raster_plan
 from ccfem.tensor import in_plane
 from ccfem.toolpaths import Toolpaths
 
@@ -79,6 +79,7 @@ class Mps:
     mode: Literal["polyline", "raster"] = "polyline"
 
     amount: ClassVar[Amount] = Amount("spacing", most=1.0, least=20.0)
+    flat_layers_only: ClassVar[bool] = True
 
     def __post_init__(self) -> None:
         if self.mode not in ("polyline", "raster"):
@@ -105,7 +106,7 @@ class Mps:
             return plan.toolpaths(layer, machine, self.minimum_length)
         pitch = self.spacing * machine.fibre_width
         rings, interior = shells(
-            layer.polygon, machine.fibre_width, pitch, self.shells, self.closest
+            layer.plane.polygon, machine.fibre_width, pitch, self.shells, self.closest
         )
         guides = self._guides(layer, stress, interior, pitch)
         paths = Toolpaths.from_plane(rings + grow(guides, interior, pitch, self.closest), layer)
@@ -114,11 +115,11 @@ class Mps:
 
     def raster(self, layer: Layer, stress: LayerStress, machine: Machine) -> RasterPlan:
         """Plan one layer on a bitmap of pixels a spacing wide, whatever the mode."""
-        image = bitmap(layer.polygon, self.spacing * machine.fibre_width)
+        image = bitmap(layer.plane.polygon, self.spacing * machine.fibre_width)
         inside = inside_shells(image.mask, self.shells)
         points = None
         if self.seeds == "ends":
-            points = _patch_middles(layer, stress.part.problem.held_or_loaded)
+            points = _patch_middles(layer, stress.held_or_loaded)
         elif self.seeds != "segments":
             points = np.array(self.seeds, dtype=np.float64).reshape(-1, 2)
         guides = stress_guides(image, inside, layer, stress, points)
@@ -132,9 +133,9 @@ class Mps:
             return []
         seeds = self._seeds(layer, stress, interior, pitch)
         curves = streamlines(
-            layer.plane_points,
+            layer.plane.points,
             layer.triangles,
-            in_plane(stress.nodal, layer.frame),
+            in_plane(stress.nodal, layer.plane.frame),
             seeds,
             _STEP * pitch,
         )
@@ -149,7 +150,7 @@ class Mps:
         if self.seeds == "segments":
             return _middles(interior, pitch)
         if self.seeds == "ends":
-            points = _patch_middles(layer, stress.part.problem.held_or_loaded)
+            points = _patch_middles(layer, stress.held_or_loaded)
         else:
             points = np.array(self.seeds, dtype=np.float64).reshape(-1, 2)
         # Points outside go to the nearest place inside, a little off the border.
@@ -194,7 +195,7 @@ def _patch_middles(layer: Layer, patches: tuple[str, ...]) -> FloatArray:
     for name in patches:
         nodes = np.unique(layer.patches.get(name, np.zeros((0, 2), dtype=np.int64)))
         if len(nodes):
-            places = layer.plane_points[nodes]
+            places = layer.plane.points[nodes]
             gap = np.linalg.norm(places - places.mean(axis=0), axis=1)
             found.append(places[np.argmin(gap)])
     return np.array(found, dtype=np.float64).reshape(-1, 2)

@@ -11,10 +11,10 @@ from typing import Any, ClassVar
 import shapely
 
 from ccfem.arrays import FloatArray
-from ccfem.elasticity.stress_field import LayerStress
 from ccfem.errors import InputError
 from ccfem.geometry.offsets import rings
 from ccfem.layers.layer import Layer
+from ccfem.layers.layer_stress import LayerStress
 from ccfem.machine.machine import Machine
 from ccfem.planning.strategy import Amount
 from ccfem.toolpaths import Toolpaths
@@ -45,6 +45,7 @@ class Offset:
     minimum_length: float | None = None
 
     amount: ClassVar[Amount] = Amount("spacing", most=1.0, least=20.0)
+    flat_layers_only: ClassVar[bool] = True
 
     def __post_init__(self) -> None:
         if not 1.0 <= self.spacing < float("inf"):
@@ -57,7 +58,7 @@ class Offset:
     def __call__(self, layer: Layer, stress: LayerStress, machine: Machine) -> Toolpaths:
         """Plan the paths of one layer; none where the section is thinner than a fibre."""
         width = machine.fibre_width
-        lines = _level_sets(layer.polygon, 0.5 * width, self.spacing * width)
+        lines = _level_sets(layer.plane.polygon, 0.5 * width, self.spacing * width)
         paths = Toolpaths.from_plane(lines, layer)
         least = machine.minimum_length if self.minimum_length is None else self.minimum_length
         return paths.select(paths.lengths >= least)

@@ -10,13 +10,16 @@ from typing import ClassVar
 
 import numpy as np
 
-from ccfem.elasticity.stress_field import LayerStress, StressField
+from ccfem.elasticity.part_stress import PartStress
+from ccfem.elasticity.stress_field import solved
 from ccfem.errors import InputError
 from ccfem.fibre_aware.prune import prune
 from ccfem.layers.layer import Layer
+from ccfem.layers.layer_stress import LayerStress
 from ccfem.machine.machine import Machine
 from ccfem.planning.equal_fibre import plan_to_length
-from ccfem.planning.strategy import Amount, LayerStrategy, create
+from ccfem.planning.strategy import Amount, LayerPlanner
+from ccfem.strategies import create
 from ccfem.toolpaths import Toolpaths
 from ccfem.virtual_testing.strand import RHO, Strand
 
@@ -51,6 +54,7 @@ class Pruned:
     rho: float = RHO
 
     amount: ClassVar[Amount] = Amount("coverage", most=0.9, least=0.1)
+    flat_layers_only: ClassVar[bool] = True
 
     def __post_init__(self) -> None:
         checks = {
@@ -65,8 +69,8 @@ class Pruned:
                 raise InputError(f"pruned.{name} must be {expected}; got {getattr(self, name)!r}")
 
     def for_part(
-        self, stress: StressField, layers: Sequence[Layer], machine: Machine
-    ) -> LayerStrategy:
+        self, stress: PartStress, layers: Sequence[Layer], machine: Machine
+    ) -> LayerPlanner:
         """Plan and prune all layers of the part.
 
         Raises
@@ -82,17 +86,13 @@ class Pruned:
         return _Planned(
             prune(
                 planned.toolpaths,
-                stress,
+                solved(stress, "pruned"),
                 wanted * len(layers),
                 machine,
                 Strand(self.rho),
                 self.rounds,
             )
         )
-
-    def __call__(self, layer: Layer, stress: LayerStress, machine: Machine) -> Toolpaths:
-        """Plan one layer by itself."""
-        return self.for_part(stress.part, [layer], machine)(layer, stress, machine)
 
 
 @dataclass(frozen=True)

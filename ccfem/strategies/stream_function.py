@@ -12,7 +12,8 @@ from typing import ClassVar
 import numpy as np
 
 from ccfem.arrays import FloatArray, IntArray
-from ccfem.elasticity.stress_field import LayerStress, StressField
+from ccfem.elasticity.part_stress import PartStress
+from ccfem.elasticity.stress_field import StressField, solved
 from ccfem.errors import InputError
 from ccfem.fibre_aware.heights import (
     alike_share,
@@ -28,10 +29,11 @@ from ccfem.fibre_aware.stream_start import plane_axes, start_field
 from ccfem.fields.layer_tension import layer_tension
 from ccfem.geometry.isocontours import isocontours
 from ccfem.layers.layer import Layer
+from ccfem.layers.layer_stress import LayerStress, stress_on
 from ccfem.linking.clearance import trim_to_clearance
 from ccfem.linking.finishing import keep_off_border, linked_paths
 from ccfem.machine.machine import Machine
-from ccfem.planning.strategy import Amount, LayerStrategy
+from ccfem.planning.strategy import Amount, LayerPlanner
 from ccfem.toolpaths import Toolpaths
 from ccfem.virtual_testing.bars import strain_operator
 from ccfem.virtual_testing.strand import RHO
@@ -103,6 +105,7 @@ class StreamFunction:
     inset: float = 0.0
 
     amount: ClassVar[Amount] = Amount("coverage", most=0.85, least=0.1)
+    flat_layers_only: ClassVar[bool] = True
 
     def __post_init__(self) -> None:
         checks = {
@@ -124,8 +127,8 @@ class StreamFunction:
                 )
 
     def for_part(
-        self, stress: StressField, layers: Sequence[Layer], machine: Machine
-    ) -> LayerStrategy:
+        self, stress: PartStress, layers: Sequence[Layer], machine: Machine
+    ) -> LayerPlanner:
         """Design the fields of the whole part and plan all its layers.
 
         Layers that are not given are taken to be filled like the nearest one that is.
@@ -135,25 +138,22 @@ class StreamFunction:
         InputError
             When no layer has a tensile direction.
         """
-        if not any(layer_tension(stress.on(layer)).defined.any() for layer in layers):
+        if not any(layer_tension(stress_on(layer, stress)).defined.any() for layer in layers):
             largest = float(np.linalg.eigvalsh(stress.stress).max())
             raise InputError(
                 "expected tension that fibre can carry; the largest tensile stress found is "
                 f"{largest:.3g} MPa, outweighed by compression: turn the load round"
             )
-        problem, group, found = self.designed(stress, layers, machine)
-        return _Planned(_Extraction(self, problem, found, stress, machine).plan(layers, group))
-
-    def __call__(self, layer: Layer, stress: LayerStress, machine: Machine) -> Toolpaths:
-        """Plan one layer by itself, as if all others were like it."""
-        return self.for_part(stress.part, [layer], machine)(layer, stress, machine)
+        field = solved(stress, "stream_function")
+        problem, group, found = self.designed(field, layers, machine)
+        return _Planned(_Extraction(self, problem, found, field, machine).plan(layers, group))
 
     def designed(
         self, stress: StressField, layers: Sequence[Layer], machine: Machine
     ) -> tuple[StreamProblem, IntArray, StreamDesign]:
         """Design the fields: the problem, the group of each layer, and the design."""
         linear = on_linear_cells(stress)
-        part = SmearedPart.of(linear, layers[0].frame)
+        part = SmearedPart.of(linear, layers[0].plane.frame)
         mesh = part.mesh
         centres = part.centroids @ part.frame[:2].T
         size = max(self.grid * machine.fibre_width, float(np.cbrt(6.0 * mesh.volumes.mean())))
@@ -246,7 +246,7 @@ class _Extraction:
 
     def layer_paths(self, layer: Layer, field: FloatArray, shift: float) -> Toolpaths:
         """Paths of one layer along unit levels, the first one `shift` above the lowest value."""
-        width, section = self.problem.width, layer.polygon
+        width, section = self.problem.width, layer.plane.polygon
         points, triangles = _refined(layer)
         values = self.problem.grid.values(points) @ field
         curves = isocontours(points, triangles, values, float(values.min()) + shift, 1.0)
@@ -266,7 +266,7 @@ class _Extraction:
 
 def _refined(layer: Layer) -> tuple[FloatArray, IntArray]:
     """Points (n, 2) and triangles (t, 3) of a layer, each triangle cut in four."""
-    points, corners = layer.plane_points, layer.triangles
+    points, corners = layer.plane.points, layer.triangles
     pairs = np.sort(corners[:, [[1, 2], [2, 0], [0, 1]]].reshape(-1, 2), axis=1)
     key, number = np.unique(pairs[:, 0] * len(points) + pairs[:, 1], return_inverse=True)
     first, second = np.divmod(key, len(points))

@@ -12,10 +12,10 @@ from typing import ClassVar
 
 import shapely
 
-from ccfem.elasticity.stress_field import LayerStress
 from ccfem.errors import InputError
 from ccfem.fields.evenly_spaced import evenly_spaced_streamlines
 from ccfem.layers.layer import Layer
+from ccfem.layers.layer_stress import LayerStress
 from ccfem.machine.machine import Machine
 from ccfem.planning.strategy import Amount
 from ccfem.tensor import in_plane
@@ -49,6 +49,7 @@ class Streamline:
     minimum_length: float | None = None
 
     amount: ClassVar[Amount] = Amount("spacing", most=1.0, least=20.0)
+    flat_layers_only: ClassVar[bool] = True
 
     def __post_init__(self) -> None:
         if not 1.0 <= self.spacing < float("inf"):
@@ -68,10 +69,10 @@ class Streamline:
         """Plan the paths of one layer; none where the section is thinner than a fibre."""
         width = machine.fibre_width
         lines = evenly_spaced_streamlines(
-            layer.plane_points,
+            layer.plane.points,
             layer.triangles,
-            in_plane(stress.nodal, layer.frame),
-            shapely.buffer(layer.polygon, -0.5 * width),
+            in_plane(stress.nodal, layer.plane.frame),
+            shapely.buffer(layer.plane.polygon, -0.5 * width),
             self.spacing * width,
             self.closest,
         )

@@ -12,10 +12,10 @@ import numpy as np
 import shapely
 
 from ccfem.arrays import BoolArray, FloatArray
-from ccfem.elasticity.stress_field import LayerStress
 from ccfem.errors import InputError
 from ccfem.geometry.offsets import join_rings, offset_rings, rings
 from ccfem.layers.layer import Layer
+from ccfem.layers.layer_stress import LayerStress
 from ccfem.linking.single_path import link_tracks
 from ccfem.machine.machine import Machine
 from ccfem.planning.strategy import Amount
@@ -91,6 +91,7 @@ class Svt:
     minimum_length: float | None = None
 
     amount: ClassVar[Amount] = Amount("spacing", most=1.0, least=20.0)
+    flat_layers_only: ClassVar[bool] = True
     crosses: ClassVar[bool] = True
 
     def __post_init__(self) -> None:
@@ -113,7 +114,7 @@ class Svt:
         """Plan the paths of one layer: for each piece of its section one, or as few as can be."""
         lines: list[FloatArray] = []
         link: list[BoolArray] = []
-        for piece in shapely.get_parts(layer.polygon):
+        for piece in shapely.get_parts(layer.plane.polygon):
             for line, mask in self._piece(piece, stress, machine):
                 lines.append(line)
                 link.append(mask)

@@ -5,10 +5,10 @@ from typing import ClassVar
 
 import numpy as np
 
-from ccfem.elasticity.stress_field import LayerStress
 from ccfem.errors import InputError
 from ccfem.geometry.hatch import zigzag
 from ccfem.layers.layer import Layer
+from ccfem.layers.layer_stress import LayerStress
 from ccfem.machine.machine import Machine
 from ccfem.planning.strategy import Amount
 from ccfem.toolpaths import Toolpaths
@@ -39,6 +39,7 @@ class Zigzag:
     turn: float = 90.0
 
     amount: ClassVar[Amount] = Amount("spacing", most=1.0, least=20.0)
+    flat_layers_only: ClassVar[bool] = True
     direction: ClassVar[str] = "angle"
 
     def __post_init__(self) -> None:
@@ -54,6 +55,6 @@ class Zigzag:
         """Plan the paths of one layer; none where the section is thinner than a fibre."""
         width = machine.fibre_width
         angle = np.radians(self.angle + self.turn * layer.index)
-        lines = zigzag(layer.polygon, 0.5 * width, width, self.spacing * width, angle)
+        lines = zigzag(layer.plane.polygon, 0.5 * width, width, self.spacing * width, angle)
         paths = Toolpaths.from_plane(lines, layer)
         return paths.select(paths.lengths >= machine.minimum_length)

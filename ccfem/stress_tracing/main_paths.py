@@ -11,7 +11,7 @@ from itertools import combinations
 import numpy as np
 
 from ccfem.arrays import FloatArray
-from ccfem.elasticity.stress_field import LayerStress
+from ccfem.layers.layer_stress import LayerStress
 from ccfem.stress_tracing.criterion import Criterion
 from ccfem.stress_tracing.frame import Frame, Member
 from ccfem.stress_tracing.stress_lines import misalignment, plane_stress_at, stress_lines

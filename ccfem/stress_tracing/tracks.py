@@ -10,9 +10,9 @@ import shapely
 from scipy.ndimage import gaussian_filter1d, maximum_filter1d
 
 from ccfem.arrays import BoolArray, FloatArray
-from ccfem.elasticity.stress_field import LayerStress
 from ccfem.geometry.offsets import ring_from
 from ccfem.geometry.polylines import subdivide, turning_angles
+from ccfem.layers.layer_stress import LayerStress
 from ccfem.stress_tracing.band import STEP, Band
 from ccfem.stress_tracing.turning import relaxed
 

@@ -19,7 +19,7 @@ from scipy.sparse import coo_array
 from scipy.sparse.linalg import spsolve
 
 from ccfem.arrays import FloatArray
-from ccfem.elasticity.stress_field import LayerStress
+from ccfem.layers.layer_stress import LayerStress
 from ccfem.stress_tracing.band import STEP, Band
 from ccfem.stress_tracing.stress_lines import plane_stress_at, stress_lines
 

@@ -11,9 +11,9 @@ import shapely
 from scipy.spatial import cKDTree
 
 from ccfem.arrays import BoolArray, FloatArray, IntArray
-from ccfem.elasticity.stress_field import LayerStress
 from ccfem.geometry.medial_axis import medial_axis
 from ccfem.geometry.polylines import pack, resample
+from ccfem.layers.layer_stress import LayerStress
 from ccfem.stress_tracing.criterion import Criterion
 from ccfem.stress_tracing.stress_lines import misalignment, plane_stress_at, stress_lines
 

@@ -16,7 +16,7 @@ from ccfem.topopt.design import Design
 from ccfem.topopt.filters import ConeFilter
 from ccfem.topopt.iteration import iterate
 from ccfem.topopt.material_axes import harmonics, sheet
-from ccfem.topopt.orientation import (
+from ccfem.topopt.oriented_compliance import (
     OrientedCompliance,
     Turn,
     down_the_gradient,

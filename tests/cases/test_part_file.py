@@ -10,6 +10,7 @@ from ccfem.elasticity.problem import Bearing, Force, PointForce, Pressure, Suppo
 from ccfem.elasticity.solve import solve
 from ccfem.errors import InputError
 from ccfem.io import write_mesh
+from ccfem.layers.slicing.planar import Planar
 from ccfem.mesh import TetMesh
 from ccfem.meshing import extrude
 
@@ -60,7 +61,7 @@ def read(folder, text):
 
 def test_the_example_reads_and_solves():
     case = read_part(EXAMPLE)
-    assert (case.name, case.layers, case.build) == ("bracket", 6, (0.0, 0.0, 1.0))
+    assert (case.name, case.slicing, case.build) == ("bracket", Planar(count=6), (0.0, 0.0, 1.0))
     assert np.allclose(np.ptp(case.problem.mesh.bounds, axis=0), [90, 60, 6])
     assert case.problem.material.name == "PLA+"
     assert case.parameters["zigzag"]["angle"] == 0.0
@@ -145,7 +146,7 @@ rings = [1.5]
     assert areas["top"] == pytest.approx(300.0)
     assert areas["side"] == pytest.approx(75.0)
     assert len(mesh.patches["tip"]) == 3
-    assert (case.name, case.title, case.layers) == ("part", "part", 12)
+    assert (case.name, case.title, case.slicing) == ("part", "part", Planar(count=12))
     assert case.machine.minimum_length == 60.0
     assert case.machine.fibre_width == 1.0
     assert case.parameters["isocurve"]["cap"] == 90

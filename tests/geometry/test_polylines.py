@@ -1,4 +1,4 @@
-"""Arc length, resampling, turning and splitting against shapely and exact shapes."""
+"""Arc length, resampling, and turning against shapely and exact shapes."""
 
 from itertools import pairwise
 
@@ -19,7 +19,6 @@ from ccfem.geometry.polylines import (
     resample,
     sample_at,
     sample_midpoints,
-    split,
     subdivide,
     turning_angles,
 )
@@ -159,9 +158,10 @@ def test_point_at_an_arc_length_is_that_of_shapely(line: np.ndarray, share: floa
 
 
 @given(polylines, st.lists(st.floats(0.01, 0.99), max_size=4))
-def test_pieces_of_a_split_line_make_up_the_line(line: np.ndarray, shares: list[float]) -> None:
+def test_parts_between_arc_lengths_make_up_the_line(line: np.ndarray, shares: list[float]) -> None:
     total = shapely.LineString(line).length
-    pieces = split(line, [share * total for share in shares])
+    cuts = [0.0, *sorted({share * total for share in shares}), total]
+    pieces = [between(line, *ends) for ends in pairwise(cuts)]
     assert sum(shapely.LineString(p).length for p in pieces) == pytest.approx(total, abs=1e-9)
     assert np.array_equal(pieces[0][0], line[0])
     assert pieces[-1][-1] == pytest.approx(line[-1], abs=1e-9)

@@ -124,8 +124,9 @@ def test_trimmed_strands_keep_the_clearance(seed: int) -> None:
         for j, b in enumerate(strings[:i])
         if of[i] != of[j]
     ]
-    # vertices keep the clearance exactly; between them a step of 0.3 mm can cut the corner
-    assert min([*nearest, 1.0]) >= np.sqrt(1.0 - 0.15**2) - 1e-9
+    # Vertices keep the clearance exactly. Where the middles of two steps of 0.3 mm pass each other
+    # at a right angle, four vertices 1 mm apart leave them sqrt(1 - 2 * 0.15^2) mm.
+    assert min([*nearest, 1.0]) >= np.sqrt(1.0 - 2.0 * 0.15**2) - 1e-9
     assert all(string.length >= 3.0 for string in strings)
 
 

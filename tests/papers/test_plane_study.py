@@ -1,5 +1,7 @@
 """Plates with the fibre as laid: sensitivity, agreement, energies, printing."""
 
+from types import SimpleNamespace
+
 import numpy as np
 import pytest
 import shapely
@@ -14,9 +16,10 @@ from benchmarks.papers.plocher_2022.plane_study import (
     reduced_stiffness,
     turned_energies,
 )
+from benchmarks.papers.plocher_2022.sensitivity import ANGLES
 from ccfem.elasticity.problem import Force, Support
 from ccfem.evaluation.plane_paths import PlanePaths
-from ccfem.evaluation.sensitivity import ANGLES, OffAxis
+from ccfem.evaluation.sensitivity import OffAxis
 from ccfem.geometry.polylines import pack
 from ccfem.linking.print_order import nearest_end_order
 from ccfem.materials import isotropic, named_material, plane_stress
@@ -46,11 +49,10 @@ def holed():
 def paths(*lines, section=None, closed=None):
     """Paths on a section, without a layer behind it."""
 
-    class Section:
-        polygon = section
+    layer = SimpleNamespace(plane=SimpleNamespace(polygon=section))
 
     packed = pack([np.array(line, dtype=float) for line in lines])
-    return PlanePaths(Section(), *packed, np.array(closed or [False] * len(lines)))
+    return PlanePaths(layer, *packed, np.array(closed or [False] * len(lines)))
 
 
 @pytest.mark.parametrize("name", TABLE_5)

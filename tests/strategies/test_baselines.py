@@ -4,6 +4,7 @@ import shapely
 
 from ccfem.errors import InputError
 from ccfem.layers.layer import Layer
+from ccfem.layers.plane import Plane
 from ccfem.machine import Machine
 from ccfem.strategies.concentric import Concentric
 from ccfem.strategies.contour_zigzag import ContourZigzag
@@ -30,8 +31,7 @@ def layer_of(section, index=0):
         nodes=np.zeros((n, 2)),
         weights=np.zeros(n),
         loops=tuple(loops),
-        frame=np.eye(3),
-        height=3.0,
+        flat=Plane(np.eye(3), 3.0),
         index=index,
         thickness=1.0,
     )

@@ -19,7 +19,7 @@ from ccfem.plates import PlaneProblem, raster_mesh, rotate_plane
 from ccfem.tensor import rotate_stiffness
 from ccfem.topopt import Compliance, Simp, Somp
 from ccfem.topopt.material_axes import harmonics, sheet
-from ccfem.topopt.orientation import OrientedCompliance
+from ccfem.topopt.oriented_compliance import OrientedCompliance
 
 FIBRE = plane_stress(50000.0, 4000.0, 0.3, 2500.0)
 WANG = plane_stress(18300.0, 19800.0, 0.17, 5150.0)

@@ -23,16 +23,16 @@ from ccfem.elasticity.stress_field import StressField
 from ccfem.fibre_aware.prune import prune
 from ccfem.fibre_aware.upper_bound import upper_bound
 from ccfem.layers.layer import Layer
-from ccfem.layers.slicing.planar import slice_planar
+from ccfem.layers.slicing.planar import Planar
+from ccfem.planning import plan
 from ccfem.planning.equal_fibre import plan_to_length
-from ccfem.planning.strategy import plan
 from ccfem.strategies.isocurve import Isocurve
 from ccfem.strategies.stream_function import StreamFunction
 from ccfem.toolpaths import Toolpaths
 from ccfem.virtual_testing.specimen import Specimen
+from ccfem.virtual_testing.stiffer import HONEST_PROMISE
 from ccfem.virtual_testing.strands import cut_strands
 from ccfem.virtual_testing.strength import first_failure
-from ccfem.virtual_testing.verdict import HONEST_PROMISE
 from ccfem.virtual_testing.virtual_test import virtual_bracket, virtual_test
 
 __all__ = ["LAYER_COUNTS", "LENGTH", "Tested", "bound", "designs", "loop", "sliced", "tested"]
@@ -58,7 +58,7 @@ def loop() -> tuple[Case, dict[str, StressField], dict[str, Specimen]]:
 def sliced(count: int = LAYERS_TABLE_2) -> tuple[Layer, ...]:
     """Layers spread evenly over the height."""
     case, _, _ = loop()
-    return slice_planar(case.problem.mesh, case.build, count=count)
+    return Planar(count=count).cut(case.problem.mesh, case.build)
 
 
 def _coverage(layers: Sequence[Layer]) -> float:

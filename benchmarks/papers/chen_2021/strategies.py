@@ -16,9 +16,9 @@ from benchmarks.papers.chen_2021.slicers import PATTERNS, slicer_found, slicer_p
 from benchmarks.papers.chen_2021.virtual_test import MATRIX_STRENGTH, authors_paths
 from ccfem.elasticity import solve
 from ccfem.evaluation import evaluate
-from ccfem.layers import slice_planar
+from ccfem.planning import Strategy, plan
 from ccfem.planning.equal_fibre import plan_to_length
-from ccfem.strategies import Strategy, create, plan
+from ccfem.strategies import create
 from ccfem.strategies.isocurve import Isocurve
 from ccfem.toolpaths import Toolpaths
 from ccfem.virtual_testing.specimen import Specimen
@@ -45,10 +45,10 @@ def main() -> None:
     """Print the table."""
     case = authors_loop()
     field = solve(case.problem)["pull"]
-    layers = slice_planar(field.mesh, case.build, count=case.layers)
+    layers = case.slicing(field, case.build, case.machine)
     specimen = Specimen.of(field)
     authors = authors_paths("ours")
-    wanted = float(authors.lengths.sum()) / case.layers
+    wanted = float(authors.lengths.sum()) / len(layers)
 
     def at_length(strategy: Strategy) -> Callable[[], Toolpaths]:
         return lambda: plan_to_length(strategy, layers, field, case.machine, wanted).toolpaths

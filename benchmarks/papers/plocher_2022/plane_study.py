@@ -8,9 +8,10 @@ import numpy as np
 import shapely
 
 from benchmarks.papers.plocher_2022.fibre_map import FibreMap
+from benchmarks.papers.plocher_2022.sensitivity import ANGLES, Sensitivity
 from ccfem.arrays import BoolArray, FloatArray, read_only
 from ccfem.evaluation.plane_paths import PlanePaths
-from ccfem.evaluation.sensitivity import ANGLES, Sensitivity, plane_compliance
+from ccfem.evaluation.sensitivity import plane_compliance
 from ccfem.evaluation.sinuosity import LONG
 from ccfem.evaluation.stiffness_alignment import Reading, agreement, performance_index, strongest
 from ccfem.linking.print_order import nearest_end_order
@@ -249,7 +250,7 @@ def bead_area(paths: PlanePaths, bead: float) -> tuple[float, float]:
         Length times width of the beads less the area that they cover, and the area of the section
         that they do not cover, both over the area of the section.
     """
-    section = paths.layer.polygon
+    section = paths.layer.plane.polygon
     index = np.repeat(np.arange(len(paths)), np.diff(paths.offsets))
     lines = shapely.linestrings(paths.points, indices=index)
     points, index = shapely.get_coordinates(

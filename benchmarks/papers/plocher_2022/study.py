@@ -37,12 +37,14 @@ from ccfem.geometry import shells
 from ccfem.geometry.medial_fill import medial_fill
 from ccfem.geometry.polylines import lengths, pack
 from ccfem.layers.layer import Layer
+from ccfem.layers.layer_stress import stress_on
 from ccfem.linking.print_order import nearest_end_order
 from ccfem.machine import Machine
 from ccfem.materials import named_material
+from ccfem.planning import plan
 from ccfem.plates import solve_plane
-from ccfem.raster.plan import RasterPlan
-from ccfem.strategies import create, mps, plan
+from ccfem.raster.raster_plan import RasterPlan
+from ccfem.strategies import create, mps
 from ccfem.toolpaths import FIBRE, Toolpaths
 
 __all__ = [
@@ -228,7 +230,7 @@ def _on_pixels(
 ) -> tuple[RasterPlan, ...]:
     if getattr(planner, "mode", "polyline") != "raster":
         return ()
-    return tuple(planner.raster(layer, stress.on(layer), machine) for layer in layers)
+    return tuple(planner.raster(layer, stress_on(layer, stress), machine) for layer in layers)
 
 
 def _of_pixels(raster: Sequence[RasterPlan]) -> dict[str, float]:

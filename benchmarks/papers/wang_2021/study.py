@@ -18,16 +18,19 @@ from ccfem.arrays import FloatArray
 from ccfem.cases import Case, create_case
 from ccfem.cases.designed import ELEMENT_SIZE, DesignPlate
 from ccfem.cases.stored.build import DESIGNED
-from ccfem.elasticity import LayerStress, StressField, solve
+from ccfem.elasticity import StressField, solve
 from ccfem.evaluation import evaluate
 from ccfem.evaluation.curvature import sample_curvature
 from ccfem.evaluation.matching import READINGS, matching_rate
 from ccfem.evaluation.plane_paths import PlanePaths, plane_paths
 from ccfem.geometry.polylines import resample, turning_angles
-from ccfem.layers import slice_planar
+from ccfem.layers import LayerStress
 from ccfem.layers.layer import Layer
+from ccfem.layers.layer_stress import stress_on
+from ccfem.layers.slicing.planar import Planar
 from ccfem.machine import Machine
-from ccfem.strategies import create, named, plan
+from ccfem.planning import plan
+from ccfem.strategies import create, named
 from ccfem.toolpaths import Toolpaths
 from ccfem.topopt import Design
 from ccfem.virtual_testing.specimen import Specimen
@@ -217,19 +220,20 @@ def run_part(case: Case, patterns: Sequence[str], tested: bool) -> PartStudy:
     """Solve a part, lay the patterns on it, and judge them; `tested` virtually, too."""
     machine = replace(case.machine, minimum_length=0.0)
     field = solve(case.problem)["down"]
-    (layer,) = slice_planar(case.problem.mesh, count=1)
-    stress = field.on(layer)
+    (layer,) = Planar(count=1).cut(case.problem.mesh)
+    stress = stress_on(layer, field)
     specimen = Specimen.of(field) if tested else None
-    found = {p: _run_pattern(p, layer, stress, machine, specimen) for p in patterns}
+    found = {p: _run_pattern(p, layer, field, machine, specimen) for p in patterns}
     return PartStudy(case, machine, field, layer, stress, MappingProxyType(found))
 
 
 def _run_pattern(
-    name: str, layer: Layer, stress: LayerStress, machine: Machine, specimen: Specimen | None
+    name: str, layer: Layer, field: StressField, machine: Machine, specimen: Specimen | None
 ) -> PatternStudy:
     strategy, parameters = PATTERNS[name]
+    stress = stress_on(layer, field)
     begun = perf_counter()
-    toolpaths = plan(create(strategy, parameters), (layer,), stress.part, machine)
+    toolpaths = plan(create(strategy, parameters), (layer,), field, machine)
     seconds = perf_counter() - begun
     width = machine.fibre_width
     rates = {
@@ -239,7 +243,7 @@ def _run_pattern(
     paths = plane_paths(toolpaths, layer)
     whole = PlanePaths(layer, paths.points, paths.offsets, paths.closed)
     places, curvature = curvature_along(whole)
-    total = evaluate(toolpaths, (layer,), stress.part, machine).total
+    total = evaluate(toolpaths, (layer,), field, machine).total
     return PatternStudy(
         toolpaths,
         paths,

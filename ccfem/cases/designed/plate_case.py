@@ -4,8 +4,9 @@ from collections.abc import Callable
 
 from ccfem.cases.case import Case
 from ccfem.cases.designed.plate import DesignPlate
-from ccfem.cases.stored.files import mesh_of_case
+from ccfem.cases.stored.stored_files import mesh_of_case
 from ccfem.elasticity.problem import Force, Problem, Support
+from ccfem.layers.slicing.planar import Planar
 from ccfem.machine.machine import Machine
 from ccfem.machine.speed_table import SpeedTable
 from ccfem.materials import printed_pla
@@ -102,7 +103,7 @@ def designed_case(
         name=plate.name,
         title=f"{plate.title}, {what}",
         problem=problem,
-        layers=_LAYERS,
+        slicing=Planar(count=_LAYERS),
         machine=prepreg_printer(),
         source=f"{_SOURCE}: size and loading; what it does not state is assumed",
     )

@@ -1,46 +1,108 @@
-"""Planar slicing of a tetrahedral mesh into layers."""
+"""Flat layers across the build direction."""
 
-from collections.abc import Iterable, Sequence
+from dataclasses import dataclass
 
 import numpy as np
 from numba import njit
 
 from ccfem.arrays import FloatArray, IntArray
+from ccfem.elasticity.part_stress import PartStress
 from ccfem.errors import InputError
 from ccfem.layers.layer import Layer
+from ccfem.layers.plane import Plane, plane_frame
+from ccfem.layers.slicer import Vector
+from ccfem.machine.machine import Machine
 from ccfem.mesh.tet_mesh import TetMesh
 
-__all__ = ["plane_frame", "slice_heights", "slice_planar"]
+__all__ = ["Planar", "slice_heights"]
 
 _SNAP = 2e-6
 """Nodes nearer to the plane than this share of the part's size are taken to lie on it [Chen et al.
 2021, section 5]: a plane through mesh nodes would otherwise cut slivers."""
 
+_COUNT = 12
+"""Layers where nothing else is asked for: those of the Loop of Chen et al. 2021."""
 
-def plane_frame(direction: Sequence[float]) -> FloatArray:
-    """Right-handed frame of the planes across a build direction.
 
-    Parameters
+@dataclass(frozen=True)
+class Planar:
+    """Flat layers across the build direction, at the middle of slabs or at given heights.
+
+    At most one of the three is given; without any there are 12 layers.
+
+    Attributes
     ----------
-    direction : sequence of 3 floats
-        Build direction; need not be of unit length.
-
-    Returns
-    -------
-    (3, 3) array
-        Rows: two in-plane unit vectors and the unit normal. Along z they are x, y, z; along y
-        x, -z, y (the tool frame of Chen et al. 2021); along x y, z, x.
+    count : int, optional
+        Number of layers, at the middle of equal slabs.
+    thickness : float, mm, optional
+        Height of a slab; the last one may stand out at the top.
+    heights : tuple of float, mm, optional
+        Heights ``points @ direction`` of the layers themselves.
     """
-    normal = np.asarray(direction, dtype=np.float64)
-    length = float(np.linalg.norm(normal)) if normal.shape == (3,) else 0.0
-    if not (np.isfinite(length) and length > 0.0):
-        raise InputError(f"build direction must be three numbers, not all 0; got {direction}")
-    normal = normal / length
-    axis = int(np.argmax(np.abs(normal)))
-    first = np.array([1.0, 0.0, 0.0]) if axis != 0 else np.array([0.0, 1.0, 0.0])
-    first -= (first @ normal) * normal
-    first /= np.linalg.norm(first)
-    return np.stack([first, np.cross(normal, first), normal])
+
+    count: int | None = None
+    thickness: float | None = None
+    heights: tuple[float, ...] | None = None
+
+    def __post_init__(self) -> None:
+        given = [n for n in ("count", "thickness", "heights") if getattr(self, n) is not None]
+        if len(given) > 1:
+            raise InputError(
+                "planar layers need one of count, thickness and heights; got "
+                f"{' and '.join(given)}: choose one"
+            )
+        if not given:
+            object.__setattr__(self, "count", _COUNT)
+        if self.count is not None and self.count < 1:
+            raise InputError(f"the number of layers must be at least 1; got {self.count}")
+        if self.heights is not None:
+            heights = tuple(sorted(float(height) for height in self.heights))
+            if not heights or not np.isfinite(heights).all():
+                raise InputError("give at least one layer height, a finite number in mm")
+            object.__setattr__(self, "heights", heights)
+
+    def __call__(self, stress: PartStress, build: Vector, machine: Machine) -> tuple[Layer, ...]:
+        """Cut a part into flat layers; the stress has no influence."""
+        return self.cut(stress.mesh, build)
+
+    def cut(self, mesh: TetMesh, build: Vector = (0.0, 0.0, 1.0)) -> tuple[Layer, ...]:
+        """Cut a mesh into flat layers.
+
+        Parameters
+        ----------
+        mesh : TetMesh
+        build : tuple of 3 floats, default z
+            Build direction.
+
+        Returns
+        -------
+        tuple of Layer
+            From the bottom to the top. Heights between two disconnected parts give no layer.
+
+        Raises
+        ------
+        InputError
+            When a height lies outside the part, or a slab is higher than the part.
+        """
+        frame = plane_frame(build)
+        level = mesh.points @ frame[2]
+        lowest, highest = float(level[mesh.corners].min()), float(level[mesh.corners].max())
+        if self.heights is None:
+            stack = slice_heights(lowest, highest, self.count, self.thickness)
+        else:
+            stack = np.array(self.heights)
+        if stack[0] < lowest or stack[-1] > highest:
+            outside = stack[0] if stack[0] < lowest else stack[-1]
+            raise InputError(
+                f"layer height {outside:g} mm lies outside the part, which reaches from "
+                f"{lowest:g} to {highest:g} mm along the build direction"
+            )
+        edges = np.concatenate([[lowest], 0.5 * (stack[1:] + stack[:-1]), [highest]])
+        layers = (
+            _cut(mesh, Plane(frame, float(h)), level, k, float(edges[k + 1] - edges[k]))
+            for k, h in enumerate(stack)
+        )
+        return tuple(layer for layer in layers if layer is not None)
 
 
 def slice_heights(
@@ -61,8 +123,6 @@ def slice_heights(
     if (count is None) == (thickness is None):
         raise InputError("give either the number of layers or their thickness, not both or none")
     if count is not None:
-        if count < 1:
-            raise InputError(f"the number of layers must be at least 1; got {count}")
         return lowest + (np.arange(count, dtype=np.float64) + 0.5) * size / count
     assert thickness is not None
     if not 0.0 < thickness <= size:
@@ -74,63 +134,10 @@ def slice_heights(
     return lowest + (np.arange(slabs, dtype=np.float64) + 0.5) * thickness
 
 
-def slice_planar(
-    mesh: TetMesh,
-    direction: Sequence[float] = (0.0, 0.0, 1.0),
-    count: int | None = None,
-    thickness: float | None = None,
-    heights: Iterable[float] | None = None,
-) -> tuple[Layer, ...]:
-    """Cut a mesh into flat layers.
-
-    Parameters
-    ----------
-    mesh : TetMesh
-    direction : sequence of 3 floats, default z
-        Build direction.
-    count, thickness, heights
-        Exactly one of: the number of layers, the height of a slab in mm, or the heights
-        ``points @ direction`` themselves in mm.
-
-    Returns
-    -------
-    tuple of Layer
-        From the bottom to the top. Heights between two disconnected parts give no layer.
-
-    Raises
-    ------
-    InputError
-        When no or several of `count`, `thickness` and `heights` are given, or a height lies
-        outside the part.
-    """
-    frame = plane_frame(direction)
-    level = mesh.points @ frame[2]
-    lowest, highest = float(level[mesh.corners].min()), float(level[mesh.corners].max())
-    if heights is None:
-        stack = slice_heights(lowest, highest, count, thickness)
-    elif count is not None or thickness is not None:
-        raise InputError("give only one of: number of layers, thickness, heights")
-    else:
-        stack = np.array(sorted(heights), dtype=np.float64)
-    if not len(stack) or not np.isfinite(stack).all():
-        raise InputError("give at least one layer height, a finite number in mm")
-    if stack[0] < lowest or stack[-1] > highest:
-        outside = stack[0] if stack[0] < lowest else stack[-1]
-        raise InputError(
-            f"layer height {outside:g} mm lies outside the part, which reaches from {lowest:g} to "
-            f"{highest:g} mm along the build direction"
-        )
-    edges = np.concatenate([[lowest], 0.5 * (stack[1:] + stack[:-1]), [highest]])
-    layers = (
-        _cut(mesh, frame, level, float(h), k, float(edges[k + 1] - edges[k]))
-        for k, h in enumerate(stack)
-    )
-    return tuple(layer for layer in layers if layer is not None)
-
-
 def _cut(
-    mesh: TetMesh, frame: FloatArray, level: FloatArray, height: float, index: int, thickness: float
+    mesh: TetMesh, plane: Plane, level: FloatArray, index: int, thickness: float
 ) -> Layer | None:
+    frame, height = plane.frame, plane.height
     snap = _SNAP * float(np.linalg.norm(mesh.bounds[1] - mesh.bounds[0]))
     signed = level - height
     signed[np.abs(signed) < snap] = 0.0
@@ -158,8 +165,7 @@ def _cut(
         nodes=nodes,
         weights=weights,
         loops=_chain(border),
-        frame=frame,
-        height=height,
+        flat=plane,
         index=index,
         thickness=thickness,
         patches=_patch_edges(mesh, border, nodes, points),

@@ -2,16 +2,16 @@
 
 from dataclasses import replace
 from functools import cache
-from types import SimpleNamespace
 
 import numpy as np
 import pytest
 import shapely
 from shapely import affinity
 
-from ccfem.elasticity.stress_field import LayerStress
 from ccfem.errors import InputError
+from ccfem.layers import LayerStress
 from ccfem.layers.layer import Layer
+from ccfem.layers.plane import Plane
 from ccfem.machine import Machine
 from ccfem.meshing import triangulate
 from ccfem.raster.patterns import GUIDE
@@ -68,8 +68,7 @@ def layer_of(name):
         nodes=np.zeros((start, 2)),
         weights=np.zeros(start),
         loops=tuple(loops),
-        frame=np.eye(3),
-        height=0.0,
+        flat=Plane(np.eye(3), 0.0),
         index=0,
         thickness=1.0,
     )
@@ -79,7 +78,7 @@ def pulled(layer, angle=0.0):
     """Uniform tension at an angle to the first axis."""
     along = np.array([np.cos(angle), np.sin(angle), 0.0])
     nodal = np.broadcast_to(np.outer(along, along), (len(layer.points), 3, 3))
-    return LayerStress(layer, np.zeros((0, 3, 3)), nodal, None)
+    return LayerStress(layer, np.zeros((0, 3, 3)), nodal)
 
 
 @cache
@@ -112,7 +111,7 @@ def test_paths_stay_inside_the_layer(name, section):
     layer, paths = layer_of(section), paths_of(name, section)
     assert len(paths) == len(planned(name, section).paths)
     for path in paths:
-        assert layer.polygon.covers(shapely.LineString(path[:, :2]))
+        assert layer.plane.polygon.covers(shapely.LineString(path[:, :2]))
     # Ends of closed paths meet; others have two ends.
     for path, closed in zip(paths, paths.closed, strict=True):
         assert np.array_equal(path[0], path[-1]) == closed
@@ -135,7 +134,7 @@ def test_same_input_gives_the_same_paths(name):
 def test_size_of_the_load_does_not_matter():
     layer = layer_of("plate")
     stress = pulled(layer, 0.3)
-    strong = LayerStress(layer, stress.cell, 1e4 * stress.nodal, None)
+    strong = LayerStress(layer, stress.cell, 1e4 * stress.nodal)
     one, other = (PATTERNS["mps"](layer, of, MACHINE) for of in (stress, strong))
     np.testing.assert_array_equal(one.points, other.points)
 
@@ -214,8 +213,7 @@ def test_seeds_of_mps():
     edge = np.flatnonzero(layer.points[:, 0] < 1e-9)
     held = replace(layer, patches={"load": np.stack([edge[:-1], edge[1:]], axis=1)})
     stress = pulled(held)
-    problem = SimpleNamespace(problem=SimpleNamespace(held_or_loaded=("load",)))
-    stress = LayerStress(held, stress.cell, stress.nodal, problem)
+    stress = replace(stress, held_or_loaded=("load",))
     plan = ends.raster(held, stress, MACHINE)
     # One guide in the middle row: rings mirror each other about it, as far as the hole.
     number = np.where(plan.regions.domain == GUIDE, plan.regions.number, -1)[:, 5:20]

@@ -1,0 +1,66 @@
+"""Stress of a whole part as planning and evaluation see it, whoever found it."""
+
+from dataclasses import dataclass
+from typing import Protocol
+
+from ccfem.arrays import FloatArray, read_only
+from ccfem.errors import InputError
+from ccfem.mesh.tet_mesh import TetMesh
+
+__all__ = ["GivenStress", "PartStress"]
+
+
+class PartStress(Protocol):
+    """Stress on a tetrahedral mesh; a `StressField` is one, and so is a `GivenStress`."""
+
+    @property
+    def mesh(self) -> TetMesh:
+        """The mesh."""
+        ...
+
+    @property
+    def stress(self) -> FloatArray:
+        """Stress of each cell, (m, 3, 3), MPa."""
+        ...
+
+    @property
+    def nodal(self) -> FloatArray:
+        """Stress at the nodes, (n, 3, 3), MPa."""
+        ...
+
+    @property
+    def held_or_loaded(self) -> tuple[str, ...]:
+        """Names of the patches that carry a support or a load."""
+        ...
+
+
+@dataclass(frozen=True)
+class GivenStress:
+    """Stress that another program, or a formula, found on a mesh.
+
+    Attributes
+    ----------
+    mesh : TetMesh
+    stress : (m, 3, 3) array, MPa
+        Per cell.
+    nodal : (n, 3, 3) array, MPa
+        At the nodes.
+    held_or_loaded : tuple of str, default none
+        Names of the patches that carry a support or a load.
+    """
+
+    mesh: TetMesh
+    stress: FloatArray
+    nodal: FloatArray
+    held_or_loaded: tuple[str, ...] = ()
+
+    def __post_init__(self) -> None:
+        for name, count in (("stress", len(self.mesh.cells)), ("nodal", len(self.mesh.points))):
+            value = read_only(getattr(self, name))
+            object.__setattr__(self, name, value)
+            if value.shape != (count, 3, 3):
+                raise InputError(
+                    f"{name} must have shape ({count}, 3, 3), one tensor for each "
+                    f"{'cell' if name == 'stress' else 'node'}; got {value.shape}: use "
+                    "tensor.from_voigt for six components"
+                )

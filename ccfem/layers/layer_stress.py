@@ -1,0 +1,41 @@
+"""Stress on a layer: all that planning on it needs to know of the part."""
+
+from dataclasses import dataclass
+
+from ccfem.arrays import FloatArray, read_only
+from ccfem.elasticity.part_stress import PartStress
+from ccfem.layers.layer import Layer
+
+__all__ = ["LayerStress", "stress_on"]
+
+
+@dataclass(frozen=True)
+class LayerStress:
+    """Stress on a layer.
+
+    Attributes
+    ----------
+    layer : Layer
+    cell : (t, 3, 3) array, MPa
+        Stress of the tetrahedron that each triangle was cut from.
+    nodal : (n, 3, 3) array, MPa
+        Stress at the layer's points.
+    held_or_loaded : tuple of str, default none
+        Names of the part's patches that carry a support or a load.
+    """
+
+    layer: Layer
+    cell: FloatArray
+    nodal: FloatArray
+    held_or_loaded: tuple[str, ...] = ()
+
+    def __post_init__(self) -> None:
+        object.__setattr__(self, "cell", read_only(self.cell))
+        object.__setattr__(self, "nodal", read_only(self.nodal))
+
+
+def stress_on(layer: Layer, stress: PartStress) -> LayerStress:
+    """Stress of a part on one of its layers."""
+    return LayerStress(
+        layer, stress.stress[layer.cell], layer.interpolate(stress.nodal), stress.held_or_loaded
+    )

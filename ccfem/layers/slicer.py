@@ -1,0 +1,34 @@
+"""What a slicer is."""
+
+from typing import Protocol, runtime_checkable
+
+from ccfem.elasticity.part_stress import PartStress
+from ccfem.layers.layer import Layer
+from ccfem.machine.machine import Machine
+
+__all__ = ["Slicer", "Vector"]
+
+Vector = tuple[float, float, float]
+
+
+@runtime_checkable
+class Slicer(Protocol):
+    """A frozen dataclass whose fields are the parameters, called with data.
+
+    One module of `ccfem.layers.slicing` is one slicer; the module's name is its name on the
+    command line and in part files, and the class has the same name in capitals
+    (``load_oriented`` holds ``LoadOriented``).
+    """
+
+    def __call__(self, stress: PartStress, build: Vector, machine: Machine) -> tuple[Layer, ...]:
+        """Cut a part into layers, from the first printed to the last.
+
+        Parameters
+        ----------
+        stress : PartStress
+            The part's mesh, and the stress on it for slicers that follow the stress.
+        build : tuple of 3 floats
+            Build direction in the frame of the mesh, of any length.
+        machine : Machine
+        """
+        ...

@@ -1,0 +1,67 @@
+"""Planning the paths of a whole part."""
+
+import os
+from collections.abc import Sequence
+from concurrent.futures import ThreadPoolExecutor
+
+from ccfem.elasticity.part_stress import PartStress
+from ccfem.errors import InputError
+from ccfem.layers.layer import Layer
+from ccfem.layers.layer_stress import stress_on
+from ccfem.machine.machine import Machine
+from ccfem.planning.strategy import PartStrategy, Strategy
+from ccfem.toolpaths import Toolpaths
+
+__all__ = ["plan"]
+
+_MOST_THREADS = 4
+"""Layers that are planned at a time; much of the work waits for the interpreter's lock."""
+
+
+def plan(
+    strategy: Strategy, layers: Sequence[Layer], stress: PartStress, machine: Machine
+) -> Toolpaths:
+    """Plan the paths of a whole part, several layers at a time.
+
+    Parameters
+    ----------
+    strategy : Strategy
+        Called from several threads at once, each with a layer of its own.
+    layers : sequence of Layer
+    stress : PartStress
+        A `StressField`, or a `GivenStress` for strategies that do not solve the part again.
+    machine : Machine
+
+    Returns
+    -------
+    Toolpaths
+        The paths of all layers, in their order.
+
+    Raises
+    ------
+    InputError
+        When the strategy plans on flat layers only and a layer is curved; and whatever the
+        strategy raises.
+    """
+    _check_layers(strategy, layers)
+    if isinstance(strategy, PartStrategy):
+        planner = strategy.for_part(stress, layers, machine)
+    else:
+        planner = strategy
+
+    def planned(layer: Layer) -> Toolpaths:
+        return planner(layer, stress_on(layer, stress), machine)
+
+    with ThreadPoolExecutor(min(os.cpu_count() or 1, _MOST_THREADS)) as pool:
+        return Toolpaths.concatenate(pool.map(planned, layers))
+
+
+def _check_layers(strategy: Strategy, layers: Sequence[Layer]) -> None:
+    """Refuse curved layers for a strategy that works in the plane of a layer."""
+    curved = [layer.index for layer in layers if layer.flat is None]
+    if curved and getattr(strategy, "flat_layers_only", False):
+        raise InputError(
+            f"{type(strategy).__name__} plans on flat layers only; {len(curved)} of {len(layers)} "
+            f"layers are curved, the first is layer {curved[0]}: choose a planar slicing, or a "
+            "strategy for curved layers"
+        )

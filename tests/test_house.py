@@ -1,0 +1,106 @@
+"""The house: no import circle, a room stands above all that it imports, few and short files."""
+
+import ast
+from collections import defaultdict
+from functools import cache
+from graphlib import CycleError, TopologicalSorter
+from pathlib import Path
+
+ROOT = Path(__file__).parent.parent
+PACKAGE = ROOT / "ccfem"
+
+TWICE = {
+    "assembly": "of tetrahedra and of plates",
+    "guides": "as curves and as pixels",
+    "hatch": "of lines and of pixels",
+    "problem": "in space and in the plane",
+    "solve": "in space and in the plane",
+}
+"""Names of modules that occur twice, since they are the same idea for two kinds of thing."""
+
+
+@cache
+def modules() -> dict[str, Path]:
+    """File of every module by its dotted name."""
+    found = {}
+    for path in PACKAGE.rglob("*.py"):
+        parts = path.relative_to(ROOT).with_suffix("").parts
+        found[".".join(parts[:-1] if parts[-1] == "__init__" else parts)] = path
+    return found
+
+
+@cache
+def imports() -> dict[str, set[str]]:
+    """Modules of ccfem that each imports, anywhere in its text: in functions and for types too."""
+    known = modules()
+    found: dict[str, set[str]] = {name: set() for name in known}
+    for name, path in known.items():
+        for node in ast.walk(ast.parse(path.read_text(encoding="utf-8"))):
+            if isinstance(node, ast.Import):
+                found[name] |= {alias.name for alias in node.names if alias.name in known}
+            elif isinstance(node, ast.ImportFrom) and node.module in known:
+                inner = (f"{node.module}.{alias.name}" for alias in node.names)
+                found[name] |= {one if one in known else node.module for one in inner}
+    return found
+
+
+def room(module: str) -> str:
+    """First package below ccfem, or the loose module."""
+    return module.split(".")[1] if "." in module else module
+
+
+def circle(graph: dict[str, set[str]]) -> list[str]:
+    """A circle of a graph, or nothing."""
+    try:
+        TopologicalSorter(graph).prepare()
+    except CycleError as error:
+        return list(error.args[1])
+    return []
+
+
+def test_a_circle_is_found():
+    assert circle({"a": {"b"}, "b": {"c"}, "c": {"a"}})
+    assert not circle({"a": {"b", "c"}, "b": {"c"}})
+
+
+def test_no_file_imports_in_a_circle():
+    # Without this the walk below might see nothing at all.
+    assert "ccfem.tensor" in imports()["ccfem.fields.layer_tension"]
+    assert not circle(imports())
+
+
+def test_a_room_stands_above_all_that_it_imports():
+    rooms: dict[str, set[str]] = defaultdict(set)
+    for name, wanted in imports().items():
+        rooms[room(name)] |= {room(one) for one in wanted} - {room(name)}
+    assert not circle(rooms)
+
+
+def test_the_core_does_not_draw():
+    drawing = {"plot", "comparison", "cli"}
+    wanted = {name for name, those in imports().items() for one in those if room(one) == "plot"}
+    assert {room(name) for name in wanted} <= drawing
+
+
+def test_tetrahedra_know_nothing_of_plates():
+    for name, wanted in imports().items():
+        if room(name) == "elasticity":
+            assert not {one for one in wanted if room(one) == "plates"}, name
+
+
+def test_at_most_twelve_loose_modules():
+    loose = sorted(path.stem for path in PACKAGE.glob("*.py"))
+    assert len(loose) <= 12, loose
+
+
+def test_no_file_above_four_hundred_lines():
+    long = {name for name, path in modules().items() if len(path.read_text().splitlines()) > 400}
+    assert not long
+
+
+def test_no_name_twice_for_two_ideas():
+    named = defaultdict(list)
+    for name, path in modules().items():
+        if path.stem != "__init__":
+            named[path.stem].append(name)
+    assert {stem for stem, those in named.items() if len(those) > 1} == set(TWICE)
