@@ -14,6 +14,7 @@ from ccfem.comparison.compare import compare
 from ccfem.elasticity.problem import Force, Problem, Support
 from ccfem.evaluation import FibreSamples
 from ccfem.evaluation.matching import THRESHOLDS
+from ccfem.layers.slicing.planar import Planar
 from ccfem.machine import Machine
 from ccfem.materials import isotropic
 from ccfem.mesh.box import box_mesh
@@ -43,7 +44,9 @@ def test_curves_are_those_of_the_samples(monkeypatch):
     supports = (Support("x_min", "x"), Support("y_min", "y"), Support("z_min", "z"))
     loads = {"pull": (Force("x_max", (1000.0, 0.0, 0.0)),)}
     problem = Problem(mesh, isotropic(3500.0, 0.35), supports, loads)
-    case = Case("strip", "Strip", problem, slicing=Planar(count=1), machine=Machine(minimum_length=20.0))
+    case = Case(
+        "strip", "Strip", problem, slicing=Planar(count=1), machine=Machine(minimum_length=20.0)
+    )
     result = compare(case, ["zigzag"], natural=True, strand=None)
     (run,) = result.runs
     (own,) = run.evaluation.samples
