@@ -12,6 +12,7 @@ import pytest
 
 from ccfem.cases.part_file import read_part
 from ccfem.errors import InputError
+from ccfem.io import read_mesh
 from ccfem.io.toml import from_table
 from ccfem.machine import Machine, SpeedTable
 from ccfem.strategies import named
@@ -32,13 +33,15 @@ def test_the_two_commands_are_there():
     assert '    pip install -e ".[test]" && pytest\n' in README
 
 
-def test_python_of_the_readme_runs(capsys):
+def test_python_of_the_readme_runs(capsys, monkeypatch, tmp_path):
+    monkeypatch.chdir(tmp_path)
     space = {}
     for block in blocks(README, "python"):
         exec(compile(block, "README.md", "exec"), space)
     said = capsys.readouterr().out
     assert "efficiency" in said
     assert "isocurve makes the stiffest part" in said
+    assert set(read_mesh(tmp_path / "cantilever.vtu").patches) == set(space["part"].mesh.patches)
 
 
 def test_part_file_of_the_readme_lacks_nothing_but_its_mesh(tmp_path):

@@ -35,12 +35,13 @@ from ccfem.strategies import create
 from ccfem.toolpaths import Toolpaths
 from ccfem.virtual_testing.strand import Strand
 
-__all__ = ["STRATEGIES", "compare", "create_all", "solve_and_slice"]
+__all__ = ["DEFAULT_STRAND", "STRATEGIES", "compare", "create_all", "solve_and_slice"]
 
 STRATEGIES = ("isocurve", "concentric", "zigzag", "contour_zigzag")
 """The strategies that are compared when none are named."""
 
 DEFAULT_STRAND = Strand()
+"""What a strand is worth where nothing else is known."""
 
 _BOUND_ITERATIONS = 7
 """The bound holds after any number of iterations; more than these lower it by half a per cent."""

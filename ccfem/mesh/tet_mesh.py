@@ -105,12 +105,6 @@ class TetMesh:
         return read_only(self.corners[:, _FACES].reshape(-1, 3)[single], np.int64)
 
     @cached_property
-    def boundary_cells(self) -> IntArray:
-        """Cell of each boundary facet, (b,)."""
-        _, _, single = self._facet_pairing
-        return read_only(single // 4, np.int64)
-
-    @cached_property
     def neighbours(self) -> IntArray:
         """Pairs of cells that share a face, (f, 2)."""
         order, first, _ = self._facet_pairing

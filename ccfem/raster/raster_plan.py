@@ -44,26 +44,22 @@ class RasterPlan:
             for chain, closed in zip(chains, self.paths.closed, strict=True)
         ]
 
-    def lines(self, stairs: bool = True) -> list[FloatArray]:
-        """Polylines (n_i, 2), mm: staircases made straight, straight runs by their ends.
+    def lines(self) -> list[FloatArray]:
+        """Polylines (n_i, 2), mm: straight runs by their ends, staircases made straight.
 
-        Parameters
-        ----------
-        stairs : bool, default True
-            Whether staircases are made straight, where the straight way is in the section.
+        A path with a straight way that leaves the section keeps all its staircases.
         """
         chains = self.chains
         if not chains:
             return []
         offsets = np.concatenate([[0], np.cumsum([len(chain) for chain in chains])])
         pixels = self.raster.pixels(np.concatenate(chains))
-        found = self._kept(chains, corners(pixels, offsets, stairs))
-        if stairs:
-            shapely.prepare(self.raster.section)
-            inside = shapely.covers(self.raster.section, [shapely.LineString(x) for x in found])
-            if not inside.all():
-                plain = self._kept(chains, corners(pixels, offsets, stairs=False))
-                found = [a if k else b for a, b, k in zip(found, plain, inside, strict=True)]
+        found = self._kept(chains, corners(pixels, offsets))
+        shapely.prepare(self.raster.section)
+        inside = shapely.covers(self.raster.section, [shapely.LineString(x) for x in found])
+        if not inside.all():
+            plain = self._kept(chains, corners(pixels, offsets, stairs=False))
+            found = [a if k else b for a, b, k in zip(found, plain, inside, strict=True)]
         return found
 
     def _kept(self, chains: list[FloatArray], keep: Any) -> list[FloatArray]:

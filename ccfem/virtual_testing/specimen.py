@@ -53,14 +53,6 @@ class Specimen:
             )
         return cls(unreinforced, system, system.assemble(), backend)
 
-    def under(self, unreinforced: StressField) -> "Specimen":
-        """Return the same part under another load case of its problem, factorisation shared."""
-        if unreinforced.problem is not self.unreinforced.problem:
-            raise InputError("expected a stress field of the same problem; got one of another")
-        other = Specimen(unreinforced, self.system, self.matrix, self.backend)
-        other.__dict__["solver"] = self.solver
-        return other
-
     @cached_property
     def solver(self) -> Solver:
         """Factorisation, or preconditioner, of the part without fibres."""

@@ -183,10 +183,9 @@ def virtual_bracket(
     part: StressField | Specimen,
     strand: Strand | None = None,
     span: Sequence[float] = RHO_SPAN,
-    backend: str = "auto",
 ) -> Bracket:
     """Both tests of `virtual_test`, with one factorisation; parameters as there."""
-    specimen = Specimen.of(part, backend) if isinstance(part, StressField) else part
+    specimen = Specimen.of(part) if isinstance(part, StressField) else part
     mesh = specimen.unreinforced.mesh
     strands = cut_strands(fibres, mesh) if isinstance(fibres, Toolpaths) else fibres
     tension = virtual_test(strands, specimen, strand, TENSION, span)

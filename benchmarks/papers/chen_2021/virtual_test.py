@@ -81,7 +81,7 @@ def main() -> None:
     carbon, area = named_material("c_fram"), case.machine.filament_area
     smeared = [oriented_ratio(strands[name], field, carbon, area)[0] for name in strands]
     text = "{:6.3f}     {:6.3f}       {:6.3f}".format(*smeared, smeared[1] / smeared[0])
-    rho = Strand.of(carbon, case.machine).stiffness(specimen.modulus) / specimen.modulus
+    rho = area / np.linalg.inv(carbon.stiffness)[0, 0] / specimen.modulus
     print(f"smeared  rho {rho:4.2f} mm^2          {text}")
 
     print(
