@@ -113,6 +113,7 @@ from typing import Any
 
 from ccfem.cases.body import Body
 from ccfem.cases.case import Case
+from ccfem.checks import check_number
 from ccfem.elasticity.problem import (
     Bearing,
     Force,
@@ -211,8 +212,7 @@ def _case(content: Mapping[str, Any], path: Path) -> Case:
     part = from_table(_Part, content, "the part file")
     if not part.supports:
         raise InputError("a part needs a support: add [[supports]] with its patch")
-    if part.layers < 1:
-        raise InputError(f"layers must be at least 1; got {part.layers}: correct it")
+    check_number("layers", part.layers, at_least=1)
     build = unit_vector(part.build, "build")
     supports = tuple(
         from_table(Support, table, f"supports[{k}]") for k, table in enumerate(part.supports)

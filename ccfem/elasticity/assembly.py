@@ -12,7 +12,7 @@ import numpy as np
 import scipy.sparse as sp
 from numba import njit
 
-from ccfem.arrays import FloatArray, IntArray, read_only
+from ccfem.arrays import FloatArray, IntArray, freeze
 from ccfem.elasticity.body import Cells
 from ccfem.mesh.tet_mesh import TetMesh
 
@@ -42,8 +42,7 @@ class Pattern:
     touching: IntArray
 
     def __post_init__(self) -> None:
-        for name in ("indptr", "indices", "start", "touching"):
-            object.__setattr__(self, name, read_only(getattr(self, name), np.int32))
+        freeze(self, indptr=np.int32, indices=np.int32, start=np.int32, touching=np.int32)
 
 
 def pattern(mesh: Cells) -> Pattern:

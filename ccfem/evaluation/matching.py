@@ -18,6 +18,7 @@ import numpy as np
 import shapely
 
 from ccfem.arrays import FloatArray, read_only
+from ccfem.checks import check_known
 from ccfem.elasticity.stress_field import LayerStress
 from ccfem.errors import InputError
 from ccfem.evaluation.alignment import AlignmentSamples, sample_alignment
@@ -164,8 +165,7 @@ def sample_matching(
     reach: float = 1.0,
 ) -> MatchingSamples:
     """Angles between the fibre and the stress of one layer; parameters as in `matching_rate`."""
-    if reading not in READINGS:
-        raise InputError(f"no reading '{reading}' of the rate; there are: {', '.join(READINGS)}")
+    check_known("reading of the rate", reading, READINGS)
     lines = paths.in_part if links else paths.strands
     if reading in ("path", "energy"):
         return _along_fibre(sample_alignment(lines, stress, step))

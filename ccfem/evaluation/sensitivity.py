@@ -1,13 +1,13 @@
 """How stiffness falls when the fibre turns away from the stress: the curve f(theta)."""
 
 from collections.abc import Callable
-from dataclasses import dataclass, field
+from dataclasses import dataclass
 from functools import cached_property
 
 import numpy as np
 from scipy.interpolate import PchipInterpolator
 
-from ccfem.arrays import FloatArray, read_only
+from ccfem.arrays import FloatArray, freeze, read_only
 from ccfem.errors import InputError
 from ccfem.materials import Material
 
@@ -50,8 +50,7 @@ class Sensitivity:
     energies: FloatArray
 
     def __post_init__(self) -> None:
-        object.__setattr__(self, "angles", read_only(self.angles))
-        object.__setattr__(self, "energies", read_only(self.energies))
+        freeze(self, angles=float, energies=float)
         if self.angles.shape != self.energies.shape or not (np.diff(self.angles) > 0.0).all():
             raise InputError(
                 "a sensitivity curve needs rising angles with an energy each; got "
@@ -93,10 +92,10 @@ class OffAxis:
     """
 
     material: Material
-    _compliance: FloatArray = field(init=False, repr=False, compare=False)
 
-    def __post_init__(self) -> None:
-        object.__setattr__(self, "_compliance", read_only(plane_compliance(self.material)))
+    @cached_property
+    def _compliance(self) -> FloatArray:
+        return read_only(plane_compliance(self.material))
 
     def compliance(self, angle: FloatArray) -> FloatArray:
         """Strain along a unit stress at `angle` (...,), radians, to the fibre, 1/MPa.

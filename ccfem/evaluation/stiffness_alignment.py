@@ -5,7 +5,7 @@ from typing import Literal
 import numpy as np
 
 from ccfem.arrays import BoolArray, FloatArray
-from ccfem.errors import InputError
+from ccfem.checks import check_known
 from ccfem.evaluation.alignment import AlignmentSamples
 from ccfem.evaluation.column import Column
 from ccfem.evaluation.sensitivity import Curve, OffAxis, acute, plane_compliance
@@ -117,8 +117,7 @@ def performance_index(
     float
         NaN without a sample that counts.
     """
-    if reading not in READINGS:
-        raise InputError(f"no reading '{reading}' of the index; there are: {', '.join(READINGS)}")
+    check_known("reading of the index", reading, READINGS)
     weight = np.ones(len(factor)) if weight is None else weight
     if not len(factor) or not weight.sum() > 0.0 or not energy.max() > 0.0:
         return float("nan")

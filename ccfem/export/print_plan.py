@@ -6,7 +6,7 @@ from itertools import pairwise
 
 import numpy as np
 
-from ccfem.arrays import FloatArray, read_only
+from ccfem.arrays import FloatArray, freeze
 from ccfem.errors import InputError
 from ccfem.geometry.hatch import zigzag
 from ccfem.geometry.offsets import offset_rings
@@ -52,8 +52,7 @@ class PrintPlan:
     thickness: FloatArray
 
     def __post_init__(self) -> None:
-        for name in ("top", "thickness"):
-            object.__setattr__(self, name, read_only(getattr(self, name)))
+        freeze(self, top=float, thickness=float)
 
 
 @dataclass(frozen=True)

@@ -12,8 +12,8 @@ import numpy as np
 from numba import njit
 
 from ccfem.arrays import BoolArray, FloatArray
+from ccfem.checks import check_number
 from ccfem.elasticity.stress_field import StressField
-from ccfem.errors import InputError
 from ccfem.machine.machine import Machine
 from ccfem.toolpaths import FIBRE, Toolpaths
 from ccfem.virtual_testing.equilibrium import equilibrium
@@ -80,11 +80,9 @@ def prune(
     InputError
         When the length is not positive, `rounds` is below 1, or there is no fibre.
     """
-    if not 0.0 < length < np.inf or rounds < 1 or not 0.0 <= cut_cost < np.inf:
-        raise InputError(
-            "prune expects a length above 0 mm, at least 1 round and a cut cost >= 0 mm; got "
-            f"{length}, {rounds} and {cut_cost}"
-        )
+    check_number("length of fibre", length, above=0.0, unit="mm")
+    check_number("rounds", rounds, at_least=1)
+    check_number("cut_cost", cut_cost, at_least=0.0, unit="mm")
     laid = _fibre_length(toolpaths)
     if laid <= length:
         return toolpaths

@@ -13,7 +13,7 @@ from typing import Any
 import numpy as np
 from numba import njit
 
-from ccfem.arrays import FloatArray, IntArray, read_only
+from ccfem.arrays import FloatArray, IntArray, freeze, read_only
 from ccfem.elasticity.assembly import cell_gradients
 from ccfem.elasticity.solve import solve
 from ccfem.elasticity.solvers import preconditioned_cg
@@ -62,8 +62,7 @@ class SmearedSolution:
     iterations: int
 
     def __post_init__(self) -> None:
-        object.__setattr__(self, "displacement", read_only(self.displacement))
-        object.__setattr__(self, "strain", read_only(self.strain))
+        freeze(self, displacement=float, strain=float)
 
 
 Fibre = Callable[[FloatArray], FloatArray]

@@ -11,6 +11,7 @@ import shapely
 from numba import njit
 
 from ccfem.arrays import FloatArray, IntArray
+from ccfem.checks import check_number
 from ccfem.errors import InputError
 from ccfem.fields.streamlines import direction_at, streamline_step, triangle_neighbours
 from ccfem.geometry.section_grid import SectionGrid, contains, section_grid
@@ -62,11 +63,8 @@ def evenly_spaced_streamlines(
         In the order in which they were found, in steps of a tenth of the separation; a line that
         comes back to its start is closed: its last point is its first.
     """
-    if not 0.0 < separation < np.inf or not 0.0 < closest < 1.0:
-        raise InputError(
-            "streamlines need a separation above 0 mm and closest between 0 and 1; got "
-            f"{separation} and {closest}"
-        )
+    check_number("separation of streamlines", separation, above=0.0, unit="mm")
+    check_number("closest", closest, above=0.0, below=1.0)
     if shapely.is_empty(region) or not len(triangles):
         return []
     s11, s22, s12 = plane_stress.T

@@ -4,7 +4,7 @@ import numpy as np
 from numba import njit
 
 from ccfem.arrays import FloatArray, IntArray
-from ccfem.errors import InputError
+from ccfem.checks import check_number
 from ccfem.geometry.locate import locate
 
 __all__ = ["direction_at", "streamline_step", "streamlines", "triangle_neighbours"]
@@ -54,8 +54,7 @@ def streamlines(
         comes back to its start within one step is closed: its last point is its first. Lines end
         inside the triangles, less than a step from the border that they run out of.
     """
-    if not 0.0 < step < np.inf:
-        raise InputError(f"step of streamlines must be above 0 mm; got {step}")
+    check_number("step of streamlines", step, above=0.0, unit="mm")
     starts = np.asarray(starts, dtype=np.float64).reshape(-1, 2)
     if not len(starts) or not len(triangles):
         return [np.zeros((0, 2)) for _ in starts]

@@ -12,6 +12,7 @@ import numpy as np
 from numba import njit
 
 from ccfem.arrays import FloatArray, IntArray
+from ccfem.checks import check_number
 from ccfem.errors import InputError
 
 __all__ = ["WORDS", "advance", "curve_points", "dubins", "dubins_curve", "word_sizes"]
@@ -50,8 +51,7 @@ def dubins(starts: FloatArray, ends: FloatArray, radius: float) -> tuple[IntArra
         For a radius that is not positive, or poses of another shape.
     """
     starts, ends = (np.ascontiguousarray(poses, dtype=np.float64) for poses in (starts, ends))
-    if not 0.0 < radius < np.inf:
-        raise InputError(f"radius of Dubins curves must be above 0 mm; got {radius}")
+    check_number("radius of Dubins curves", radius, above=0.0, unit="mm")
     if starts.ndim != 2 or starts.shape[1] != 3 or starts.shape != ends.shape:
         raise InputError(
             f"poses must be two arrays of shape (n, 3); got {starts.shape} and {ends.shape}: give "
@@ -79,8 +79,7 @@ def dubins_curve(start: FloatArray, end: FloatArray, radius: float, step: float)
         The first and the last point are those given, exactly; both ends of every piece are among
         the points. k = 1 where the poses are the same.
     """
-    if not 0.0 < step < np.inf:
-        raise InputError(f"step of Dubins curves must be above 0 mm; got {step}")
+    check_number("step of Dubins curves", step, above=0.0, unit="mm")
     turns, sizes = dubins(np.reshape(start, (1, 3)), np.reshape(end, (1, 3)), radius)
     return curve_points(np.asarray(start), np.asarray(end), turns[0], sizes[0], radius, step)
 

@@ -16,8 +16,8 @@ from scipy.sparse import coo_array
 from scipy.sparse.csgraph import connected_components
 from scipy.spatial import QhullError, Voronoi, cKDTree
 
-from ccfem.arrays import BoolArray, FloatArray, IntArray, read_only
-from ccfem.errors import InputError
+from ccfem.arrays import BoolArray, FloatArray, IntArray, freeze
+from ccfem.checks import check_number
 from ccfem.geometry.offsets import rings
 
 __all__ = ["MedialAxis", "MedialSegment", "medial_axis"]
@@ -52,8 +52,7 @@ class MedialSegment:
     ends: tuple[int, int]
 
     def __post_init__(self) -> None:
-        for name in ("points", "radius", "left", "right"):
-            object.__setattr__(self, name, read_only(getattr(self, name)))
+        freeze(self, points=float, radius=float, left=float, right=float)
 
     @property
     def closed(self) -> bool:
@@ -84,8 +83,7 @@ class MedialAxis:
     segments: tuple[MedialSegment, ...]
 
     def __post_init__(self) -> None:
-        object.__setattr__(self, "nodes", read_only(self.nodes))
-        object.__setattr__(self, "radius", read_only(self.radius))
+        freeze(self, nodes=float, radius=float)
 
 
 def medial_axis(
@@ -123,8 +121,7 @@ def medial_axis(
     InputError
         For a step that is not above 0.
     """
-    if not 0.0 < step < np.inf:
-        raise InputError(f"step of the medial axis must be above 0 mm; got {step}")
+    check_number("step of the medial axis", step, above=0.0, unit="mm")
     border = _Border.of(section, step)
     nothing = MedialAxis(np.zeros((0, 2)), np.zeros(0), ())
     if len(border.points) < 4:

@@ -5,7 +5,7 @@ from typing import Any
 
 import shapely
 
-from ccfem.errors import InputError
+from ccfem.checks import check_known
 from ccfem.layers.layer import Layer
 
 __all__ = ["holes_on"]
@@ -21,9 +21,7 @@ def holes_on(layer: Layer, patches: Iterable[str]) -> list[Any]:
     """
     touched: set[int] = set()
     for name in patches:
-        if name not in layer.patches:
-            known = ", ".join(sorted(layer.patches)) or "none"
-            raise InputError(f"no patch named '{name}' for conformal curves; there are: {known}")
+        check_known("patch", name, sorted(layer.patches))
         touched |= set(layer.patches[name].ravel().tolist())
     rings = [shapely.Polygon(layer.plane_points[loop]) for loop in layer.loops if len(loop) > 2]
     loops = [loop for loop in layer.loops if len(loop) > 2]

@@ -3,13 +3,12 @@
 from collections.abc import Mapping
 from dataclasses import dataclass, field
 from functools import cached_property
-from types import MappingProxyType
 from typing import Any
 
 import numpy as np
 import shapely
 
-from ccfem.arrays import FloatArray, IntArray, read_only
+from ccfem.arrays import FloatArray, IntArray, freeze, read_only
 
 __all__ = ["Layer"]
 
@@ -57,18 +56,8 @@ class Layer:
     patches: Mapping[str, IntArray] = field(default_factory=dict)
 
     def __post_init__(self) -> None:
-        for name, dtype in (
-            ("points", np.float64),
-            ("triangles", np.int64),
-            ("cell", np.int64),
-            ("nodes", np.int64),
-            ("weights", np.float64),
-            ("frame", np.float64),
-        ):
-            object.__setattr__(self, name, read_only(getattr(self, name), dtype))
+        freeze(self, points=float, triangles=int, cell=int, nodes=int, weights=float, frame=float)
         object.__setattr__(self, "loops", tuple(read_only(x, np.int64) for x in self.loops))
-        patches = {name: read_only(edges, np.int64) for name, edges in self.patches.items()}
-        object.__setattr__(self, "patches", MappingProxyType(patches))
 
     def interpolate(self, nodal: FloatArray) -> FloatArray:
         """Values at the layer's points, (n, ...), of a field given at the mesh nodes."""

@@ -7,7 +7,7 @@ import numpy as np
 import shapely
 from numba import njit
 
-from ccfem.arrays import FloatArray, IntArray, read_only
+from ccfem.arrays import FloatArray, IntArray, freeze
 from ccfem.geometry.dubins import WORDS, curve_points, word_sizes
 from ccfem.geometry.polylines import between, resample
 from ccfem.geometry.section_grid import SectionGrid
@@ -55,8 +55,7 @@ class RingRoutes:
     radius: float
 
     def __post_init__(self) -> None:
-        for name in ("ring", "starts", "goal", "position", "cost"):
-            object.__setattr__(self, name, read_only(getattr(self, name)))
+        freeze(self, ring=float, starts=float, goal=float, position=float, cost=float)
 
 
 def ring_routes(

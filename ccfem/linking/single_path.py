@@ -15,7 +15,8 @@ from typing import Any
 import numpy as np
 import shapely
 
-from ccfem.arrays import BoolArray, FloatArray, IntArray, read_only
+from ccfem.arrays import BoolArray, FloatArray, IntArray, freeze
+from ccfem.checks import check_number
 from ccfem.errors import InputError
 from ccfem.geometry.offsets import ring_from
 from ccfem.geometry.places import INSIDE, VOID, cut_at_section
@@ -54,8 +55,7 @@ class LinkedPath:
     link: BoolArray
 
     def __post_init__(self) -> None:
-        object.__setattr__(self, "points", read_only(self.points))
-        object.__setattr__(self, "link", read_only(self.link, np.bool_))
+        freeze(self, points=float, link=bool)
 
     @property
     def links(self) -> list[FloatArray]:
@@ -151,8 +151,7 @@ def link_tracks(
         return LinkedPath(np.zeros((0, 2)), np.zeros(0, dtype=bool))
     if shapely.is_empty(section):
         raise InputError("tracks can only be linked round a section; got an empty one")
-    if not 0.0 < width < np.inf:
-        raise InputError(f"width of tracks must be above 0 mm; got {width}")
+    check_number("width of tracks", width, above=0.0, unit="mm")
     if len(wanted) == len(wanted[0]) == 1:
         return LinkedPath(wanted[0][0], np.zeros(len(wanted[0][0]), dtype=bool))
     radius = max(radius, 0.05 * width)

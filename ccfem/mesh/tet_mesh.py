@@ -3,11 +3,11 @@
 from collections.abc import Mapping
 from dataclasses import dataclass, field, replace
 from functools import cached_property
-from types import MappingProxyType
 
 import numpy as np
 
-from ccfem.arrays import FloatArray, IntArray, read_only
+from ccfem.arrays import FloatArray, IntArray, freeze, read_only
+from ccfem.checks import check_known
 from ccfem.errors import InputError
 
 __all__ = ["TetMesh"]
@@ -40,10 +40,7 @@ class TetMesh:
     faces = _FACES
 
     def __post_init__(self) -> None:
-        object.__setattr__(self, "points", read_only(self.points))
-        object.__setattr__(self, "cells", read_only(self.cells, np.int64))
-        patches = {name: read_only(facets, np.int64) for name, facets in self.patches.items()}
-        object.__setattr__(self, "patches", MappingProxyType(patches))
+        freeze(self, points=float, cells=int, patches=int)
         if self.points.ndim != 2 or self.points.shape[1] != 3:
             raise InputError(
                 f"mesh points must have shape (n, 3); got {self.points.shape}: give x, y, z a node"
@@ -172,9 +169,7 @@ class TetMesh:
         InputError
             When there is no patch of that name; the known ones are listed.
         """
-        if name not in self.patches:
-            known = ", ".join(sorted(self.patches)) or "none"
-            raise InputError(f"no patch named '{name}'; the mesh has: {known}")
+        check_known("patch", name, sorted(self.patches))
         return self.patches[name]
 
     def quadratic(self) -> "TetMesh":

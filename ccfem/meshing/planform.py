@@ -15,6 +15,7 @@ import shapely
 from scipy.spatial import Delaunay, QhullError, cKDTree
 
 from ccfem.arrays import FloatArray, IntArray
+from ccfem.checks import check_number
 from ccfem.errors import InputError
 
 __all__ = ["triangulate"]
@@ -99,8 +100,7 @@ def _check(polygon: Any, edge_length: float) -> None:
         raise InputError(
             f"the planform is not a valid polygon: {shapely.is_valid_reason(polygon)}: correct it"
         )
-    if not 0.0 < edge_length < np.inf:
-        raise InputError(f"edge length must be above 0 mm; got {edge_length}: correct it")
+    check_number("edge length", edge_length, above=0.0, unit="mm")
     expected = polygon.area / (0.433 * edge_length**2)
     if expected > _MOST:
         raise InputError(

@@ -10,6 +10,7 @@ from dataclasses import dataclass
 from importlib.metadata import entry_points
 from typing import Any, ClassVar, Protocol, runtime_checkable
 
+from ccfem.checks import check_known
 from ccfem.elasticity.stress_field import LayerStress, StressField
 from ccfem.errors import InputError, known_names
 from ccfem.io.toml import from_table
@@ -91,10 +92,7 @@ def create(name: str, parameters: Mapping[str, Any] | None = None) -> Strategy:
         For an unknown strategy or parameter, the known ones listed; for a value of a wrong type.
     """
     known = named()
-    if name not in known:
-        raise InputError(
-            f"no strategy named '{name}'; there are: {known_names(name, sorted(known))}"
-        )
+    check_known("strategy", name, sorted(known))
     fields = {f.name for f in dataclasses.fields(known[name])}  # type: ignore[arg-type]
     for parameter in parameters or {}:
         if parameter not in fields:

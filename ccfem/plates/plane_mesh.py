@@ -3,13 +3,13 @@
 from collections.abc import Mapping
 from dataclasses import dataclass, field, replace
 from functools import cached_property
-from types import MappingProxyType
 from typing import NamedTuple
 
 import numpy as np
 from numpy.typing import ArrayLike
 
-from ccfem.arrays import BoolArray, FloatArray, IntArray, read_only
+from ccfem.arrays import BoolArray, FloatArray, IntArray, freeze, read_only
+from ccfem.checks import check_known
 from ccfem.errors import InputError
 
 __all__ = ["PlaneMesh", "Raster", "Sheet", "raster_image", "raster_mesh"]
@@ -36,10 +36,7 @@ class PlaneMesh:
     order = 1
 
     def __post_init__(self) -> None:
-        object.__setattr__(self, "points", read_only(self.points))
-        object.__setattr__(self, "cells", read_only(self.cells, np.int64))
-        patches = {name: read_only(edges, np.int64) for name, edges in self.patches.items()}
-        object.__setattr__(self, "patches", MappingProxyType(patches))
+        freeze(self, points=float, cells=int, patches=int)
         if self.points.ndim != 2 or self.points.shape[1] != 2:
             raise InputError(
                 f"plane mesh points must have shape (n, 2); got {self.points.shape}: give x, y a "
@@ -135,9 +132,7 @@ class PlaneMesh:
         InputError
             When there is no patch of that name; the known ones are listed.
         """
-        if name not in self.patches:
-            known = ", ".join(sorted(self.patches)) or "none"
-            raise InputError(f"no patch named '{name}'; the mesh has: {known}")
+        check_known("patch", name, sorted(self.patches))
         return self.patches[name]
 
     def facet_nodes(self, edges: IntArray) -> IntArray:

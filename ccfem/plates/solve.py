@@ -6,7 +6,7 @@ from functools import cached_property
 import numpy as np
 import scipy.sparse as sp
 
-from ccfem.arrays import FloatArray, read_only
+from ccfem.arrays import FloatArray, freeze
 from ccfem.elasticity.loads import load_case
 from ccfem.elasticity.solve import solve_system
 from ccfem.elasticity.solvers import DIRECT, Solver, choose_direct, factorise
@@ -69,8 +69,8 @@ class PlaneField:
     record: SolveRecord
 
     def __post_init__(self) -> None:
-        for name in ("displacement", "strain", "stress", "cell_energy", "reactions"):
-            object.__setattr__(self, name, read_only(getattr(self, name)))
+        freeze(self, displacement=float, reactions=float)
+        freeze(self, strain=float, stress=float, cell_energy=float)
 
     @property
     def mesh(self) -> PlaneMesh:

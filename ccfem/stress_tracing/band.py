@@ -11,7 +11,7 @@ import numpy as np
 import shapely
 from scipy.ndimage import gaussian_filter1d
 
-from ccfem.arrays import BoolArray, FloatArray, read_only
+from ccfem.arrays import BoolArray, FloatArray, freeze
 from ccfem.stress_tracing.frame import FREE, Frame, Member
 from ccfem.stress_tracing.main_paths import MainPath
 
@@ -66,8 +66,7 @@ class Band:
     closed: bool = False
 
     def __post_init__(self) -> None:
-        for name in ("middle", "half", "width", "free"):
-            object.__setattr__(self, name, read_only(getattr(self, name)))
+        freeze(self, middle=float, half=float, width=float, free=float)
 
 
 def band(path: MainPath, frame: Frame, crossing: bool = True) -> Band:

@@ -8,7 +8,7 @@ import numpy as np
 from scipy.sparse import coo_array
 from scipy.sparse.csgraph import connected_components
 
-from ccfem.arrays import BoolArray, FloatArray, IntArray, read_only
+from ccfem.arrays import BoolArray, FloatArray, IntArray, freeze
 from ccfem.geometry.medial_axis import MedialAxis, MedialSegment, medial_axis
 
 __all__ = ["FREE", "Frame", "Member", "frame"]
@@ -44,8 +44,7 @@ class Member:
     closed: bool = False
 
     def __post_init__(self) -> None:
-        for name in ("points", "left", "right"):
-            object.__setattr__(self, name, read_only(getattr(self, name)))
+        freeze(self, points=float, left=float, right=float)
 
     @cached_property
     def reversed(self) -> "Member":
@@ -79,8 +78,7 @@ class Frame:
     radius: FloatArray
 
     def __post_init__(self) -> None:
-        object.__setattr__(self, "joints", read_only(self.joints))
-        object.__setattr__(self, "radius", read_only(self.radius))
+        freeze(self, joints=float, radius=float)
 
     def ends_at(self, joint: int) -> list[tuple[int, int]]:
         """Find the ends in a joint: number of the member, and 0 for its start or 1 for its end."""

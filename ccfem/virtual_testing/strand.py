@@ -4,7 +4,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from ccfem.errors import InputError
+from ccfem.checks import check_fields, check_number
 from ccfem.machine.machine import Machine
 from ccfem.materials import Material
 
@@ -37,10 +37,8 @@ class Strand:
     strength: float | None = 86.0
 
     def __post_init__(self) -> None:
-        for name in ("rho", "axial_stiffness", "strength"):
-            value = getattr(self, name)
-            if value is not None and not 0.0 < value < np.inf:
-                raise InputError(f"strand.{name} must be a finite number > 0; got {value}")
+        check_fields(self, "rho", above=0.0, unit="mm^2")
+        check_fields(self, "axial_stiffness", "strength", above=0.0, unit="N")
 
     @classmethod
     def of(cls, material: Material, machine: Machine) -> "Strand":
@@ -50,8 +48,7 @@ class Strand:
         where the material has no tensile strength.
         """
         area = machine.filament_area
-        if not area > 0.0:
-            raise InputError("machine.filament_area must be above 0 for a virtual test; got 0")
+        check_number("machine.filament_area for a virtual test", area, above=0.0, unit="mm^2")
         modulus = 1.0 / np.linalg.inv(material.stiffness)[0, 0]
         tensile = material.tensile_strength
         return cls(

@@ -5,7 +5,7 @@ from dataclasses import dataclass
 import numpy as np
 from numba import njit
 
-from ccfem.arrays import FloatArray, IntArray, read_only
+from ccfem.arrays import FloatArray, IntArray, freeze
 from ccfem.errors import InputError
 from ccfem.mesh.tet_mesh import TetMesh
 from ccfem.toolpaths import FIBRE, Toolpaths
@@ -51,10 +51,7 @@ class Strands:
     outside: float
 
     def __post_init__(self) -> None:
-        for name in ("cell", "path"):
-            object.__setattr__(self, name, read_only(getattr(self, name), np.int64))
-        for name in ("length", "tangent", "arc", "middle"):
-            object.__setattr__(self, name, read_only(getattr(self, name)))
+        freeze(self, cell=int, path=int, length=float, tangent=float, arc=float, middle=float)
 
     def __len__(self) -> int:
         return len(self.cell)

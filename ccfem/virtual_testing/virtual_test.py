@@ -6,7 +6,7 @@ from time import perf_counter
 
 import numpy as np
 
-from ccfem.arrays import FloatArray, read_only
+from ccfem.arrays import FloatArray, freeze
 from ccfem.elasticity.stress_field import SolveRecord, StressField
 from ccfem.errors import InputError
 from ccfem.toolpaths import Toolpaths
@@ -66,7 +66,7 @@ class VirtualTest:
     updates: int
 
     def __post_init__(self) -> None:
-        object.__setattr__(self, "axial_force", read_only(self.axial_force))
+        freeze(self, axial_force=float)
 
     @property
     def ratio(self) -> float:
