@@ -24,10 +24,10 @@ from ccfem.errors import InputError
 from ccfem.evaluation.alignment import AlignmentSamples, sample_alignment
 from ccfem.evaluation.column import Column
 from ccfem.evaluation.plane_paths import PlanePaths, plane_paths, pool
-from ccfem.evaluation.stiffness_alignment import strongest
+from ccfem.evaluation.sensitivity import acute
 from ccfem.geometry.places import INSIDE, section_places
 from ccfem.geometry.polylines import subdivide
-from ccfem.tensor import in_plane, largest_in_plane
+from ccfem.tensor import in_plane, strongest, strongest_in_plane
 from ccfem.toolpaths import Toolpaths
 
 __all__ = [
@@ -181,8 +181,8 @@ def sample_matching(
             else tree.query(places, predicate="dwithin", distance=reach)
         )
         tangent = np.arctan2(*(ends - starts).T[::-1])
-        turned = np.abs(tangent[piece] - direction[vector]) % np.pi
-        np.minimum.at(angle, vector, np.degrees(np.minimum(turned, np.pi - turned)))
+        turned = acute(tangent[piece] - direction[vector])
+        np.minimum.at(angle, vector, np.degrees(turned))
     return MatchingSamples(angle, area, size)
 
 
@@ -201,12 +201,9 @@ def _stress_vectors(stress: LayerStress) -> tuple[FloatArray, FloatArray, FloatA
     """
     layer = stress.layer
     plane = in_plane(stress.nodal, layer.frame)[layer.triangles].mean(axis=1)
-    largest, smallest, angle = largest_in_plane(plane)
-    across, defined = strongest(largest, smallest)
-    direction = angle + 0.5 * np.pi * across
-    size = np.maximum(np.abs(largest), np.abs(smallest))
+    value, direction, defined = strongest_in_plane(plane)
     centres = layer.plane_points[layer.triangles].mean(axis=1)
-    return centres[defined], direction[defined], size[defined], layer.areas[defined]
+    return centres[defined], direction[defined], np.abs(value[defined]), layer.areas[defined]
 
 
 def _pieces(paths: PlanePaths, longest: float) -> tuple[FloatArray, FloatArray]:

@@ -13,8 +13,14 @@ from numba import njit
 from ccfem.arrays import FloatArray, IntArray
 from ccfem.checks import check_number
 from ccfem.errors import InputError
-from ccfem.fields.streamlines import direction_at, streamline_step, triangle_neighbours
+from ccfem.fields.streamlines import (
+    direction_at,
+    mean_and_shear,
+    streamline_step,
+    triangle_neighbours,
+)
 from ccfem.geometry.section_grid import SectionGrid, contains, section_grid
+from ccfem.tensor import strongest_in_plane
 
 __all__ = ["evenly_spaced_streamlines"]
 
@@ -67,9 +73,7 @@ def evenly_spaced_streamlines(
     check_number("closest", closest, above=0.0, below=1.0)
     if shapely.is_empty(region) or not len(triangles):
         return []
-    s11, s22, s12 = plane_stress.T
-    field = np.stack([0.5 * (s11 + s22), 0.5 * (s11 - s22), s12], axis=1)
-    sizes = np.abs(field[:, 0]) + np.hypot(field[:, 1], field[:, 2])
+    field, sizes = mean_and_shear(plane_stress), np.abs(strongest_in_plane(plane_stress)[0])
     middles = points[triangles].mean(axis=1)
     seeds = np.argsort(-sizes[triangles].mean(axis=1), kind="stable")
     seeds = seeds[shapely.contains_xy(region, middles[seeds])]

@@ -6,8 +6,15 @@ from numba import njit
 from ccfem.arrays import FloatArray, IntArray
 from ccfem.checks import check_number
 from ccfem.geometry.locate import locate
+from ccfem.tensor import strongest_in_plane
 
-__all__ = ["direction_at", "streamline_step", "streamlines", "triangle_neighbours"]
+__all__ = [
+    "direction_at",
+    "mean_and_shear",
+    "streamline_step",
+    "streamlines",
+    "triangle_neighbours",
+]
 
 _SHARPEST = 0.5
 """Cosine of the largest turn of the direction within one step: beyond 60 degrees two families of
@@ -58,9 +65,7 @@ def streamlines(
     starts = np.asarray(starts, dtype=np.float64).reshape(-1, 2)
     if not len(starts) or not len(triangles):
         return [np.zeros((0, 2)) for _ in starts]
-    s11, s22, s12 = plane_stress.T
-    field = np.stack([0.5 * (s11 + s22), 0.5 * (s11 - s22), s12], axis=1)
-    size = float((np.abs(field[:, 0]) + np.hypot(field[:, 1], field[:, 2])).max())
+    field, size = mean_and_shear(plane_stress), np.abs(strongest_in_plane(plane_stress)[0]).max()
     corners = np.ascontiguousarray(points[triangles])
     beside = triangle_neighbours(triangles, len(points))
     if longest is None:
@@ -81,6 +86,12 @@ def streamlines(
         line = np.concatenate([back[:0:-1], ahead])
         lines.append(line if len(line) > 1 else line[:0])
     return lines
+
+
+def mean_and_shear(plane_stress: FloatArray) -> FloatArray:
+    """Mean, half the difference and shear of plane stress (n, 3), MPa: linear in the stress."""
+    s11, s22, s12 = plane_stress.T
+    return np.stack([0.5 * (s11 + s22), 0.5 * (s11 - s22), s12], axis=1)
 
 
 def triangle_neighbours(triangles: IntArray, count: int) -> IntArray:

@@ -5,6 +5,7 @@ import numpy as np
 from ccfem.arrays import FloatArray
 from ccfem.elasticity.stress_field import LayerStress
 from ccfem.evaluation.plane_paths import plane_paths
+from ccfem.evaluation.sensitivity import acute
 from ccfem.geometry.locate import locate
 from ccfem.geometry.polylines import resample, sample_midpoints, turning_angles
 from ccfem.layers.layer import Layer
@@ -36,8 +37,7 @@ def alignment_on_paths(paths: Toolpaths, stress: LayerStress, step: float = 1.0)
     triangle, weights = locate(layer.plane_points, layer.triangles, middle, step)
     corners = in_plane(stress.nodal, layer.frame)[layer.triangles[triangle]]
     largest, _, direction = largest_in_plane(np.einsum("qk,qkc->qc", weights, corners))
-    turned = np.abs(np.arctan2(tangent[:, 1], tangent[:, 0]) - direction) % np.pi
-    angle = np.degrees(np.minimum(turned, np.pi - turned))
+    angle = np.degrees(acute(np.arctan2(tangent[:, 1], tangent[:, 0]) - direction))
     angle[(triangle < 0) | (largest <= 0.0)] = np.nan
     return Coloured(_pieces(middle, tangent, length), angle, "degrees off tension", (0.0, 90.0))
 

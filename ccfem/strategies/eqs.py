@@ -19,7 +19,7 @@ from ccfem.geometry.parallel_strands import open_lines
 from ccfem.layers.layer import Layer
 from ccfem.machine.machine import Machine
 from ccfem.planning.strategy import Amount
-from ccfem.tensor import in_plane
+from ccfem.tensor import in_plane, strongest_in_plane
 from ccfem.toolpaths import Toolpaths
 
 __all__ = ["Eqs"]
@@ -85,10 +85,9 @@ class Eqs:
         """Longest candidate (n, 2); empty where no candidate lies in the region."""
         plane = in_plane(stress.nodal, layer.frame)
         if self.seed is None:
-            s11, s22, s12 = plane[layer.triangles].mean(axis=1).T
-            size = np.abs(0.5 * (s11 + s22)) + np.hypot(0.5 * (s11 - s22), s12)
+            value, _, _ = strongest_in_plane(plane[layer.triangles].mean(axis=1))
             middles = layer.plane_points[layer.triangles].mean(axis=1)
-            order = np.argsort(-size, kind="stable")
+            order = np.argsort(-np.abs(value), kind="stable")
             starts = middles[order[shapely.contains_xy(region, middles[order])]][:_CANDIDATES]
         else:
             starts = np.array([self.seed])

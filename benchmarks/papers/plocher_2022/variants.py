@@ -12,14 +12,14 @@ from benchmarks.papers.plocher_2022.plates import Plate, five_holes, single_hole
 from benchmarks.papers.plocher_2022.study import RASTER, CaseStudy, machine_of
 from ccfem.evaluation.plane_paths import plane_paths
 from ccfem.evaluation.sinuosity import path_sinuosity, sample_sinuosity, sinuosity_indices
-from ccfem.evaluation.stiffness_alignment import agreement, strongest
+from ccfem.evaluation.stiffness_alignment import agreement
 from ccfem.geometry.polylines import pack
 from ccfem.materials import named_material
 from ccfem.plates.solve import PlaneField
 from ccfem.raster.patterns import concentric_regions, medial_regions
 from ccfem.raster.plan import raster_plan
 from ccfem.strategies import create, plan
-from ccfem.tensor import largest_in_plane
+from ccfem.tensor import strongest_in_plane
 
 __all__ = [
     "VARIANTS",
@@ -69,9 +69,8 @@ class Tried:
 
 def strongest_direction(field: PlaneField) -> Any:
     """Direction (m,) of the largest stress, radians, and where there is one."""
-    largest, smallest, angle = largest_in_plane(field.stress)
-    across, defined = strongest(largest, smallest)
-    return angle + np.where(across, 0.5 * np.pi, 0.0), defined
+    _, angle, defined = strongest_in_plane(field.stress)
+    return angle, defined
 
 
 def try_variant(plate: Plate, strategy: str, parameters: dict[str, Any]) -> Tried:
