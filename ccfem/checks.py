@@ -64,7 +64,7 @@ def check_number(
 def check_fields(value: object, *names: str, **bounds: Any) -> None:
     """Refuse a dataclass with a field that is not a finite number within bounds.
 
-    None passes where it is the field's default. The message names a field as in ``eqs.spacing``.
+    None passes where the annotation has it. The message names a field as in ``eqs.spacing``.
 
     Parameters
     ----------
@@ -80,8 +80,9 @@ def check_fields(value: object, *names: str, **bounds: Any) -> None:
     """
     for name in names:
         given = getattr(value, name)
-        if given is not None or getattr(type(value), name, 0.0) is not None:
-            check_number(f"{_name(value)}.{name}", given, **bounds)
+        if given is None and type(None) in get_args(get_type_hints(type(value))[name]):
+            continue
+        check_number(f"{_name(value)}.{name}", given, **bounds)
 
 
 def check_choices(value: object) -> None:

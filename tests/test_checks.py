@@ -14,6 +14,7 @@ from ccfem.errors import InputError
 class WideStrand:
     width: float = 1.0
     least: float | None = None
+    most: float | None = 9.0
     end: Literal["round", "flat"] = "round"
 
 
@@ -57,6 +58,7 @@ def test_fields_are_named_by_their_class_and_may_be_left_out():
         check_fields(WideStrand(least=0.0), "width", "least", above=0.0, unit="mm")
     with pytest.raises(InputError, match=r"wide_strand\.width must be a finite number, .*None"):
         check_fields(WideStrand(width=None), "width", above=0.0)
+    check_fields(WideStrand(most=None), "most", above=0.0)
 
 
 def test_fields_with_choices_hold_one_of_them():

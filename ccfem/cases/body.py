@@ -45,7 +45,7 @@ class Body:
         if self.mesh is not None:
             mesh = read_mesh(folder / self.mesh, self.scale, check=False)
             if self.order == 1 and mesh.order == 2:
-                mesh = _linear(mesh)
+                mesh = mesh.linear()
             mesh, report = check_mesh(mesh, merge=self.merge_nodes)
         else:
             mesh, report = check_mesh(_filled(self, folder))
@@ -86,15 +86,6 @@ class _Planform:
     height: float
     edge_length: float
     holes: tuple[dict[str, Any], ...] = ()
-
-
-def _linear(mesh: TetMesh) -> TetMesh:
-    """Mesh of the corners of a quadratic mesh."""
-    corners, cells = np.unique(mesh.corners, return_inverse=True)
-    number = np.zeros(len(mesh.points), dtype=np.int64)
-    number[corners] = np.arange(len(corners))
-    patches = {name: number[facets] for name, facets in mesh.patches.items()}
-    return TetMesh(mesh.points[corners], cells.reshape(-1, 4), patches)
 
 
 def _filled(body: Body, folder: Path) -> TetMesh:

@@ -26,7 +26,7 @@ from ccfem.evaluation.column import Column
 from ccfem.evaluation.plane_paths import PlanePaths, plane_paths, pool
 from ccfem.evaluation.sensitivity import acute
 from ccfem.geometry.places import INSIDE, section_places
-from ccfem.geometry.polylines import subdivide
+from ccfem.geometry.polylines import starts_segment, subdivide
 from ccfem.tensor import in_plane, strongest, strongest_in_plane
 from ccfem.toolpaths import Toolpaths
 
@@ -209,9 +209,7 @@ def _stress_vectors(stress: LayerStress) -> tuple[FloatArray, FloatArray, FloatA
 def _pieces(paths: PlanePaths, longest: float) -> tuple[FloatArray, FloatArray]:
     """Both ends (s, 2) of the straight pieces of the fibre that lie in the section."""
     points, offsets, _ = subdivide(paths.points, paths.offsets, longest)
-    follows = np.ones(len(points), dtype=bool)
-    follows[offsets[1:] - 1] = False
-    first = np.flatnonzero(follows)
+    first = np.flatnonzero(starts_segment(offsets))
     starts, ends = points[first], points[first + 1]
     inside = section_places(0.5 * (starts + ends), paths.layer.polygon) == INSIDE
     return starts[inside], ends[inside]

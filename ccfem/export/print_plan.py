@@ -10,7 +10,7 @@ from ccfem.arrays import FloatArray, freeze
 from ccfem.errors import InputError
 from ccfem.geometry.hatch import zigzag
 from ccfem.geometry.offsets import offset_rings
-from ccfem.geometry.polylines import merge_repeated, pack
+from ccfem.geometry.polylines import is_closed, merge_repeated, pack
 from ccfem.layers import Layer, slice_planar
 from ccfem.linking.print_order import nearest_end_order
 from ccfem.machine.machine import Machine
@@ -233,7 +233,7 @@ def _printed(lines: list[FloatArray], height: float, number: int, kind: int) -> 
         offsets=offsets,
         layer=np.full(len(lines), number),
         kind=np.full(len(lines), kind),
-        closed=np.array([np.array_equal(line[0], line[-1]) for line in lines]),
+        closed=np.array([is_closed(line) for line in lines]),
     )
 
 

@@ -248,13 +248,8 @@ def on_linear_cells(stress: StressField, backend: str = "auto") -> StressField:
     mesh = problem.mesh
     if mesh.order == 1:
         return stress
-    kept, corners = np.unique(mesh.corners, return_inverse=True)
-    place = np.full(len(mesh.points), -1)
-    place[kept] = np.arange(len(kept))
-    patches = {name: place[facets] for name, facets in mesh.patches.items()}
-    linear = TetMesh(mesh.points[kept], corners.reshape(-1, 4), patches)
     loads = {stress.case: problem.loads[stress.case]}
-    return solve(replace(problem, mesh=linear, loads=loads), backend)[stress.case]
+    return solve(replace(problem, mesh=mesh.linear(), loads=loads), backend)[stress.case]
 
 
 @njit(cache=True)

@@ -89,7 +89,7 @@ def evenly_spaced_streamlines(
         _Field(
             np.ascontiguousarray(points[triangles]),
             np.ascontiguousarray(field[triangles]),
-            triangle_neighbours(triangles, len(points)),
+            triangle_neighbours(triangles),
             _LEAST * float(sizes.max()),
         ),
         grid,

@@ -6,6 +6,7 @@ from numba import njit
 from ccfem.arrays import FloatArray, IntArray
 from ccfem.checks import check_number
 from ccfem.geometry.locate import locate
+from ccfem.mesh.facets import paired
 from ccfem.tensor import strongest_in_plane
 
 __all__ = [
@@ -67,7 +68,7 @@ def streamlines(
         return [np.zeros((0, 2)) for _ in starts]
     field, size = mean_and_shear(plane_stress), np.abs(strongest_in_plane(plane_stress)[0]).max()
     corners = np.ascontiguousarray(points[triangles])
-    beside = triangle_neighbours(triangles, len(points))
+    beside = triangle_neighbours(triangles)
     if longest is None:
         longest = 10.0 * float(np.linalg.norm(points.max(axis=0) - points.min(axis=0)))
     steps = int(np.ceil(longest / step))
@@ -94,14 +95,11 @@ def mean_and_shear(plane_stress: FloatArray) -> FloatArray:
     return np.stack([0.5 * (s11 + s22), 0.5 * (s11 - s22), s12], axis=1)
 
 
-def triangle_neighbours(triangles: IntArray, count: int) -> IntArray:
+def triangle_neighbours(triangles: IntArray) -> IntArray:
     """Triangle beyond the side opposite to each corner, (t, 3), -1 at the border."""
-    sides = np.sort(triangles[:, [[1, 2], [2, 0], [0, 1]]].reshape(-1, 2), axis=1)
-    key = sides[:, 0] * count + sides[:, 1]
-    order = np.argsort(key, kind="stable")
-    same = np.flatnonzero(key[order[1:]] == key[order[:-1]])
-    one, other = order[same], order[same + 1]
-    beside = np.full(len(key), -1, dtype=np.int64)
+    sides = triangles[:, [[1, 2], [2, 0], [0, 1]]].reshape(-1, 2)
+    one, other = paired(sides)[0].T
+    beside = np.full(len(sides), -1, dtype=np.int64)
     beside[one], beside[other] = other // 3, one // 3
     return beside.reshape(-1, 3)
 

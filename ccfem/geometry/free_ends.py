@@ -9,6 +9,7 @@ import shapely
 
 from ccfem.arrays import FloatArray, IntArray
 from ccfem.geometry.offsets import rings
+from ccfem.geometry.polylines import is_closed, line_length, straight_pieces
 
 __all__ = ["lead_on", "strips"]
 
@@ -96,10 +97,9 @@ def lead_on(
 
 def _free_ends(lines: Sequence[FloatArray], pitch: float) -> list[tuple[int, int]]:
     """Line and index (0 or -1) of every end of the open lines, the longest line first."""
-    size = np.array([np.linalg.norm(np.diff(line, axis=0), axis=1).sum() for line in lines])
+    size = np.array([line_length(line) for line in lines])
     order = np.argsort(-np.round(size / pitch, 3), kind="stable")
-    is_open = [not bool((line[0] == line[-1]).all()) for line in lines]
-    return [(int(number), end) for number in order if is_open[number] for end in (0, -1)]
+    return [(int(k), end) for k in order if not is_closed(lines[k]) for end in (0, -1)]
 
 
 class _Parts:
@@ -138,7 +138,7 @@ class _Obstacles:
     def of(cls, lines: Sequence[FloatArray], region: Any, pitch: float) -> "_Obstacles":
         border = rings(region)
         curves = [*lines, *border]
-        pairs = np.concatenate([np.stack([c[:-1], c[1:]], axis=1) for c in curves])
+        pairs = straight_pieces(curves)
         owner = np.concatenate([np.arange(len(lines)), np.full(len(border), -1)])
         along = pairs[:, 1] - pairs[:, 0]
         along = along / np.maximum(np.linalg.norm(along, axis=1), 1e-300)[:, None]

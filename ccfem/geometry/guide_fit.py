@@ -13,7 +13,7 @@ import shapely
 
 from ccfem.arrays import FloatArray
 from ccfem.geometry.offsets import rings
-from ccfem.geometry.polylines import pack, sample_midpoints
+from ccfem.geometry.polylines import pack, sample_midpoints, straight_pieces
 
 __all__ = ["fitted_guides"]
 
@@ -45,7 +45,7 @@ def fitted_guides(guides: Sequence[FloatArray], region: Any, pitch: float) -> li
         Instead of a guide that moves by half a pitch there are two, half a pitch to either side:
         the strands beside it are the same, and a symmetric part stays so.
     """
-    border = _pieces(rings(region))
+    border = straight_pieces(rings(region))
     shifts = np.zeros(len(guides))
     moved = list(guides)
     rays = [_rays(guide, pitch) for guide in guides]
@@ -53,7 +53,7 @@ def fitted_guides(guides: Sequence[FloatArray], region: Any, pitch: float) -> li
     for _ in range(_ROUNDS):
         before = shifts.copy()
         for k, (start, normal) in enumerate(rays):
-            others = _pieces([other for j, other in enumerate(moved) if j != k])
+            others = straight_pieces([other for j, other in enumerate(moved) if j != k])
             gap, parallel, to_guide = _nearer(fixed[k], _first_hits(start, normal, others, pitch))
             shifts[k] = _best_shift(gap / pitch - np.where(to_guide, 0.0, 0.5), parallel)
             moved[k] = _aside(guides[k], shifts[k] * pitch)
@@ -85,12 +85,6 @@ def _rays(guide: FloatArray, pitch: float) -> tuple[FloatArray, FloatArray]:
     points, offsets = pack([guide])
     start, along, _, _ = sample_midpoints(points, offsets, _STEP * pitch)
     return start, np.column_stack([-along[:, 1], along[:, 0]])
-
-
-def _pieces(curves: Sequence[FloatArray]) -> FloatArray:
-    """Straight pieces (m, 2, 2) of curves."""
-    pairs = [np.stack([curve[:-1], curve[1:]], axis=1) for curve in curves]
-    return np.concatenate([np.zeros((0, 2, 2)), *pairs])
 
 
 def _first_hits(

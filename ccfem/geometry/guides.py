@@ -7,7 +7,7 @@ import numpy as np
 import shapely
 
 from ccfem.arrays import FloatArray
-from ccfem.geometry.parallel_strands import open_lines
+from ccfem.geometry.shapes import open_lines
 
 __all__ = ["spaced_guides"]
 

@@ -19,6 +19,8 @@ from scipy.spatial import QhullError, Voronoi, cKDTree
 from ccfem.arrays import BoolArray, FloatArray, IntArray, freeze
 from ccfem.checks import check_number
 from ccfem.geometry.offsets import rings
+from ccfem.geometry.polylines import is_closed, line_length
+from ccfem.mesh.facets import facet_keys
 
 __all__ = ["MedialAxis", "MedialSegment", "medial_axis"]
 
@@ -57,12 +59,12 @@ class MedialSegment:
     @property
     def closed(self) -> bool:
         """Whether the curve is closed."""
-        return self.ends[0] == self.ends[1] and bool((self.points[0] == self.points[-1]).all())
+        return self.ends[0] == self.ends[1] and is_closed(self.points)
 
     @property
     def length(self) -> float:
         """Length, mm."""
-        return float(np.linalg.norm(np.diff(self.points, axis=0), axis=1).sum())
+        return line_length(self.points)
 
 
 @dataclass(frozen=True)
@@ -239,7 +241,7 @@ class _Graph:
         _, first = np.unique(place, return_index=True)
         points, nearest = points[first], nearest[first]
         edges = np.sort(place[edges], axis=1)
-        _, rows = np.unique(edges[:, 0] * len(points) + edges[:, 1], return_index=True)
+        _, rows = np.unique(facet_keys(edges)[0], return_index=True)
         rows = rows[edges[rows, 0] != edges[rows, 1]]
         edges, sites = edges[rows], sites[rows]
         middle = points[edges].mean(axis=1)
@@ -314,8 +316,7 @@ def _pruned(graph: _Graph, chains: list[list[int]], prune: float, step: float) -
             free = [degree[end] == 1 for end in (chain[0], chain[-1])]
             if not any(free):
                 continue
-            place = graph.points[chain]
-            length = float(np.linalg.norm(np.diff(place, axis=0), axis=1).sum())
+            length = line_length(graph.points[chain])
             if all(free):
                 least = min(step, 0.1 * float(graph.radius[chain].max()))
             else:

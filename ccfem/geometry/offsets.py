@@ -8,6 +8,7 @@ import shapely
 from shapely.geometry.polygon import orient
 
 from ccfem.arrays import FloatArray
+from ccfem.geometry.polylines import along_line, line_length
 
 __all__ = ["inset", "join_rings", "offset_rings", "ring_from", "rings"]
 
@@ -148,7 +149,7 @@ def join_rings(
     return [
         chain[0]
         if len(chain) == 1
-        else np.concatenate([*chain[:-1], _until(chain[-1], _length(chain[-1]) - gap)])
+        else np.concatenate([*chain[:-1], _until(chain[-1], line_length(chain[-1]) - gap)])
         for chain in chains
     ]
 
@@ -157,7 +158,7 @@ def _ramp(
     ring: FloatArray, inner: Sequence[FloatArray], spacing: float, gap: float, walls: Any
 ) -> tuple[FloatArray, FloatArray, int] | None:
     """`ring` opened, the nearest ring of the next level from its start, and its position there."""
-    length, longest = _length(ring), gap + _RAMPS[0] * spacing
+    length, longest = line_length(ring), gap + _RAMPS[0] * spacing
     if not inner or length < 2.0 * longest:
         return None
     landing = _until(ring, length - gap)[-1]
@@ -165,7 +166,7 @@ def _ramp(
     distances = shapely.distance(curves, shapely.points(landing))
     nearest = int(np.argmin(distances))
     partner = ring_from(inner[nearest], landing)
-    if distances[nearest] > 1.5 * spacing or _length(partner) < 2.0 * longest:
+    if distances[nearest] > 1.5 * spacing or line_length(partner) < 2.0 * longest:
         return None
     for ramp in _RAMPS:
         opened = _until(ring, length - gap - ramp * spacing)
@@ -176,13 +177,9 @@ def _ramp(
     return None
 
 
-def _length(line: FloatArray) -> float:
-    return float(np.linalg.norm(np.diff(line, axis=0), axis=1).sum())
-
-
 def _until(line: FloatArray, distance: float) -> FloatArray:
     """Part of a polyline up to a distance along it."""
-    along = np.concatenate([[0.0], np.cumsum(np.linalg.norm(np.diff(line, axis=0), axis=1))])
+    along = along_line(line)
     k = int(np.searchsorted(along, distance))
     t = (distance - along[k - 1]) / (along[k] - along[k - 1])
     return np.concatenate([line[:k], [line[k - 1] + t * (line[k] - line[k - 1])]])

@@ -13,16 +13,24 @@ import numpy as np
 from ccfem.arrays import BoolArray, FloatArray, IntArray
 
 __all__ = [
+    "along_line",
     "arc_lengths",
     "between",
+    "inner_points",
+    "is_closed",
     "lengths",
+    "line_length",
     "merge_repeated",
     "pack",
     "point_at",
+    "points_along",
     "resample",
+    "runs",
     "sample_at",
     "sample_midpoints",
     "split",
+    "starts_segment",
+    "straight_pieces",
     "subdivide",
     "turning_angles",
 ]
@@ -34,6 +42,27 @@ def pack(lines: Sequence[FloatArray]) -> tuple[FloatArray, IntArray]:
     offsets = np.concatenate([[0], np.cumsum(sizes, dtype=np.int64)]).astype(np.int64)
     points = np.concatenate(lines) if len(lines) else np.zeros((0, 2))
     return np.asarray(points, dtype=np.float64), offsets
+
+
+def straight_pieces(lines: Sequence[FloatArray]) -> FloatArray:
+    """Both ends (s, 2, 2) of the straight pieces of (n_i, 2) polylines, one after the other."""
+    pairs = [np.stack([line[:-1], line[1:]], axis=1) for line in lines]
+    return np.concatenate([np.zeros((0, 2, 2)), *pairs])
+
+
+def starts_segment(offsets: IntArray) -> BoolArray:
+    """Mask (P,) of the points that start a segment: all but the last one of each polyline."""
+    mask = np.ones(int(offsets[-1]), dtype=bool)
+    mask[offsets[1:][np.diff(offsets) > 0] - 1] = False
+    return mask
+
+
+def inner_points(offsets: IntArray, closed: BoolArray) -> BoolArray:
+    """Mask (P,) of the points at which polylines go on: of closed ones also the first."""
+    mask = starts_segment(offsets)
+    held = np.diff(offsets) > 0
+    mask[offsets[:-1][held]] &= np.asarray(closed, dtype=bool)[held]
+    return mask
 
 
 def _steps(points: FloatArray, offsets: IntArray) -> FloatArray:
@@ -229,6 +258,32 @@ def turning_angles(points: FloatArray, offsets: IntArray, closed: BoolArray) -> 
     else:
         across = np.linalg.norm(np.cross(into, out), axis=1)
     return np.arctan2(across, along)
+
+
+def is_closed(line: FloatArray) -> bool:
+    """Whether one polyline (n, d) ends at its first point."""
+    return bool((line[0] == line[-1]).all())
+
+
+def line_length(line: FloatArray) -> float:
+    """Length of one polyline (n, d)."""
+    return float(np.linalg.norm(np.diff(line, axis=0), axis=1).sum())
+
+
+def along_line(line: FloatArray) -> FloatArray:
+    """Arc length (n,) from the start of one polyline (n, d) to each of its points."""
+    return np.concatenate([[0.0], np.cumsum(np.linalg.norm(np.diff(line, axis=0), axis=1))])
+
+
+def points_along(line: FloatArray, along: FloatArray, positions: FloatArray) -> FloatArray:
+    """Columns of one polyline (n, d) at positions (k,) of its arc length `along`: (k, d) array."""
+    return np.stack([np.interp(positions, along, column) for column in line.T], axis=1)
+
+
+def runs(mask: BoolArray) -> IntArray:
+    """Start and end (k, 2), the end not included, of each run of true values of a mask (n,)."""
+    edges = np.diff(np.concatenate([[False], mask, [False]]).astype(np.int8))
+    return np.flatnonzero(edges).reshape(-1, 2)
 
 
 def point_at(line: FloatArray, position: float) -> FloatArray:

@@ -20,7 +20,7 @@ from ccfem.checks import check_number
 from ccfem.errors import InputError
 from ccfem.geometry.offsets import ring_from
 from ccfem.geometry.places import INSIDE, VOID, cut_at_section
-from ccfem.geometry.polylines import between
+from ccfem.geometry.polylines import between, is_closed, line_length, runs
 from ccfem.geometry.section_grid import section_grid
 from ccfem.linking.exchanges import improved_order
 from ccfem.linking.link_curves import LinkCurves, link_curve, link_curves, stub_points
@@ -89,8 +89,7 @@ class LinkedPath:
 
     def _stretches(self) -> IntArray:
         """Points (k, 2) at which each link begins and ends."""
-        edges = np.diff(np.concatenate([[False], self.link, [False]]).astype(int))
-        return np.flatnonzero(edges).reshape(-1, 2)
+        return runs(self.link)
 
 
 def link_tracks(
@@ -156,7 +155,7 @@ def link_tracks(
         return LinkedPath(wanted[0][0], np.zeros(len(wanted[0][0]), dtype=bool))
     radius = max(radius, 0.05 * width)
     opened = _opened(wanted, radius, width)
-    closed = [_is_closed(track) for group in wanted for track in group]
+    closed = [is_closed(track) for group in wanted for track in group]
     tracks = [track for group in opened for track in group]
     weights = np.array([inside_weight, void_weight, 0.0])
     network = _Network.between(tracks, np.array(closed), section, radius, weights)
@@ -171,10 +170,6 @@ def _clean(track: FloatArray) -> FloatArray:
     if track.ndim != 2 or track.shape[1] != 2 or not np.isfinite(track).all():
         raise InputError(f"tracks must be finite (n, 2) arrays; got shape {track.shape}")
     return track[np.concatenate([[True], (np.diff(track, axis=0) != 0.0).any(axis=1)])]
-
-
-def _is_closed(track: FloatArray) -> bool:
-    return bool((track[0] == track[-1]).all())
 
 
 def _opened(
@@ -192,19 +187,19 @@ def _opened(
             track[[0, -1]]
             for other in (*groups[:k], *groups[k + 1 :], group)
             for track in other
-            if not (other is group and _is_closed(track))
+            if not (other is group and is_closed(track))
         ]
         seam: FloatArray | None = None
         tracks = []
         for track in group:
-            if not _is_closed(track):
+            if not is_closed(track):
                 tracks.append(track)
                 continue
             if seam is None:
                 seam = np.concatenate(others).mean(axis=0) if others else track[0]
             ring = ring_from(track, seam)
             seam = ring[0]
-            length = float(np.linalg.norm(np.diff(ring, axis=0), axis=1).sum())
+            length = line_length(ring)
             tracks.append(between(ring, 0.0, max(length - gap, 0.5 * length)))
         found.append(tracks)
     return found

@@ -7,6 +7,7 @@ import numpy as np
 import shapely
 
 from ccfem.arrays import FloatArray
+from ccfem.geometry.polylines import is_closed
 from ccfem.linking.joining import ring_arc
 
 __all__ = ["spiral"]
@@ -43,7 +44,7 @@ def spiral(
     list of (n, 2) arrays
         Open lines first in their order, then rings and spirals from the outside in.
     """
-    closed = [k for k, line in enumerate(lines) if np.array_equal(line[0], line[-1])]
+    closed = [k for k, line in enumerate(lines) if is_closed(line)]
     rings = [_counter_clockwise(lines[k]) for k in closed]
     kept = [line for k, line in enumerate(lines) if k not in set(closed)]
     obstacles = [shapely.linestrings(line) for line in kept]

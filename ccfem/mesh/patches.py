@@ -14,6 +14,7 @@ from numpy.typing import ArrayLike
 from ccfem.arrays import BoolArray, FloatArray, IntArray
 from ccfem.checks import check_fields
 from ccfem.errors import InputError
+from ccfem.mesh.facets import are_among
 from ccfem.mesh.tet_mesh import TetMesh
 
 __all__ = [
@@ -23,7 +24,6 @@ __all__ = [
     "Nearest",
     "PatchRule",
     "Plane",
-    "facet_keys",
     "match_boundary",
     "patches_from_rules",
     "unit_vector",
@@ -264,16 +264,7 @@ def match_boundary(mesh: TetMesh, facets: IntArray) -> IntArray:
     """
     if not len(facets):
         return np.zeros((0, 3), dtype=np.int64)
-    return mesh.boundary[np.isin(facet_keys(mesh.boundary), facet_keys(facets))]
-
-
-def facet_keys(facets: IntArray) -> IntArray:
-    """One integer (...,) for the nodes of each facet (..., 3), whatever their order.
-
-    Node numbers must stay below 2^21 (two million).
-    """
-    a, b, c = np.moveaxis(np.sort(np.asarray(facets, dtype=np.int64), axis=-1), -1, 0)
-    return ((a << 21) + b << 21) + c
+    return mesh.boundary[are_among(mesh.boundary, facets)]
 
 
 def unit_vector(value: str | ArrayLike, what: str) -> FloatArray:

@@ -9,14 +9,21 @@ import numpy as np
 from ccfem.arrays import FloatArray, IntArray, freeze, read_only
 from ccfem.checks import check_known
 from ccfem.errors import InputError
+from ccfem.mesh.facets import paired, positions, unique_edges
 
-__all__ = ["TetMesh"]
+__all__ = ["TetMesh", "signed_volumes"]
 
 _FACES = np.array([[1, 2, 3], [0, 3, 2], [0, 1, 3], [0, 2, 1]])
 """Corner nodes of the face opposite to each corner, outward for a positive cell."""
 
 _EDGES = np.array([[0, 1], [1, 2], [0, 2], [0, 3], [1, 3], [2, 3]])
 """Corner nodes of the edge that carries mid-side node 4 + k (VTK order)."""
+
+
+def signed_volumes(points: FloatArray, corners: IntArray) -> FloatArray:
+    """Volume of straight-sided tetrahedra (m, 4), (m,), mm^3; negative where turned inside out."""
+    a, b, c, d = np.moveaxis(points[corners], 1, 0)
+    return np.asarray(np.einsum("ij,ij->i", np.cross(b - a, c - a), d - a) / 6.0)
 
 
 @dataclass(frozen=True)
@@ -69,8 +76,7 @@ class TetMesh:
     @cached_property
     def volumes(self) -> FloatArray:
         """Signed volume of each (straight-sided) cell, (m,), mm^3."""
-        a, b, c, d = np.moveaxis(self.points[self.corners], 1, 0)
-        return read_only(np.einsum("ij,ij->i", np.cross(b - a, c - a), d - a) / 6.0)
+        return read_only(signed_volumes(self.points, self.corners))
 
     @cached_property
     def aspects(self) -> FloatArray:
@@ -83,36 +89,29 @@ class TetMesh:
         with np.errstate(divide="ignore"):
             return read_only(longest * largest / (3.0 * np.abs(self.volumes)))
 
+    @property
+    def _facets(self) -> IntArray:
+        """Corner nodes of the faces of all cells, (4 m, 3), outward."""
+        return self.corners[:, _FACES].reshape(-1, 3)
+
     @cached_property
-    def _facet_pairing(self) -> tuple[IntArray, IntArray, IntArray]:
-        """Facets sorted so that equal ones are adjacent: order, first of a pair, single ones."""
-        facets = np.sort(self.corners[:, _FACES].reshape(-1, 3), axis=1)
-        n = len(self.points)
-        key = (facets[:, 0] * n + facets[:, 1]) * n + facets[:, 2]
-        order = np.argsort(key, kind="stable")
-        same = key[order[1:]] == key[order[:-1]]
-        first = np.flatnonzero(same)
-        single = np.ones(len(key), dtype=bool)
-        single[first] = single[first + 1] = False
-        return order, first, np.sort(order[single])
+    def _pairing(self) -> tuple[IntArray, IntArray]:
+        return paired(self._facets)
 
     @cached_property
     def boundary(self) -> IntArray:
         """Corner nodes of the boundary facets, (b, 3), outward."""
-        _, _, single = self._facet_pairing
-        return read_only(self.corners[:, _FACES].reshape(-1, 3)[single], np.int64)
+        return read_only(self._facets[self._pairing[1]], int)
 
     @cached_property
     def boundary_cells(self) -> IntArray:
         """Cell of each boundary facet, (b,)."""
-        _, _, single = self._facet_pairing
-        return read_only(single // 4, np.int64)
+        return read_only(self._pairing[1] // 4, int)
 
     @cached_property
     def neighbours(self) -> IntArray:
         """Pairs of cells that share a face, (f, 2)."""
-        order, first, _ = self._facet_pairing
-        return read_only(np.stack([order[first], order[first + 1]], axis=1) // 4, np.int64)
+        return read_only(self._pairing[0] // 4, int)
 
     @cached_property
     def bounds(self) -> FloatArray:
@@ -140,22 +139,16 @@ class TetMesh:
         """
         if self.order == 1 or not len(facets):
             return facets
-        n = len(self.points)
-        on_facet = np.zeros(n, dtype=bool)
+        on_facet = np.zeros(len(self.points), dtype=bool)
         on_facet[facets] = True
         ends = self.cells[:, self.edges].reshape(-1, 2)
         chosen = np.flatnonzero(on_facet[ends].all(axis=1))
-        ends = np.sort(ends[chosen], axis=1)
-        keys, first = np.unique(ends[:, 0] * n + ends[:, 1], return_index=True)
-        middle = self.cells[:, 4:].reshape(-1)[chosen[first]]
-        sides = np.sort(facets[:, [[0, 1], [1, 2], [2, 0]]], axis=2)
-        wanted = sides[..., 0] * n + sides[..., 1]
-        at = np.minimum(np.searchsorted(keys, wanted), len(keys) - 1)
-        if (keys[at] != wanted).any():
+        at = positions(facets[:, [[0, 1], [1, 2], [2, 0]]].reshape(-1, 2), ends[chosen])
+        if (at < 0).any():
             raise InputError(
                 "a patch has facets that no cell of the mesh has: name boundary facets"
             )
-        return np.hstack([facets, middle[at]])
+        return np.hstack([facets, self.cells[:, 4:].reshape(-1)[chosen[at]].reshape(-1, 3)])
 
     def with_patches(self, patches: Mapping[str, IntArray]) -> "TetMesh":
         """Return the same mesh with more named patches, (k, 3) facets each."""
@@ -176,11 +169,17 @@ class TetMesh:
         """Return the P2 mesh with a node at the middle of every edge; patches stay."""
         if self.order == 2:
             return self
-        pairs = np.sort(self.cells[:, _EDGES].reshape(-1, 2), axis=1)
-        key = pairs[:, 0] * len(self.points) + pairs[:, 1]
-        _, first, inverse = np.unique(key, return_index=True, return_inverse=True)
-        middle = self.points[pairs[first]].mean(axis=1)
-        extra = len(self.points) + inverse.reshape(-1, 6)
-        return TetMesh(
-            np.concatenate([self.points, middle]), np.hstack([self.cells, extra]), self.patches
-        )
+        edges, edge = unique_edges(self.cells[:, _EDGES].reshape(-1, 2))
+        points = np.concatenate([self.points, self.points[edges].mean(axis=1)])
+        extra = len(self.points) + edge.reshape(-1, 6)
+        return TetMesh(points, np.hstack([self.cells, extra]), self.patches)
+
+    def linear(self) -> "TetMesh":
+        """Return the P1 mesh of the corners alone; nodes are renumbered, patches stay."""
+        if self.order == 1:
+            return self
+        kept, cells = np.unique(self.corners, return_inverse=True)
+        number = np.full(len(self.points), -1)
+        number[kept] = np.arange(len(kept))
+        patches = {name: number[facets] for name, facets in self.patches.items()}
+        return TetMesh(self.points[kept], cells.reshape(-1, 4), patches)

@@ -17,6 +17,7 @@ from scipy.spatial import Delaunay, QhullError, cKDTree
 from ccfem.arrays import FloatArray, IntArray
 from ccfem.checks import check_number
 from ccfem.errors import InputError
+from ccfem.mesh.facets import are_among
 
 __all__ = ["triangulate"]
 
@@ -240,14 +241,11 @@ def _conforming(
     for _ in range(8):
         points = np.concatenate([*outline, inner])
         corners = _delaunay(points)
-        sides = np.sort(corners[:, [[0, 1], [1, 2], [2, 0]]].reshape(-1, 2), axis=1)
-        known = np.unique(sides[:, 0] * len(points) + sides[:, 1])
+        sides = corners[:, [[0, 1], [1, 2], [2, 0]]].reshape(-1, 2)
         start, closer = 0, []
         for ring in outline:
             here = start + np.arange(len(ring))
-            there = np.roll(here, -1)
-            key = np.minimum(here, there) * len(points) + np.maximum(here, there)
-            lost = np.flatnonzero(~np.isin(key, known))
+            lost = np.flatnonzero(~are_among(np.stack([here, np.roll(here, -1)], axis=1), sides))
             middle = 0.5 * (ring[lost] + np.roll(ring, -1, axis=0)[lost])
             closer.append(np.insert(ring, lost + 1, middle, axis=0))
             start += len(ring)

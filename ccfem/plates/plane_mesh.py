@@ -11,6 +11,7 @@ from numpy.typing import ArrayLike
 from ccfem.arrays import BoolArray, FloatArray, IntArray, freeze, read_only
 from ccfem.checks import check_known
 from ccfem.errors import InputError
+from ccfem.mesh.facets import paired, positions
 
 __all__ = ["PlaneMesh", "Raster", "Sheet", "raster_image", "raster_mesh"]
 
@@ -88,32 +89,23 @@ class PlaneMesh:
         return np.stack([self.cells, np.roll(self.cells, -1, axis=1)], axis=2).reshape(-1, 2)
 
     @cached_property
-    def _pairing(self) -> tuple[IntArray, IntArray, IntArray]:
-        """Edges sorted so that equal ones are adjacent: order, first of a pair, single ones."""
-        low, high = np.sort(self._edges, axis=1).T
-        key = low * len(self.points) + high
-        order = np.argsort(key, kind="stable")
-        first = np.flatnonzero(key[order[1:]] == key[order[:-1]])
-        single = np.ones(len(key), dtype=bool)
-        single[first] = single[first + 1] = False
-        return order, first, np.sort(order[single])
+    def _pairing(self) -> tuple[IntArray, IntArray]:
+        return paired(self._edges)
 
     @cached_property
     def boundary(self) -> IntArray:
         """Boundary edges, (b, 2), walked with the part on the left."""
-        return read_only(self._edges[self._pairing[2]], np.int64)
+        return read_only(self._edges[self._pairing[1]], int)
 
     @cached_property
     def boundary_cells(self) -> IntArray:
         """Cell of each boundary edge, (b,)."""
-        return read_only(self._pairing[2] // self.cells.shape[1], np.int64)
+        return read_only(self._pairing[1] // self.cells.shape[1], int)
 
     @cached_property
     def neighbours(self) -> IntArray:
         """Pairs of cells that share an edge, (f, 2)."""
-        order, first, _ = self._pairing
-        pairs = np.stack([order[first], order[first + 1]], axis=1)
-        return read_only(pairs // self.cells.shape[1], np.int64)
+        return read_only(self._pairing[0] // self.cells.shape[1], int)
 
     @cached_property
     def bounds(self) -> FloatArray:
@@ -194,15 +186,9 @@ class Sheet:
 
     def facet_areas(self, edges: IntArray) -> tuple[FloatArray, FloatArray]:
         """Areas (k,), mm^2, and outward unit normals (k, 2) of boundary edges (k, 2)."""
-        n = len(self.points)
-        a, b = np.sort(self.boundary, axis=1).T
-        order = np.argsort(a * n + b)
-        known = (a * n + b)[order]
-        low, high = np.sort(edges, axis=1).T
-        at = np.minimum(np.searchsorted(known, low * n + high), len(known) - 1)
-        if (known[at] != low * n + high).any():
+        at = positions(edges, self.boundary)
+        if (at < 0).any():
             raise InputError("a loaded patch has edges inside the part: name boundary edges")
-        at = order[at]
         first, second = np.moveaxis(self.points[self.boundary[at]], 1, 0)
         x, y = (second - first).T
         length = np.hypot(x, y)

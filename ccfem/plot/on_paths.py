@@ -7,7 +7,7 @@ from ccfem.elasticity.stress_field import LayerStress
 from ccfem.evaluation.plane_paths import plane_paths
 from ccfem.evaluation.sensitivity import acute
 from ccfem.geometry.locate import locate
-from ccfem.geometry.polylines import resample, sample_midpoints, turning_angles
+from ccfem.geometry.polylines import resample, sample_midpoints, starts_segment, turning_angles
 from ccfem.layers.layer import Layer
 from ccfem.plot.paths import Coloured
 from ccfem.tensor import in_plane, largest_in_plane
@@ -57,9 +57,7 @@ def curvature_on_paths(paths: Toolpaths, layer: Layer, most: float, step: float 
     lines = plane_paths(paths, layer)
     points, offsets = resample(lines.points, lines.offsets, step)
     angle = turning_angles(points, offsets, lines.closed)
-    starts = np.ones(len(points), dtype=bool)
-    starts[offsets[1:] - 1] = False
-    first = np.flatnonzero(starts)
+    first = np.flatnonzero(starts_segment(offsets))
     segments = np.stack([points[first], points[first + 1]], axis=1)
     size = np.maximum(np.linalg.norm(segments[:, 1] - segments[:, 0], axis=1), 1e-9)
     curvature = np.maximum(angle[first], angle[first + 1]) / size

@@ -15,9 +15,10 @@ from ccfem.arrays import FloatArray
 from ccfem.elasticity.stress_field import LayerStress
 from ccfem.errors import InputError
 from ccfem.fields.streamlines import streamlines
-from ccfem.geometry.parallel_strands import open_lines
+from ccfem.geometry.shapes import open_lines
 from ccfem.layers.layer import Layer
 from ccfem.machine.machine import Machine
+from ccfem.planning.infill import SPACING, check_fill, long_enough
 from ccfem.planning.strategy import Amount
 from ccfem.tensor import in_plane, strongest_in_plane
 from ccfem.toolpaths import Toolpaths
@@ -57,17 +58,12 @@ class Eqs:
     seed: tuple[float, float] | None = None
     minimum_length: float | None = None
 
-    amount: ClassVar[Amount] = Amount("spacing", most=1.0, least=20.0)
+    amount: ClassVar[Amount] = SPACING
 
     def __post_init__(self) -> None:
-        if not 1.0 <= self.spacing < float("inf"):
-            raise InputError(f"eqs.spacing must be at least 1 fibre width; got {self.spacing}")
+        check_fill(self)
         if self.seed is not None and not np.isfinite(self.seed).all():
             raise InputError(f"eqs.seed must be a point in mm; got {self.seed}")
-        if self.minimum_length is not None and not 0.0 <= self.minimum_length < float("inf"):
-            raise InputError(
-                f"eqs.minimum_length must be a finite number >= 0; got {self.minimum_length}"
-            )
 
     def __call__(self, layer: Layer, stress: LayerStress, machine: Machine) -> Toolpaths:
         """Plan the paths of one layer; none where the section is thinner than a fibre."""
@@ -77,9 +73,7 @@ class Eqs:
         if len(seed) < 2:
             return Toolpaths.empty()
         lines = _iso_lines(seed, region, self.spacing * width, _OFF * width)
-        paths = Toolpaths.from_plane(lines, layer)
-        least = machine.minimum_length if self.minimum_length is None else self.minimum_length
-        return paths.select(paths.lengths >= least)
+        return long_enough(Toolpaths.from_plane(lines, layer), self.minimum_length, machine)
 
     def _seed_line(self, layer: Layer, stress: LayerStress, region: Any, step: float) -> FloatArray:
         """Longest candidate (n, 2); empty where no candidate lies in the region."""

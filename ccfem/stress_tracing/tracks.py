@@ -12,7 +12,7 @@ from scipy.ndimage import gaussian_filter1d, maximum_filter1d
 from ccfem.arrays import BoolArray, FloatArray
 from ccfem.elasticity.stress_field import LayerStress
 from ccfem.geometry.offsets import ring_from
-from ccfem.geometry.polylines import subdivide, turning_angles
+from ccfem.geometry.polylines import along_line, subdivide, turning_angles
 from ccfem.stress_tracing.band import STEP, Band
 from ccfem.stress_tracing.turning import relaxed
 
@@ -139,7 +139,7 @@ def clipped(line: FloatArray, section: Any, core: slice, within: slice) -> Float
 
 def _last_inside(line: FloatArray, inside: BoolArray) -> int:
     """Index of the last point inside before a line is outside for more than a while."""
-    along = np.concatenate([[0.0], np.cumsum(np.linalg.norm(np.diff(line, axis=0), axis=1))])
+    along = along_line(line)
     within = np.flatnonzero(inside)
     left = np.flatnonzero(np.diff(along[within]) > _OUTSIDE + STEP)
     return int(within[left[0]] if len(left) else within[-1])

@@ -13,7 +13,7 @@ from scipy.spatial import cKDTree
 from ccfem.arrays import BoolArray, FloatArray, IntArray
 from ccfem.elasticity.stress_field import LayerStress
 from ccfem.geometry.medial_axis import medial_axis
-from ccfem.geometry.polylines import pack, resample
+from ccfem.geometry.polylines import inner_points, pack, resample
 from ccfem.stress_tracing.criterion import Criterion
 from ccfem.stress_tracing.stress_lines import misalignment, plane_stress_at, stress_lines
 
@@ -79,10 +79,7 @@ def _points(section: Any, sampling: float, step: float) -> tuple[FloatArray, Int
     if not axis.segments:
         return np.zeros((0, 2)), np.zeros(0, dtype=np.int64), np.zeros(0, dtype=bool)
     lines, offsets = resample(*pack([segment.points for segment in axis.segments]), step)
-    inner = np.ones(len(lines), dtype=bool)
-    inner[offsets[1:] - 1] = False
-    open_ones = np.array([segment.ends[0] >= 0 for segment in axis.segments])
-    inner[offsets[:-1][open_ones]] = False
+    inner = inner_points(offsets, np.array([segment.ends[0] < 0 for segment in axis.segments]))
     ends = [end for segment in axis.segments for end in segment.ends if end >= 0]
     degree = np.bincount(ends, minlength=len(axis.nodes)) if ends else np.zeros(0, dtype=np.int64)
     nodes = np.flatnonzero(degree)

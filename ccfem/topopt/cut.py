@@ -5,8 +5,8 @@ from typing import NamedTuple
 import numpy as np
 
 from ccfem.arrays import BoolArray, FloatArray, IntArray
-from ccfem.mesh.patches import facet_keys
-from ccfem.mesh.tet_mesh import TetMesh
+from ccfem.mesh.facets import are_among, positions
+from ccfem.mesh.tet_mesh import TetMesh, signed_volumes
 
 __all__ = ["CutMesh", "cut_mesh", "volume_above"]
 
@@ -107,8 +107,7 @@ def cut_mesh(mesh: TetMesh, values: FloatArray, level: float) -> CutMesh:
     points = (1.0 - share) * mesh.points[ends[:, 0]] + share * mesh.points[ends[:, 1]]
     cells = _cells(mesh, inside, keys)
     points = np.concatenate([mesh.points, points])
-    a, b, c, d = np.moveaxis(points[cells], 1, 0)
-    turned = np.einsum("ij,ij->i", np.cross(b - a, c - a), d - a) < 0.0
+    turned = signed_volumes(points, cells) < 0.0
     cells[turned] = cells[turned][:, [0, 2, 1, 3]]
     used, number = np.unique(cells, return_inverse=True)
     found = TetMesh(points[used], number.reshape(-1, 4))
@@ -116,7 +115,7 @@ def cut_mesh(mesh: TetMesh, values: FloatArray, level: float) -> CutMesh:
     facet = _facets(mesh, np.concatenate([own, ends])[used][found.boundary])
     patches = {}
     for name, facets in mesh.patches.items():
-        chosen = np.isin(facet_keys(mesh.boundary), facet_keys(facets))
+        chosen = are_among(mesh.boundary, facets)
         patches[name] = found.boundary[chosen[facet] & (facet >= 0)]
     return CutMesh(found.with_patches(patches), facet)
 
@@ -155,10 +154,6 @@ def _facets(mesh: TetMesh, nodes: IntArray) -> IntArray:
     nodes = np.sort(nodes.reshape(-1, 6), axis=1)
     fresh = np.concatenate([np.ones((len(nodes), 1), dtype=bool), np.diff(nodes) > 0], axis=1)
     flat = fresh.sum(axis=1) == 3
-    known = facet_keys(mesh.boundary)
-    order = np.argsort(known)
-    wanted = facet_keys(nodes[flat][fresh[flat]].reshape(-1, 3))
-    at = order[np.minimum(np.searchsorted(known, wanted, sorter=order), len(order) - 1)]
     result = np.full(len(nodes), -1)
-    result[flat] = np.where(known[at] == wanted, at, -1)
+    result[flat] = positions(nodes[flat][fresh[flat]].reshape(-1, 3), mesh.boundary)
     return result

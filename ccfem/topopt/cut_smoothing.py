@@ -4,8 +4,8 @@ import numpy as np
 import scipy.sparse as sp
 
 from ccfem.arrays import BoolArray, FloatArray, IntArray
-from ccfem.mesh.patches import facet_keys
-from ccfem.mesh.tet_mesh import TetMesh
+from ccfem.mesh.facets import are_among
+from ccfem.mesh.tet_mesh import TetMesh, signed_volumes
 from ccfem.topopt.cut import CutMesh
 
 __all__ = ["relaxed"]
@@ -95,9 +95,8 @@ def _free_directions(cut: CutMesh) -> FloatArray:
 def _patch_ends(mesh: TetMesh, border: IntArray) -> BoolArray:
     """Nodes (n,) where facets (b, 3) inside and outside a patch meet."""
     ends = np.zeros(len(mesh.points), dtype=bool)
-    keys = facet_keys(border)
     for facets in mesh.patches.values():
-        own = np.isin(keys, facet_keys(facets))
+        own = are_among(border, facets)
         inside, outside = np.zeros((2, len(mesh.points)), dtype=bool)
         inside[border[own]], outside[border[~own]] = True, True
         ends |= inside & outside
@@ -106,19 +105,14 @@ def _patch_ends(mesh: TetMesh, border: IntArray) -> BoolArray:
 
 def _safely_moved(cells: IntArray, points: FloatArray, wanted: FloatArray) -> FloatArray:
     """Points moved to where they are wanted, save those whose cells would become flat."""
-    before = _volumes(points, cells)
+    before = signed_volumes(points, cells)
     least = _THIN * float(before.mean())
     moved = wanted.copy()
     while True:
-        after = _volumes(moved, cells)
+        after = signed_volumes(moved, cells)
         flat = (after < least) & (after < before * (1.0 - 1e-12))
         stuck = np.unique(cells[flat])
         stuck = stuck[(moved[stuck] != points[stuck]).any(axis=1)]
         if not len(stuck):
             return moved
         moved[stuck] = points[stuck]
-
-
-def _volumes(points: FloatArray, cells: IntArray) -> FloatArray:
-    a, b, c, d = np.moveaxis(points[cells], 1, 0)
-    return np.asarray(np.einsum("ij,ij->i", np.cross(b - a, c - a), d - a) / 6.0)

@@ -11,7 +11,7 @@ from ccfem.arrays import BoolArray, FloatArray, IntArray
 from ccfem.elasticity.problem import Force, Load, PointForce, Problem, Support
 from ccfem.errors import InputError
 from ccfem.materials import Material
-from ccfem.mesh.patches import facet_keys
+from ccfem.mesh.facets import are_among
 from ccfem.mesh.tet_mesh import TetMesh
 from ccfem.meshing import extrude
 from ccfem.plates.problem import PlaneProblem
@@ -168,7 +168,7 @@ def _taken_over(
     boundary = mesh.boundary
     if edges.shape[1] == 1:
         return _round(mesh.points[edges[:, 0]], walls, size, edge_length)
-    own = np.isin(_edge_keys(boundary), _edge_keys(edges))
+    own = are_among(boundary, edges)
     tree = shapely.STRtree(shapely.linestrings(mesh.points[boundary]))
     middles = shapely.points(walls.middle)
     (wall, edge), distance = tree.query_nearest(middles, return_distance=True)
@@ -181,11 +181,6 @@ def _taken_over(
     length = np.linalg.norm(outward, axis=1)
     facing = (outward * walls.normal).sum(axis=1) > _FACING * np.maximum(length, 1e-300)
     return nearest & facing
-
-
-def _edge_keys(edges: IntArray) -> IntArray:
-    """One integer (k,) for the nodes of each edge (k, 2), whatever their order."""
-    return facet_keys(np.pad(edges, ((0, 0), (0, 1)), mode="edge"))
 
 
 def _round(points: FloatArray, walls: _Walls, size: float, edge_length: float) -> BoolArray:

@@ -11,6 +11,7 @@ from ccfem.arrays import BoolArray, FloatArray, IntArray
 from ccfem.elasticity.problem import PointForce, Problem
 from ccfem.errors import InputError
 from ccfem.materials import Material
+from ccfem.mesh.facets import unique_edges
 from ccfem.mesh.tet_mesh import TetMesh
 from ccfem.topopt.cut import cut_mesh, volume_above
 from ccfem.topopt.cut_smoothing import relaxed
@@ -110,13 +111,11 @@ def _field(problem: Problem, density: FloatArray) -> _Field:
     for load in (load for case in problem.loads.values() for load in case):
         if isinstance(load, PointForce):
             anchors.append(np.array([cKDTree(mesh.points).query(load.point)[1]]))
-    ends = np.sort(mesh.cells[:, mesh.edges].reshape(-1, 2), axis=1)
-    keys = np.unique(ends[:, 0] * n + ends[:, 1])
     return _Field(
         mesh=mesh,
         values=total / np.maximum(weight, 1e-300),
         share=0.25 * weight / mesh.volumes.mean(),
-        pairs=np.stack(np.divmod(keys, n), axis=1),
+        pairs=unique_edges(mesh.cells[:, mesh.edges].reshape(-1, 2))[0],
         anchors=anchors,
     )
 

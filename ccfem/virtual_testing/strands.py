@@ -7,6 +7,7 @@ from numba import njit
 
 from ccfem.arrays import FloatArray, IntArray, freeze
 from ccfem.errors import InputError
+from ccfem.geometry.polylines import starts_segment
 from ccfem.mesh.tet_mesh import TetMesh
 from ccfem.toolpaths import FIBRE, Toolpaths
 
@@ -87,9 +88,8 @@ def cut_strands(toolpaths: Toolpaths, mesh: TetMesh, most_outside: float = 0.01)
         When there is no fibre, or none but links outside the mesh; or when more of it than allowed
         lies outside.
     """
-    follows = np.repeat(toolpaths.kind == FIBRE, np.diff(toolpaths.offsets))
-    follows[toolpaths.offsets[1:] - 1] = False
-    first_point = np.flatnonzero(follows)
+    fibre = np.repeat(toolpaths.kind == FIBRE, np.diff(toolpaths.offsets))
+    first_point = np.flatnonzero(fibre & starts_segment(toolpaths.offsets))
     path = np.searchsorted(toolpaths.offsets, first_point, side="right") - 1
     start = toolpaths.points[first_point]
     step = toolpaths.points[first_point + 1] - start
