@@ -13,7 +13,7 @@ import scipy.sparse as sp
 from numba import njit
 
 from ccfem.arrays import FloatArray, IntArray, freeze
-from ccfem.elasticity.body import Cells
+from ccfem.mesh.cell_mesh import CellMesh
 from ccfem.mesh.tet_mesh import TetMesh
 
 __all__ = ["Pattern", "add_blocks", "assemble", "cell_gradients", "pattern"]
@@ -45,7 +45,7 @@ class Pattern:
         freeze(self, indptr=np.int32, indices=np.int32, start=np.int32, touching=np.int32)
 
 
-def pattern(mesh: Cells) -> Pattern:
+def pattern(mesh: CellMesh) -> Pattern:
     """Find the pattern of the stiffness matrix of a mesh."""
     (m, q), n = mesh.cells.shape, len(mesh.points)
     starts = np.arange(0, m * q + 1, q, dtype=np.int32)

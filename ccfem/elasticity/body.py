@@ -1,44 +1,13 @@
-"""What the equations ask of a mesh and of a problem, in space or in the plane."""
+"""What loads and supports ask of a body and of a problem, in space or in the plane."""
 
 from collections.abc import Mapping
 from typing import Protocol
 
 from ccfem.arrays import FloatArray, IntArray
 from ccfem.elasticity.problem import Load, Support
+from ccfem.mesh.cell_mesh import CellMesh
 
-__all__ = ["Cells", "LoadedBody", "SupportedProblem"]
-
-
-class Cells(Protocol):
-    """A mesh of d-dimensional cells, d = 2 or 3, with named patches of facets."""
-
-    @property
-    def points(self) -> FloatArray:
-        """Nodes, (n, d), mm."""
-        ...
-
-    @property
-    def cells(self) -> IntArray:
-        """Nodes of each cell, (m, q)."""
-        ...
-
-    @property
-    def corners(self) -> IntArray:
-        """Corner nodes of each cell."""
-        ...
-
-    @property
-    def neighbours(self) -> IntArray:
-        """Pairs of cells that share a facet, (f, 2)."""
-        ...
-
-    def patch(self, name: str) -> IntArray:
-        """Facets of a named patch by their corners."""
-        ...
-
-    def facet_nodes(self, facets: IntArray) -> IntArray:
-        """All nodes of facets: their corners, and the middles of their sides."""
-        ...
+__all__ = ["LoadedBody", "SupportedProblem"]
 
 
 class LoadedBody(Protocol):
@@ -76,7 +45,7 @@ class SupportedProblem(Protocol):
     """A problem as supports and loads see it."""
 
     @property
-    def mesh(self) -> Cells:
+    def mesh(self) -> CellMesh:
         """The mesh that is held."""
         ...
 

@@ -8,8 +8,9 @@ import scipy.sparse as sp
 from scipy.sparse.csgraph import connected_components
 
 from ccfem.arrays import BoolArray, FloatArray, IntArray, read_only
-from ccfem.elasticity.body import Cells, SupportedProblem
+from ccfem.elasticity.body import SupportedProblem
 from ccfem.errors import InputError
+from ccfem.mesh.cell_mesh import CellMesh
 
 __all__ = ["Held", "check_support", "held", "rigid_modes"]
 
@@ -128,7 +129,7 @@ def rigid_modes(points: FloatArray) -> FloatArray:
     return modes.reshape(-1, 6)
 
 
-def check_support(mesh: Cells, fixed: BoolArray) -> None:
+def check_support(mesh: CellMesh, fixed: BoolArray) -> None:
     """Check that no piece of the part can move as a rigid body.
 
     Bodies are cells joined through faces (edges in the plane); bodies that share only an edge or a

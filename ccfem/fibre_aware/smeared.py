@@ -253,28 +253,28 @@ def on_linear_cells(stress: StressField, backend: str = "auto") -> StressField:
 
 
 @njit(cache=True)
+def _strain(cell, slopes, plane):  # type: ignore[no-untyped-def]  # pragma: no cover
+    """Strain e11, e22 and twice e12 in the plane of one cell."""
+    e1, e2, e12 = 0.0, 0.0, 0.0
+    for a in range(4):
+        u, v = plane[cell[a], 0], plane[cell[a], 1]
+        x, y = slopes[a, 0], slopes[a, 1]
+        e1 += u * x
+        e2 += v * y
+        e12 += u * y + v * x
+    return e1, e2, e12
+
+
+@njit(cache=True)
 def _strains(cells, slopes, plane, result):  # type: ignore[no-untyped-def]  # pragma: no cover
     for c in range(len(cells)):
-        e1, e2, e12 = 0.0, 0.0, 0.0
-        for a in range(4):
-            u, v = plane[cells[c, a], 0], plane[cells[c, a], 1]
-            x, y = slopes[c, a, 0], slopes[c, a, 1]
-            e1 += u * x
-            e2 += v * y
-            e12 += u * y + v * x
-        result[c, 0], result[c, 1], result[c, 2] = e1, e2, e12
+        result[c, 0], result[c, 1], result[c, 2] = _strain(cells[c], slopes[c], plane)
 
 
 @njit(cache=True)
 def _forces(cells, slopes, packed, plane, result):  # type: ignore[no-untyped-def]  # pragma: no cover
     for c in range(len(cells)):
-        e1, e2, e12 = 0.0, 0.0, 0.0
-        for a in range(4):
-            u, v = plane[cells[c, a], 0], plane[cells[c, a], 1]
-            x, y = slopes[c, a, 0], slopes[c, a, 1]
-            e1 += u * x
-            e2 += v * y
-            e12 += u * y + v * x
+        e1, e2, e12 = _strain(cells[c], slopes[c], plane)
         s1 = packed[c, 0] * e1 + packed[c, 1] * e2 + packed[c, 2] * e12
         s2 = packed[c, 1] * e1 + packed[c, 3] * e2 + packed[c, 4] * e12
         s12 = packed[c, 2] * e1 + packed[c, 4] * e2 + packed[c, 5] * e12

@@ -171,7 +171,8 @@ def _lay(field, grid, laid, seeds, homes, apart, test, step):  # type: ignore[no
             x, y = seeds[tried]
             home = homes[tried]
             tried += 1
-        if not contains(grid, x, y) or _occupied(laid, x, y, apart * (1.0 - _SLACK)):
+        taken = _crowded(laid, x, y, -1, 0.0, apart * (1.0 - _SLACK), False)
+        if taken or not contains(grid, x, y):
             continue
         turn, end, ring = _trace(field, grid, laid, count, lines, x, y, home, test, step)
         if end - count < apart / step:
@@ -249,25 +250,11 @@ def _take_back(laid, first, end):  # type: ignore[no-untyped-def]
 
 
 @njit(cache=True, nogil=True)
-def _occupied(laid, x, y, limit):  # type: ignore[no-untyped-def]
-    """Whether a point of any line is nearer than a limit."""
-    i, j = _cell(laid, x, y)
-    nx, ny = laid.head.shape
-    for a in range(max(i - 1, 0), min(i + 2, nx)):
-        for b in range(max(j - 1, 0), min(j + 2, ny)):
-            q = laid.head[a, b]
-            while q >= 0:
-                if (laid.spot[q, 0] - x) ** 2 + (laid.spot[q, 1] - y) ** 2 < limit * limit:
-                    return True
-                q = laid.following[q]
-    return False
-
-
-@njit(cache=True, nogil=True)
 def _crowded(laid, x, y, number, along, limit, homing):  # type: ignore[no-untyped-def]
     """Whether a point of another line, or of another stretch of this one, is nearer than a limit.
 
-    A line that comes home meets the stretch about its seed: that does not count.
+    A line that comes home meets the stretch about its seed: that does not count. Line -1 has no
+    points yet.
     """
     i, j = _cell(laid, x, y)
     nx, ny = laid.head.shape

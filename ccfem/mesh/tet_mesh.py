@@ -1,15 +1,14 @@
 """Tetrahedral meshes with named patches."""
 
-from collections.abc import Mapping
-from dataclasses import dataclass, field, replace
+from dataclasses import dataclass
 from functools import cached_property
 
 import numpy as np
 
-from ccfem.arrays import FloatArray, IntArray, freeze, read_only
-from ccfem.checks import check_known
+from ccfem.arrays import FloatArray, IntArray, read_only
 from ccfem.errors import InputError
-from ccfem.mesh.facets import paired, positions, unique_edges
+from ccfem.mesh.cell_mesh import CellMesh
+from ccfem.mesh.facets import positions, unique_edges
 
 __all__ = ["TetMesh", "signed_volumes"]
 
@@ -27,7 +26,7 @@ def signed_volumes(points: FloatArray, corners: IntArray) -> FloatArray:
 
 
 @dataclass(frozen=True)
-class TetMesh:
+class TetMesh(CellMesh):
     """A tetrahedral mesh, linear (P1) or quadratic (P2), with named boundary patches.
 
     Attributes
@@ -39,29 +38,11 @@ class TetMesh:
         Boundary facets by their corner nodes.
     """
 
-    points: FloatArray
-    cells: IntArray
-    patches: Mapping[str, IntArray] = field(default_factory=dict)
-
+    dimension = 3
+    sizes = (4, 10)
+    kinds = "linear or quadratic tetrahedra"
     edges = _EDGES
     faces = _FACES
-
-    def __post_init__(self) -> None:
-        freeze(self, points=float, cells=int, patches=int)
-        if self.points.ndim != 2 or self.points.shape[1] != 3:
-            raise InputError(
-                f"mesh points must have shape (n, 3); got {self.points.shape}: give x, y, z a node"
-            )
-        if self.cells.ndim != 2 or self.cells.shape[1] not in (4, 10) or not len(self.cells):
-            raise InputError(
-                f"mesh cells must have shape (m, 4) or (m, 10) with m >= 1; got "
-                f"{self.cells.shape}: give linear or quadratic tetrahedra"
-            )
-        if self.cells.min() < 0 or self.cells.max() >= len(self.points):
-            raise InputError(
-                f"mesh cells must name nodes 0 to {len(self.points) - 1}; got "
-                f"{self.cells.min()} to {self.cells.max()}: check the numbering of the file"
-            )
 
     @property
     def order(self) -> int:
@@ -90,33 +71,9 @@ class TetMesh:
             return read_only(longest * largest / (3.0 * np.abs(self.volumes)))
 
     @property
-    def _facets(self) -> IntArray:
+    def facets(self) -> IntArray:
         """Corner nodes of the faces of all cells, (4 m, 3), outward."""
         return self.corners[:, _FACES].reshape(-1, 3)
-
-    @cached_property
-    def _pairing(self) -> tuple[IntArray, IntArray]:
-        return paired(self._facets)
-
-    @cached_property
-    def boundary(self) -> IntArray:
-        """Corner nodes of the boundary facets, (b, 3), outward."""
-        return read_only(self._facets[self._pairing[1]], int)
-
-    @cached_property
-    def boundary_cells(self) -> IntArray:
-        """Cell of each boundary facet, (b,)."""
-        return read_only(self._pairing[1] // 4, int)
-
-    @cached_property
-    def neighbours(self) -> IntArray:
-        """Pairs of cells that share a face, (f, 2)."""
-        return read_only(self._pairing[0] // 4, int)
-
-    @cached_property
-    def bounds(self) -> FloatArray:
-        """Smallest and largest coordinates, (2, 3), mm."""
-        return read_only(np.stack([self.points.min(axis=0), self.points.max(axis=0)]))
 
     def facet_areas(self, facets: IntArray) -> tuple[FloatArray, FloatArray]:
         """Areas (k,), mm^2, and unit normals (k, 3) of facets (k, 3)."""
@@ -149,21 +106,6 @@ class TetMesh:
                 "a patch has facets that no cell of the mesh has: name boundary facets"
             )
         return np.hstack([facets, self.cells[:, 4:].reshape(-1)[chosen[at]].reshape(-1, 3)])
-
-    def with_patches(self, patches: Mapping[str, IntArray]) -> "TetMesh":
-        """Return the same mesh with more named patches, (k, 3) facets each."""
-        return replace(self, patches={**self.patches, **patches})
-
-    def patch(self, name: str) -> IntArray:
-        """Facets (k, 3) of a named patch.
-
-        Raises
-        ------
-        InputError
-            When there is no patch of that name; the known ones are listed.
-        """
-        check_known("patch", name, sorted(self.patches))
-        return self.patches[name]
 
     def quadratic(self) -> "TetMesh":
         """Return the P2 mesh with a node at the middle of every edge; patches stay."""
