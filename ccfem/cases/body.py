@@ -5,6 +5,7 @@ from pathlib import Path
 from typing import Any, Literal
 
 import numpy as np
+import shapely
 
 from ccfem.errors import InputError
 from ccfem.io import read_mesh, read_surface
@@ -94,8 +95,6 @@ def _filled(body: Body, folder: Path) -> TetMesh:
         from ccfem.meshing import tetrahedralise
 
         return tetrahedralise(read_surface(folder / body.surface, body.scale), body.edge_length)
-    import shapely
-
     from ccfem.meshing import extrude
 
     plan = from_table(_Planform, body.planform, "planform")
@@ -114,10 +113,8 @@ def _filled(body: Body, folder: Path) -> TetMesh:
     return extrude(outline.difference(holes), plan.height, plan.edge_length)
 
 
-def _polygon(outline: tuple[tuple[float, float], ...], where: str) -> Any:
+def _polygon(outline: tuple[tuple[float, float], ...], where: str) -> shapely.Polygon:
     """Make a polygon of an outline that does not cut itself."""
-    import shapely
-
     if len(outline) < 3:
         raise InputError(f"{where}.outline needs at least 3 points; got {len(outline)}: add some")
     polygon = shapely.Polygon(outline)

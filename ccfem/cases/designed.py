@@ -7,7 +7,7 @@ optimised, the part that the optimum stands for, and the case of either part.
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass, replace
 from functools import cached_property
-from typing import Any, Literal
+from typing import Literal
 
 import numpy as np
 import shapely
@@ -101,7 +101,7 @@ class Hole:
     radius: float
     rim: float = 0.0
 
-    def disc(self, more: float = 0.0) -> Any:
+    def disc(self, more: float = 0.0) -> shapely.Polygon:
         """Area of the hole, wider by `more`, mm: a shapely Polygon."""
         return shapely.Point(self.x, self.y).buffer(self.radius + more, quad_segs=32)
 
@@ -132,7 +132,7 @@ class DesignPlate:
 
     name: str
     title: str
-    border: Any
+    border: shapely.Polygon
     supports: Mapping[str, tuple[Stretch, str]]
     load: Stretch
     volume_fraction: float
@@ -148,7 +148,7 @@ class DesignPlate:
         check_choices(self)
 
     @cached_property
-    def domain(self) -> Any:
+    def domain(self) -> shapely.Polygon:
         """The plate with its holes: a shapely Polygon, mm."""
         return self.border.difference(shapely.union_all([hole.disc() for hole in self.holes]))
 
@@ -193,7 +193,7 @@ class DesignPlate:
             progress=progress,
         )
 
-    def outline(self, design: Design) -> Any:
+    def outline(self, design: Design) -> shapely.Polygon:
         """Part that a design of this plate stands for: a shapely Polygon, mm."""
         density = np.where(self.rims, 0.0, design.density)
         for hole in self.holes:
@@ -216,12 +216,12 @@ class DesignPlate:
         return np.asarray(cKDTree(self.problem.mesh.centres).query(centres)[1])
 
     @property
-    def part(self) -> Any:
+    def part(self) -> shapely.Polygon:
         """Optimised part: a shapely Polygon, mm; the stored one where there is one."""
         stored = stored_outline(self.name, self.volume_fraction)
         return self.outline(self.design()) if stored is None else stored
 
-    def mesh(self, polygon: Any, element_size: float, thickness: float) -> TetMesh:
+    def mesh(self, polygon: shapely.Polygon, element_size: float, thickness: float) -> TetMesh:
         """Extrude the plate, or a part of it, with patches of supports, load and holes.
 
         Patch ``bottom`` is the face at z = 0.

@@ -4,7 +4,7 @@ B. Jobard, W. Lefer, Creating evenly-spaced streamlines of arbitrary density, Vi
 Scientific Computing '97, Springer (1997) 43.
 """
 
-from typing import Any, NamedTuple
+from typing import NamedTuple
 
 import numpy as np
 import shapely
@@ -20,6 +20,7 @@ from ccfem.fields.streamlines import (
     triangle_neighbours,
 )
 from ccfem.geometry.section_grid import SectionGrid, contains, section_grid
+from ccfem.geometry.shapes import Region
 from ccfem.tensor import strongest_in_plane
 
 __all__ = ["evenly_spaced_streamlines"]
@@ -37,7 +38,7 @@ def evenly_spaced_streamlines(
     points: FloatArray,
     triangles: IntArray,
     plane_stress: FloatArray,
-    region: Any,
+    region: Region,
     separation: float,
     closest: float = 0.5,
 ) -> list[FloatArray]:

@@ -12,6 +12,7 @@ from ccfem.arrays import FloatArray, IntArray, read_only
 from ccfem.geometry.isocontours import triangle_edges
 from ccfem.layers.layer import Layer
 from ccfem.mesh.facets import paired
+from ccfem.mesh.measures import signed_areas
 
 __all__ = ["Surface", "positive_definite"]
 
@@ -47,9 +48,7 @@ class Surface:
     @cached_property
     def areas(self) -> FloatArray:
         """Area of each triangle, (t,), mm^2."""
-        a, b, c = np.moveaxis(self.points[self.triangles], 1, 0)
-        u, v = b - a, c - a
-        return read_only(0.5 * (u[:, 0] * v[:, 1] - u[:, 1] * v[:, 0]))
+        return read_only(signed_areas(self.points, self.triangles))
 
     @cached_property
     def gradients(self) -> FloatArray:

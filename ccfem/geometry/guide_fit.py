@@ -6,14 +6,14 @@ its whole length; where the guide lies decides how much of it there is.
 """
 
 from collections.abc import Sequence
-from typing import Any
 
 import numpy as np
 import shapely
 
-from ccfem.arrays import FloatArray
+from ccfem.arrays import BoolArray, FloatArray
 from ccfem.geometry.offsets import rings
 from ccfem.geometry.polylines import pack, sample_midpoints, straight_pieces
+from ccfem.geometry.shapes import Region
 
 __all__ = ["fitted_guides"]
 
@@ -28,7 +28,7 @@ _ROUNDS = 3
 """A guide is fitted between its neighbours, and these move too: times that all are fitted."""
 
 
-def fitted_guides(guides: Sequence[FloatArray], region: Any, pitch: float) -> list[FloatArray]:
+def fitted_guides(guides: Sequence[FloatArray], region: Region, pitch: float) -> list[FloatArray]:
     """Guides moved aside by at most half a pitch, so that gaps and overlaps become least.
 
     Parameters
@@ -123,7 +123,7 @@ def _first_hits(
 
 def _nearer(
     border: tuple[FloatArray, FloatArray], guides: tuple[FloatArray, FloatArray]
-) -> tuple[FloatArray, FloatArray, Any]:
+) -> tuple[FloatArray, FloatArray, BoolArray]:
     """Nearer of two hits: distance, how parallel, and whether it is the second."""
     second = guides[0] < border[0]
     gap = np.where(second, guides[0], border[0])

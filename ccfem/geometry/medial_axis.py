@@ -8,19 +8,18 @@ against its chord.
 
 from dataclasses import dataclass
 from itertools import pairwise
-from typing import Any
 
 import numpy as np
 import shapely
-from scipy.sparse import coo_array
-from scipy.sparse.csgraph import connected_components
 from scipy.spatial import QhullError, Voronoi, cKDTree
 
 from ccfem.arrays import BoolArray, FloatArray, IntArray, freeze
 from ccfem.checks import check_number
 from ccfem.geometry.offsets import rings
 from ccfem.geometry.polylines import is_closed, line_length
+from ccfem.geometry.shapes import Region
 from ccfem.mesh.facets import facet_keys
+from ccfem.mesh.measures import connected
 
 __all__ = ["MedialAxis", "MedialSegment", "medial_axis"]
 
@@ -89,7 +88,7 @@ class MedialAxis:
 
 
 def medial_axis(
-    section: Any,
+    section: Region,
     step: float,
     object_angle: float | None = 105.0,
     arc_chord: float | None = None,
@@ -153,7 +152,7 @@ class _Border:
     after: IntArray
 
     @classmethod
-    def of(cls, section: Any, step: float) -> "_Border":
+    def of(cls, section: Region, step: float) -> "_Border":
         points, ring, along, around, before, after = [], [], [], [], [], []
         start = 0
         for number, line in enumerate(rings(section)):
@@ -211,7 +210,7 @@ class _Graph:
     chord: FloatArray
 
     @classmethod
-    def inside(cls, section: Any, border: _Border, step: float) -> "_Graph | None":
+    def inside(cls, section: Region, border: _Border, step: float) -> "_Graph | None":
         try:
             diagram = Voronoi(border.points)
         except QhullError:
@@ -236,8 +235,7 @@ class _Graph:
         # Samples on one circle give several vertices in one place.
         size = np.linalg.norm(points[edges[:, 0]] - points[edges[:, 1]], axis=1)
         tiny = edges[size < _SAME * step]
-        join = coo_array((np.ones(len(tiny)), tiny.T), shape=(len(points),) * 2)
-        _, place = connected_components(join, directed=False)
+        place = connected(tiny, len(points))
         _, first = np.unique(place, return_index=True)
         points, nearest = points[first], nearest[first]
         edges = np.sort(place[edges], axis=1)
@@ -331,7 +329,7 @@ def _pruned(graph: _Graph, chains: list[list[int]], prune: float, step: float) -
         chains = _chains(edges, np.ones(len(edges), dtype=bool), len(graph.points))
 
 
-def _as_axis(section: Any, graph: _Graph, chains: list[list[int]]) -> MedialAxis:
+def _as_axis(section: Region, graph: _Graph, chains: list[list[int]]) -> MedialAxis:
     """Values of the chains, and a node for every part of the section that has none."""
     ends = {end for chain in chains if chain[0] != chain[-1] for end in (chain[0], chain[-1])}
     starts = shapely.points(graph.points[[chain[0] for chain in chains]])

@@ -1,7 +1,6 @@
 """Offsets of a section from its border, and rings joined into one path."""
 
 from collections.abc import Sequence
-from typing import Any
 
 import numpy as np
 import shapely
@@ -9,6 +8,7 @@ from shapely.geometry.polygon import orient
 
 from ccfem.arrays import FloatArray
 from ccfem.geometry.polylines import along_line, line_length
+from ccfem.geometry.shapes import Region
 
 __all__ = ["inset", "join_rings", "offset_rings", "ring_from", "rings"]
 
@@ -23,7 +23,7 @@ _RAMPS = (2.0, 1.0, 0.0)
 27, 45 and 90 degrees."""
 
 
-def inset(section: Any, distance: float, width: float = 0.0) -> Any:
+def inset(section: Region, distance: float, width: float = 0.0) -> Region:
     """Part of a section that keeps a distance from its border.
 
     Parameters
@@ -48,7 +48,7 @@ def inset(section: Any, distance: float, width: float = 0.0) -> Any:
     return inner
 
 
-def rings(section: Any) -> list[FloatArray]:
+def rings(section: Region) -> list[FloatArray]:
     """Border rings of a (Multi)Polygon as closed (k, 2) polylines, material on the left, mm."""
     found = []
     for part in shapely.get_parts(section):
@@ -60,7 +60,7 @@ def rings(section: Any) -> list[FloatArray]:
 
 
 def offset_rings(
-    section: Any, first: float, spacing: float, width: float, count: int | None = None
+    section: Region, first: float, spacing: float, width: float, count: int | None = None
 ) -> list[list[FloatArray]]:
     """Rings parallel to the border of a section, every one measured from the border itself.
 
@@ -155,7 +155,11 @@ def join_rings(
 
 
 def _ramp(
-    ring: FloatArray, inner: Sequence[FloatArray], spacing: float, gap: float, walls: Any
+    ring: FloatArray,
+    inner: Sequence[FloatArray],
+    spacing: float,
+    gap: float,
+    walls: shapely.MultiLineString,
 ) -> tuple[FloatArray, FloatArray, int] | None:
     """`ring` opened, the nearest ring of the next level from its start, and its position there."""
     length, longest = line_length(ring), gap + _RAMPS[0] * spacing

@@ -2,7 +2,6 @@
 
 from collections.abc import Sequence
 from itertools import pairwise
-from typing import Any
 
 import numpy as np
 import shapely
@@ -10,7 +9,7 @@ import shapely
 from ccfem.arrays import FloatArray, IntArray
 from ccfem.geometry.free_ends import lead_on
 from ccfem.geometry.polylines import is_closed, line_length, straight_pieces
-from ccfem.geometry.shapes import open_lines
+from ccfem.geometry.shapes import Region, open_lines
 from ccfem.geometry.shells import concentric
 
 __all__ = ["fill_rest", "grow", "lengthened", "parallels"]
@@ -32,7 +31,7 @@ _TOLERANCE = 2e-3
 
 def grow(
     curves: Sequence[FloatArray],
-    region: Any,
+    region: Region,
     pitch: float,
     closest: float,
     count: int | None = None,
@@ -77,7 +76,7 @@ def grow(
 
 def parallels(
     curves: Sequence[FloatArray],
-    region: Any,
+    region: Region,
     pitch: float,
     closest: float,
     count: int | None = None,
@@ -146,7 +145,7 @@ def parallels(
 
 
 def _own_pieces(
-    ring: FloatArray, sides: Any, owners: IntArray, distance: float, tolerance: float
+    ring: FloatArray, sides: shapely.STRtree, owners: IntArray, distance: float, tolerance: float
 ) -> list[FloatArray]:
     """Pieces of a ring that lie at a distance from their nearest curve, split where that changes.
 
@@ -174,7 +173,7 @@ def _without_hooks(line: FloatArray, least: float) -> FloatArray:
     return line[long[0] : long[-1] + 2] if len(long) else line
 
 
-def fill_rest(rest: Any, pitch: float, closest: float) -> list[FloatArray]:
+def fill_rest(rest: Region, pitch: float, closest: float) -> list[FloatArray]:
     """Concentric strands in what other strands leave open.
 
     Parameters
@@ -199,7 +198,7 @@ def fill_rest(rest: Any, pitch: float, closest: float) -> list[FloatArray]:
     return concentric(shapely.multipolygons(parts), pitch, closest, walls=False)
 
 
-def lengthened(line: FloatArray, region: Any, near: float, length: float) -> FloatArray:
+def lengthened(line: FloatArray, region: Region, near: float, length: float) -> FloatArray:
     """Open line made longer, straight, at ends that lie near the border of a region.
 
     Parameters

@@ -1,6 +1,6 @@
 """A section for compiled loops: where a point lies about it, and how much room it has there."""
 
-from typing import Any, NamedTuple
+from typing import NamedTuple
 
 import numpy as np
 import shapely
@@ -9,6 +9,7 @@ from scipy.ndimage import distance_transform_edt
 
 from ccfem.arrays import BoolArray, FloatArray, IntArray
 from ccfem.geometry.places import INSIDE, OUTSIDE, VOID
+from ccfem.geometry.shapes import Region
 
 __all__ = ["SectionGrid", "contains", "place", "place_and_room", "section_grid"]
 
@@ -43,7 +44,7 @@ class SectionGrid(NamedTuple):
     outer: BoolArray
 
 
-def section_grid(section: Any, margin: float, cell: float = 0.5) -> SectionGrid:
+def section_grid(section: Region, margin: float, cell: float = 0.5) -> SectionGrid:
     """Prepare a section for `place` and `place_and_room`.
 
     Parameters

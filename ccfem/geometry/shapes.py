@@ -1,27 +1,30 @@
 """Shapely geometry: its types, and the way from polylines to it and back."""
 
 from collections.abc import Sequence
-from typing import Any
 
 import numpy as np
 import shapely
+from numpy.typing import NDArray
 
 from ccfem.arrays import FloatArray
 from ccfem.geometry.polylines import pack
 
-__all__ = ["Region", "open_lines", "strings"]
+__all__ = ["Region", "Shapes", "open_lines", "strings"]
 
 Region = shapely.Polygon | shapely.MultiPolygon
 """An area in a plane, mm: the section of a layer or a part of it; it may be empty."""
 
+Shapes = NDArray[np.object_]
+"""An array of shapely geometries."""
 
-def strings(lines: Sequence[FloatArray]) -> Any:
+
+def strings(lines: Sequence[FloatArray]) -> Shapes:
     """LineStrings (k,) of some (n_i, 2) polylines."""
     points, offsets = pack(lines)
     return shapely.linestrings(points, indices=np.repeat(np.arange(len(lines)), np.diff(offsets)))
 
 
-def open_lines(shapes: Any) -> list[FloatArray]:
+def open_lines(shapes: shapely.Geometry | Shapes) -> list[FloatArray]:
     """Lines of geometries as (k, 2) arrays, pieces that touch end to end joined."""
     found = []
     for shape in np.atleast_1d(shapes):

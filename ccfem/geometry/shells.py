@@ -1,7 +1,5 @@
 """Concentric strands: rings along the border, and lines along the middle of what they leave."""
 
-from typing import Any
-
 import numpy as np
 import shapely
 
@@ -10,6 +8,7 @@ from ccfem.geometry.medial_axis import MedialAxis, medial_axis
 from ccfem.geometry.offsets import inset, rings
 from ccfem.geometry.polylines import is_closed, line_length, runs, straight_pieces
 from ccfem.geometry.sections import corners_only
+from ccfem.geometry.shapes import Region
 
 __all__ = ["concentric", "middle_lines", "shells"]
 
@@ -23,8 +22,8 @@ _STRAIGHT = 0.03
 
 
 def shells(
-    section: Any, width: float, pitch: float, count: int, closest: float
-) -> tuple[list[FloatArray], Any]:
+    section: Region, width: float, pitch: float, count: int, closest: float
+) -> tuple[list[FloatArray], Region]:
     """Rings along every border of a section, and what they leave inside.
 
     Parameters
@@ -57,7 +56,7 @@ def shells(
 
 
 def concentric(
-    section: Any,
+    section: Region,
     pitch: float,
     closest: float,
     first: float | None = None,
@@ -108,7 +107,7 @@ def concentric(
     return lines + middle_lines(axis, lines, pitch, closest, first, count, walls)
 
 
-def _opened(section: Any, distance: float, width: float) -> Any:
+def _opened(section: Region, distance: float, width: float) -> Region:
     """Part of a section inside a distance, without channels narrower than a width.
 
     As `inset`, but corners stay sharp: strands fill them at the price of lying closer there.
@@ -124,7 +123,7 @@ def _opened(section: Any, distance: float, width: float) -> Any:
     return shapely.remove_repeated_points(shapely.multipolygons(parts), _SAME * width)
 
 
-def _narrow(section: Any, first: float, pitch: float, closest: float, count: int) -> bool:
+def _narrow(section: Region, first: float, pitch: float, closest: float, count: int) -> bool:
     """Whether some part of the section is too narrow for `count` rings, corners left aside."""
     depth = first + (count - 1 + 0.5 * closest) * pitch
     core = shapely.buffer(section, -depth, join_style="mitre")

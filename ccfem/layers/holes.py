@@ -1,7 +1,6 @@
 """Holes of a layer, found by the patches that their edges lie on."""
 
 from collections.abc import Iterable
-from typing import Any
 
 import shapely
 
@@ -11,7 +10,7 @@ from ccfem.layers.layer import Layer
 __all__ = ["holes_on"]
 
 
-def holes_on(layer: Layer, patches: Iterable[str]) -> list[Any]:
+def holes_on(layer: Layer, patches: Iterable[str]) -> list[shapely.Polygon]:
     """Holes of a flat layer whose edge touches one of the patches, as shapely Polygons.
 
     Raises

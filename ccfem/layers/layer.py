@@ -3,12 +3,13 @@
 from collections.abc import Mapping
 from dataclasses import dataclass, field
 from functools import cached_property
-from typing import Any
 
 import numpy as np
 import shapely
 
 from ccfem.arrays import FloatArray, IntArray, freeze, read_only
+from ccfem.geometry.shapes import Region
+from ccfem.mesh.measures import signed_areas
 
 __all__ = ["Layer"]
 
@@ -80,12 +81,10 @@ class Layer:
     @cached_property
     def areas(self) -> FloatArray:
         """Area of each triangle, (t,), mm^2."""
-        a, b, c = np.moveaxis(self.plane_points[self.triangles], 1, 0)
-        u, v = b - a, c - a
-        return read_only(0.5 * (u[:, 0] * v[:, 1] - u[:, 1] * v[:, 0]))
+        return read_only(signed_areas(self.plane_points, self.triangles))
 
     @cached_property
-    def polygon(self) -> Any:
+    def polygon(self) -> Region:
         """Section of a flat layer in plane coordinates: a valid (Multi)Polygon with holes, mm."""
         rings = [shapely.Polygon(self.plane_points[loop]) for loop in self.loops if len(loop) > 2]
         outer = [ring for ring in rings if ring.exterior.is_ccw]

@@ -1,20 +1,19 @@
 """Curves that run along a chosen boundary, and isocurves led into them [Chen et al. 2021, 4.4]."""
 
 from collections.abc import Sequence
-from typing import Any
 
 import numpy as np
 import shapely
 
 from ccfem.arrays import FloatArray
 from ccfem.geometry.polylines import is_closed
-from ccfem.geometry.shapes import open_lines
+from ccfem.geometry.shapes import Region, open_lines
 from ccfem.linking.joining import Joint, join, ring_arc
 
 __all__ = ["lead_into", "parallel_curve"]
 
 
-def parallel_curve(boundary: Any, distance: float, section: Any) -> list[FloatArray]:
+def parallel_curve(boundary: shapely.Polygon, distance: float, section: Region) -> list[FloatArray]:
     """Curve at a distance from a closed boundary, inside the section.
 
     Parameters
@@ -36,7 +35,7 @@ def parallel_curve(boundary: Any, distance: float, section: Any) -> list[FloatAr
 
 
 def lead_into(
-    lines: Sequence[FloatArray], boundary: Any, distance: float, section: Any
+    lines: Sequence[FloatArray], boundary: shapely.Polygon, distance: float, section: Region
 ) -> list[FloatArray]:
     """Cut lines back to a distance from a boundary and join the cut ends along it.
 
@@ -74,7 +73,9 @@ def lead_into(
     return join(pieces, _pairing(sorted(ends), ring, section))
 
 
-def _pairing(ends: list[tuple[float, int]], ring: Any, section: Any) -> list[Joint]:
+def _pairing(
+    ends: list[tuple[float, int]], ring: shapely.LinearRing, section: Region
+) -> list[Joint]:
     """Joints of consecutive ends along the ring, of the smallest total length."""
     count = len(ends)
     if count < 2:

@@ -1,20 +1,19 @@
 """From curves to paths that can be printed: kept off the border, linked, short ones dropped."""
 
 from collections.abc import Sequence
-from typing import Any
 
 import numpy as np
 import shapely
 
 from ccfem.arrays import FloatArray
 from ccfem.geometry.polylines import along_line, is_closed, line_length, points_along
-from ccfem.geometry.shapes import open_lines
+from ccfem.geometry.shapes import Region, open_lines
 from ccfem.linking.joining import link_ends
 
 __all__ = ["close_short_ring", "keep_off_border", "linked_paths"]
 
 
-def keep_off_border(lines: Sequence[FloatArray], section: Any, inset: float) -> list[FloatArray]:
+def keep_off_border(lines: Sequence[FloatArray], section: Region, inset: float) -> list[FloatArray]:
     """Parts of lines that keep a distance from the border of a section.
 
     Parameters
@@ -45,7 +44,7 @@ def keep_off_border(lines: Sequence[FloatArray], section: Any, inset: float) -> 
 
 def linked_paths(
     lines: list[FloatArray],
-    section: Any,
+    section: Region,
     width: float,
     link_limit: float,
     least_length: float,

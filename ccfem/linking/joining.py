@@ -10,7 +10,7 @@ from scipy.spatial import cKDTree
 
 from ccfem.arrays import FloatArray
 from ccfem.geometry.polylines import along_line, is_closed, points_along
-from ccfem.geometry.shapes import strings
+from ccfem.geometry.shapes import Region, strings
 
 __all__ = ["Joint", "join", "link_ends", "ring_arc"]
 
@@ -98,7 +98,7 @@ class _Link:
 
 def link_ends(
     lines: Sequence[FloatArray],
-    section: Any,
+    section: Region,
     limit: float,
     width: float,
     turn_cost: float = 1.0,
@@ -143,7 +143,7 @@ def link_ends(
 
 
 def _accept(
-    lines: list[FloatArray], links: list[_Link], section: Any, clearance: float
+    lines: list[FloatArray], links: list[_Link], section: Region, clearance: float
 ) -> list[FloatArray]:
     """Take links greedily, cheapest first, as long as they keep off everything else."""
     if not links:
@@ -180,7 +180,7 @@ def _accept(
 
 
 def _free_links(
-    lines: list[FloatArray], paths: Any, owners: Any, section: Any, clearance: float
+    lines: list[FloatArray], paths: Any, owners: Any, section: Region, clearance: float
 ) -> Any:
     """Mask (l,) of links inside the section and clear of all strands but their own."""
     # The link of two ends on one edge of the border lies on it: that must not be up to rounding.
@@ -244,7 +244,7 @@ def _boundary_links(
     points: FloatArray,
     outward: FloatArray,
     ends: Any,
-    section: Any,
+    section: Region,
     inset: float,
     limit: float,
     turn_cost: float,
@@ -281,7 +281,7 @@ def _boundary_links(
     return links
 
 
-def ring_arc(ring: Any, start: float, length: float) -> FloatArray:
+def ring_arc(ring: shapely.LinearRing, start: float, length: float) -> FloatArray:
     """Points (n, 2) of a closed ring from the arc length `start` over `length`, both ends in."""
     corners = shapely.get_coordinates(ring)
     along = along_line(corners)

@@ -10,7 +10,6 @@ the order of the tracks is the one whose links cost least (`ordering`).
 from collections.abc import Sequence
 from dataclasses import dataclass
 from itertools import pairwise
-from typing import Any
 
 import numpy as np
 import shapely
@@ -22,6 +21,7 @@ from ccfem.geometry.offsets import ring_from
 from ccfem.geometry.places import INSIDE, VOID, cut_at_section
 from ccfem.geometry.polylines import between, is_closed, line_length, runs
 from ccfem.geometry.section_grid import section_grid
+from ccfem.geometry.shapes import Region
 from ccfem.linking.exchanges import improved_order
 from ccfem.linking.link_curves import LinkCurves, link_curve, link_curves, stub_points
 from ccfem.linking.ordering import costs_between_ends, order_clusters, strand_visits
@@ -63,7 +63,7 @@ class LinkedPath:
         return [self.points[a : b + 1] for a, b in self._stretches()]
 
     def without_long_links(
-        self, section: Any, inside: float, over_void: float = np.inf
+        self, section: Region, inside: float, over_void: float = np.inf
     ) -> "list[LinkedPath]":
         """Leave out links of which more than so many mm lies inside a section or over its voids.
 
@@ -94,7 +94,7 @@ class LinkedPath:
 
 def link_tracks(
     groups: Sequence[Sequence[FloatArray]],
-    section: Any,
+    section: Region,
     radius: float,
     width: float,
     inside_weight: float = 8.0,
@@ -236,7 +236,7 @@ class _Network:
         cls,
         tracks: Sequence[FloatArray],
         closed: BoolArray,
-        section: Any,
+        section: Region,
         radius: float,
         weights: FloatArray,
     ) -> "_Network":

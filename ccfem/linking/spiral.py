@@ -1,13 +1,13 @@
 """Nested closed strands joined to one spiral, so that the fibre is cut once and not at each."""
 
 from collections.abc import Callable, Sequence
-from typing import Any
 
 import numpy as np
 import shapely
 
 from ccfem.arrays import FloatArray
 from ccfem.geometry.polylines import is_closed
+from ccfem.geometry.shapes import Region
 from ccfem.linking.joining import ring_arc
 
 __all__ = ["spiral"]
@@ -20,7 +20,7 @@ def spiral(
     lines: Sequence[FloatArray],
     limit: float,
     cost: Callable[[FloatArray], FloatArray],
-    section: Any,
+    section: Region,
 ) -> list[FloatArray]:
     """Join closed lines that lie in each other to spirals.
 
@@ -112,7 +112,7 @@ def _wind(
     return np.concatenate(pieces)
 
 
-def _fits(line: FloatArray, obstacles: list[Any], section: Any) -> bool:
+def _fits(line: FloatArray, obstacles: list[shapely.LineString], section: Region) -> bool:
     string = shapely.linestrings(line)
     return bool(
         shapely.is_simple(string)

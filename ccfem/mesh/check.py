@@ -4,14 +4,13 @@ from collections.abc import Mapping
 from dataclasses import dataclass
 
 import numpy as np
-from scipy.sparse import coo_array
-from scipy.sparse.csgraph import connected_components
 
 from ccfem.arrays import BoolArray, FloatArray, IntArray
 from ccfem.errors import InputError
 from ccfem.mesh.facets import are_among
+from ccfem.mesh.measures import connected, signed_volumes
 from ccfem.mesh.patches import match_boundary
-from ccfem.mesh.tet_mesh import TetMesh, signed_volumes
+from ccfem.mesh.tet_mesh import TetMesh
 
 __all__ = ["MeshReport", "about_slivers", "check_mesh"]
 
@@ -252,10 +251,8 @@ def _check_faces(mesh: TetMesh) -> None:
 
 def _components(corners: IntArray, nodes: int) -> int:
     """Count the pieces that hang together through nodes."""
-    links = corners[:, [0, 0, 0]].ravel(), corners[:, 1:].ravel()
-    graph = coo_array((np.ones(len(links[0]), dtype=bool), links), shape=(nodes, nodes))
-    _, label = connected_components(graph, directed=False)
-    return len(np.unique(label[corners[:, 0]]))
+    piece = connected(corners[:, [[0, 1], [0, 2], [0, 3]]].reshape(-1, 2), nodes)
+    return len(np.unique(piece[corners[:, 0]]))
 
 
 def _patches(

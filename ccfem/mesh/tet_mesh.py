@@ -9,20 +9,15 @@ from ccfem.arrays import FloatArray, IntArray, read_only
 from ccfem.errors import InputError
 from ccfem.mesh.cell_mesh import CellMesh
 from ccfem.mesh.facets import positions, unique_edges
+from ccfem.mesh.measures import signed_volumes
 
-__all__ = ["TetMesh", "signed_volumes"]
+__all__ = ["TetMesh"]
 
 _FACES = np.array([[1, 2, 3], [0, 3, 2], [0, 1, 3], [0, 2, 1]])
 """Corner nodes of the face opposite to each corner, outward for a positive cell."""
 
 _EDGES = np.array([[0, 1], [1, 2], [0, 2], [0, 3], [1, 3], [2, 3]])
 """Corner nodes of the edge that carries mid-side node 4 + k (VTK order)."""
-
-
-def signed_volumes(points: FloatArray, corners: IntArray) -> FloatArray:
-    """Volume of straight-sided tetrahedra (m, 4), (m,), mm^3; negative where turned inside out."""
-    a, b, c, d = np.moveaxis(points[corners], 1, 0)
-    return np.asarray(np.einsum("ij,ij->i", np.cross(b - a, c - a), d - a) / 6.0)
 
 
 @dataclass(frozen=True)

@@ -8,7 +8,6 @@ triangulation in every round.
 
 from collections.abc import Callable
 from itertools import pairwise
-from typing import Any
 
 import numpy as np
 import shapely
@@ -17,7 +16,9 @@ from scipy.spatial import Delaunay, QhullError, cKDTree
 from ccfem.arrays import FloatArray, IntArray
 from ccfem.checks import check_number
 from ccfem.errors import InputError
+from ccfem.geometry.shapes import Region
 from ccfem.mesh.facets import are_among
+from ccfem.mesh.measures import signed_areas
 
 __all__ = ["triangulate"]
 
@@ -40,7 +41,7 @@ Size = Callable[[FloatArray], FloatArray]
 
 
 def triangulate(
-    polygon: Any, edge_length: float, keep: FloatArray | None = None
+    polygon: shapely.Polygon, edge_length: float, keep: FloatArray | None = None
 ) -> tuple[FloatArray, IntArray]:
     """Triangulate a planform.
 
@@ -90,7 +91,7 @@ def triangulate(
     return points[used], number[triangles]
 
 
-def _check(polygon: Any, edge_length: float) -> None:
+def _check(polygon: shapely.Polygon, edge_length: float) -> None:
     """Raise on a planform or edge length that cannot be meshed."""
     if not isinstance(polygon, shapely.Polygon) or polygon.is_empty:
         raise InputError(
@@ -192,7 +193,9 @@ def _along(ring: FloatArray, corners: IntArray, size: Size) -> FloatArray:
     return np.concatenate(found)
 
 
-def _grid(polygon: Any, edge_length: float, size: Size, outline: FloatArray) -> FloatArray:
+def _grid(
+    polygon: shapely.Polygon, edge_length: float, size: Size, outline: FloatArray
+) -> FloatArray:
     """Inner points (k, 2): a hexagonal grid, and points of a finer one in the gaps it leaves."""
     coarse = _hexagons(polygon, edge_length)
     wanted = size(coarse)
@@ -205,7 +208,7 @@ def _grid(polygon: Any, edge_length: float, size: Size, outline: FloatArray) -> 
     return np.concatenate([coarse, _thinned(fine[order], wanted[order])])
 
 
-def _hexagons(polygon: Any, step: float) -> FloatArray:
+def _hexagons(polygon: shapely.Polygon, step: float) -> FloatArray:
     """Points (k, 2) of a hexagonal grid inside a polygon."""
     low, high = np.array(polygon.bounds[:2]), np.array(polygon.bounds[2:])
     count = np.ceil((high - low) / (step * np.array([1.0, np.sqrt(0.75)]))).astype(int) + 2
@@ -269,23 +272,16 @@ def _delaunay(points: FloatArray) -> IntArray:
         raise InputError(
             "the planform has no area that could be triangulated: check its coordinates"
         ) from None
-    clockwise = _areas(points, corners) < 0.0
+    clockwise = signed_areas(points, corners) < 0.0
     corners[clockwise] = corners[clockwise][:, ::-1]
     return corners
 
 
-def _areas(points: FloatArray, corners: IntArray) -> FloatArray:
-    """Signed area of each triangle, (t,), mm^2."""
-    a, b, c = np.moveaxis(points[corners], 1, 0)
-    u, v = b - a, c - a
-    return 0.5 * (u[:, 0] * v[:, 1] - u[:, 1] * v[:, 0])
-
-
-def _inside(points: FloatArray, domain: Any) -> IntArray:
+def _inside(points: FloatArray, domain: Region) -> IntArray:
     """Delaunay triangles with their centre in the domain; those without area are left out."""
     corners = _delaunay(points)
     centre = points[corners].mean(axis=1)
-    area = _areas(points, corners)
+    area = signed_areas(points, corners)
     sides = np.roll(points[corners], 1, axis=1) - points[corners]
     longest = np.linalg.norm(sides, axis=2).max(axis=1)
     shapely.prepare(domain)
@@ -295,7 +291,7 @@ def _inside(points: FloatArray, domain: Any) -> IntArray:
 def _smoothed(points: FloatArray, corners: IntArray, fixed: int, size: Size) -> FloatArray:
     """Points moved to the weighted mean of the centres of the triangles round them."""
     centre = points[corners].mean(axis=1)
-    weight = _areas(points, corners) / size(centre) ** 2
+    weight = signed_areas(points, corners) / size(centre) ** 2
     total = np.zeros(len(points))
     moment = np.zeros_like(points)
     for column in corners.T:

@@ -1,8 +1,7 @@
 """Prismatic parts: a triangulated planform, extruded and cut into tetrahedra."""
 
-from typing import Any
-
 import numpy as np
+import shapely
 from scipy.sparse import coo_array
 from scipy.sparse.csgraph import reverse_cuthill_mckee
 
@@ -18,7 +17,7 @@ _SPLIT = np.array([[0, 1, 2, 5], [0, 1, 4, 5], [0, 3, 4, 5]])
 
 
 def extrude(
-    polygon: Any,
+    polygon: shapely.Polygon,
     height: float,
     edge_length: float,
     layers: int | None = None,

@@ -2,7 +2,6 @@
 
 from dataclasses import dataclass
 from functools import cached_property
-from typing import Any
 
 import numpy as np
 import shapely
@@ -10,6 +9,7 @@ import shapely
 from ccfem.arrays import BoolArray, FloatArray, IntArray, freeze, read_only
 from ccfem.checks import check_number
 from ccfem.errors import InputError
+from ccfem.geometry.shapes import Region
 
 __all__ = ["NEIGHBOURS", "Bitmap", "bitmap"]
 
@@ -43,7 +43,7 @@ class Bitmap:
     mask: BoolArray
     pixel: float
     origin: FloatArray
-    section: Any
+    section: Region
 
     def __post_init__(self) -> None:
         freeze(self, mask=bool, origin=float)
@@ -96,7 +96,7 @@ class Bitmap:
         return near | np.roll(near, 1, 1)
 
 
-def bitmap(section: Any, pixel: float) -> Bitmap:
+def bitmap(section: Region, pixel: float) -> Bitmap:
     """Bitmap of a section.
 
     A box of a whole number of pixels is divided into exactly those; otherwise the pixels are

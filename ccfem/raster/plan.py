@@ -1,12 +1,11 @@
 """A pattern of pixels as paths in the plane of a layer."""
 
 from dataclasses import dataclass
-from typing import Any
 
 import numpy as np
 import shapely
 
-from ccfem.arrays import FloatArray
+from ccfem.arrays import BoolArray, FloatArray
 from ccfem.geometry.polylines import pack
 from ccfem.layers.layer import Layer
 from ccfem.raster.bitmap import Bitmap
@@ -66,7 +65,7 @@ class RasterPlan:
                 found = [a if k else b for a, b, k in zip(found, plain, inside, strict=True)]
         return found
 
-    def _kept(self, chains: list[FloatArray], keep: Any) -> list[FloatArray]:
+    def _kept(self, chains: list[FloatArray], keep: BoolArray) -> list[FloatArray]:
         ends = np.cumsum([len(chain) for chain in chains])[:-1]
         return [chain[k] for chain, k in zip(chains, np.split(keep, ends), strict=True)]
 

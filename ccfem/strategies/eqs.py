@@ -6,7 +6,7 @@ fiber paths of continuous fiber composites, Composites Part B 183 (2020) 107681 
 """
 
 from dataclasses import dataclass
-from typing import Any, ClassVar
+from typing import ClassVar
 
 import numpy as np
 import shapely
@@ -15,7 +15,7 @@ from ccfem.arrays import FloatArray
 from ccfem.elasticity.stress_field import LayerStress
 from ccfem.errors import InputError
 from ccfem.fields.streamlines import streamlines
-from ccfem.geometry.shapes import open_lines
+from ccfem.geometry.shapes import Region, open_lines
 from ccfem.layers.layer import Layer
 from ccfem.machine.machine import Machine
 from ccfem.planning.infill import SPACING, check_fill, long_enough
@@ -75,7 +75,9 @@ class Eqs:
         lines = _iso_lines(seed, region, self.spacing * width, _OFF * width)
         return long_enough(Toolpaths.from_plane(lines, layer), self.minimum_length, machine)
 
-    def _seed_line(self, layer: Layer, stress: LayerStress, region: Any, step: float) -> FloatArray:
+    def _seed_line(
+        self, layer: Layer, stress: LayerStress, region: Region, step: float
+    ) -> FloatArray:
         """Longest candidate (n, 2); empty where no candidate lies in the region."""
         plane = in_plane(stress.nodal, layer.frame)
         if self.seed is None:
@@ -91,7 +93,7 @@ class Eqs:
         return lines[int(np.argmax([len(line) for line in lines]))]
 
 
-def _iso_lines(seed: FloatArray, region: Any, pitch: float, off: float) -> list[FloatArray]:
+def _iso_lines(seed: FloatArray, region: Region, pitch: float, off: float) -> list[FloatArray]:
     """Lines (k, 2), mm, at whole multiples of a pitch from a seed line, clipped to a region."""
     curve = shapely.simplify(shapely.LineString(seed), 0.5 * off)
     lines = open_lines(shapely.intersection(curve, region))

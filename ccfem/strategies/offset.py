@@ -6,13 +6,14 @@ fiber paths of continuous fiber composites, Composites Part B 183 (2020) 107681.
 """
 
 from dataclasses import dataclass
-from typing import Any, ClassVar
+from typing import ClassVar
 
 import shapely
 
 from ccfem.arrays import FloatArray
 from ccfem.elasticity.stress_field import LayerStress
 from ccfem.geometry.offsets import rings
+from ccfem.geometry.shapes import Region
 from ccfem.layers.layer import Layer
 from ccfem.machine.machine import Machine
 from ccfem.planning.infill import SPACING, check_fill, long_enough
@@ -56,7 +57,7 @@ class Offset:
         return long_enough(Toolpaths.from_plane(lines, layer), self.minimum_length, machine)
 
 
-def _level_sets(section: Any, first: float, spacing: float) -> list[FloatArray]:
+def _level_sets(section: Region, first: float, spacing: float) -> list[FloatArray]:
     """Find the closed curves (k, 2), mm, at `first`, `first + spacing`, ... inside a section."""
     found: list[FloatArray] = []
     distance = first

@@ -6,7 +6,7 @@ planning method for 3D printing of continuous fiber reinforced plastics, Composi
 """
 
 from dataclasses import dataclass
-from typing import Any, ClassVar, Literal
+from typing import ClassVar, Literal
 
 import numpy as np
 import shapely
@@ -15,6 +15,7 @@ from ccfem.arrays import BoolArray, FloatArray
 from ccfem.checks import check_fields
 from ccfem.elasticity.stress_field import LayerStress
 from ccfem.geometry.offsets import join_rings, offset_rings, rings
+from ccfem.geometry.shapes import Region
 from ccfem.layers.layer import Layer
 from ccfem.linking.single_path import link_tracks
 from ccfem.machine.machine import Machine
@@ -111,7 +112,9 @@ class Svt:
         paths = Toolpaths.from_plane(lines, layer, link=link)
         return long_enough(paths, self.minimum_length, machine)
 
-    def groups(self, piece: Any, stress: LayerStress, machine: Machine) -> list[list[FloatArray]]:
+    def groups(
+        self, piece: Region, stress: LayerStress, machine: Machine
+    ) -> list[list[FloatArray]]:
         """Strands (n_i, 2), mm, of each main path of one piece of the section, not yet joined."""
         members = frame(piece, _SAMPLING * machine.fibre_width)
         criterion = Criterion(turn=self.turn)
@@ -124,7 +127,7 @@ class Svt:
         return found
 
     def _piece(
-        self, piece: Any, stress: LayerStress, machine: Machine
+        self, piece: Region, stress: LayerStress, machine: Machine
     ) -> list[tuple[FloatArray, BoolArray]]:
         """Paths of one piece of the section, with the mask of their links."""
         if self.mode == "points":
@@ -140,7 +143,7 @@ class Svt:
         parts = path.without_long_links(piece, self.longest_inside, over_void)
         return [(part.points, part.link) for part in parts]
 
-    def _rings(self, piece: Any, machine: Machine) -> list[FloatArray]:
+    def _rings(self, piece: Region, machine: Machine) -> list[FloatArray]:
         """Concentric rings of a piece that has no members, joined by ramps."""
         width = machine.fibre_width
         levels = offset_rings(piece, 0.5 * width, self.spacing * width, width)

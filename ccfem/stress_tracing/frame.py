@@ -2,14 +2,13 @@
 
 from dataclasses import dataclass, replace
 from functools import cached_property
-from typing import Any
 
 import numpy as np
-from scipy.sparse import coo_array
-from scipy.sparse.csgraph import connected_components
 
 from ccfem.arrays import BoolArray, FloatArray, IntArray, freeze
 from ccfem.geometry.medial_axis import MedialAxis, MedialSegment, medial_axis
+from ccfem.geometry.shapes import Region
+from ccfem.mesh.measures import connected
 
 __all__ = ["FREE", "Frame", "Member", "frame"]
 
@@ -90,7 +89,7 @@ class Frame:
         ]
 
 
-def frame(section: Any, step: float, contraction: float = 1.25) -> Frame:
+def frame(section: Region, step: float, contraction: float = 1.25) -> Frame:
     """Members and joints of a section.
 
     Parameters
@@ -136,8 +135,7 @@ def _joints(
     inner = np.flatnonzero((ends >= 0).all(axis=1))
     inner = inner[junction[ends[inner]].all(axis=1)]
     short[inner] = length[inner] < contraction * axis.radius[ends[inner]].max(axis=1)
-    link = coo_array((np.ones(short.sum()), ends[short].T), shape=(len(axis.nodes),) * 2)
-    _, group = connected_components(link, directed=False)
+    group = connected(ends[short], len(axis.nodes))
     joint = np.full(len(axis.nodes), FREE)
     _, joint[junction] = np.unique(group[junction], return_inverse=True)
     return joint, short

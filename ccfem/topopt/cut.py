@@ -6,7 +6,8 @@ import numpy as np
 
 from ccfem.arrays import BoolArray, FloatArray, IntArray
 from ccfem.mesh.facets import are_among, positions
-from ccfem.mesh.tet_mesh import TetMesh, signed_volumes
+from ccfem.mesh.measures import signed_volumes
+from ccfem.mesh.tet_mesh import TetMesh
 
 __all__ = ["CutMesh", "cut_mesh", "volume_above"]
 

@@ -5,7 +5,8 @@ import scipy.sparse as sp
 
 from ccfem.arrays import BoolArray, FloatArray, IntArray
 from ccfem.mesh.facets import are_among
-from ccfem.mesh.tet_mesh import TetMesh, signed_volumes
+from ccfem.mesh.measures import signed_volumes
+from ccfem.mesh.tet_mesh import TetMesh
 from ccfem.topopt.cut import CutMesh
 
 __all__ = ["relaxed"]
