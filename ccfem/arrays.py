@@ -7,7 +7,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import ArrayLike, DTypeLike, NDArray
 
-__all__ = ["BoolArray", "FloatArray", "IntArray", "freeze", "read_only"]
+__all__ = ["BoolArray", "FloatArray", "IntArray", "freeze", "read_only", "repeated"]
 
 FloatArray = NDArray[np.float64]
 IntArray = NDArray[np.int64]
@@ -35,6 +35,18 @@ def read_only(values: ArrayLike, dtype: DTypeLike = float) -> NDArray[Any]:
     array = np.array(array, dtype=dtype, order="C")
     array.flags.writeable = False
     return array
+
+
+def repeated(counts: IntArray) -> tuple[IntArray, IntArray]:
+    """Owner of each of ``counts[0] + counts[1] + ...`` things, and its number among its owner's.
+
+    Examples
+    --------
+    >>> repeated(np.array([2, 0, 3]))
+    (array([0, 0, 2, 2, 2]), array([0, 1, 0, 1, 2]))
+    """
+    owner = np.repeat(np.arange(len(counts)), counts)
+    return owner, np.arange(len(owner)) - (np.cumsum(counts) - counts)[owner]
 
 
 def freeze(value: object, **kinds: DTypeLike) -> None:

@@ -7,7 +7,7 @@ from typing import Any
 import numpy as np
 import pytest
 
-from ccfem.arrays import FloatArray, IntArray, freeze, read_only
+from ccfem.arrays import FloatArray, IntArray, freeze, read_only, repeated
 
 
 @dataclass(frozen=True)
@@ -51,3 +51,11 @@ def test_a_frozen_value_cannot_be_changed_from_outside():
     ):
         with pytest.raises((ValueError, TypeError, AttributeError)):
             change()
+
+
+def test_repeated_counts_up_for_each_owner():
+    counts = np.array([2, 0, 3, 1])
+    owner, number = repeated(counts)
+    wanted = [(k, i) for k, count in enumerate(counts) for i in range(count)]
+    assert list(zip(owner.tolist(), number.tolist(), strict=True)) == wanted
+    assert repeated(np.zeros(3, dtype=np.int64))[0].shape == (0,)

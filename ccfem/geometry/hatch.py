@@ -5,7 +5,7 @@ from dataclasses import dataclass
 import numpy as np
 import shapely
 
-from ccfem.arrays import FloatArray, IntArray
+from ccfem.arrays import FloatArray, IntArray, repeated
 from ccfem.geometry.offsets import inset, rings
 from ccfem.geometry.shapes import Region
 
@@ -93,8 +93,8 @@ def hatch(section: Region, angle: float, pitch: float) -> Hatch:
     level_a, level_b = np.ceil((a[:, 1] - lowest) / pitch), np.ceil((b[:, 1] - lowest) / pitch)
     first = np.minimum(level_a, level_b).astype(np.int64)
     count = np.abs(level_a - level_b).astype(np.int64)
-    edge = np.repeat(np.arange(len(a)), count)
-    row = np.arange(len(edge)) - np.repeat(np.cumsum(count) - count, count) + first[edge]
+    edge, row = repeated(count)
+    row = row + first[edge]
     y = lowest + pitch * row
     t = np.clip((y - a[edge, 1]) / (b[edge, 1] - a[edge, 1]), 0.0, 1.0)
     x = a[edge, 0] + t * (b[edge, 0] - a[edge, 0])

@@ -5,7 +5,7 @@ from dataclasses import dataclass
 import numpy as np
 from numba import njit
 
-from ccfem.arrays import FloatArray, IntArray
+from ccfem.arrays import FloatArray, IntArray, repeated
 from ccfem.mesh.facets import unique_edges
 
 __all__ = ["Isocontours", "isocontours", "least_distance", "steepest_spacing", "triangle_edges"]
@@ -84,16 +84,12 @@ def isocontours(
     line, offsets = _chain(of_triangle, low, high, start)
     order = np.argsort(level[line[offsets[:-1]]], kind="stable")
     sizes = np.diff(offsets)[order]
-    taken = _gather(line, offsets, order, sizes)
+    nth, number = repeated(sizes)
+    taken = line[offsets[:-1][order][nth] + number]
     new_offsets = np.concatenate([[0], np.cumsum(sizes)]).astype(np.int64)
     on, w = ends[edge[taken]], weights[taken]
     curve = (1.0 - w)[:, None] * points[on[:, 0]] + w[:, None] * points[on[:, 1]]
     return Isocontours(curve, new_offsets, level[taken[new_offsets[:-1]]], on, w)
-
-
-def _gather(line: IntArray, offsets: IntArray, order: IntArray, sizes: IntArray) -> IntArray:
-    shift = np.repeat(offsets[:-1][order] - (np.cumsum(sizes) - sizes), sizes)
-    return line[np.arange(int(sizes.sum())) + shift]
 
 
 def triangle_edges(triangles: IntArray) -> tuple[IntArray, IntArray]:

@@ -13,7 +13,7 @@ import numpy as np
 import shapely
 from scipy.spatial import QhullError, Voronoi, cKDTree
 
-from ccfem.arrays import BoolArray, FloatArray, IntArray, freeze
+from ccfem.arrays import BoolArray, FloatArray, IntArray, freeze, repeated
 from ccfem.checks import check_number
 from ccfem.geometry.offsets import rings
 from ccfem.geometry.polylines import is_closed, line_length
@@ -163,8 +163,8 @@ class _Border:
             n = int(count.sum())
             if n < 3:
                 continue
-            edge = np.repeat(np.arange(len(a)), count)
-            share = (np.arange(n) - np.repeat(np.cumsum(count) - count, count)) / count[edge]
+            edge, part = repeated(count)
+            share = part / count[edge]
             here = start + np.arange(n)
             points.append(a[edge] + share[:, None] * side[edge])
             ring.append(np.full(n, number))

@@ -10,7 +10,7 @@ from itertools import pairwise
 
 import numpy as np
 
-from ccfem.arrays import BoolArray, FloatArray, IntArray
+from ccfem.arrays import BoolArray, FloatArray, IntArray, repeated
 
 __all__ = [
     "along_line",
@@ -149,8 +149,7 @@ def resample(points: FloatArray, offsets: IntArray, step: float) -> tuple[FloatA
     total = lengths(points, offsets)
     parts = np.maximum(1, np.round(total / step).astype(np.int64))
     ends = np.concatenate([[0], np.cumsum(parts + 1)])
-    line = np.repeat(np.arange(len(total)), parts + 1)
-    number = np.arange(ends[-1]) - ends[line]
+    line, number = repeated(parts + 1)
     found, _ = sample_at(points, offsets, line, number * (total / parts)[line])
     if len(total):
         found[ends[:-1]], found[ends[1:] - 1] = points[offsets[:-1]], points[offsets[1:] - 1]
@@ -176,10 +175,10 @@ def sample_midpoints(
     """
     total = lengths(points, offsets)
     parts = np.where(total > 0.0, np.maximum(1, np.round(total / step)), 0).astype(np.int64)
-    line = np.repeat(np.arange(len(total)), parts)
+    line, number = repeated(parts)
     size = np.divide(total, parts, out=np.zeros(len(total)), where=parts > 0)[line]
-    number = np.arange(len(line)) - (np.cumsum(parts) - parts)[line]
-    found, segment = sample_at(points, offsets, line, (number + 0.5) * size)
+    middle = np.asarray((number + 0.5) * size, dtype=np.float64)
+    found, segment = sample_at(points, offsets, line, middle)
     tangent = points[np.minimum(segment + 1, len(points) - 1)] - points[segment]
     norm = np.linalg.norm(tangent, axis=1)
     return found, tangent / np.maximum(norm, 1e-300)[:, None], size, line
@@ -201,9 +200,9 @@ def subdivide(
     # Pieces of the segment that each point starts; the last point of a polyline starts none.
     pieces = np.ones(len(points), dtype=np.int64)
     pieces[:-1] = np.maximum(1, np.ceil(steps[1:] / longest - 1e-9))
-    segment = np.repeat(np.arange(len(points)), pieces)
+    segment, number = repeated(pieces)
     first = np.concatenate([[0], np.cumsum(pieces)])
-    share = ((np.arange(len(segment)) - first[segment]) / pieces[segment])[:, None]
+    share = (number / pieces[segment])[:, None]
     following = np.minimum(segment + 1, len(points) - 1)
     return (1.0 - share) * points[segment] + share * points[following], first[offsets], segment
 

@@ -7,7 +7,7 @@ import shapely
 from numba import njit
 from scipy.ndimage import distance_transform_edt
 
-from ccfem.arrays import BoolArray, FloatArray, IntArray
+from ccfem.arrays import BoolArray, FloatArray, IntArray, repeated
 from ccfem.geometry.places import INSIDE, OUTSIDE, VOID
 from ccfem.geometry.shapes import Region
 
@@ -69,8 +69,8 @@ def section_grid(section: Region, margin: float, cell: float = 0.5) -> SectionGr
     nx, ny = (np.floor((high - low) / cell) + 1).astype(int)
     rows = np.sort(((edges[:, [1, 3]] - low[1]) / cell).astype(np.int64), axis=1)
     count = rows[:, 1] - rows[:, 0] + 1
-    edge = np.repeat(np.arange(len(edges)), count)
-    row = rows[edge, 0] + np.arange(len(edge)) - np.repeat(np.cumsum(count) - count, count)
+    edge, row = repeated(count)
+    row = row + rows[edge, 0]
     starts = np.concatenate([[0], np.cumsum(np.bincount(row, minlength=ny))])
     by_row = edge[np.argsort(row, kind="stable")]
     places, room = np.empty((nx, ny), dtype=np.int64), np.empty((nx, ny))
