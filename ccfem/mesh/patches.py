@@ -27,6 +27,7 @@ __all__ = [
     "match_boundary",
     "patches_from_rules",
     "unit_vector",
+    "with_groups",
 ]
 
 Vector = tuple[float, float, float]
@@ -265,6 +266,15 @@ def match_boundary(mesh: TetMesh, facets: IntArray) -> IntArray:
     if not len(facets):
         return np.zeros((0, 3), dtype=np.int64)
     return mesh.boundary[are_among(mesh.boundary, facets)]
+
+
+def with_groups(mesh: TetMesh, groups: Mapping[str, IntArray]) -> TetMesh:
+    """Return the mesh with groups of facets (k, 3) as patches, as far as they are on the boundary.
+
+    Groups without a boundary facet give no patch.
+    """
+    found = {name: match_boundary(mesh, facets) for name, facets in groups.items()}
+    return mesh.with_patches({name: facets for name, facets in found.items() if len(facets)})
 
 
 def unit_vector(value: str | ArrayLike, what: str) -> FloatArray:

@@ -132,9 +132,8 @@ def virtual_test(
     SolveError
         When the solve misses its tolerance.
     """
-    specimen = Specimen.of(part, backend) if isinstance(part, StressField) else part
+    specimen, strands = _prepared(fibres, part, backend)
     before = specimen.unreinforced
-    strands = cut_strands(fibres, before.mesh) if isinstance(fibres, Toolpaths) else fibres
     axial = (Strand() if strand is None else strand).stiffness(specimen.modulus)
     started = perf_counter()
     found = equilibrium(specimen, strands, axial, mode)
@@ -179,6 +178,15 @@ def virtual_test(
     )
 
 
+def _prepared(
+    fibres: Toolpaths | Strands, part: StressField | Specimen, backend: str
+) -> tuple[Specimen, Strands]:
+    specimen = Specimen.of(part, backend) if isinstance(part, StressField) else part
+    if isinstance(fibres, Toolpaths):
+        fibres = cut_strands(fibres, specimen.unreinforced.mesh)
+    return specimen, fibres
+
+
 def virtual_bracket(
     fibres: Toolpaths | Strands,
     part: StressField | Specimen,
@@ -187,9 +195,7 @@ def virtual_bracket(
     backend: str = "auto",
 ) -> Bracket:
     """Both tests of `virtual_test`, with one factorisation; parameters as there."""
-    specimen = Specimen.of(part, backend) if isinstance(part, StressField) else part
-    mesh = specimen.unreinforced.mesh
-    strands = cut_strands(fibres, mesh) if isinstance(fibres, Toolpaths) else fibres
+    specimen, strands = _prepared(fibres, part, backend)
     tension = virtual_test(strands, specimen, strand, TENSION, span)
     return Bracket(tension, virtual_test(strands, specimen, strand, BONDED, span))
 
@@ -215,7 +221,6 @@ def virtual_brackets(
     for name, field in parts.items():
         specimen = Specimen.of(field, backend) if first is None else first.under(field)
         first = specimen
-        if isinstance(fibres, Toolpaths):
-            fibres = cut_strands(fibres, field.mesh)
+        specimen, fibres = _prepared(fibres, specimen, backend)
         result[name] = virtual_bracket(fibres, specimen, strand, span)
     return result
