@@ -11,11 +11,14 @@ import sys
 import tempfile
 from pathlib import Path
 
+from ccfem.layers.layer_stress import stress_on
+
 from ccfem.cases import create_case
 from ccfem.elasticity import solve
-from ccfem.layers import slice_planar
+from ccfem.layers.slicing.planar import Planar
+from ccfem.planning import plan
 from ccfem.plot.paths import layer_picture
-from ccfem.strategies import create, plan
+from ccfem.strategies import create
 
 ROOT = Path(__file__).resolve().parents[1]
 PLACE = re.compile(
@@ -27,10 +30,10 @@ def draw_bridge() -> None:
     """Draw the one path of `svt` on the optimised bridge: docs/bridge.png."""
     case = create_case("bridge")
     stress = solve(case.problem)["down"]
-    layers = slice_planar(case.problem.mesh, case.build, count=1)
+    layers = Planar(count=1).cut(case.problem.mesh, case.build)
     paths = plan(create("svt"), layers, stress, case.machine)
     layer = layers[0]
-    figure = layer_picture(layer, stress.on(layer), paths, case.machine.fibre_width)
+    figure = layer_picture(layer, stress_on(layer, stress), paths, case.machine.fibre_width)
     figure.savefig(ROOT / "docs" / "bridge.png", dpi=220)
 
 

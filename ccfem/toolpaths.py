@@ -103,10 +103,10 @@ class Toolpaths:
         if closed is None:
             closed = [len(line) > 0 and np.array_equal(line[0], line[-1]) for line in lines]
         sizes = [len(lines[k]) for k in keep]
-        points = layer.to_space(np.concatenate([lines[k] for k in keep]))
+        points = layer.plane.to_space(np.concatenate([lines[k] for k in keep]))
         return cls(
             points=points,
-            normals=np.broadcast_to(layer.frame[2], points.shape),
+            normals=np.broadcast_to(layer.plane.frame[2], points.shape),
             offsets=np.concatenate([[0], np.cumsum(sizes)]),
             layer=np.full(len(keep), layer.index),
             kind=np.full(len(keep), kind),

@@ -26,8 +26,9 @@ from ccfem.evaluation import evaluate
 from ccfem.comparison.headline import headline_values
 from ccfem.comparison.remarks import verdict
 from ccfem.comparison.ranking import ranking
-from ccfem.layers import slice_planar
-from ccfem.strategies import create, plan
+from ccfem.layers.slicing.planar import Planar
+from ccfem.planning import plan
+from ccfem.strategies import create
 
 # %% [markdown]
 # ## A part with its load
@@ -57,7 +58,7 @@ assert np.allclose(stress.reactions.sum(axis=0), -pull, atol=1e-3)
 # A strategy is a small value whose fields are its parameters.
 
 # %%
-layers = slice_planar(case.problem.mesh, case.build, count=3)
+layers = Planar(count=3).cut(case.problem.mesh, case.build)
 paths = plan(create("isocurve", {"cap": 90.0}), layers, stress, case.machine)
 print(len(paths), "paths,", round(paths.lengths.sum() / 1000.0, 2), "m of fibre")
 assert paths.lengths.min() >= case.machine.minimum_length

@@ -20,6 +20,7 @@
 import numpy as np
 
 from benchmarks.papers.plocher_2022.plates import single_hole
+from ccfem.layers.layer_stress import stress_on
 from ccfem.evaluation import evaluate
 from benchmarks.papers.plocher_2022.fibre_map import fibre_map
 from ccfem.evaluation.plane_paths import plane_paths
@@ -27,7 +28,8 @@ from benchmarks.papers.plocher_2022.plane_study import benchmark, laid_plate, pr
 from ccfem.evaluation.sensitivity import OffAxis
 from ccfem.machine import Machine
 from ccfem.materials import named_material
-from ccfem.strategies import create, plan
+from ccfem.planning import plan
+from ccfem.strategies import create
 
 plate = single_hole()
 print(plate.title, plate.mask.shape, "pixels of", plate.bead, "mm")
@@ -114,7 +116,7 @@ assert results["mps"]["stress"] < 0.6 * results["grid 45"]["stress"]
 # then a path of the 45 degree grid, which makes beads overlap and the print longer.
 
 # %%
-image = create("mps", {"mode": "raster"}).raster(layers[0], stress.on(layers[0]), machine)
+image = create("mps", {"mode": "raster"}).raster(layers[0], stress_on(layers[0], stress), machine)
 solid, paths = image.raster.mask, image.paths
 print(len(paths), "paths through", solid.sum(), "pixels,", paths.isolated.sum(), "isolated")
 assert len(paths.pixels) + paths.isolated.sum() == solid.sum()

@@ -20,6 +20,7 @@ from dataclasses import replace
 
 import numpy as np
 
+from ccfem.layers.layer_stress import stress_on
 from ccfem.cases import create_case
 from ccfem.cases.bridge import bridge_plate
 from ccfem.elasticity import solve
@@ -29,8 +30,9 @@ from ccfem.evaluation.matching import THRESHOLDS, matching_rate
 from ccfem.evaluation.plane_paths import plane_paths
 from ccfem.virtual_testing.strand import RHO, Strand
 from ccfem.virtual_testing.virtual_test import virtual_bracket
-from ccfem.layers import slice_planar
-from ccfem.strategies import create, plan
+from ccfem.layers.slicing.planar import Planar
+from ccfem.planning import plan
+from ccfem.strategies import create
 from ccfem.tensor import in_plane, largest_in_plane
 from ccfem.toolpaths import Toolpaths
 
@@ -52,20 +54,20 @@ def prepared(optimised):
     """Case, stress of the part, and its one layer."""
     case = create_case("bridge", optimised=optimised)
     field = solve(case.problem)["down"]
-    (layer,) = slice_planar(case.problem.mesh, count=1)
+    (layer,) = Planar(count=1).cut(case.problem.mesh)
     return replace(case.machine, minimum_length=0.0), field, layer
 
 
 def uniaxial(stress):
     """Share of the area where one principal stress is five times the other."""
     layer = stress.layer
-    plane = in_plane(stress.nodal, layer.frame)[layer.triangles].mean(axis=1)
+    plane = in_plane(stress.nodal, layer.plane.frame)[layer.triangles].mean(axis=1)
     sizes = np.sort(np.abs(np.stack(largest_in_plane(plane)[:2])), axis=0)
     return float(layer.areas[sizes[1] >= 5.0 * sizes[0]].sum() / layer.areas.sum())
 
 
 parts = {name: prepared(name == "optimised") for name in ("optimised", "full")}
-shares = {name: uniaxial(field.on(layer)) for name, (_, field, layer) in parts.items()}
+shares = {name: uniaxial(stress_on(layer, field)) for name, (_, field, layer) in parts.items()}
 part = plate.part
 print(f"part: {part.area / plate.domain.area:.3f} of the plate, {len(part.interiors)} windows")
 print("uniaxial:", {name: round(share, 2) for name, share in shares.items()})
@@ -93,7 +95,7 @@ for where, (machine, field, layer) in parts.items():
         paths = plan(strategy, (layer,), field, machine)
         laid[where, name] = paths
         indices[where, name] = evaluate(paths, (layer,), field, machine).total
-        rates[where, name] = 100.0 * matching_rate(paths, [field.on(layer)], step=0.9)
+        rates[where, name] = 100.0 * matching_rate(paths, [stress_on(layer, field)], step=0.9)
 
 svt = indices["optimised", "svt"]
 print(f"{svt['fibre_length'] / 1000.0:.2f} m in {svt['paths']:.0f} path")

@@ -48,8 +48,8 @@ def timed(load: Callable[[], object]) -> dict[str, float]:
     """Seconds of each stage of one run, and of the whole."""
     from ccfem.cases.case import Case
     from ccfem.elasticity import solve
-    from ccfem.layers import slice_planar
-    from ccfem.strategies import plan
+    from ccfem.layers.slicing.planar import Planar
+    from ccfem.planning import plan
     from ccfem.strategies.isocurve import Isocurve
 
     marks = [time.perf_counter()]
@@ -62,7 +62,7 @@ def timed(load: Callable[[], object]) -> dict[str, float]:
     stage()
     field = next(iter(solve(case.problem).values()))
     stage()
-    layers = slice_planar(field.mesh, case.build, count=12)
+    layers = Planar(count=12).cut(field.mesh, case.build)
     stage()
     plan(Isocurve(), layers, field, case.machine)
     stage()

@@ -17,7 +17,8 @@ import numpy as np
 from ccfem.cases import create_case
 from ccfem.elasticity import solve
 from ccfem.elasticity.stress_field import StressField
-from ccfem.layers import Layer, slice_planar
+from ccfem.layers import Layer
+from ccfem.layers.slicing.planar import Planar
 from ccfem.machine import Machine
 from ccfem.planning.equal_fibre import plan_to_length
 from ccfem.strategies.isocurve import Isocurve
@@ -56,7 +57,7 @@ class Part:
         """Solve and slice a case by name."""
         case = create_case(name)
         field = next(iter(solve(case.problem).values()))
-        layers = slice_planar(field.mesh, case.build, count=case.layers)
+        layers = Planar(count=case.layers).cut(field.mesh, case.build)
         return cls(name, field, layers, case.machine, Specimen.of(field))
 
 

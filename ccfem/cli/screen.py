@@ -22,7 +22,7 @@ from ccfem.comparison.result import Comparison
 from ccfem.virtual_testing.verdict import HONEST_PROMISE
 
 if typing.TYPE_CHECKING:
-    from ccfem.strategies import Strategy
+    from ccfem.planning.strategy import Strategy
 
 __all__ = ["print_cases", "print_comparison", "print_strategies", "print_strategy"]
 

@@ -14,15 +14,18 @@ from ccfem.elasticity.stress_field import StressField
 from ccfem.errors import InputError, SolveError, known_names
 from ccfem.evaluation import evaluate
 from ccfem.fibre_aware.upper_bound import upper_bound
-from ccfem.layers import Layer, slice_planar
+from ccfem.layers import Layer
+from ccfem.layers.slicing.planar import Planar
 from ccfem.planning.equal_fibre import (
     Planned,
     check_wanted,
     length_per_layer,
     plan_to_length,
 )
+from ccfem.planning.plan import plan
+from ccfem.planning.strategy import Strategy
 from ccfem.progress import Progress, silent
-from ccfem.strategies import Strategy, create, plan
+from ccfem.strategies import create
 from ccfem.toolpaths import Toolpaths
 from ccfem.virtual_testing.equilibrium import BONDED, TENSION
 from ccfem.virtual_testing.specimen import Specimen
@@ -108,7 +111,7 @@ def solve_and_slice(
     with _timed(seconds, "slice"):
         chosen = case.layers if layers is None else layers
         count, heights = (chosen, None) if isinstance(chosen, int) else (None, chosen)
-        stack = slice_planar(case.problem.mesh, case.build, count=count, heights=heights)
+        stack = Planar(count=count, heights=heights).cut(case.problem.mesh, case.build)
     return stress, stack, seconds
 
 

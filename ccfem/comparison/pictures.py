@@ -11,6 +11,7 @@ from ccfem.evaluation.curvature import sample_curvature
 from ccfem.evaluation.matching import THRESHOLDS, matching_rate
 from ccfem.evaluation.plane_paths import plane_paths, pool
 from ccfem.layers import Layer
+from ccfem.layers.layer_stress import stress_on
 from ccfem.plot.canvas import png
 from ccfem.plot.colours import palette
 from ccfem.plot.curves import curvature_curves, matching_curves
@@ -55,7 +56,7 @@ def draw_pictures(comparison: Comparison, progress: Progress = silent) -> Pictur
     layers, runs, stress = comparison.layers, comparison.succeeded, comparison.stress
     machine = comparison.case.machine
     width = machine.fibre_width
-    limit = max(tension_limit(stress.on(layer)) for layer in layers)
+    limit = max(tension_limit(stress_on(layer, stress)) for layer in layers)
     colours = palette(run.name for run in comparison.runs)
     paths = {}
     for k, layer in enumerate(layers):
@@ -63,7 +64,7 @@ def draw_pictures(comparison: Comparison, progress: Progress = silent) -> Pictur
         for run in runs:
             figure = layer_picture(
                 layer,
-                stress.on(layer),
+                stress_on(layer, stress),
                 run.toolpaths,
                 width,
                 f"{run.name}, layer {layer.index}",
@@ -75,7 +76,7 @@ def draw_pictures(comparison: Comparison, progress: Progress = silent) -> Pictur
     middle = layers[len(layers) // 2]
     overview = compare_layer(
         middle,
-        stress.on(middle),
+        stress_on(middle, stress),
         {run.name: run.toolpaths for run in runs},
         width,
         {run.name: caption(run, middle) for run in runs},
@@ -86,7 +87,7 @@ def draw_pictures(comparison: Comparison, progress: Progress = silent) -> Pictur
     return Pictures(
         paths,
         _forces(runs, middle, width, colours),
-        png(tension_picture(stress.on(middle), heading, "size and direction", limit)),
+        png(tension_picture(stress_on(middle, stress), heading, "size and direction", limit)),
         png(overview),
         png(matching_curves(rates, THRESHOLDS, "fibre along the stress", colours)),
         png(curvature_curves(bends, machine.minimum_radius, "curvature", colours)),
@@ -110,7 +111,7 @@ def caption(run: Run, layer: Layer) -> str:
 def _curves(comparison: Comparison) -> tuple[dict[str, FloatArray], dict[str, FloatArray]]:
     """Take matching rates, and samples of the curvature, 1/mm, of each run over all layers."""
     step = comparison.case.machine.fibre_width
-    stresses = [comparison.stress.on(layer) for layer in comparison.layers]
+    stresses = [stress_on(layer, comparison.stress) for layer in comparison.layers]
     rates, bends = {}, {}
     for run in comparison.succeeded:
         lines = [plane_paths(run.toolpaths, layer) for layer in comparison.layers]
@@ -151,6 +152,8 @@ def _forces(
             colour=colours[run.name],
         )
         if failure is not None:
-            mark_failure(figure.axes[0], layer.to_plane(np.asarray(failure.where)), failure.what)
+            mark_failure(
+                figure.axes[0], layer.plane.project(np.asarray(failure.where)), failure.what
+            )
         drawn[run.name] = png(figure)
     return drawn

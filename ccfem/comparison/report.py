@@ -183,7 +183,7 @@ def _against_each_other(comparison: Comparison) -> str:
 
 def _pictures(comparison: Comparison, pictures: Pictures) -> str:
     runs = [run for run in ranking(comparison) if run.evaluation is not None]
-    heights = {layer.index: layer.height for layer in comparison.layers}
+    heights = {layer.index: layer.plane.height for layer in comparison.layers}
 
     def row(index: int) -> str:
         figures = [

@@ -11,7 +11,7 @@ from ccfem.elasticity.stress_field import StressField
 from ccfem.evaluation import Evaluation
 from ccfem.fibre_aware.upper_bound import UpperBound
 from ccfem.layers import Layer
-from ccfem.strategies import Strategy
+from ccfem.planning.strategy import Strategy
 from ccfem.toolpaths import Toolpaths
 from ccfem.virtual_testing.strength import FirstFailure
 from ccfem.virtual_testing.virtual_test import Bracket

@@ -116,9 +116,9 @@ def sample_alignment(paths: PlanePaths, stress: LayerStress, step: float) -> Ali
     layer = paths.layer
     lines = paths.in_part
     points, tangents, length, _ = sample_midpoints(lines.points, lines.offsets, step)
-    triangle, weights = locate(layer.plane_points, layer.triangles, points, _ROUNDING)
+    triangle, weights = locate(layer.plane.points, layer.triangles, points, _ROUNDING)
     inside = triangle >= 0
-    corners = in_plane(stress.nodal, layer.frame)[layer.triangles[triangle[inside]]]
+    corners = in_plane(stress.nodal, layer.plane.frame)[layer.triangles[triangle[inside]]]
     s = np.einsum("qk,qkc->qc", weights[inside], corners)
     t = tangents[inside]
     largest, smallest, direction = largest_in_plane(s)

@@ -44,7 +44,7 @@ def sample_containment(paths: PlanePaths) -> ContainmentSamples:
     paths = paths.strands
     if not len(paths):
         return ContainmentSamples(np.zeros(1), np.zeros(1))
-    section = paths.layer.polygon
+    section = paths.layer.plane.polygon
     grown = section.buffer(TOLERANCE, quad_segs=2)
     shapely.prepare(grown)
     index = np.repeat(np.arange(len(paths)), np.diff(paths.offsets))

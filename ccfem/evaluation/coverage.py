@@ -101,13 +101,13 @@ def sample_coverage(paths: PlanePaths, stress: LayerStress, width: float) -> Cov
     """
     layer, paths = paths.layer, paths.in_part
     step = 0.2 * width
-    plane = layer.plane_points
+    plane = layer.plane.points
     low, high = plane.min(axis=0), plane.max(axis=0)
     origin = low - step * np.array(_SHIFT)
     shape = np.floor((high - origin) / step).astype(np.int64) + 1
     tension = np.full((shape[0], shape[1]), -1.0)
     _paint_section(
-        tension, origin, step, plane, layer.triangles, in_plane(stress.nodal, layer.frame)
+        tension, origin, step, plane, layer.triangles, in_plane(stress.nodal, layer.plane.frame)
     )
     covered = np.zeros(tension.shape, dtype=np.bool_)
     pieces, offsets, _ = subdivide(paths.points, paths.offsets, width)

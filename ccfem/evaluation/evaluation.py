@@ -25,6 +25,7 @@ from ccfem.evaluation import (
 from ccfem.evaluation.column import Column
 from ccfem.evaluation.plane_paths import PlanePaths, plane_paths, pool
 from ccfem.layers.layer import Layer
+from ccfem.layers.layer_stress import stress_on
 from ccfem.machine.machine import Machine
 from ccfem.toolpaths import Toolpaths
 
@@ -155,7 +156,9 @@ def _check_layers(toolpaths: Toolpaths, layers: Sequence[Layer]) -> None:
                 "the layers that the paths were planned on"
             )
         layer = known[index]
-        apart = np.abs(toolpaths.on_layer(index).points @ layer.frame[2] - layer.height).max()
+        apart = np.abs(
+            toolpaths.on_layer(index).points @ layer.plane.frame[2] - layer.plane.height
+        ).max()
         if apart > 0.5 * layer.thickness + _ROUNDING:
             raise InputError(
                 f"a path of layer {index} lies {apart:.3g} mm above or below it: give the layers "
@@ -167,7 +170,7 @@ def _sample(toolpaths: Toolpaths, layer: Layer, stress: StressField, machine: Ma
     """Take the samples of one layer, in the order that `_indices` reads them."""
     width = machine.fibre_width
     paths: PlanePaths = plane_paths(toolpaths, layer)
-    on_layer = stress.on(layer)
+    on_layer = stress_on(layer, stress)
     return [
         manufacture.sample_manufacture(paths, toolpaths, machine),
         sinuosity.sample_sinuosity(paths, width),

@@ -53,7 +53,7 @@ def sample_links(paths: PlanePaths) -> LinkSamples:
     before[paths.offsets[:-1][paths.closed]] = paths.offsets[1:][paths.closed] - 2
     follows = paths.link[before[first]]
     start, end = paths.points[first], paths.points[first + 1]
-    pieces = cut_at_section(start, end, paths.layer.polygon)
+    pieces = cut_at_section(start, end, paths.layer.plane.polygon)
     size = np.linalg.norm(end - start, axis=1)[pieces.step] * (pieces.end - pieces.begin)
     length = np.array([[size[pieces.place == place].sum() for place, _ in _PLACES.values()]])
     return LinkSamples(np.array([float((~follows).sum())]), length)

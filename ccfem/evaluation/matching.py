@@ -200,9 +200,9 @@ def _stress_vectors(stress: LayerStress) -> tuple[FloatArray, FloatArray, FloatA
     The stress is the nodal one, at the centroid.
     """
     layer = stress.layer
-    plane = in_plane(stress.nodal, layer.frame)[layer.triangles].mean(axis=1)
+    plane = in_plane(stress.nodal, layer.plane.frame)[layer.triangles].mean(axis=1)
     value, direction, defined = strongest_in_plane(plane)
-    centres = layer.plane_points[layer.triangles].mean(axis=1)
+    centres = layer.plane.points[layer.triangles].mean(axis=1)
     return centres[defined], direction[defined], np.abs(value[defined]), layer.areas[defined]
 
 
@@ -211,7 +211,7 @@ def _pieces(paths: PlanePaths, longest: float) -> tuple[FloatArray, FloatArray]:
     points, offsets, _ = subdivide(paths.points, paths.offsets, longest)
     first = np.flatnonzero(starts_segment(offsets))
     starts, ends = points[first], points[first + 1]
-    inside = section_places(0.5 * (starts + ends), paths.layer.polygon) == INSIDE
+    inside = section_places(0.5 * (starts + ends), paths.layer.plane.polygon) == INSIDE
     return starts[inside], ends[inside]
 
 

@@ -68,7 +68,7 @@ class PlanePaths:
             return self
         first = np.flatnonzero(self.link)
         start, end = self.points[first], self.points[first + 1]
-        pieces = cut_at_section(start, end, self.layer.polygon)
+        pieces = cut_at_section(start, end, self.layer.plane.polygon)
         away = np.zeros(len(self.points), dtype=bool)
         away[first[pieces.step[pieces.begin == 0.0]]] = (pieces.place != INSIDE)[
             pieces.begin == 0.0
@@ -95,7 +95,7 @@ def plane_paths(toolpaths: Toolpaths, layer: Layer) -> PlanePaths:
     """Fibre paths of `toolpaths` on a flat layer; paths of no length are left out."""
     paths = toolpaths.select((toolpaths.layer == layer.index) & (toolpaths.kind == FIBRE))
     points, offsets, kept_points = merge_repeated(
-        layer.to_plane(paths.points), paths.offsets, _REPEATED
+        layer.plane.project(paths.points), paths.offsets, _REPEATED
     )
     # The last of the points merged starts the step to the next one.
     link = paths.link[np.append(kept_points, len(paths.points))[1:] - 1]

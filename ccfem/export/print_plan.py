@@ -11,7 +11,8 @@ from ccfem.errors import InputError
 from ccfem.geometry.hatch import zigzag
 from ccfem.geometry.offsets import offset_rings
 from ccfem.geometry.polylines import is_closed, merge_repeated, pack
-from ccfem.layers import Layer, slice_planar
+from ccfem.layers import Layer
+from ccfem.layers.slicing.planar import Planar
 from ccfem.linking.print_order import nearest_end_order
 from ccfem.machine.machine import Machine
 from ccfem.mesh.tet_mesh import TetMesh
@@ -118,7 +119,7 @@ def plan_print(
     """
     fibre = toolpaths.of_kind(FIBRE)
     _check_fibre(fibre, layers, machine)
-    frame = layers[0].frame
+    frame = layers[0].plane.frame
     corners = mesh.points[np.unique(mesh.corners)] @ frame.T
     lowest, highest = corners.min(axis=0), corners.max(axis=0)
     laid = [layer for layer in layers if layer.index in fibre.layer]
@@ -166,11 +167,11 @@ def _slabs(layers: Sequence[Layer], bottom: float, top: float, machine: Machine)
     slabs: list[_Slab] = []
     level = bottom
     for layer in sorted(layers, key=lambda one: one.height):
-        lower = layer.height - 0.5 * machine.fibre_height
-        upper = layer.height + 0.5 * machine.fibre_height
+        lower = layer.plane.height - 0.5 * machine.fibre_height
+        upper = layer.plane.height + 0.5 * machine.fibre_height
         if lower < level - _SAME or upper > top + _SAME:
             raise InputError(
-                f"fibre layer {layer.index} at {layer.height:g} mm does not fit with a fibre "
+                f"fibre layer {layer.index} at {layer.plane.height:g} mm does not fit with a fibre "
                 f"height of {machine.fibre_height:g} mm between {level:g} and {top:g} mm: move it "
                 "with --heights, or take fewer layers"
             )
@@ -195,7 +196,7 @@ def _matrix_lines(
     """Lines (n, 2) of each matrix layer in the plane of `frame`: a contour, a zigzag inside it."""
     width, profile = machine.matrix_width, machine.gcode
     middles = [0.5 * (slab.lower + slab.upper) for slab in slabs]
-    found = slice_planar(mesh, frame[2], heights=middles) if middles else ()
+    found = Planar(heights=middles).cut(mesh, frame[2]) if middles else ()
     sections = {layer.index: layer for layer in found}
     for number in range(len(slabs)):
         if number not in sections:

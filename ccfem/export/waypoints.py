@@ -139,7 +139,7 @@ def write_waypoints(path: str | Path, toolpaths: Toolpaths, layers: Sequence[Lay
     for layer in layers:
         out.append(f"{_MARK} {layer.index}")
         for line in fibre.on_layer(layer.index):
-            rows = (line @ layer.frame.T).round(4) + 0.0
+            rows = (line @ layer.plane.frame.T).round(4) + 0.0
             out += ["S", *(f"X{x:.10g} Y{y:.10g} Z{z:.10g}" for x, y, z in rows.tolist()), "E"]
     with whole_file(path) as temporary:
         temporary.write_text("\n".join(out) + "\n", encoding="utf-8")

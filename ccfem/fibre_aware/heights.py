@@ -15,7 +15,7 @@ __all__ = ["alike_share", "fibre_capacity", "group_layers", "nearest_layer"]
 
 def nearest_layer(part: SmearedPart, layers: Sequence[Layer]) -> IntArray:
     """Position in `layers` of the one nearest in height to each cell, (m,)."""
-    heights = np.array([layer.height for layer in layers])
+    heights = np.array([layer.plane.height for layer in layers])
     order = np.argsort(heights, kind="stable")
     bounds = 0.5 * (heights[order][1:] + heights[order][:-1])
     level = part.centroids @ part.frame[2]
@@ -36,7 +36,7 @@ def group_layers(layers: Sequence[Layer], groups: int) -> IntArray:
     (n,) int array
         Group of each layer; every group has a layer.
     """
-    order = np.argsort([layer.height for layer in layers], kind="stable")
+    order = np.argsort([layer.plane.height for layer in layers], kind="stable")
     group = np.empty(len(layers), dtype=np.int64)
     group[order] = np.arange(len(layers)) * min(groups, len(layers)) // len(layers)
     return group

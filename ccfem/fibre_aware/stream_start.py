@@ -14,6 +14,7 @@ from ccfem.fields.layer_elements import Surface, positive_definite
 from ccfem.fields.layer_tension import SampledTension, layer_tension
 from ccfem.fields.orientation import orient
 from ccfem.layers.layer import Layer
+from ccfem.layers.layer_stress import stress_on
 
 __all__ = ["plane_axes", "start_field"]
 
@@ -76,7 +77,7 @@ def start_field(
     (c,) array
         Coefficients; zero for a group without tension.
     """
-    tensions = [layer_tension(stress.on(layer)) for layer in layers]
+    tensions = [layer_tension(stress_on(layer, stress)) for layer in layers]
     values = np.concatenate([np.where(t.defined, t.stress, 0.0) for t in tensions])
     weight = np.concatenate([layer.areas for layer in layers])
     order = np.argsort(values, kind="stable")

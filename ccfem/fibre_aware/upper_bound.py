@@ -113,7 +113,7 @@ def upper_bound(
     check_number("number of layers", len(layers), at_least=1)
     check_number("iterations", iterations, at_least=1)
     check_known("mode", mode, MODES)
-    part = SmearedPart.of(stress, layers[0].frame)
+    part = SmearedPart.of(stress, layers[0].plane.frame)
     axial = (Strand() if strand is None else strand).stiffness(part.modulus)
     most = fibre_capacity(part, layers, machine)
     volume = part.mesh.volumes

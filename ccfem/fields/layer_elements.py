@@ -43,7 +43,7 @@ class Surface:
     @classmethod
     def of(cls, layer: Layer) -> "Surface":
         """Surface of a flat layer in its plane coordinates."""
-        return cls(layer.plane_points, layer.triangles)
+        return cls(layer.plane.points, layer.triangles)
 
     @cached_property
     def areas(self) -> FloatArray:

@@ -60,7 +60,7 @@ def layer_tension(
     """
     layer = stress.layer
     tensors = stress.cell if source == "cell" else stress.nodal[layer.triangles].mean(axis=1)
-    plane = in_plane(tensors, layer.frame)
+    plane = in_plane(tensors, layer.plane.frame)
     tension = plane_tension(plane, compression_limit)
     if sense == "absolute":
         tension = _absolute(plane)
@@ -92,7 +92,7 @@ class MeshTension:
 
     def on(self, layer: Layer) -> SampledTension:
         """Project to a layer: each triangle takes the vector and stress of its tetrahedron."""
-        plane = self.direction[layer.cell] @ layer.frame[:2].T
+        plane = self.direction[layer.cell] @ layer.plane.frame[:2].T
         length = np.linalg.norm(plane, axis=1)
         defined = self.defined[layer.cell] & (length > 1e-6)
         unit = plane / np.maximum(length, 1e-300)[:, None]

@@ -1,6 +1,6 @@
 """Layers, and slicing."""
 
 from ccfem.layers.layer import Layer
-from ccfem.layers.slicing.planar import plane_frame, slice_heights, slice_planar
+from ccfem.layers.slicing.planar import Planar, plane_frame, slice_heights
 
-__all__ = ["Layer", "plane_frame", "slice_heights", "slice_planar"]
+__all__ = ["Layer", "Planar", "plane_frame", "slice_heights"]

@@ -15,7 +15,8 @@ from ccfem.checks import check_number
 from ccfem.elasticity.stress_field import StressField
 from ccfem.layers.layer import Layer
 from ccfem.machine.machine import Machine
-from ccfem.planning.strategy import Amount, Strategy, plan
+from ccfem.planning.plan import plan
+from ccfem.planning.strategy import Amount, Strategy
 from ccfem.toolpaths import FIBRE, Toolpaths
 
 __all__ = ["TOLERANCE", "Planned", "check_wanted", "length_per_layer", "plan_to_length"]

@@ -88,7 +88,7 @@ class Infill(ABC):
 
     def raster(self, layer: Layer, stress: LayerStress, machine: Machine) -> RasterPlan:
         """Plan one layer on a bitmap of pixels a spacing wide, whatever the mode."""
-        image = bitmap(layer.polygon, self.spacing * machine.fibre_width)
+        image = bitmap(layer.plane.polygon, self.spacing * machine.fibre_width)
         return raster_plan(image, self.regions(image, layer, stress))
 
     def for_part(
@@ -97,7 +97,7 @@ class Infill(ABC):
         """Prepare the sections of a part; `stress` does not matter for that."""
         if self.mode == "raster":
             return _Prepared(self, {})
-        sections = [corners_only(layer.polygon) for layer in layers]
+        sections = [corners_only(layer.plane.polygon) for layer in layers]
         unequal = list(dict.fromkeys(sections))
         with ThreadPoolExecutor(os.cpu_count()) as pool:
             made = list(pool.map(partial(self.prepare, machine=machine), unequal))

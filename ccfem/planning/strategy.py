@@ -15,6 +15,7 @@ from ccfem.elasticity.stress_field import LayerStress, StressField
 from ccfem.errors import InputError, known_names
 from ccfem.io.toml import from_table
 from ccfem.layers.layer import Layer
+from ccfem.layers.layer_stress import stress_on
 from ccfem.machine.machine import Machine
 from ccfem.toolpaths import Toolpaths
 
@@ -132,7 +133,7 @@ def plan(
     planner: LayerStrategy = for_part(stress, layers, machine) if for_part else strategy
 
     def planned(layer: Layer) -> Toolpaths:
-        return planner(layer, stress.on(layer), machine)
+        return planner(layer, stress_on(layer, stress), machine)
 
     with ThreadPoolExecutor(min(os.cpu_count() or 1, _MOST_THREADS)) as pool:
         return Toolpaths.concatenate(pool.map(planned, layers))

@@ -37,11 +37,11 @@ def tension_picture(
         End of the colour scale; default `plot.paths.tension_limit`.
     """
     layer = stress.layer
-    figure, (axes,) = new_figure(extents_of(layer.plane_points))
+    figure, (axes,) = new_figure(extents_of(layer.plane.points))
     end = tension_limit(stress) if limit is None else limit
     draw_section(axes, layer, filled=False)
     colours = draw_stress(axes, stress, end)
-    plane = in_plane(stress.nodal[layer.triangles].mean(axis=1), layer.frame)
+    plane = in_plane(stress.nodal[layer.triangles].mean(axis=1), layer.plane.frame)
     largest, _, angle = largest_in_plane(plane)
     draw_directions(
         axes, layer, np.stack([np.cos(angle), np.sin(angle)], axis=1), largest > 0.02 * end
@@ -68,8 +68,8 @@ def draw_directions(
     """
     from matplotlib.collections import LineCollection
 
-    middle = layer.plane_points[layer.triangles].mean(axis=1)
-    size = float(np.ptp(layer.plane_points, axis=0).max()) / _STROKES
+    middle = layer.plane.points[layer.triangles].mean(axis=1)
+    size = float(np.ptp(layer.plane.points, axis=0).max()) / _STROKES
     kept = np.flatnonzero(np.ones(len(middle), dtype=bool) if shown is None else shown)
     # One triangle for each field of a grid: the one nearest to the middle of the field.
     field = np.floor(middle[kept] / size)
@@ -107,13 +107,13 @@ def scalar_picture(
     """
     from matplotlib.collections import LineCollection
 
-    figure, (axes,) = new_figure(extents_of(layer.plane_points))
+    figure, (axes,) = new_figure(extents_of(layer.plane.points))
     draw_section(axes, layer, filled=False)
     colours = scale("field")
     limits = (float(values.min()), float(values.max()))
     per_point = len(values) == len(layer.points)
     axes.tripcolor(
-        *layer.plane_points.T,
+        *layer.plane.points.T,
         layer.triangles,
         *([values] if per_point else []),
         facecolors=None if per_point else values,

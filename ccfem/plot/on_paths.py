@@ -34,8 +34,8 @@ def alignment_on_paths(paths: Toolpaths, stress: LayerStress, step: float = 1.0)
     layer = stress.layer
     lines = plane_paths(paths, layer)
     middle, tangent, length, _ = sample_midpoints(lines.points, lines.offsets, step)
-    triangle, weights = locate(layer.plane_points, layer.triangles, middle, step)
-    corners = in_plane(stress.nodal, layer.frame)[layer.triangles[triangle]]
+    triangle, weights = locate(layer.plane.points, layer.triangles, middle, step)
+    corners = in_plane(stress.nodal, layer.plane.frame)[layer.triangles[triangle]]
     largest, _, direction = largest_in_plane(np.einsum("qk,qkc->qc", weights, corners))
     angle = np.degrees(acute(np.arctan2(tangent[:, 1], tangent[:, 0]) - direction))
     angle[(triangle < 0) | (largest <= 0.0)] = np.nan
@@ -86,8 +86,12 @@ def force_on_paths(
     Coloured
         The scale ends at the force that 99 % of the pieces stay below.
     """
-    here = np.abs(middle @ layer.frame[2] - layer.height) < 1e-6 * (1.0 + abs(layer.height))
-    pieces = _pieces(layer.to_plane(middle[here]), layer.to_plane(tangent[here]), length[here])
+    here = np.abs(middle @ layer.plane.frame[2] - layer.plane.height) < 1e-6 * (
+        1.0 + abs(layer.plane.height)
+    )
+    pieces = _pieces(
+        layer.plane.project(middle[here]), layer.plane.project(tangent[here]), length[here]
+    )
     size = np.abs(force[here])
     most = float(np.quantile(size, 0.99)) if len(size) else 1.0
     most = max(most, 1e-12)

@@ -78,7 +78,7 @@ def tension_limit(stress: LayerStress, share: float = 0.98) -> float:
 
 def _tension(stress: LayerStress) -> FloatArray:
     """Larger principal stress in the plane at the layer's points, (n,), MPa, 0 where negative."""
-    largest, _, _ = largest_in_plane(in_plane(stress.nodal, stress.layer.frame))
+    largest, _, _ = largest_in_plane(in_plane(stress.nodal, stress.layer.plane.frame))
     return np.maximum(largest, 0.0)
 
 
@@ -86,10 +86,10 @@ def picture_extents(
     layer: Layer, toolpaths: Iterable[Toolpaths]
 ) -> tuple[float, float, float, float]:
     """Extents, mm, of a layer with fibre paths on it, whose links may lie outside the section."""
-    points = [layer.plane_points]
+    points = [layer.plane.points]
     for paths in toolpaths:
         wanted = paths.select((paths.layer == layer.index) & (paths.kind == FIBRE))
-        points.append(layer.to_plane(wanted.points))
+        points.append(layer.plane.project(wanted.points))
     return extents_of(np.concatenate(points))
 
 
@@ -98,7 +98,7 @@ def draw_section(axes: "Axes", layer: Layer, filled: bool = True) -> None:
     from matplotlib.collections import PathCollection
     from matplotlib.path import Path
 
-    corners = [layer.plane_points[np.append(loop, loop[:1])] for loop in layer.loops]
+    corners = [layer.plane.points[np.append(loop, loop[:1])] for loop in layer.loops]
     if not corners:
         return
     outline = Path.make_compound_path(*[Path(ring, closed=True) for ring in corners])
@@ -113,7 +113,7 @@ def draw_stress(axes: "Axes", stress: LayerStress, limit: float) -> Any:
     """Colour a layer by its tension, from none to `limit`, MPa; returns the colour map."""
     layer, colours = stress.layer, scale("stress")
     axes.tripcolor(
-        *layer.plane_points.T,
+        *layer.plane.points.T,
         layer.triangles,
         _tension(stress),
         shading="gouraud",
@@ -162,7 +162,7 @@ def draw_paths(
 def _strands_and_links(paths: Toolpaths, layer: Layer) -> tuple[list[FloatArray], list[FloatArray]]:
     """Paths cut where links begin and end: the strands, and the links, as (n, 2) arrays, mm."""
     found: tuple[list[FloatArray], list[FloatArray]] = ([], [])
-    plane = layer.to_plane(paths.points)
+    plane = layer.plane.project(paths.points)
     for start, end in pairwise(paths.offsets.tolist()):
         link = paths.link[start : end - 1]
         if not len(link):

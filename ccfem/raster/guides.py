@@ -135,8 +135,8 @@ def stress_guides(
         seeds = segment_seeds(inside)
     else:
         seeds = nearest_pixels(inside, raster.pixels(points))
-    plane = in_plane(stress.nodal, layer.frame)
+    plane = in_plane(stress.nodal, layer.plane.frame)
     starts = raster.centres(seeds)
     step = _STEP * raster.pixel
-    curves = streamlines(layer.plane_points, layer.triangles, plane, starts, step)
+    curves = streamlines(layer.plane.points, layer.triangles, plane, starts, step)
     return guide_pixels(raster, inside, curves, seeds)

@@ -74,11 +74,11 @@ class Concentric(Infill):
         """Rings, or what joins them."""
         width, spacing = machine.fibre_width, self.spacing * machine.fibre_width
         if self.filled:
-            return concentric(layer.polygon, spacing, _CLOSEST, 0.5 * width, self.rings)
-        levels = offset_rings(layer.polygon, 0.5 * width, spacing, width, self.rings)
+            return concentric(layer.plane.polygon, spacing, _CLOSEST, 0.5 * width, self.rings)
+        levels = offset_rings(layer.plane.polygon, 0.5 * width, spacing, width, self.rings)
         if not self.joined or not levels:
             return [ring for level in levels for ring in level]
-        first = layer.plane_points[layer.loops[0][:2]].mean(axis=0)
+        first = layer.plane.points[layer.loops[0][:2]].mean(axis=0)
         start = first if self.start is None else np.asarray(self.start, dtype=np.float64)
         return join_rings(levels, start, spacing, width)
 

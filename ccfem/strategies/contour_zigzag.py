@@ -60,6 +60,6 @@ class ContourZigzag:
             (self.contours + 0.5) * width,
             np.radians(self.angle + self.turn * layer.index),
         )
-        lines = zigzag(layer.polygon, inside, width, self.spacing * width, angle)
+        lines = zigzag(layer.plane.polygon, inside, width, self.spacing * width, angle)
         inner = long_enough(Toolpaths.from_plane(lines, layer), None, machine)
         return Toolpaths.concatenate([contours, inner])

@@ -68,7 +68,7 @@ class Eqs:
     def __call__(self, layer: Layer, stress: LayerStress, machine: Machine) -> Toolpaths:
         """Plan the paths of one layer; none where the section is thinner than a fibre."""
         width = machine.fibre_width
-        region = shapely.buffer(layer.polygon, -0.5 * width)
+        region = shapely.buffer(layer.plane.polygon, -0.5 * width)
         seed = self._seed_line(layer, stress, region, _STEP * width)
         if len(seed) < 2:
             return Toolpaths.empty()
@@ -79,15 +79,15 @@ class Eqs:
         self, layer: Layer, stress: LayerStress, region: Region, step: float
     ) -> FloatArray:
         """Longest candidate (n, 2); empty where no candidate lies in the region."""
-        plane = in_plane(stress.nodal, layer.frame)
+        plane = in_plane(stress.nodal, layer.plane.frame)
         if self.seed is None:
             value, _, _ = strongest_in_plane(plane[layer.triangles].mean(axis=1))
-            middles = layer.plane_points[layer.triangles].mean(axis=1)
+            middles = layer.plane.points[layer.triangles].mean(axis=1)
             order = np.argsort(-np.abs(value), kind="stable")
             starts = middles[order[shapely.contains_xy(region, middles[order])]][:_CANDIDATES]
         else:
             starts = np.array([self.seed])
-        lines = streamlines(layer.plane_points, layer.triangles, plane, starts, step)
+        lines = streamlines(layer.plane.points, layer.triangles, plane, starts, step)
         if not lines:
             return np.zeros((0, 2))
         return lines[int(np.argmax([len(line) for line in lines]))]

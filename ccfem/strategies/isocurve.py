@@ -30,6 +30,7 @@ from ccfem.geometry.isocontours import Isocontours
 from ccfem.geometry.polylines import is_closed, runs
 from ccfem.layers.holes import holes_on
 from ccfem.layers.layer import Layer
+from ccfem.layers.layer_stress import stress_on
 from ccfem.linking.clearance import trim_to_clearance
 from ccfem.linking.conformal import lead_into, parallel_curve
 from ccfem.linking.finishing import keep_off_border, linked_paths
@@ -189,7 +190,9 @@ class Isocurve:
                 stress, self.stress, self.sense, self.compression_limit, self.incompatible
             )
         planner = _Planner(self, part)
-        if not any(planner.tension(layer, stress.on(layer)).defined.any() for layer in layers):
+        if not any(
+            planner.tension(layer, stress_on(layer, stress)).defined.any() for layer in layers
+        ):
             largest = float(np.linalg.eigvalsh(stress.stress).max())
             raise InputError(
                 "expected tension along which to lay fibre; the largest tensile stress found is "
@@ -290,7 +293,7 @@ class _Planner:
         machine: Machine,
     ) -> list[FloatArray]:
         """Curves round the chosen holes, isocurves led into them, ends linked, the rest dropped."""
-        s, width, section = self.strategy, machine.fibre_width, layer.polygon
+        s, width, section = self.strategy, machine.fibre_width, layer.plane.polygon
         rings: list[FloatArray] = []
         names = part.problem.held_or_loaded if s.conformal == "loaded" else s.conformal
         for hole in holes_on(layer, names) if s.rings else []:
@@ -313,7 +316,7 @@ class _Planner:
 
 def _nearest(layer: Layer, values: FloatArray) -> Callable[[FloatArray], FloatArray]:
     """Return a function that gives points (k, 2) the value of the nearest triangle."""
-    tree = cKDTree(layer.plane_points[layer.triangles].mean(axis=1))
+    tree = cKDTree(layer.plane.points[layer.triangles].mean(axis=1))
     return lambda points: values[tree.query(points)[1]]
 
 

@@ -130,9 +130,9 @@ class Mps(Infill):
         if self.seeds != "segments":
             seeds = _moved_inside(self._points(layer, stress), interior, pitch)
         curves = streamlines(
-            layer.plane_points,
+            layer.plane.points,
             layer.triangles,
-            in_plane(stress.nodal, layer.frame),
+            in_plane(stress.nodal, layer.plane.frame),
             seeds,
             _STEP * pitch,
         )
@@ -186,7 +186,7 @@ def _patch_middles(layer: Layer, patches: tuple[str, ...]) -> FloatArray:
     for name in patches:
         nodes = np.unique(layer.patches.get(name, np.zeros((0, 2), dtype=np.int64)))
         if len(nodes):
-            places = layer.plane_points[nodes]
+            places = layer.plane.points[nodes]
             gap = np.linalg.norm(places - places.mean(axis=0), axis=1)
             found.append(places[np.argmin(gap)])
     return np.array(found, dtype=np.float64).reshape(-1, 2)

@@ -53,7 +53,7 @@ class Offset:
     def __call__(self, layer: Layer, stress: LayerStress, machine: Machine) -> Toolpaths:
         """Plan the paths of one layer; none where the section is thinner than a fibre."""
         width = machine.fibre_width
-        lines = _level_sets(layer.polygon, 0.5 * width, self.spacing * width)
+        lines = _level_sets(layer.plane.polygon, 0.5 * width, self.spacing * width)
         return long_enough(Toolpaths.from_plane(lines, layer), self.minimum_length, machine)
 
 

@@ -17,7 +17,8 @@ from ccfem.fibre_aware.prune import prune
 from ccfem.layers.layer import Layer
 from ccfem.machine.machine import Machine
 from ccfem.planning.equal_fibre import plan_to_length
-from ccfem.planning.strategy import Amount, LayerStrategy, create
+from ccfem.planning.strategy import Amount, LayerStrategy
+from ccfem.strategies import create
 from ccfem.toolpaths import Toolpaths
 from ccfem.virtual_testing.strand import RHO, Strand
 

@@ -29,6 +29,7 @@ from ccfem.fibre_aware.stream_start import plane_axes, start_field
 from ccfem.fields.layer_tension import layer_tension
 from ccfem.geometry.isocontours import isocontours, triangle_edges
 from ccfem.layers.layer import Layer
+from ccfem.layers.layer_stress import stress_on
 from ccfem.linking.clearance import trim_to_clearance
 from ccfem.linking.finishing import keep_off_border, linked_paths
 from ccfem.machine.machine import Machine
@@ -125,7 +126,7 @@ class StreamFunction:
         InputError
             When no layer has a tensile direction.
         """
-        if not any(layer_tension(stress.on(layer)).defined.any() for layer in layers):
+        if not any(layer_tension(stress_on(layer, stress)).defined.any() for layer in layers):
             largest = float(np.linalg.eigvalsh(stress.stress).max())
             raise InputError(
                 "expected tension that fibre can carry; the largest tensile stress found is "
@@ -143,7 +144,7 @@ class StreamFunction:
     ) -> tuple[StreamProblem, IntArray, StreamDesign]:
         """Design the fields: the problem, the group of each layer, and the design."""
         linear = on_linear_cells(stress)
-        part = SmearedPart.of(linear, layers[0].frame)
+        part = SmearedPart.of(linear, layers[0].plane.frame)
         mesh = part.mesh
         centres = part.centroids @ part.frame[:2].T
         size = max(self.grid * machine.fibre_width, float(np.cbrt(6.0 * mesh.volumes.mean())))
@@ -236,7 +237,7 @@ class _Extraction:
 
     def layer_paths(self, layer: Layer, field: FloatArray, shift: float) -> Toolpaths:
         """Paths of one layer along unit levels, the first one `shift` above the lowest value."""
-        width, section = self.problem.width, layer.polygon
+        width, section = self.problem.width, layer.plane.polygon
         points, triangles = _refined(layer)
         values = self.problem.grid.values(points) @ field
         curves = isocontours(points, triangles, values, float(values.min()) + shift, 1.0)
@@ -256,7 +257,7 @@ class _Extraction:
 
 def _refined(layer: Layer) -> tuple[FloatArray, IntArray]:
     """Points (n, 2) and triangles (t, 3) of a layer, each triangle cut in four."""
-    points, corners = layer.plane_points, layer.triangles
+    points, corners = layer.plane.points, layer.triangles
     edges, opposite = triangle_edges(corners)
     a, b, c = corners.T
     x, y, z = opposite.T + len(points)

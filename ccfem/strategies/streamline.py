@@ -59,10 +59,10 @@ class Streamline:
         """Plan the paths of one layer; none where the section is thinner than a fibre."""
         width = machine.fibre_width
         lines = evenly_spaced_streamlines(
-            layer.plane_points,
+            layer.plane.points,
             layer.triangles,
-            in_plane(stress.nodal, layer.frame),
-            shapely.buffer(layer.polygon, -0.5 * width),
+            in_plane(stress.nodal, layer.plane.frame),
+            shapely.buffer(layer.plane.polygon, -0.5 * width),
             self.spacing * width,
             self.closest,
         )

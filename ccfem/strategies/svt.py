@@ -105,7 +105,7 @@ class Svt:
         """Plan the paths of one layer: for each piece of its section one, or as few as can be."""
         lines: list[FloatArray] = []
         link: list[BoolArray] = []
-        for piece in shapely.get_parts(layer.polygon):
+        for piece in shapely.get_parts(layer.plane.polygon):
             for line, mask in self._piece(piece, stress, machine):
                 lines.append(line)
                 link.append(mask)

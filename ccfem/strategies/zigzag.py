@@ -50,5 +50,5 @@ class Zigzag:
         """Plan the paths of one layer; none where the section is thinner than a fibre."""
         width = machine.fibre_width
         angle = np.radians(self.angle + self.turn * layer.index)
-        lines = zigzag(layer.polygon, 0.5 * width, width, self.spacing * width, angle)
+        lines = zigzag(layer.plane.polygon, 0.5 * width, width, self.spacing * width, angle)
         return long_enough(Toolpaths.from_plane(lines, layer), None, machine)

@@ -37,8 +37,8 @@ def plane_stress_at(stress: LayerStress, points: FloatArray, reach: float) -> Fl
     Points outside the layer by no more than `reach`, mm, take the stress of its border; others 0.
     """
     layer = stress.layer
-    cell, weights = locate(layer.plane_points, layer.triangles, points, reach)
-    corner = in_plane(stress.nodal, layer.frame)[layer.triangles[cell]]
+    cell, weights = locate(layer.plane.points, layer.triangles, points, reach)
+    corner = in_plane(stress.nodal, layer.plane.frame)[layer.triangles[cell]]
     return np.where(cell[:, None] >= 0, np.einsum("kc,kci->ki", weights, corner), 0.0)
 
 

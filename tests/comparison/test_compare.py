@@ -19,8 +19,9 @@ from ccfem.evaluation import evaluate
 from ccfem.machine import Machine
 from ccfem.materials import isotropic
 from ccfem.mesh.box import box_mesh
+from ccfem.planning import plan
 from ccfem.planning.equal_fibre import length_per_layer
-from ccfem.strategies import create, plan
+from ccfem.strategies import create
 from ccfem.toolpaths import Toolpaths
 
 SIZE = (60.0, 24.0, 4.0)

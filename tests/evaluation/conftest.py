@@ -9,7 +9,7 @@ from ccfem.elasticity.problem import Problem, Support
 from ccfem.elasticity.stress_field import SolveRecord, StressField
 from ccfem.evaluation.plane_paths import PlanePaths, plane_paths
 from ccfem.layers.layer import Layer
-from ccfem.layers.slicing.planar import slice_planar
+from ccfem.layers.slicing.planar import Planar
 from ccfem.materials import isotropic
 from ccfem.mesh import TetMesh
 from ccfem.mesh.box import box_mesh
@@ -62,7 +62,7 @@ def make_part(
     nothing, record = np.zeros_like(mesh.points), SolveRecord("by hand", 0, 0.0, 0.0, 0.0, 0)
     cell = stress(mesh.points[mesh.corners].mean(axis=1))
     field = StressField(problem, "pull", nothing, cell, stress(mesh.points), nothing, 0.0, record)
-    return Part(field, slice_planar(mesh, direction, count=count))
+    return Part(field, Planar(count=count).cut(mesh, direction))
 
 
 def uniform(s11: float, s22: float = 0.0, s12: float = 0.0) -> Callable[[np.ndarray], np.ndarray]:

@@ -2,12 +2,13 @@
 
 import numpy as np
 import pytest
+from ccfem.layers.layer_stress import stress_on
 
 from ccfem.evaluation.alignment import alignment_indices, sample_alignment
 
 
 def indices(part, *lines):
-    on_layer = part.stress.on(part.layers[0])
+    on_layer = stress_on(part.layers[0], part.stress)
     return alignment_indices(sample_alignment(part.plane(*lines), on_layer, 1.0))
 
 
@@ -100,7 +101,7 @@ def test_without_a_direction_there_is_no_angle(make_part, uniform, equal):
 
 
 def test_fibre_outside_the_part_meets_no_stress(pulled):
-    on_layer = pulled.stress.on(pulled.layers[0])
+    on_layer = stress_on(pulled.layers[0], pulled.stress)
     samples = sample_alignment(pulled.plane([[30, -20], [30, 40]]), on_layer, 1.0)
     assert samples.length.sum() == pytest.approx(40.0)
     nothing = alignment_indices(

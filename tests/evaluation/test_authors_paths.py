@@ -83,10 +83,10 @@ def test_coverage_is_the_area_of_the_buffered_paths(authors, totals):
     paths = authors.published_paths("ours")
     covered = area = 0.0
     for layer in layers:
-        lines = [shapely.LineString(layer.to_plane(p)) for p in paths.on_layer(layer.index)]
+        lines = [shapely.LineString(layer.plane.project(p)) for p in paths.on_layer(layer.index)]
         band = shapely.union_all([line.buffer(0.5) for line in lines])
-        covered += band.intersection(layer.polygon).area
-        area += layer.polygon.area
+        covered += band.intersection(layer.plane.polygon).area
+        area += layer.plane.polygon.area
     assert totals["ours"]["coverage"] == pytest.approx(covered / area, abs=2e-4)
 
 

@@ -32,7 +32,7 @@ def test_a_strand_all_outside(pulled):
 
 
 def test_the_depth_in_a_hole_is_that_of_the_worst_place_between_the_points(framed):
-    assert framed.layers[0].polygon.area == pytest.approx(60.0 * 40.0 - 20.0 * 10.0)
+    assert framed.layers[0].plane.polygon.area == pytest.approx(60.0 * 40.0 - 20.0 * 10.0)
     length, depth = indices(framed.plane([[5, 20], [55, 20]]))
     assert length == pytest.approx(20.0, abs=3e-4)
     assert depth == pytest.approx(5.0, abs=2e-4)

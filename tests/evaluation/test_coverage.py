@@ -3,12 +3,13 @@
 import numpy as np
 import pytest
 import shapely
+from ccfem.layers.layer_stress import stress_on
 
 from ccfem.evaluation.coverage import coverage_indices, sample_coverage
 
 
 def indices(part, *lines, width=1.0):
-    on_layer = part.stress.on(part.layers[0])
+    on_layer = stress_on(part.layers[0], part.stress)
     return coverage_indices(sample_coverage(part.plane(*lines), on_layer, width))
 
 
@@ -43,7 +44,7 @@ def test_crooked_paths_cover_the_area_of_their_buffer(pulled, width):
         for _ in range(10)
     ]
     band = shapely.union_all([shapely.LineString(line).buffer(0.5 * width, 64) for line in lines])
-    exact = band.intersection(pulled.layers[0].polygon).area / 2400.0
+    exact = band.intersection(pulled.layers[0].plane.polygon).area / 2400.0
     assert indices(pulled, *lines, width=width)["coverage"] == pytest.approx(exact, rel=0.01)
 
 

@@ -10,7 +10,7 @@ from scipy.spatial.transform import Rotation
 
 from ccfem.errors import InputError
 from ccfem.evaluation import COLUMNS, evaluate
-from ccfem.layers.slicing.planar import slice_planar
+from ccfem.layers.slicing.planar import Planar
 from ccfem.machine import Machine
 from ccfem.mesh import TetMesh
 from ccfem.mesh.box import box_mesh
@@ -232,7 +232,7 @@ def test_turning_and_moving_part_and_paths_changes_nothing(part, lines, seed):
         stress=turn @ part.stress.stress @ turn.T,
         nodal=turn @ part.stress.nodal @ turn.T,
     )
-    layers = slice_planar(moved, tuple(turn[:, 2]), count=2)
+    layers = Planar(count=2).cut(moved, tuple(turn[:, 2]))
     here = part.paths(*lines)
     there = replace(here, points=here.points @ turn.T + shift, normals=here.normals @ turn.T)
     first = evaluate(here, part.layers, part.stress, MACHINE).total

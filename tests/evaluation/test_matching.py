@@ -4,6 +4,7 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
+from ccfem.layers.layer_stress import stress_on
 from scipy.spatial.transform import Rotation
 
 from ccfem.errors import InputError
@@ -13,7 +14,7 @@ from ccfem.evaluation.matching import READINGS, THRESHOLDS, matching_indices, ma
 
 def rate(part, paths, reading="path", **options):
     return matching_rate(
-        paths, [part.stress.on(layer) for layer in part.layers], reading, **options
+        paths, [stress_on(layer, part.stress) for layer in part.layers], reading, **options
     )
 
 
@@ -44,11 +45,11 @@ def test_tracks_made_of_the_stress_vectors_match_them_all(make_part, uniform, re
     part = make_part(turning, divisions=(13, 8, 1))
     layer = part.layers[0]
     # The nodal stress of each triangle's middle, by eigenvectors.
-    stress = part.stress.on(layer).nodal[layer.triangles].mean(axis=1)[:, :2, :2]
+    stress = stress_on(layer, part.stress).nodal[layer.triangles].mean(axis=1)[:, :2, :2]
     values, vectors = np.linalg.eigh(stress)
     largest = np.abs(values).argmax(axis=1)
     along = vectors[np.arange(len(vectors)), :, largest]
-    middle = layer.plane_points[layer.triangles].mean(axis=1)
+    middle = layer.plane.points[layer.triangles].mean(axis=1)
     lines = np.stack([middle - 0.1 * along, middle + 0.1 * along], axis=1)
     assert rate(part, part.paths(*lines), reading) == pytest.approx(1.0)
 
@@ -74,7 +75,7 @@ def test_directions_all_round_match_by_chance(pulled, reading):
 def test_random_directions_beside_every_vector_match_by_chance(pulled):
     rng = np.random.default_rng(1)
     layer = pulled.layers[0]
-    middle = layer.plane_points[layer.triangles].mean(axis=1)
+    middle = layer.plane.points[layer.triangles].mean(axis=1)
     lines = [strand(rng.uniform(0.0, 180.0), 0.2, place) for place in middle]
     found = rate(pulled, pulled.paths(*lines), "stress_nearest")
     error = np.sqrt(0.25 / len(lines))
@@ -96,7 +97,7 @@ def test_energy_weighs_fibre_with_the_size_of_the_stress(make_part):
 
 def test_in_compression_alone_alignment_and_matching_differ(make_part, uniform):
     part = make_part(uniform(-10.0, 3.0))
-    samples = sample_alignment(part.plane(strand(0.0)), part.stress.on(part.layers[0]), 1.0)
+    samples = sample_alignment(part.plane(strand(0.0)), stress_on(part.layers[0], part.stress), 1.0)
     assert matching_indices(samples)["matching_path_10"] == 1.0
     assert alignment_indices(samples)["aligned_10"] == 0.0
 
@@ -119,7 +120,7 @@ def test_the_best_piece_counts_within_reach_only(pulled):
     alone = pulled.paths(*[[[0, y], [60, y]] for y in np.arange(2.0, 40.0, 4.0)])
     for reach in (0.5, 1.0):
         layer = pulled.layers[0]
-        y = layer.plane_points[layer.triangles].mean(axis=1)[:, 1]
+        y = layer.plane.points[layer.triangles].mean(axis=1)[:, 1]
         near = np.abs(y % 4.0 - 2.0) <= reach
         share = layer.areas[near].sum() / layer.areas.sum()
         found = rate(pulled, alone, "stress_best", reach=reach)
@@ -163,12 +164,12 @@ def test_load_and_frame_do_not_matter(make_part, reading):
     first = rate(part, part.paths(*lines), reading)
     assert 0.01 < first[0] < first[6] < 0.9
     scaled = replace(part.stress, nodal=1e6 * part.stress.nodal)
-    again = matching_rate(part.paths(*lines), [scaled.on(part.layers[0])], reading)
+    again = matching_rate(part.paths(*lines), [stress_on(part.layers[0], scaled)], reading)
     assert again == pytest.approx(first, abs=1e-12)
     turn = Rotation.random(rng=3).as_matrix()
     # The layer is turned, not sliced anew: a slice may cut the same section in other triangles.
-    stress, layer, here = part.stress.on(part.layers[0]), part.layers[0], part.paths(*lines)
-    frame = layer.frame @ turn.T
+    stress, layer, here = stress_on(part.layers[0], part.stress), part.layers[0], part.paths(*lines)
+    frame = layer.plane.frame @ turn.T
     frame[:2] = [0.6 * frame[0] + 0.8 * frame[1], 0.6 * frame[1] - 0.8 * frame[0]]
     layer = replace(layer, points=layer.points @ turn.T, frame=frame)
     there = replace(here, points=here.points @ turn.T, normals=here.normals @ turn.T)
@@ -183,7 +184,7 @@ def test_layers_count_by_their_fibre_or_by_their_area(make_part, reading):
     part = make_part(turning, count=2)
     fibre = [part.paths(*lines[:3], layer=0), part.paths(lines[3], layer=1)]
     paths = type(fibre[0]).concatenate(fibre)
-    stresses = [part.stress.on(layer) for layer in part.layers]
+    stresses = [stress_on(layer, part.stress) for layer in part.layers]
     each = [matching_rate(paths, [stress], reading) for stress in stresses]
     weights = [one.lengths.sum() for one in fibre] if reading == "path" else [1.0, 1.0]
     expected = np.average(each, axis=0, weights=weights)

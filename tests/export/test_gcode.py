@@ -13,7 +13,7 @@ from ccfem.evaluation.plane_paths import plane_paths
 from ccfem.export.gcode import gcode, write_gcode
 from ccfem.export.print_plan import check_machine, plan_print
 from ccfem.io.toml import from_table
-from ccfem.layers import slice_planar
+from ccfem.layers.slicing.planar import Planar
 from ccfem.machine import Machine, SpeedTable
 from ccfem.machine.gcode_profile import GcodeProfile
 from ccfem.mesh.box import box_mesh
@@ -58,7 +58,7 @@ def plate():
     outline = shapely.box(*CORNER[:2], *(CORNER + SIZE)[:2])
     mesh = extrude(outline.difference(shapely.Point(25.0, 35.0).buffer(HOLE, 64)), 4.0, 6.0)
     mesh = replace(mesh, points=mesh.points + CORNER * [0.0, 0.0, 1.0])
-    layers = slice_planar(mesh, count=3)
+    layers = Planar(count=3).cut(mesh)
     parts = [Toolpaths.from_plane(lines, k) for lines, k in zip(LINES, layers, strict=True)]
     return mesh, layers, Toolpaths.concatenate(parts)
 
@@ -284,7 +284,7 @@ def test_a_cutter_at_the_nozzle_and_a_path_of_just_the_tail(plate, follow):
 
 def test_a_part_built_along_y_lies_flat_on_the_bed(follow):
     mesh = box_mesh((60.0, 4.0, 20.0), (6, 2, 2), (5.0, -2.0, 7.0))
-    layers = slice_planar(mesh, (0.0, 1.0, 0.0), count=2)
+    layers = Planar(count=2).cut(mesh, (0.0, 1.0, 0.0))
     # The plane's axes are x and -z.
     line = np.array([[10.0, -20.0], [60.0, -20.0]])
     paths = Toolpaths.from_plane([line], layers[1])
@@ -351,7 +351,7 @@ def test_prints_that_cannot_be(plate, tmp_path):
         plan_print(paths, layers[:1], mesh, MACHINE)
     with pytest.raises(InputError, match=r"fibre layer 0 at 3\.66667 mm does not fit .* 3 and 7"):
         plan_print(paths, layers, mesh, replace(MACHINE, fibre_height=1.34))
-    close = slice_planar(mesh, heights=[4.0, 4.09])
+    close = Planar(heights=[4.0, 4.09]).cut(mesh)
     with pytest.raises(InputError, match=r"fibre layer 1 at 4\.09 mm .* 4\.05 and 7 mm"):
         plan_print(paths.select(paths.layer < 2), close, mesh, MACHINE)
     small = replace(MACHINE, gcode=GcodeProfile(bed=(100.0, 40.0, 100.0)))

@@ -7,7 +7,7 @@ import pytest
 
 from ccfem.errors import InputError
 from ccfem.export.waypoints import read_waypoints, write_waypoints
-from ccfem.layers.slicing.planar import plane_frame, slice_planar
+from ccfem.layers.slicing.planar import Planar, plane_frame
 from ccfem.mesh.box import box_mesh
 from ccfem.toolpaths import MATRIX, Toolpaths
 
@@ -51,7 +51,7 @@ def test_tool_coordinates_are_x_minus_z_y_of_a_mesh_built_along_y(tmp_path, newl
 
 def test_what_is_written_is_read_again(tmp_path):
     mesh = box_mesh((200.0, 10.0, 90.0), (4, 2, 3), (-100.0, 0.0, -45.0))
-    layers = slice_planar(mesh, (0.3, 1.0, -0.2), count=3)
+    layers = Planar(count=3).cut(mesh, (0.3, 1.0, -0.2))
     rng = np.random.default_rng(0)
     lines = [(rng.random((n, 2)) - 0.5) * [200.0, 90.0] for n in (2, 7, 30)]
     lines[2][-1] = lines[2][0]
@@ -60,7 +60,7 @@ def test_what_is_written_is_read_again(tmp_path):
     )
     path = tmp_path / "paths_raw.txt"
     write_waypoints(path, made, layers)
-    found = read_waypoints(path, layers[0].frame)
+    found = read_waypoints(path, layers[0].plane.frame)
     assert found.points == pytest.approx(made.points, abs=1e-4)
     for name in ("offsets", "layer", "closed", "kind"):
         assert np.array_equal(getattr(found, name), getattr(made, name))
@@ -73,16 +73,16 @@ def test_what_is_written_is_read_again(tmp_path):
 
 
 def test_only_fibre_is_written(tmp_path):
-    layers = slice_planar(box_mesh((10.0, 10.0, 2.0), (1, 1, 1)), count=1)
+    layers = Planar(count=1).cut(box_mesh((10.0, 10.0, 2.0), (1, 1, 1)))
     paths = Toolpaths.from_plane([np.eye(2), np.ones((2, 2)) * [[1], [2]]], layers[0])
     write_waypoints(tmp_path / "a.txt", replace(paths, kind=np.array([0, MATRIX])), layers)
-    assert len(read_waypoints(tmp_path / "a.txt", layers[0].frame)) == 1
+    assert len(read_waypoints(tmp_path / "a.txt", layers[0].plane.frame)) == 1
 
 
 def test_no_path_is_a_file_of_layers_only(tmp_path):
-    layers = slice_planar(box_mesh((10.0, 10.0, 2.0), (1, 1, 1)), count=2)
+    layers = Planar(count=2).cut(box_mesh((10.0, 10.0, 2.0), (1, 1, 1)))
     write_waypoints(tmp_path / "a.txt", Toolpaths.empty(), layers)
-    assert len(read_waypoints(tmp_path / "a.txt", layers[0].frame)) == 0
+    assert len(read_waypoints(tmp_path / "a.txt", layers[0].plane.frame)) == 0
 
 
 @pytest.mark.parametrize(
@@ -112,7 +112,7 @@ def test_files_that_cannot_be_read_or_written(tmp_path):
     (tmp_path / "binary.txt").write_bytes(b"\xff\xfe\x00S")
     with pytest.raises(InputError, match="it holds no text"):
         read_waypoints(tmp_path / "binary.txt", ALONG_Y)
-    layers = slice_planar(box_mesh((10.0, 10.0, 2.0), (1, 1, 1)), count=1)
+    layers = Planar(count=1).cut(box_mesh((10.0, 10.0, 2.0), (1, 1, 1)))
     with pytest.raises(InputError, match=r"cannot write .* there is no folder"):
         write_waypoints(tmp_path / "missing" / "a.txt", Toolpaths.empty(), layers)
     paths = replace(Toolpaths.from_plane([np.eye(2)], layers[0]), layer=np.array([4]))

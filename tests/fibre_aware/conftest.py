@@ -5,7 +5,7 @@ import pytest
 
 from ccfem.elasticity.problem import Force, Problem, Support, Traction
 from ccfem.elasticity.solve import solve
-from ccfem.layers.slicing.planar import slice_planar
+from ccfem.layers.slicing.planar import Planar
 from ccfem.materials import isotropic
 from ccfem.mesh.box import box_mesh
 
@@ -17,7 +17,7 @@ def pulled_bar():
     supports = (Support("x_min", "x"), Support("y_min", "y"), Support("z_min", "z"))
     loads = {"pull": (Traction("x_max", (5.0, 0.0, 0.0)),)}
     problem = Problem(mesh, isotropic(3500.0, 0.35), supports, loads)
-    return solve(problem, tolerance=1e-10)["pull"], slice_planar(mesh, count=4)
+    return solve(problem, tolerance=1e-10)["pull"], Planar(count=4).cut(mesh)
 
 
 @pytest.fixture(scope="session")
@@ -27,7 +27,7 @@ def bent_beam():
     problem = Problem(
         mesh, isotropic(3500.0, 0.35), (Support("x_min"),), {"tip": (Force("x_max", (0, 50, 0)),)}
     )
-    return solve(problem, tolerance=1e-10)["tip"], slice_planar(mesh, count=4)
+    return solve(problem, tolerance=1e-10)["tip"], Planar(count=4).cut(mesh)
 
 
 @pytest.fixture

@@ -8,7 +8,7 @@ from hypothesis import strategies as st
 from ccfem.errors import InputError
 from ccfem.fibre_aware.prune import Profile, profiles, prune, shorten
 from ccfem.machine import Machine
-from ccfem.planning.strategy import plan
+from ccfem.planning import plan
 from ccfem.strategies.isocurve import Isocurve
 from ccfem.toolpaths import MATRIX, Toolpaths
 from ccfem.virtual_testing.strands import cut_strands

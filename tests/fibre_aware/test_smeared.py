@@ -23,7 +23,7 @@ def uniform(part, stiffness, angle):
 def test_fibre_along_uniform_tension_adds_its_stiffness(pulled_bar):
     # A bar in parallel with its fibre: stiffness ratio 1 + EA m / E.
     stress, layers = pulled_bar
-    part = SmearedPart.of(stress, layers[0].frame)
+    part = SmearedPart.of(stress, layers[0].plane.frame)
     found = part.solve(lambda strain: uniform(part, 7000.0, 0.0), tolerance=1e-10)
     assert part.ratio(found.work) == pytest.approx(1.0 + 7000.0 / 3500.0, rel=1e-8)
 
@@ -31,7 +31,7 @@ def test_fibre_along_uniform_tension_adds_its_stiffness(pulled_bar):
 def test_agrees_with_an_assembled_stiffness(bent_beam):
     # The same fibre as a stiffness of the cells, solved by the solver of the elasticity package.
     stress, layers = bent_beam
-    part = SmearedPart.of(stress, layers[0].frame)
+    part = SmearedPart.of(stress, layers[0].plane.frame)
     found = part.solve(lambda strain: uniform(part, 4000.0, ANGLE), tolerance=1e-10)
     fibre = np.zeros((6, 6))
     fibre[0, 0] = 4000.0
@@ -48,7 +48,7 @@ def test_agrees_with_an_assembled_stiffness(bent_beam):
 
 def test_fibre_in_tension_only_leaves_what_is_pressed(bent_beam):
     stress, layers = bent_beam
-    part = SmearedPart.of(stress, layers[0].frame)
+    part = SmearedPart.of(stress, layers[0].plane.frame)
     q = along(0.0)
 
     def one_sided(strain):
@@ -70,7 +70,7 @@ def test_moving_support_instead_of_a_force(pulled_bar):
     problem = stress.problem
     supports = (*problem.supports, Support("x_max", "x", (0.1, 0.0, 0.0)))
     moved = solve(replace(problem, supports=supports, loads={"move": ()}))["move"]
-    part = SmearedPart.of(moved, layers[0].frame)
+    part = SmearedPart.of(moved, layers[0].plane.frame)
     assert not part.forced
     found = part.solve(lambda strain: uniform(part, 7000.0, 0.0), tolerance=1e-10)
     assert part.ratio(found.work) == pytest.approx(3.0, rel=1e-8)

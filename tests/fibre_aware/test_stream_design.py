@@ -10,7 +10,7 @@ from ccfem.fibre_aware.smeared import SmearedPart
 from ccfem.fibre_aware.spline_grid import SplineGrid
 from ccfem.fibre_aware.stream_design import StreamProblem, design
 from ccfem.fibre_aware.stream_start import plane_axes, start_field
-from ccfem.layers.slicing.planar import slice_planar
+from ccfem.layers.slicing.planar import Planar
 from ccfem.machine import Machine
 from ccfem.materials import isotropic
 from ccfem.mesh.box import box_mesh
@@ -19,7 +19,7 @@ MACHINE = Machine()
 
 
 def problem_of(stress, layers, coverage=0.4, groups=1, size=2.5):
-    part = SmearedPart.of(stress, layers[0].frame)
+    part = SmearedPart.of(stress, layers[0].plane.frame)
     centres = part.centroids @ part.frame[:2].T
     capacity = fibre_capacity(part, layers, MACHINE)
     return StreamProblem(
@@ -118,7 +118,7 @@ def test_groups_have_their_own_fields(bent_beam):
 
 def test_heights_of_layers(pulled_bar):
     stress, layers = pulled_bar
-    part = SmearedPart.of(stress, layers[0].frame)
+    part = SmearedPart.of(stress, layers[0].plane.frame)
     expected = np.floor(part.centroids[:, 2])
     np.testing.assert_array_equal(nearest_layer(part, layers), expected)
     # In another order than by height: positions follow the sequence given.
@@ -130,7 +130,7 @@ def test_heights_of_layers(pulled_bar):
 
 def test_stress_is_alike_at_all_heights_in_the_plane_and_not_in_bending(pulled_bar):
     stress, layers = pulled_bar
-    part = SmearedPart.of(stress, layers[0].frame)
+    part = SmearedPart.of(stress, layers[0].plane.frame)
     assert alike_share(part, stress.stress, 2.0) == pytest.approx(1.0, abs=1e-9)
     bent = np.zeros((len(part.mesh.cells), 3, 3))
     bent[:, 0, 0] = part.centroids[:, 2] - 2.0
@@ -141,7 +141,7 @@ def test_axes_turn_with_the_part(bent_beam):
     stress, layers = bent_beam
     angle = 0.7
     turn = np.array([[np.cos(angle), -np.sin(angle)], [np.sin(angle), np.cos(angle)]])
-    part = SmearedPart.of(stress, layers[0].frame)
+    part = SmearedPart.of(stress, layers[0].plane.frame)
     energy = np.linalg.norm(stress.stress, axis=(1, 2)) ** 2
     centre, axes = plane_axes(part, energy)
     points = stress.mesh.points.copy()
@@ -152,7 +152,7 @@ def test_axes_turn_with_the_part(bent_beam):
         mesh, stress.problem.material, (Support("x_min"),), {"t": (Force("x_max", force),)}
     )
     field = solve(turned, tolerance=1e-10)["t"]
-    other = SmearedPart.of(field, slice_planar(mesh, count=4)[0].frame)
+    other = SmearedPart.of(field, Planar(count=4).cut(mesh)[0].frame)
     centre_2, axes_2 = plane_axes(other, np.linalg.norm(field.stress, axis=(1, 2)) ** 2)
     np.testing.assert_allclose(centre_2, turn @ centre, atol=1e-6)
     assert abs(axes_2[0] @ (turn @ axes[0])) == pytest.approx(1.0, abs=1e-9)
@@ -163,7 +163,7 @@ def test_no_tension_no_fibre():
     supports = (Support("x_min", "x"), Support("y_min", "y"), Support("z_min", "z"))
     push = {"push": (Traction("x_max", (-1.0, 0.0, 0.0)),)}
     stress = solve(Problem(mesh, isotropic(3500.0, 0.0), supports, push))["push"]
-    layers = slice_planar(mesh, count=1)
+    layers = Planar(count=1).cut(mesh)
     problem, field = started(stress, layers)
     assert not field.any()
     assert problem.evaluate(field).ratio == pytest.approx(1.0, abs=1e-9)

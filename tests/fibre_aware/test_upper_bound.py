@@ -8,7 +8,7 @@ from ccfem.fibre_aware.heights import fibre_capacity
 from ccfem.fibre_aware.smeared import SmearedPart, SmearedSolution
 from ccfem.fibre_aware.upper_bound import certificate, upper_bound
 from ccfem.machine import Machine
-from ccfem.planning.strategy import plan
+from ccfem.planning import plan
 from ccfem.strategies.isocurve import Isocurve
 from ccfem.strategies.zigzag import Zigzag
 from ccfem.toolpaths import Toolpaths
@@ -52,7 +52,7 @@ def test_any_displacement_proves_a_bound(bent_beam, rng):
     stress, layers = bent_beam
     length = 3000.0
     best = upper_bound(stress, layers, length, MACHINE)
-    part = SmearedPart.of(stress, layers[0].frame)
+    part = SmearedPart.of(stress, layers[0].plane.frame)
     most = fibre_capacity(part, layers, MACHINE)
     axial = 4.0 * part.modulus
     free = part.specimen.system.held.free
@@ -65,7 +65,7 @@ def test_any_displacement_proves_a_bound(bent_beam, rng):
 
 def test_scale_of_the_displacement_does_not_matter(bent_beam):
     stress, layers = bent_beam
-    part = SmearedPart.of(stress, layers[0].frame)
+    part = SmearedPart.of(stress, layers[0].plane.frame)
     most = fibre_capacity(part, layers, MACHINE)
     values = []
     for scale in (1.0, 2.5):
@@ -90,7 +90,7 @@ def test_more_fibre_and_more_layers_allow_more(bent_beam):
 def test_density_found_keeps_length_and_width(bent_beam):
     stress, layers = bent_beam
     found = upper_bound(stress, layers, 2000.0, MACHINE)
-    part = SmearedPart.of(stress, layers[0].frame)
+    part = SmearedPart.of(stress, layers[0].plane.frame)
     total = found.density.sum(axis=1)
     assert total.max() <= fibre_capacity(part, layers, MACHINE).max() * (1.0 + 1e-6)
     assert part.mesh.volumes @ total == pytest.approx(2000.0, rel=1e-3)

@@ -6,7 +6,7 @@ from shapely import affinity
 
 from ccfem.cases.named import create_case
 from ccfem.geometry.sections import corners_only
-from ccfem.layers import slice_planar
+from ccfem.layers.slicing.planar import Planar
 
 L_SHAPE = shapely.Polygon([(0, 0), (30, 0), (30, 10), (10, 10), (10, 30), (0, 30)])
 
@@ -36,6 +36,6 @@ def test_a_section_of_no_width_is_empty():
 
 def test_layers_of_an_extruded_part_are_equal():
     case = create_case("open_hole", element_size=4.0)
-    layers = slice_planar(case.problem.mesh, case.build, count=4)
-    assert not layers[0].polygon.equals_exact(layers[1].polygon, 0.0)
-    assert len({corners_only(layer.polygon) for layer in layers}) == 1
+    layers = Planar(count=4).cut(case.problem.mesh, case.build)
+    assert not layers[0].plane.polygon.equals_exact(layers[1].plane.polygon, 0.0)
+    assert len({corners_only(layer.plane.polygon) for layer in layers}) == 1

@@ -10,12 +10,13 @@ import shapely
 from ccfem.elasticity.problem import Force, Problem, Support
 from ccfem.elasticity.solve import solve
 from ccfem.evaluation import evaluate
-from ccfem.layers.slicing.planar import slice_planar
+from ccfem.layers.slicing.planar import Planar
 from ccfem.machine import Machine
 from ccfem.materials import isotropic
 from ccfem.mesh import TetMesh
 from ccfem.mesh.box import box_mesh
-from ccfem.strategies import create, named, plan
+from ccfem.planning import plan
+from ccfem.strategies import create, named
 
 MACHINE = Machine()
 NAMES = sorted(named())
@@ -55,7 +56,7 @@ def planned_on(load=1.0, degrees=0.0):
     problem = Problem(
         mesh, isotropic(3500.0, 0.35), (Support("left"),), {"pull": (Force("right", force),)}
     )
-    return solve(problem, tolerance=1e-10)["pull"], slice_planar(mesh, count=2)
+    return solve(problem, tolerance=1e-10)["pull"], Planar(count=2).cut(mesh)
 
 
 @cache
@@ -108,7 +109,7 @@ def test_lays_fibre_on_every_layer(name):
     paths = default_paths(name)
     assert np.isfinite(paths.points).all()
     assert set(paths.layer) == {0, 1}
-    heights = [layer.height for layer in planned_on()[1]]
+    heights = [layer.plane.height for layer in planned_on()[1]]
     for path, layer in zip(paths, paths.layer, strict=True):
         np.testing.assert_allclose(path[:, 2], heights[layer], atol=1e-9)
     np.testing.assert_array_equal(np.unique(paths.normals, axis=0), [[0.0, 0.0, 1.0]])
@@ -152,7 +153,7 @@ def test_paths_turn_with_the_part(name, turn):
 @pytest.mark.parametrize("name", NAMES)
 def test_paths_stay_inside_the_layer(name):
     for layer in planned_on()[1]:
-        allowed = shapely.buffer(layer.polygon, 0.02)
+        allowed = shapely.buffer(layer.plane.polygon, 0.02)
         shapely.prepare(allowed)
         assert shapely.covers(allowed, strands(default_paths(name).on_layer(layer.index))).all()
 

@@ -11,7 +11,7 @@ from ccfem.evaluation.manufacture import manufacture_indices, sample_manufacture
 from ccfem.evaluation.plane_paths import plane_paths
 from ccfem.geometry.polylines import pack
 from ccfem.io.toml import from_table
-from ccfem.layers import slice_planar
+from ccfem.layers.slicing.planar import Planar
 from ccfem.machine import Machine, SpeedTable
 from ccfem.machine.gcode_profile import GcodeProfile
 from ccfem.machine.speeds import step_speeds, table_speeds
@@ -125,7 +125,7 @@ def test_points_a_hair_apart_do_not_make_a_line_bent():
 def test_corners_of_a_meshed_circle_are_no_turns():
     # A circle of radius 30 in chords of 2.4 mm, as a mesh has it, with points anywhere on them.
     rng = np.random.default_rng(1)
-    (layer,) = slice_planar(box_mesh((90.0, 90.0, 1.0), (1, 1, 1)), count=1)
+    (layer,) = Planar(count=1).cut(box_mesh((90.0, 90.0, 1.0), (1, 1, 1)))
     turn = np.linspace(0.0, 2.0 * np.pi, 79)
     corners = 45.0 + 30.0 * np.stack([np.cos(turn), np.sin(turn)], axis=1)
     share = rng.random((78, 2, 1))
@@ -151,7 +151,7 @@ def test_repeated_points_and_paths_without_length_change_nothing():
 
 
 def test_the_table_is_for_fibre_and_the_print_time_goes_by_it():
-    (layer,) = slice_planar(box_mesh((90.0, 90.0, 1.0), (1, 1, 1)), count=1)
+    (layer,) = Planar(count=1).cut(box_mesh((90.0, 90.0, 1.0), (1, 1, 1)))
     fibre = Toolpaths.from_plane([turned([30.0, 40.0, 20.0], [90.0, 90.0])], layer)
     matrix = Toolpaths.from_plane([turned([30.0], [])], layer, kind=MATRIX)
     travel = Toolpaths.from_plane([turned([8.0], [])], layer, kind=TRAVEL)

@@ -2,6 +2,7 @@
 
 import numpy as np
 import pytest
+from ccfem.layers.layer_stress import stress_on
 
 from benchmarks.papers.plocher_2022.plates import five_holes, optimised_beam, plates, single_hole
 from ccfem.errors import InputError
@@ -55,9 +56,11 @@ def test_layers_carry_the_stress_of_the_pixels(plate):
     layers, stress = plate.planned_on(2)
     assert [layer.index for layer in layers] == [0, 1]
     for layer in layers:
-        assert layer.polygon.area == pytest.approx(plate.polygon.area, rel=0.003)
-    centres = layers[0].plane_points[layers[0].triangles].mean(axis=1)
-    found = in_plane(stress.on(layers[0]).nodal, layers[0].frame)[layers[0].triangles].mean(axis=1)
+        assert layer.plane.polygon.area == pytest.approx(plate.polygon.area, rel=0.003)
+    centres = layers[0].plane.points[layers[0].triangles].mean(axis=1)
+    found = in_plane(stress_on(layers[0], stress).nodal, layers[0].plane.frame)[
+        layers[0].triangles
+    ].mean(axis=1)
     field = plate.isotropic_field
     nearest = np.linalg.norm(field.mesh.centres[:, None] - centres[::37], axis=2).argmin(axis=0)
     off = np.linalg.norm(found[::37] - field.stress[nearest], axis=1)

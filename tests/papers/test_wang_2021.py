@@ -12,7 +12,7 @@ from benchmarks.papers.wang_2021.study import PATTERNS, PLATES, curvature_along,
 from benchmarks.papers.wang_2021.tables import ROWS, plate_table, result_table, speed_table
 from ccfem.cases import create_case
 from ccfem.evaluation.plane_paths import PlanePaths
-from ccfem.layers import slice_planar
+from ccfem.layers.slicing.planar import Planar
 
 
 @pytest.fixture(scope="module")
@@ -51,7 +51,7 @@ def test_fibre_makes_the_part_stiffer(plate):
 
 def test_curvature_of_a_corner_and_of_a_circle():
     """A square corner has 2 sin 45 degrees over the step, a circle one over its radius."""
-    (layer,) = slice_planar(create_case("l_shape", element_size=8.0).problem.mesh, count=1)
+    (layer,) = Planar(count=1).cut(create_case("l_shape", element_size=8.0).problem.mesh)
     corner = np.array([[0.0, 0.0], [5.0, 0.0], [5.0, 5.0]])
     angle = np.linspace(0.0, 2.0 * np.pi, 7201)
     circle = 6.0 * np.stack([np.cos(angle), np.sin(angle)], axis=1)

@@ -10,12 +10,12 @@ import pytest
 from ccfem.elasticity.problem import Force, Problem, Support
 from ccfem.elasticity.solve import solve
 from ccfem.errors import InputError
-from ccfem.layers import slice_planar
+from ccfem.layers.slicing.planar import Planar
 from ccfem.machine import Machine
 from ccfem.materials import isotropic
 from ccfem.mesh.box import box_mesh
+from ccfem.planning import Amount, plan
 from ccfem.planning.equal_fibre import Planned, length_per_layer, plan_to_length
-from ccfem.strategies import Amount, plan
 from ccfem.toolpaths import Toolpaths
 
 LENGTH, WIDTH = 60.0, 40.0
@@ -53,7 +53,7 @@ def plate():
     problem = Problem(
         mesh, isotropic(3500.0, 0.35), (Support("x_min"),), {"pull": (Force("x_max", (1e3, 0, 0)),)}
     )
-    return solve(problem)["pull"], slice_planar(mesh, count=8)
+    return solve(problem)["pull"], Planar(count=8).cut(mesh)
 
 
 @pytest.mark.parametrize("wanted", [2400.0, 1730.0, 1000.0, 600.0, 130.0])

@@ -7,14 +7,15 @@ from typing import ClassVar, Literal
 import numpy as np
 import pytest
 import shapely
+from ccfem.layers.layer_stress import stress_on
 
 from ccfem.cases.named import create_case
 from ccfem.elasticity.solve import solve
 from ccfem.errors import InputError
-from ccfem.layers import slice_planar
+from ccfem.layers.slicing.planar import Planar
 from ccfem.machine.machine import Machine
+from ccfem.planning import plan
 from ccfem.planning.infill import Infill, long_enough
-from ccfem.planning.strategy import plan
 from ccfem.raster.patterns import grid_regions
 from ccfem.strategies.grid import Grid
 from ccfem.strategies.mat import Mat
@@ -40,7 +41,7 @@ class Rows(Infill):
         return section
 
     def strands(self, layer, stress, machine, prepared):
-        assert shapely.symmetric_difference(prepared, layer.polygon).area < 1e-6
+        assert shapely.symmetric_difference(prepared, layer.plane.polygon).area < 1e-6
         x, y = shapely.get_coordinates(shapely.centroid(prepared))[0]
         return [np.array([[x - half, y], [x + half, y]]) for half in (15.0, 4.0)]
 
@@ -52,7 +53,7 @@ class Rows(Infill):
 def part():
     case = create_case("open_hole", element_size=4.0)
     (stress,) = solve(case.problem).values()
-    return stress, slice_planar(case.problem.mesh, case.build, count=4)
+    return stress, Planar(count=4).cut(case.problem.mesh, case.build)
 
 
 def test_equal_sections_are_prepared_once(part):
@@ -86,9 +87,9 @@ def test_a_part_is_planned_as_its_layers_are(strategy, part):
     planner = strategy.for_part(stress, layers, MACHINE)
     whole = plan(strategy, layers, stress, MACHINE)
     for layer in layers[:2]:
-        alone = strategy(layer, stress.on(layer), MACHINE)
+        alone = strategy(layer, stress_on(layer, stress), MACHINE)
         np.testing.assert_array_equal(whole.on_layer(layer.index).points, alone.points)
-    planner(layers[0], stress.on(layers[0]), MACHINE)
+    planner(layers[0], stress_on(layers[0], stress), MACHINE)
     held = [x for made in planner.known.values() for x in made if isinstance(x, shapely.Geometry)]
     assert len(held) == (0 if isinstance(strategy, Mat) else 4)
     assert not shapely.is_prepared(held).any()

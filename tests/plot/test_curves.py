@@ -2,14 +2,14 @@ import numpy as np
 import pytest
 
 from ccfem.errors import InputError
-from ccfem.layers.slicing.planar import slice_planar
+from ccfem.layers.slicing.planar import Planar
 from ccfem.mesh.box import box_mesh
 from ccfem.plot.canvas import png
 from ccfem.plot.colours import palette
 from ccfem.plot.curves import curvature_curves, curvature_maps, matching_curves
 from ccfem.toolpaths import Toolpaths
 
-LAYER = slice_planar(box_mesh((60.0, 30.0, 4.0), (6, 3, 1)), count=1)[0]
+LAYER = Planar(count=1).cut(box_mesh((60.0, 30.0, 4.0), (6, 3, 1)))[0]
 
 
 def curve(figure, name):

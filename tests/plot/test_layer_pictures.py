@@ -6,7 +6,7 @@ from PIL import Image
 
 from ccfem.elasticity.stress_field import LayerStress
 from ccfem.errors import InputError
-from ccfem.layers.slicing.planar import slice_planar
+from ccfem.layers.slicing.planar import Planar
 from ccfem.mesh.box import box_mesh
 from ccfem.plot.canvas import extents_of, inches_per_mm, new_figure, png, save
 from ccfem.plot.colours import INK, LINK, SECTION, palette, scale
@@ -21,7 +21,7 @@ from ccfem.plot.paths import (
 )
 from ccfem.toolpaths import Toolpaths
 
-LAYER = slice_planar(box_mesh((60.0, 30.0, 4.0), (6, 3, 1)), count=1)[0]
+LAYER = Planar(count=1).cut(box_mesh((60.0, 30.0, 4.0), (6, 3, 1)))[0]
 
 
 def uniform(s11, s22=0.0, s12=0.0):
@@ -87,7 +87,7 @@ def test_scale_of_a_picture(extents, columns):
 
 
 def test_extents():
-    assert extents_of(LAYER.plane_points) == pytest.approx((0.0, 0.0, 60.0, 30.0))
+    assert extents_of(LAYER.plane.points) == pytest.approx((0.0, 0.0, 60.0, 30.0))
 
 
 def test_section_and_path_are_where_they_should_be():
@@ -171,7 +171,7 @@ def test_curvature_of_a_circle():
 
 
 def test_force_is_that_of_the_pieces_on_the_layer():
-    middle = np.array([[10.0, 10.0, LAYER.height], [20.0, 10.0, LAYER.height + 1.0]])
+    middle = np.array([[10.0, 10.0, LAYER.plane.height], [20.0, 10.0, LAYER.plane.height + 1.0]])
     tangent = np.array([[1.0, 0.0, 0.0], [1.0, 0.0, 0.0]])
     found = force_on_paths(middle, tangent, np.array([2.0, 2.0]), np.array([-7.0, 9.0]), LAYER)
     np.testing.assert_allclose(found.segments, [[[9.0, 10.0], [11.0, 10.0]]])
@@ -199,7 +199,7 @@ def test_strokes_run_along_the_tension():
 
 @pytest.mark.parametrize("at", ["points", "triangles"])
 def test_scalar_field_at_points_and_on_triangles(at):
-    x = LAYER.plane_points[:, 0]
+    x = LAYER.plane.points[:, 0]
     values = x if at == "points" else x[LAYER.triangles].mean(axis=1)
     figure = scalar_picture(LAYER, values, [np.array([[30.0, 1.0], [30.0, 29.0]])], "mm", "x")
     assert pixel(figure, 5.0, 7.0).sum() > pixel(figure, 55.0, 7.0).sum() + 100

@@ -7,7 +7,7 @@ from PIL import Image
 from ccfem.elasticity.problem import Problem, Support
 from ccfem.elasticity.stress_field import SolveRecord, StressField
 from ccfem.errors import InputError
-from ccfem.layers.slicing.planar import slice_planar
+from ccfem.layers.slicing.planar import Planar
 from ccfem.materials import isotropic
 from ccfem.mesh.box import box_mesh
 from ccfem.plot.part3d import part_picture, paths_polydata, surface_polydata
@@ -19,7 +19,7 @@ LINES = [
     np.array([[2.0, 8.0], [15.0, 8.0]]),
 ]
 PATHS = Toolpaths.concatenate(
-    Toolpaths.from_plane(LINES, layer) for layer in slice_planar(MESH, count=2)
+    Toolpaths.from_plane(LINES, layer) for layer in Planar(count=2).cut(MESH)
 )
 
 

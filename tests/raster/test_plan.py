@@ -112,7 +112,7 @@ def test_paths_stay_inside_the_layer(name, section):
     layer, paths = layer_of(section), paths_of(name, section)
     assert len(paths) == len(planned(name, section).paths)
     for path in paths:
-        assert layer.polygon.covers(shapely.LineString(path[:, :2]))
+        assert layer.plane.polygon.covers(shapely.LineString(path[:, :2]))
     # Ends of closed paths meet; others have two ends.
     for path, closed in zip(paths, paths.closed, strict=True):
         assert np.array_equal(path[0], path[-1]) == closed

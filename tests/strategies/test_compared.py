@@ -8,11 +8,12 @@ from ccfem.cases import create_case
 from ccfem.elasticity import Force, Problem, Support, solve
 from ccfem.errors import InputError
 from ccfem.evaluation import evaluate
-from ccfem.layers import slice_planar
+from ccfem.layers.slicing.planar import Planar
 from ccfem.machine import Machine
 from ccfem.materials import isotropic
 from ccfem.mesh.box import box_mesh
-from ccfem.strategies import create, plan
+from ccfem.planning import plan
+from ccfem.strategies import create
 from ccfem.strategies.offset import _level_sets
 
 MACHINE = Machine(fibre_width=1.0, minimum_length=5.0)
@@ -28,7 +29,7 @@ def bar():
         (Support("x_min"),),
         {"pull": (Force("x_max", (100.0, 0.0, 0.0)),)},
     )
-    return solve(problem)["pull"], slice_planar(mesh, count=1)
+    return solve(problem)["pull"], Planar(count=1).cut(mesh)
 
 
 @pytest.fixture(scope="module")
@@ -36,7 +37,7 @@ def holed():
     """Stress of a plate with a round hole, pulled along x, and its one layer."""
     case = create_case("open_hole")
     (stress,) = solve(case.problem).values()
-    return stress, slice_planar(case.problem.mesh, case.build, count=1)
+    return stress, Planar(count=1).cut(case.problem.mesh, case.build)
 
 
 def test_offset_lays_all_distances_to_the_border(bar) -> None:

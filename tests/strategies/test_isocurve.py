@@ -13,12 +13,13 @@ from ccfem.elasticity.problem import Problem, Support, Traction
 from ccfem.elasticity.stress_field import SolveRecord, StressField
 from ccfem.errors import InputError
 from ccfem.evaluation import evaluate
-from ccfem.layers import slice_planar
+from ccfem.layers.slicing.planar import Planar
 from ccfem.machine import Machine
 from ccfem.materials import isotropic
 from ccfem.mesh import TetMesh
 from ccfem.mesh.box import box_mesh
-from ccfem.strategies import create, plan
+from ccfem.planning import plan
+from ccfem.strategies import create
 from ccfem.strategies.isocurve import Isocurve
 from ccfem.toolpaths import Toolpaths
 
@@ -57,7 +58,7 @@ def ring_mesh(inner: float, outer: float) -> TetMesh:
 
 
 def planned(strategy: Isocurve, field: StressField, count: int = 1) -> tuple:
-    layers = slice_planar(field.mesh, count=count)
+    layers = Planar(count=count).cut(field.mesh)
     return plan(strategy, layers, field, MACHINE), layers
 
 
@@ -130,7 +131,7 @@ def test_strands_keep_off_the_boundary() -> None:
 
 def test_half_the_width_gives_twice_the_length() -> None:
     field = field_of(box_mesh((60.0, 30.0, 2.0), (20, 10, 1)), uniform(0.3))
-    layers = slice_planar(field.mesh, count=1)
+    layers = Planar(count=1).cut(field.mesh)
     lengths = [
         plan(Isocurve(), layers, field, Machine(fibre_width=width)).lengths.sum()
         for width in (1.0, 0.5)
@@ -273,7 +274,7 @@ def test_figures_on_the_authors_loop() -> None:
 
     case = authors_loop()
     field = next(iter(solve(case.problem).values()))
-    layers = slice_planar(field.mesh, case.build, count=12)
+    layers = Planar(count=12).cut(field.mesh, case.build)
     paths: Toolpaths = plan(Isocurve(), layers, field, MACHINE)
     total = evaluate(paths, layers, field, MACHINE).total
     assert total["fibre_length"] <= 34658.0

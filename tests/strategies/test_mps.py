@@ -63,7 +63,7 @@ def layer_of(section, edge_length=1.5):
 
 def stress_of(layer, tensor):
     """Stress in the plane, a function of points (n, 2) with values (n, 3): s11, s22, s12."""
-    s11, s22, s12 = np.broadcast_to(tensor(layer.plane_points).T, (3, len(layer.points)))
+    s11, s22, s12 = np.broadcast_to(tensor(layer.plane.points).T, (3, len(layer.points)))
     nodal = np.zeros((len(layer.points), 3, 3))
     nodal[:, 0, 0], nodal[:, 1, 1] = s11, s22
     nodal[:, 0, 1] = nodal[:, 1, 0] = s12
@@ -92,7 +92,7 @@ def round_hole(points, centre=(30.0, 10.0), radius=3.0):
 def plan(strategy, section, tensor=along_x):
     layer = layer_of(section)
     paths = strategy(layer, stress_of(layer, tensor), MACHINE)
-    return [path[:, :2] for path in paths], layer.polygon
+    return [path[:, :2] for path in paths], layer.plane.polygon
 
 
 def curves(lines):
@@ -172,7 +172,7 @@ def test_grids_agree_with_the_stress_by_half(angle):
     found = []
     for index in (0, 1):
         paths = grid(replace(layer, index=index), stress, MACHINE)
-        found.append(agreement([path[:, :2] for path in paths], layer.polygon, kirsch))
+        found.append(agreement([path[:, :2] for path in paths], layer.plane.polygon, kirsch))
     assert 53.0 < np.mean(found) < 57.0
 
 

@@ -5,6 +5,7 @@ from dataclasses import replace
 import numpy as np
 import pytest
 import shapely
+from ccfem.layers.layer_stress import stress_on
 
 from benchmarks.papers.plocher_2022.plane_study import bead_area
 from benchmarks.papers.plocher_2022.plates import plates
@@ -29,7 +30,7 @@ class Laid:
         points[:, :2] += noise * np.random.default_rng(0).standard_normal((len(points), 2))
         machine = Machine(fibre_width=plate.bead, minimum_length=0.0)
         moved = replace(layer, points=points)
-        paths = plane_paths(Mps()(moved, stress.on(layer), machine), moved)
+        paths = plane_paths(Mps()(moved, stress_on(layer, stress), machine), moved)
         self.length = paths.lengths.sum()
         self.overlap, self.gaps = bead_area(paths, plate.bead)
         self.agreement = 100.0 * self._agreement(paths, plate, np.asarray(shift))
@@ -63,7 +64,7 @@ def test_plates_are_filled_along_the_stress(plate, laid):
     assert laid.gaps < 0.02
     # Nothing lies outside: length times width is the section, less gaps, plus overlap.
     (layer, *_), _ = plate[1].planned_on(1)
-    used = laid.length * plate[1].bead / layer.polygon.area
+    used = laid.length * plate[1].bead / layer.plane.polygon.area
     assert used == pytest.approx(1.0 + laid.overlap - laid.gaps, abs=1e-4)
 
 

@@ -6,9 +6,10 @@ import pytest
 from ccfem.cases import create_case
 from ccfem.elasticity import solve
 from ccfem.errors import InputError
-from ccfem.layers import slice_planar
+from ccfem.layers.slicing.planar import Planar
+from ccfem.planning import plan
 from ccfem.planning.equal_fibre import plan_to_length
-from ccfem.strategies import create, plan
+from ccfem.strategies import create
 from ccfem.strategies.pruned import Pruned
 from ccfem.virtual_testing.specimen import Specimen
 from ccfem.virtual_testing.virtual_test import virtual_test
@@ -18,7 +19,7 @@ from ccfem.virtual_testing.virtual_test import virtual_test
 def test_pruned_fibre_beats_the_same_length_planned_outright(name: str) -> None:
     case = create_case("loop", element_size=4.0)
     field = solve(case.problem)["pull"]
-    layers = slice_planar(field.mesh, case.build, count=3)
+    layers = Planar(count=3).cut(field.mesh, case.build)
     specimen = Specimen.of(field)
     strategy = Pruned(of=name, coverage=0.3, overfill=1.5)
     pruned = plan(strategy, layers, field, case.machine)

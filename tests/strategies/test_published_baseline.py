@@ -11,11 +11,12 @@ from ccfem.elasticity.solve import solve
 from ccfem.evaluation import evaluate
 from ccfem.export.waypoints import read_waypoints
 from ccfem.io import read_mesh
-from ccfem.layers.slicing.planar import slice_planar
+from ccfem.layers.slicing.planar import Planar
 from ccfem.machine import Machine
 from ccfem.materials import isotropic
 from ccfem.mesh.patches import Cylinder, patches_from_rules
-from ccfem.strategies import create, plan
+from ccfem.planning import plan
+from ccfem.strategies import create
 
 FOLDER = "CCFEM_CHEN2021"
 MACHINE = Machine()
@@ -36,8 +37,8 @@ def loop():
     )
     force = Force("load", (0.0, 0.0, 1000.0))
     problem = Problem(mesh, isotropic(3500.0, 0.35), (Support("support"),), {"pull": (force,)})
-    layers = slice_planar(mesh, (0, 1, 0), heights=0.25 + 0.5 * np.arange(12))
-    paths = read_waypoints(folder / "GcodeGenerater_Zigzag_Contour_raw.txt", layers[0].frame)
+    layers = Planar(heights=0.25 + 0.5 * np.arange(12)).cut(mesh, (0, 1, 0))
+    paths = read_waypoints(folder / "GcodeGenerater_Zigzag_Contour_raw.txt", layers[0].plane.frame)
     return solve(problem)["pull"], layers, paths.select(paths.layer < 12)
 
 

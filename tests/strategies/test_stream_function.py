@@ -2,6 +2,7 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
+from ccfem.layers.layer_stress import stress_on
 
 from ccfem.elasticity.problem import Force, Problem, Support, Traction
 from ccfem.elasticity.solve import solve
@@ -9,11 +10,11 @@ from ccfem.errors import InputError
 from ccfem.evaluation import evaluate
 from ccfem.fibre_aware.prune import prune
 from ccfem.fibre_aware.upper_bound import upper_bound
-from ccfem.layers.slicing.planar import slice_planar
+from ccfem.layers.slicing.planar import Planar
 from ccfem.machine import Machine
 from ccfem.materials import isotropic
 from ccfem.mesh.box import box_mesh
-from ccfem.planning.strategy import plan
+from ccfem.planning import plan
 from ccfem.strategies.isocurve import Isocurve
 from ccfem.strategies.stream_function import StreamFunction
 from ccfem.virtual_testing.virtual_test import virtual_test
@@ -31,7 +32,7 @@ def pulled_bar():
     mesh = box_mesh((60.0, 20.0, 4.0), (24, 8, 2))
     supports = (Support("x_min", "x"), Support("y_min", "y"), Support("z_min", "z"))
     problem = Problem(mesh, PLA, supports, {"pull": (Traction("x_max", (5.0, 0.0, 0.0)),)})
-    return solve(problem, tolerance=1e-10)["pull"], slice_planar(mesh, count=3)
+    return solve(problem, tolerance=1e-10)["pull"], Planar(count=3).cut(mesh)
 
 
 @pytest.fixture(scope="module")
@@ -40,7 +41,7 @@ def bent_beam():
     mesh = box_mesh((80.0, 30.0, 4.0), (32, 12, 2))
     loads = {"tip": (Force("x_max", (0.0, -50.0, 0.0)),)}
     problem = Problem(mesh, PLA, (Support("x_min"),), loads)
-    return solve(problem, tolerance=1e-10)["tip"], slice_planar(mesh, count=3)
+    return solve(problem, tolerance=1e-10)["tip"], Planar(count=3).cut(mesh)
 
 
 @pytest.fixture(scope="module")
@@ -49,7 +50,7 @@ def bent_plate():
     mesh = box_mesh((60.0, 20.0, 10.0), (24, 8, 6))
     loads = {"tip": (Force("x_max", (0.0, 0.0, -20.0)),)}
     problem = Problem(mesh, PLA, (Support("x_min"),), loads)
-    return solve(problem, tolerance=1e-10)["tip"], slice_planar(mesh, count=6)
+    return solve(problem, tolerance=1e-10)["tip"], Planar(count=6).cut(mesh)
 
 
 def test_uniform_tension_gets_straight_fibre_and_the_stiffness_of_parallel_bars(pulled_bar):
@@ -104,7 +105,7 @@ def test_fibre_lies_where_bending_across_the_layers_stretches(bent_plate):
 def test_one_layer_by_itself_gets_its_share(pulled_bar):
     stress, layers = pulled_bar
     strategy = StreamFunction(coverage=0.4, evaluations=5)
-    alone = strategy(layers[1], stress.on(layers[1]), MACHINE)
+    alone = strategy(layers[1], stress_on(layers[1], stress), MACHINE)
     assert set(alone.layer) == {1}
     assert 0.95 * 0.4 < coverage_of(alone, layers[1:2]) <= 0.4 * (1.0 + 1e-9)
 
@@ -113,7 +114,7 @@ def test_quadratic_cells_are_planned_too(pulled_bar):
     stress, _ = pulled_bar
     mesh = stress.mesh.quadratic()
     quadratic = solve(replace(stress.problem, mesh=mesh))["pull"]
-    layers = slice_planar(mesh, count=2)
+    layers = Planar(count=2).cut(mesh)
     paths = plan(StreamFunction(coverage=0.4, evaluations=3), layers, quadratic, MACHINE)
     assert 0.35 < coverage_of(paths, layers) <= 0.4 * (1.0 + 1e-9)
 

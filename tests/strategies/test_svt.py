@@ -5,6 +5,7 @@ from dataclasses import replace
 import numpy as np
 import pytest
 import shapely
+from ccfem.layers.layer_stress import stress_on
 
 from ccfem.cases import create_case
 from ccfem.elasticity import Force, Problem, Support, solve
@@ -12,7 +13,7 @@ from ccfem.errors import InputError
 from ccfem.evaluation import evaluate
 from ccfem.evaluation.matching import matching_rate
 from ccfem.geometry.polylines import resample, turning_angles
-from ccfem.layers import slice_planar
+from ccfem.layers.slicing.planar import Planar
 from ccfem.machine import Machine
 from ccfem.materials import isotropic
 from ccfem.mesh.patches import Plane, patches_from_rules
@@ -28,8 +29,8 @@ MACHINE = Machine(fibre_width=0.9, minimum_radius=1.5, minimum_length=5.0)
 def bridge():
     case = create_case("bridge")
     stress = solve(case.problem)["down"]
-    layer = slice_planar(case.problem.mesh, case.build, count=1)[0]
-    return layer, stress.on(layer), case.machine
+    layer = Planar(count=1).cut(case.problem.mesh, case.build)[0]
+    return layer, stress_on(layer, stress), case.machine
 
 
 @pytest.fixture(scope="module")
@@ -44,8 +45,8 @@ def pulled(section):
     mesh = patches_from_rules(mesh, rules)
     load = {"pull": (Force("right", (100.0, 0.0, 0.0)),)}
     problem = Problem(mesh, isotropic(1000.0, 0.3), (Support("left"),), load)
-    layer = slice_planar(mesh, count=1)[0]
-    return layer, solve(problem)["pull"].on(layer)
+    layer = Planar(count=1).cut(mesh)[0]
+    return layer, stress_on(layer, solve(problem)["pull"])
 
 
 def plane_strands(paths):
@@ -65,10 +66,10 @@ def test_bridge_is_one_path_with_its_links_outside(bridge, bridge_path):
     starts = np.flatnonzero(bridge_path.link)
     plane = bridge_path.points[:, :2]
     links = shapely.linestrings(np.stack([plane[starts], plane[starts + 1]], axis=1))
-    inner = layer.polygon.buffer(-1e-6)
+    inner = layer.plane.polygon.buffer(-1e-6)
     assert shapely.length(shapely.intersection(links, inner)).sum() < 1e-3
     for strand in plane_strands(bridge_path):
-        assert layer.polygon.buffer(1e-4).covers(shapely.LineString(strand))
+        assert layer.plane.polygon.buffer(1e-4).covers(shapely.LineString(strand))
 
 
 def test_links_outside_are_never_left_out(bridge, bridge_path):
@@ -79,7 +80,7 @@ def test_links_outside_are_never_left_out(bridge, bridge_path):
 def test_bridge_has_arch_tie_and_four_diagonals(bridge):
     """Figure 7 of the paper: the arch with the rafters, the tie, and the diagonals between."""
     layer, stress, machine = bridge
-    groups = create("svt").groups(layer.polygon, stress, machine)
+    groups = create("svt").groups(layer.plane.polygon, stress, machine)
     assert len(groups) == 6
     reach = sorted(np.ptp(np.concatenate(group)[:, 0]) for group in groups)
     assert all(size > 170.0 for size in reach[4:])
@@ -90,7 +91,9 @@ def test_bridge_is_covered_without_sharp_turns(bridge, bridge_path):
     layer, _, machine = bridge
     strands = plane_strands(bridge_path)
     beads = shapely.buffer([shapely.LineString(s) for s in strands], 0.5 * machine.fibre_width)
-    covered = shapely.union_all(beads).intersection(layer.polygon).area / layer.polygon.area
+    covered = (
+        shapely.union_all(beads).intersection(layer.plane.polygon).area / layer.plane.polygon.area
+    )
     assert covered >= 0.96
     for strand in strands:
         even, offsets = resample(strand, np.array([0, len(strand)]), 0.5)
@@ -104,20 +107,22 @@ def test_bridge_is_covered_without_sharp_turns(bridge, bridge_path):
 def test_frames_of_the_paper_are_one_path_of_strands_side_by_side(name, inside):
     case = create_case(name)
     stress = solve(case.problem)["down"]
-    layers = slice_planar(case.problem.mesh, case.build, count=1)
+    layers = Planar(count=1).cut(case.problem.mesh, case.build)
     strategy = create("svt")
-    paths = strategy(layers[0], stress.on(layers[0]), case.machine)
+    paths = strategy(layers[0], stress_on(layers[0], stress), case.machine)
     assert len(paths) == 1
     found = evaluate(paths, layers, stress, case.machine).total
     assert found["link_inside"] <= inside
     assert found["coverage"] >= 0.95
     # Distance to the nearest strand of the same main path, along all of them.
     apart = []
-    for group in strategy.groups(layers[0].polygon, stress.on(layers[0]), case.machine):
+    for group in strategy.groups(
+        layers[0].plane.polygon, stress_on(layers[0], stress), case.machine
+    ):
         lines = np.array([shapely.LineString(track) for track in group])
         for k, track in enumerate(group):
             even, _ = resample(track, np.array([0, len(track)]), 0.5)
-            even = even[shapely.contains_xy(layers[0].polygon, *even.T)]
+            even = even[shapely.contains_xy(layers[0].plane.polygon, *even.T)]
             others = shapely.multilinestrings(np.delete(lines, k))
             apart.append(shapely.distance(shapely.points(even), others))
     assert np.percentile(np.concatenate(apart), 5.0) >= 0.5
@@ -163,9 +168,11 @@ def test_wide_members_are_not_laid_over_each_other(plate_with_hole):
     paths = create("svt", {"links": "none"})(layer, stress, MACHINE)
     lines = np.split(paths.points[:, :2], paths.offsets[1:-1])
     beads = shapely.buffer([shapely.LineString(x) for x in lines], 0.45, cap_style="flat")
-    covered = shapely.union_all(beads).intersection(layer.polygon).area / layer.polygon.area
+    covered = (
+        shapely.union_all(beads).intersection(layer.plane.polygon).area / layer.plane.polygon.area
+    )
     assert covered > 0.95
-    assert paths.lengths.sum() * MACHINE.fibre_width / layer.polygon.area < 1.15
+    assert paths.lengths.sum() * MACHINE.fibre_width / layer.plane.polygon.area < 1.15
 
 
 @pytest.mark.parametrize("longest", [6.0, 1000.0])
@@ -176,7 +183,7 @@ def test_no_link_lies_inside_for_longer_than_is_allowed(plate_with_hole, longest
     edges = np.flatnonzero(np.diff(np.concatenate([[False], paths.link]).astype(int)))
     plane = paths.points[:, :2]
     links = [plane[a : b + 1] for a, b in zip(edges[::2], edges[1::2], strict=True)]
-    inside = [shapely.LineString(x).intersection(layer.polygon).length for x in links]
+    inside = [shapely.LineString(x).intersection(layer.plane.polygon).length for x in links]
     assert len(plane_strands(paths)) == len(links) + len(paths)
     assert max(inside) <= longest
     if longest == 1000.0:
@@ -188,7 +195,7 @@ def test_no_link_lies_inside_for_longer_than_is_allowed(plate_with_hole, longest
 
 def test_no_link_lies_over_voids_where_none_may(plate_with_hole):
     layer, stress = plate_with_hole
-    hole = shapely.Polygon(layer.polygon.interiors[0]).buffer(-1e-3)
+    hole = shapely.Polygon(layer.plane.polygon.interiors[0]).buffer(-1e-3)
     machine = replace(MACHINE, fibre_width=1.8, minimum_radius=3.0)
     over = []
     for parameters in ({}, {"longest_over_void": 0.0}):
@@ -204,7 +211,7 @@ def test_no_link_lies_over_voids_where_none_may(plate_with_hole):
 def test_square_and_disc_are_filled_by_rings(section):
     layer, stress = pulled(section)
     paths = create("svt")(layer, stress, MACHINE)
-    fill = paths.lengths.sum() * MACHINE.fibre_width / layer.polygon.area
+    fill = paths.lengths.sum() * MACHINE.fibre_width / layer.plane.polygon.area
     assert 0.85 < fill < 1.02
     assert not paths.link.any()
 
@@ -229,8 +236,8 @@ def test_every_piece_of_a_section_has_its_path():
     )
     load = {"pull": (Force("top", (0.0, 0.0, 100.0)),)}
     stress = solve(Problem(mesh, isotropic(1000.0, 0.3), (Support("foot"),), load))["pull"]
-    layer = slice_planar(mesh, (0.0, 1.0, 0.0), count=4)[3]
-    paths = create("svt")(layer, stress.on(layer), MACHINE)
+    layer = Planar(count=4).cut(mesh, (0.0, 1.0, 0.0))[3]
+    paths = create("svt")(layer, stress_on(layer, stress), MACHINE)
     assert len(paths) == 2
     counts = sorted(len(plane_strands(paths.select(np.arange(2) == k))) for k in range(2))
     assert counts == [7, 10]

@@ -2,14 +2,14 @@ import numpy as np
 import pytest
 
 from ccfem.elasticity.stress_field import LayerStress
-from ccfem.layers import slice_planar
+from ccfem.layers.slicing.planar import Planar
 from ccfem.meshing import extrude
 
 
 def _stressed(section, tensor):
-    layer = slice_planar(extrude(section, 1.0, 3.0, 1), count=1)[0]
+    layer = Planar(count=1).cut(extrude(section, 1.0, 3.0, 1))[0]
     nodal = np.zeros((len(layer.points), 3, 3))
-    nodal[:, :2, :2] = tensor(layer.plane_points) if callable(tensor) else tensor
+    nodal[:, :2, :2] = tensor(layer.plane.points) if callable(tensor) else tensor
     return LayerStress(layer, nodal[layer.triangles].mean(axis=1), nodal, None)
 
 

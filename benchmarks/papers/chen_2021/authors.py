@@ -17,7 +17,7 @@ from ccfem.evaluation import Evaluation, evaluate
 from ccfem.export.waypoints import read_waypoints
 from ccfem.geometry.polylines import turning_angles
 from ccfem.layers.layer import Layer
-from ccfem.layers.slicing.planar import slice_planar
+from ccfem.layers.slicing.planar import Planar
 from ccfem.machine import Machine
 from ccfem.toolpaths import Toolpaths
 
@@ -96,14 +96,14 @@ def solved_loop() -> tuple[StressField, tuple[Layer, ...], Machine]:
     """Stress of the authors' Loop, its 20 published layers, and the machine."""
     case = authors_loop()
     stress = solve(case.problem)["pull"]
-    layers = slice_planar(case.problem.mesh, case.build, count=LAYERS_PUBLISHED)
+    layers = Planar(count=LAYERS_PUBLISHED).cut(case.problem.mesh, case.build)
     return stress, layers, case.machine
 
 
 def published_paths(name: str) -> Toolpaths:
     """Read the published paths of the Loop, "ours" or "zigzag", all 20 layers."""
     _, layers, _ = solved_loop()
-    return read_waypoints(authors_folder() / "Loop" / PATHS[name], layers[0].frame)
+    return read_waypoints(authors_folder() / "Loop" / PATHS[name], layers[0].plane.frame)
 
 
 def evaluate_published(name: str, count: int = LAYERS_PUBLISHED) -> Evaluation:

@@ -23,9 +23,9 @@ from ccfem.elasticity.stress_field import StressField
 from ccfem.fibre_aware.prune import prune
 from ccfem.fibre_aware.upper_bound import upper_bound
 from ccfem.layers.layer import Layer
-from ccfem.layers.slicing.planar import slice_planar
+from ccfem.layers.slicing.planar import Planar
+from ccfem.planning import plan
 from ccfem.planning.equal_fibre import plan_to_length
-from ccfem.planning.strategy import plan
 from ccfem.strategies.isocurve import Isocurve
 from ccfem.strategies.stream_function import StreamFunction
 from ccfem.toolpaths import Toolpaths
@@ -58,7 +58,7 @@ def loop() -> tuple[Case, dict[str, StressField], dict[str, Specimen]]:
 def sliced(count: int = LAYERS_TABLE_2) -> tuple[Layer, ...]:
     """Layers spread evenly over the height."""
     case, _, _ = loop()
-    return slice_planar(case.problem.mesh, case.build, count=count)
+    return Planar(count=count).cut(case.problem.mesh, case.build)
 
 
 def _coverage(layers: Sequence[Layer]) -> float:

@@ -22,8 +22,8 @@ from ccfem.arrays import FloatArray
 from ccfem.elasticity import solve
 from ccfem.errors import InputError
 from ccfem.evaluation import evaluate
-from ccfem.layers import slice_planar
 from ccfem.layers.layer import Layer
+from ccfem.layers.slicing.planar import Planar
 from ccfem.planning.equal_fibre import TOLERANCE, length_per_layer
 from ccfem.toolpaths import Toolpaths
 
@@ -195,13 +195,13 @@ def _fill(layer: Layer, pattern: str, angle: float, density: float) -> list[Floa
                 f"'{said}': correct the pattern, the angle or the density"
             )
         lines = extrusion_lines(printed.read_text(encoding="utf-8"), f"G-code of {PROGRAM}")
-    middle = 0.5 * (layer.plane_points.min(axis=0) + layer.plane_points.max(axis=0))
+    middle = 0.5 * (layer.plane.points.min(axis=0) + layer.plane.points.max(axis=0))
     return [line - np.array(_CENTRE) + middle for line in lines]
 
 
 def _write_slab(path: Path, layer: Layer) -> None:
     """Write the section of a flat layer, extruded by `_HEIGHT` from z = 0, as binary STL."""
-    flat, n = layer.plane_points, len(layer.points)
+    flat, n = layer.plane.points, len(layer.points)
     points = np.concatenate([np.insert(flat, 2, z, axis=1) for z in (0.0, _HEIGHT)])
     triangles = [layer.triangles[:, ::-1], layer.triangles + n]
     for loop in layer.loops:
@@ -308,7 +308,7 @@ def main() -> None:
     """Print the alignment at full density, and below it what is stated."""
     case = authors_loop()
     field = solve(case.problem)["pull"]
-    layers = slice_planar(field.mesh, case.build, count=case.layers)
+    layers = Planar(count=case.layers).cut(field.mesh, case.build)
     heads = ("< 10", "< 20", "< 30", "by stress", "< 20", "< 30", "mean angle", "efficiency")
     print(f"{'':28}" + "".join(f"{head:>12}" for head in (*heads, "mm/layer", "outside mm")))
     for name, (pattern, angle, turn) in PATTERNS.items():

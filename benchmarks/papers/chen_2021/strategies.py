@@ -16,9 +16,10 @@ from benchmarks.papers.chen_2021.slicers import PATTERNS, slicer_found, slicer_p
 from benchmarks.papers.chen_2021.virtual_test import MATRIX_STRENGTH, authors_paths
 from ccfem.elasticity import solve
 from ccfem.evaluation import evaluate
-from ccfem.layers import slice_planar
+from ccfem.layers.slicing.planar import Planar
+from ccfem.planning import Strategy, plan
 from ccfem.planning.equal_fibre import plan_to_length
-from ccfem.strategies import Strategy, create, plan
+from ccfem.strategies import create
 from ccfem.strategies.isocurve import Isocurve
 from ccfem.toolpaths import Toolpaths
 from ccfem.virtual_testing.specimen import Specimen
@@ -45,7 +46,7 @@ def main() -> None:
     """Print the table."""
     case = authors_loop()
     field = solve(case.problem)["pull"]
-    layers = slice_planar(field.mesh, case.build, count=case.layers)
+    layers = Planar(count=case.layers).cut(field.mesh, case.build)
     specimen = Specimen.of(field)
     authors = authors_paths("ours")
     wanted = float(authors.lengths.sum()) / case.layers

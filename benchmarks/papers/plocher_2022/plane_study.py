@@ -247,7 +247,7 @@ def bead_area(paths: PlanePaths, bead: float) -> tuple[float, float]:
         Length times width of the beads less the area that they cover, and the area of the section
         that they do not cover, both over the area of the section.
     """
-    section = paths.layer.polygon
+    section = paths.layer.plane.polygon
     index = np.repeat(np.arange(len(paths)), np.diff(paths.offsets))
     lines = shapely.linestrings(paths.points, indices=index)
     points, index = shapely.get_coordinates(

@@ -20,7 +20,7 @@ from ccfem.elasticity.problem import Force, Load, PointForce, Problem, Support
 from ccfem.elasticity.stress_field import StressField
 from ccfem.errors import InputError
 from ccfem.layers.layer import Layer
-from ccfem.layers.slicing.planar import slice_planar
+from ccfem.layers.slicing.planar import Planar
 from ccfem.materials import isotropic, plane_stress
 from ccfem.mesh import TetMesh
 from ccfem.meshing import extrude
@@ -120,7 +120,7 @@ class Plate:
         stress = StressField(
             problem, "load", nothing, cell, nodal, nothing, plane.strain_energy, plane.record
         )
-        return slice_planar(mesh, count=layers), stress
+        return Planar(count=layers).cut(mesh), stress
 
     def _with_patches(self, mesh: TetMesh) -> TetMesh:
         """Facets on the sides where the plate is held and loaded, or round the points there."""

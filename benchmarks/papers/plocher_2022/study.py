@@ -11,6 +11,7 @@ from time import perf_counter
 from typing import Any
 
 import numpy as np
+from ccfem.layers.layer_stress import stress_on
 
 from benchmarks.papers.plocher_2022.fibre_map import FibreMap, fibre_map
 from benchmarks.papers.plocher_2022.plane_study import (
@@ -38,9 +39,10 @@ from ccfem.layers.layer import Layer
 from ccfem.linking.print_order import nearest_end_order
 from ccfem.machine import Machine
 from ccfem.materials import named_material
+from ccfem.planning import plan
 from ccfem.plates.solve import solve_plane
 from ccfem.raster.plan import RasterPlan
-from ccfem.strategies import create, plan
+from ccfem.strategies import create
 from ccfem.toolpaths import FIBRE, Toolpaths
 
 __all__ = [
@@ -219,7 +221,7 @@ def _on_pixels(
 ) -> tuple[RasterPlan, ...]:
     if getattr(planner, "mode", "polyline") != "raster":
         return ()
-    return tuple(planner.raster(layer, stress.on(layer), machine) for layer in layers)
+    return tuple(planner.raster(layer, stress_on(layer, stress), machine) for layer in layers)
 
 
 def _of_pixels(raster: Sequence[RasterPlan]) -> dict[str, float]:

@@ -15,10 +15,11 @@ from ccfem.evaluation.sinuosity import path_sinuosity, sample_sinuosity, sinuosi
 from ccfem.evaluation.stiffness_alignment import agreement
 from ccfem.geometry.polylines import pack
 from ccfem.materials import named_material
+from ccfem.planning import plan
 from ccfem.plates.solve import PlaneField
 from ccfem.raster.patterns import concentric_regions, medial_regions
 from ccfem.raster.plan import raster_plan
-from ccfem.strategies import create, plan
+from ccfem.strategies import create
 from ccfem.tensor import strongest_in_plane
 
 __all__ = [

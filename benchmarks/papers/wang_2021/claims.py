@@ -74,7 +74,7 @@ def _design(plate: PlateStudy) -> dict[str, float]:
 
 def uniaxial(stress: LayerStress) -> float:
     """Share of the area, %, where one principal stress is at least five times the other in size."""
-    plane = in_plane(stress.nodal, stress.layer.frame)[stress.layer.triangles].mean(axis=1)
+    plane = in_plane(stress.nodal, stress.layer.plane.frame)[stress.layer.triangles].mean(axis=1)
     sizes = np.sort(np.abs(np.stack(largest_in_plane(plane)[:2])), axis=0)
     one = sizes[1] >= 5.0 * sizes[0]
     return 100.0 * float(stress.layer.areas[one].sum() / stress.layer.areas.sum())
@@ -83,7 +83,7 @@ def uniaxial(stress: LayerStress) -> float:
 def _stresses(plate: PlateStudy) -> dict[str, float]:
     part = plate.optimised
     width = part.machine.fibre_width
-    axis = medial_axis(part.layer.polygon, 0.5 * width, object_angle=None, arc_chord=1.6)
+    axis = medial_axis(part.layer.plane.polygon, 0.5 * width, object_angle=None, arc_chord=1.6)
     lines = Toolpaths.from_plane([segment.points for segment in axis.segments], part.layer)
     rate = matching_rate(lines, [part.stress], "stress_nearest", np.array([30.0]), step=width)
     before, after = uniaxial(plate.original.stress), uniaxial(part.stress)
@@ -127,7 +127,7 @@ def _curvatures(plate: PlateStudy) -> dict[str, float]:
             least = min(_sharp_turns(one) for one in others)
             fewer = float(_sharp_turns(lpp) < least)
             found[f"lpp has the fewest sharp turns, others on the {where}"] = fewer
-    inside = shapely.contains_xy(plate.optimised.layer.polygon.buffer(1e-3), *lpp.places.T)
+    inside = shapely.contains_xy(plate.optimised.layer.plane.polygon.buffer(1e-3), *lpp.places.T)
     sharp = lpp.curvature > LIMIT
     found["tight places of lpp that lie outside"] = 100.0 * float((~inside[sharp]).mean())
     if plate.plate.holes and "concentric" in plate.original.patterns:
@@ -183,9 +183,9 @@ def _leads(plate: PlateStudy) -> dict[str, float]:
 
 def joint_discs(part: PartStudy) -> object:
     """Discs of the joints of a part, within its section: a shapely geometry."""
-    joints = frame(part.layer.polygon, 0.5 * part.machine.fibre_width)
+    joints = frame(part.layer.plane.polygon, 0.5 * part.machine.fibre_width)
     discs = shapely.buffer(shapely.points(joints.joints), joints.radius)
-    return shapely.intersection(shapely.union_all(discs), part.layer.polygon)
+    return shapely.intersection(shapely.union_all(discs), part.layer.plane.polygon)
 
 
 def _fill(plate: PlateStudy) -> dict[str, float]:

@@ -74,7 +74,7 @@ def draw_all(study: Mapping[str, PlateStudy], folder: Path) -> list[str]:
 def _voronoi(plate: PlateStudy) -> Figure:
     """Voronoi diagram of points on the border of a piece of the bridge, and its medial axis."""
     part = plate.optimised
-    polygon = part.layer.polygon
+    polygon = part.layer.plane.polygon
     width, height = plate.plate.border.bounds[2:]
     window = shapely.box(0.0, 0.0, 0.38 * width, 0.84 * height)
     figure, axes = panels([window, window], 2)
@@ -105,7 +105,7 @@ def _stresses(plate: PlateStudy) -> Figure:
         (axes[1], plate.original, "(b) stress of the full plate: blue pulled, green pressed"),
         (axes[2], plate.optimised, "(c) stress of the optimised part"),
     ):
-        section(one, part.layer.polygon)
+        section(one, part.layer.plane.polygon)
         strokes(one, part)
         title(one, text)
     return figure
@@ -116,7 +116,7 @@ def _speeds(plate: PlateStudy) -> Figure:
     part = plate.optimised
     lpp = part.patterns["lpp"]
     figure, (axes,) = panels([shapely.MultiPoint(lpp.paths.points)], 1, 7.0)
-    section(axes, part.layer.polygon)
+    section(axes, part.layer.plane.polygon)
     speed = step_speeds(lpp.toolpaths, part.machine)
     drawn = coloured(axes, lpp, speed, (0.0, 35.0))
     bar(figure, axes, drawn, "mm/s")
@@ -138,14 +138,14 @@ def _process(plate: PlateStudy) -> Figure:
         (axes[0], plate.original, "(a) load and stress of the full plate"),
         (axes[1], plate.optimised, "(b) stress of the optimised part"),
     ):
-        section(one, part.layer.polygon)
+        section(one, part.layer.plane.polygon)
         strokes(one, part)
         title(one, text)
     show_load(axes[0], plate.plate)
-    section(axes[2], plate.optimised.layer.polygon)
+    section(axes[2], plate.optimised.layer.plane.polygon)
     _main_paths(axes[2], plate)
     title(axes[2], "(c) main load paths")
-    section(axes[3], plate.optimised.layer.polygon)
+    section(axes[3], plate.optimised.layer.plane.polygon)
     path(axes[3], lpp)
     title(axes[3], "(d) one path; links blue")
     return figure
@@ -154,7 +154,7 @@ def _process(plate: PlateStudy) -> Figure:
 def _main_paths(axes: Any, plate: PlateStudy) -> None:
     """Draw main load paths as `svt` joins them, one colour each."""
     part, svt = plate.optimised, Svt()
-    members = frame(part.layer.polygon, 0.5 * part.machine.fibre_width)
+    members = frame(part.layer.plane.polygon, 0.5 * part.machine.fibre_width)
     found = main_paths(members, part.stress, Criterion(turn=svt.turn), svt.width_ratio)
     names = [str(k) for k in range(len(found))]
     for one, colour in zip(found, palette(names).values(), strict=True):
@@ -165,10 +165,10 @@ def _compared(plate: PlateStudy) -> dict[str, tuple[Any, PatternStudy]]:
     """Section and pattern of lpp on the optimised part and of the slicer's on the full plate."""
     shown = {}
     if "lpp" in plate.optimised.patterns:
-        shown["lpp"] = (plate.optimised.layer.polygon, plate.optimised.patterns["lpp"])
+        shown["lpp"] = (plate.optimised.layer.plane.polygon, plate.optimised.patterns["lpp"])
     for name in BASELINES:
         if name in plate.original.patterns:
-            shown[name] = (plate.original.layer.polygon, plate.original.patterns[name])
+            shown[name] = (plate.original.layer.plane.polygon, plate.original.patterns[name])
     return shown
 
 
@@ -252,11 +252,11 @@ def _other_methods(plate: PlateStudy) -> Figure:
     have = [name for name in _OTHERS if name in part.patterns]
     figure, axes = panels([plate.plate.domain] * (1 + len(have)), 2)
     section(axes[0], plate.plate.domain, filled=False)
-    section(axes[0], part.layer.polygon)
+    section(axes[0], part.layer.plane.polygon)
     show_load(axes[0], plate.plate)
     title(axes[0], "(a) load and supports")
     for letter, one, name in zip("bcd", axes[1:], have, strict=False):
-        section(one, part.layer.polygon)
+        section(one, part.layer.plane.polygon)
         path(one, part.patterns[name], COLOURS[name])
         total = part.patterns[name].total
         text = f"{total['paths']:.0f} pieces, {100.0 * total['coverage']:.0f} % covered"
@@ -268,12 +268,12 @@ def _lpp(plate: PlateStudy) -> Figure:
     """Draw the main directions of tension and compression, and the path."""
     part = plate.optimised
     lpp = part.patterns["lpp"]
-    box = shapely.union(part.layer.polygon, shapely.MultiPoint(lpp.paths.points)).bounds
-    figure, axes = panels([part.layer.polygon] * 2, 2, box=box)
+    box = shapely.union(part.layer.plane.polygon, shapely.MultiPoint(lpp.paths.points)).bounds
+    figure, axes = panels([part.layer.plane.polygon] * 2, 2, box=box)
     for one in axes[:2]:
-        section(one, part.layer.polygon)
+        section(one, part.layer.plane.polygon)
     strokes(axes[0], part, 45)
-    axis = frame(part.layer.polygon, 0.5 * part.machine.fibre_width)
+    axis = frame(part.layer.plane.polygon, 0.5 * part.machine.fibre_width)
     lines_of(axes[0], [member.points for member in axis.members], INK, 1.2)
     title(axes[0], "(a) pulled (blue), pressed (green), medial axis")
     path(axes[1], lpp)

@@ -107,14 +107,14 @@ def show_load(axes: Any, plate: DesignPlate) -> None:
 def strokes(axes: Any, part: PartStudy, count: int = 70) -> None:
     """Stress vectors: strokes along the principal stress of the larger size, as long as it is."""
     layer = part.layer
-    plane = in_plane(part.stress.nodal, layer.frame)[layer.triangles].mean(axis=1)
+    plane = in_plane(part.stress.nodal, layer.plane.frame)[layer.triangles].mean(axis=1)
     value, angle, _ = strongest_in_plane(plane)
     pulled, size = value >= 0.0, np.abs(value)
-    middle = layer.plane_points[layer.triangles].mean(axis=1)
-    chosen = _spread(middle, float(np.ptp(layer.plane_points, axis=0).max()) / count)
+    middle = layer.plane.points[layer.triangles].mean(axis=1)
+    chosen = _spread(middle, float(np.ptp(layer.plane.points, axis=0).max()) / count)
     most = np.quantile(size, 0.97)
     chosen = chosen[size[chosen] > 0.01 * most]
-    half = 0.5 * np.ptp(layer.plane_points, axis=0).max() / count
+    half = 0.5 * np.ptp(layer.plane.points, axis=0).max() / count
     half = half * np.clip(size[chosen] / most, 0.35, 1.3)
     along = half[:, None] * np.stack([np.cos(angle), np.sin(angle)], axis=1)[chosen]
     for kind, colour in ((pulled[chosen], PULLED), (~pulled[chosen], PRESSED)):

@@ -13,6 +13,7 @@ from types import MappingProxyType
 from typing import Any
 
 import numpy as np
+from ccfem.layers.layer_stress import stress_on
 
 from ccfem.arrays import FloatArray
 from ccfem.cases import Case, create_case
@@ -24,10 +25,11 @@ from ccfem.evaluation.curvature import sample_curvature
 from ccfem.evaluation.matching import READINGS, matching_rate
 from ccfem.evaluation.plane_paths import PlanePaths, plane_paths
 from ccfem.geometry.polylines import resample, turning_angles
-from ccfem.layers import slice_planar
 from ccfem.layers.layer import Layer
+from ccfem.layers.slicing.planar import Planar
 from ccfem.machine import Machine
-from ccfem.strategies import create, named, plan
+from ccfem.planning import plan
+from ccfem.strategies import create, named
 from ccfem.toolpaths import Toolpaths
 from ccfem.topopt import Design
 from ccfem.virtual_testing.specimen import Specimen
@@ -217,8 +219,8 @@ def run_part(case: Case, patterns: Sequence[str], tested: bool) -> PartStudy:
     """Solve a part, lay the patterns on it, and judge them; `tested` virtually, too."""
     machine = replace(case.machine, minimum_length=0.0)
     field = solve(case.problem)["down"]
-    (layer,) = slice_planar(case.problem.mesh, count=1)
-    stress = field.on(layer)
+    (layer,) = Planar(count=1).cut(case.problem.mesh)
+    stress = stress_on(layer, field)
     specimen = Specimen.of(field) if tested else None
     found = {p: _run_pattern(p, layer, stress, machine, specimen) for p in patterns}
     return PartStudy(case, machine, field, layer, stress, MappingProxyType(found))

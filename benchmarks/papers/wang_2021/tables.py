@@ -95,7 +95,7 @@ def plate_table(study: Mapping[str, PlateStudy]) -> str:
                 name,
                 f"{width:g} x {height:g}",
                 f"{plate.volume_fraction:g}",
-                f"{one.optimised.layer.polygon.area / plate.domain.area:.3f}",
+                f"{one.optimised.layer.plane.polygon.area / plate.domain.area:.3f}",
                 *found,
                 *(f"{w:.1f}" for w in work),
                 f"{one.seconds:.1f}",

@@ -20,7 +20,8 @@ from ccfem.cases.designed import Hole, designed_case
 from ccfem.evaluation.curvature import sample_curvature
 from ccfem.evaluation.manufacture import sample_manufacture
 from ccfem.evaluation.plane_paths import PlanePaths, plane_paths
-from ccfem.strategies import create, plan
+from ccfem.planning import plan
+from ccfem.strategies import create
 
 __all__ = ["RADII", "Tried", "try_hole", "try_radii", "variant_quantities", "variant_table"]
 

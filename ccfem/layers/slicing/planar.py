@@ -10,7 +10,7 @@ from ccfem.errors import InputError
 from ccfem.layers.layer import Layer
 from ccfem.mesh.tet_mesh import TetMesh
 
-__all__ = ["plane_frame", "slice_heights", "slice_planar"]
+__all__ = ["Planar", "plane_frame", "slice_heights"]
 
 _SNAP = 2e-6
 """Nodes nearer to the plane than this share of the part's size are taken to lie on it [Chen et al.
@@ -74,7 +74,7 @@ def slice_heights(
     return lowest + (np.arange(slabs, dtype=np.float64) + 0.5) * thickness
 
 
-def slice_planar(
+def Planar(
     mesh: TetMesh,
     direction: Sequence[float] = (0.0, 0.0, 1.0),
     count: int | None = None,

@@ -6,17 +6,19 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from ccfem.errors import InputError
-from ccfem.layers import plane_frame, slice_heights, slice_planar
+from ccfem.layers import plane_frame
+from ccfem.layers.slicing.planar import Planar
+from ccfem.layers.slicing.planar import slice_heights
 from ccfem.mesh import TetMesh
 from ccfem.mesh.box import box_mesh
 
 
 def test_a_box_gives_rectangles_of_its_section() -> None:
     mesh = box_mesh((6.0, 4.0, 2.0), (6, 4, 2))
-    layers = slice_planar(mesh, (0, 0, 1), count=5)
+    layers = Planar(count=5).cut(mesh, (0, 0, 1))
     assert len(layers) == 5
     for layer in layers:
-        assert layer.polygon.area == pytest.approx(24.0, rel=1e-12)
+        assert layer.plane.polygon.area == pytest.approx(24.0, rel=1e-12)
         assert layer.areas.sum() == pytest.approx(24.0, rel=1e-12)
         assert layer.areas.min() > 0.0
         assert len(layer.loops) == 1
@@ -24,7 +26,7 @@ def test_a_box_gives_rectangles_of_its_section() -> None:
 
 def test_layers_through_mesh_nodes_have_the_whole_section() -> None:
     mesh = box_mesh((6.0, 4.0, 2.0), (6, 4, 2))
-    low, middle = slice_planar(mesh, (0, 0, 1), heights=[0.0, 1.0])
+    low, middle = Planar(heights=[0.0, 1.0]).cut(mesh, (0, 0, 1))
     assert low.areas.sum() == pytest.approx(24.0, rel=1e-12)
     assert middle.areas.sum() == pytest.approx(24.0, rel=1e-12)
     # each face in the plane is taken once, from one of the two cells that share it
@@ -42,27 +44,27 @@ def test_section_areas_integrate_to_the_volume(
     mesh = box_mesh((3.0, 2.0, 1.5), (3, 2, 2))
     moved = mesh.points + np.random.default_rng(seed).uniform(-0.1, 0.1, mesh.points.shape)
     mesh = TetMesh(moved, mesh.cells)
-    layers = slice_planar(mesh, direction, count=400)
+    layers = Planar(count=400).cut(mesh, direction)
     volume = sum(float(layer.areas.sum()) * layer.thickness for layer in layers)
     assert volume == pytest.approx(float(mesh.volumes.sum()), rel=2e-3)
     layer = layers[len(layers) // 2]
-    assert layer.polygon.area == pytest.approx(float(layer.areas.sum()), rel=1e-9)
+    assert layer.plane.polygon.area == pytest.approx(float(layer.areas.sum()), rel=1e-9)
 
 
 def test_linear_fields_are_interpolated_exactly() -> None:
     mesh = box_mesh((3.0, 2.0, 1.5), (3, 2, 2))
     gradient = np.array([1.0, -2.0, 0.5])
-    (layer,) = slice_planar(mesh, (1, 2, 3), count=1)
+    (layer,) = Planar(count=1).cut(mesh, (1, 2, 3))
     values = layer.interpolate(mesh.points @ gradient)
     np.testing.assert_allclose(values, layer.points @ gradient, atol=1e-12)
-    np.testing.assert_allclose(layer.points @ layer.frame[2], layer.height, atol=1e-12)
+    np.testing.assert_allclose(layer.points @ layer.plane.frame[2], layer.plane.height, atol=1e-12)
 
 
 def test_patches_are_kept_on_the_boundary() -> None:
     mesh = box_mesh((3.0, 2.0, 1.0), (3, 2, 1))
     facets = mesh.boundary
     wall = facets[(mesh.points[facets][:, :, 0] > 3.0 - 1e-9).all(axis=1)]
-    (layer,) = slice_planar(mesh.with_patches({"wall": wall}), count=1)
+    (layer,) = Planar(count=1).cut(mesh.with_patches({"wall": wall}))
     edges = layer.points[layer.patches["wall"]]
     np.testing.assert_allclose(edges[:, :, 0], 3.0)
     assert np.linalg.norm(edges[:, 1] - edges[:, 0], axis=1).sum() == pytest.approx(2.0)
@@ -72,10 +74,10 @@ def test_material_lies_left_of_the_loops() -> None:
     mesh = box_mesh((3.0, 3.0, 1.0), (3, 3, 1))
     centre = mesh.points[mesh.cells].mean(axis=1)
     hole = (np.abs(centre[:, :2] - 1.5) < 0.5).all(axis=1)
-    (layer,) = slice_planar(TetMesh(mesh.points, mesh.cells[~hole]), count=1)
+    (layer,) = Planar(count=1).cut(TetMesh(mesh.points, mesh.cells[~hole]))
     assert len(layer.loops) == 2
-    assert layer.polygon.area == pytest.approx(8.0)
-    assert len(layer.polygon.interiors) == 1
+    assert layer.plane.polygon.area == pytest.approx(8.0)
+    assert len(layer.plane.polygon.interiors) == 1
 
 
 def test_frames_are_right_handed_and_y_is_the_tool_frame_of_the_paper() -> None:
@@ -107,4 +109,4 @@ def test_heights_lie_at_the_middle_of_slabs() -> None:
 )
 def test_bad_slices_are_refused(arguments: dict, message: str) -> None:
     with pytest.raises(InputError, match=message):
-        slice_planar(box_mesh((1.0, 1.0, 1.0), (1, 1, 1)), **arguments)
+        Planar(None=arguments).cut(box_mesh((1.0, 1.0, 1.0), (1, 1, 1)))
