@@ -2,9 +2,9 @@
 
 from collections.abc import Mapping
 from dataclasses import dataclass, field
-from types import MappingProxyType
 from typing import Any
 
+from ccfem.arrays import freeze
 from ccfem.elasticity.problem import Problem
 from ccfem.layers.slicer import Slicer
 from ccfem.layers.slicing.planar import Planar
@@ -47,5 +47,4 @@ class Case:
     findings: tuple[str, ...] = ()
 
     def __post_init__(self) -> None:
-        parameters = {name: MappingProxyType(dict(p)) for name, p in self.parameters.items()}
-        object.__setattr__(self, "parameters", MappingProxyType(parameters))
+        freeze(self, parameters=dict)

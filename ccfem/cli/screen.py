@@ -14,12 +14,12 @@ from rich.console import Console
 from rich.markup import escape
 from rich.table import Table
 
+from ccfem.checks import check_known
 from ccfem.cli.docstring import about, attributes
 from ccfem.comparison.headline import HEADLINE, cell_text, headline_values
 from ccfem.comparison.ranking import best_values, ranking
 from ccfem.comparison.remarks import remarks, verdict
 from ccfem.comparison.result import Comparison, Run
-from ccfem.errors import InputError, known_names
 from ccfem.virtual_testing.stiffer import HONEST_PROMISE
 
 if typing.TYPE_CHECKING:
@@ -70,9 +70,7 @@ def print_strategy(name: str) -> None:
     from ccfem.strategies import named
 
     known = named()
-    if name not in known:
-        there = known_names(name, sorted(known))
-        raise InputError(f"no strategy named '{name}'; there are: {there}")
+    check_known("strategy", name, sorted(known))
     strategy, by_class = known[name], {each.__name__: each for each in known.values()}
     console = Console(highlight=False)
     console.print(f"[bold]{name}[/bold]")

@@ -9,6 +9,7 @@ from itertools import count
 from typing import Any
 
 from ccfem.cases.case import Case
+from ccfem.checks import check_known
 from ccfem.comparison.result import Comparison, Run
 from ccfem.comparison.stages import (
     Part,
@@ -211,8 +212,7 @@ def _load_case(case: Case, name: str | None) -> str:
         raise InputError(f"case '{case.name}' has no load case; give it at least one load")
     if name is None:
         return known[0]
-    if name not in known:
-        raise InputError(f"no load case named '{name}'; the case has: {', '.join(known)}")
+    check_known("load case", name, known)
     return name
 
 

@@ -3,9 +3,9 @@
 import dataclasses
 from collections.abc import Mapping
 from dataclasses import dataclass, field
-from types import MappingProxyType
 from typing import Any
 
+from ccfem.arrays import freeze
 from ccfem.cases.case import Case
 from ccfem.elasticity.stress_field import StressField
 from ccfem.evaluation import Evaluation
@@ -82,7 +82,7 @@ class Run:
     seconds: Mapping[str, float] = field(default_factory=dict)
 
     def __post_init__(self) -> None:
-        object.__setattr__(self, "seconds", MappingProxyType(dict(self.seconds)))
+        freeze(self, seconds=dict)
 
     @property
     def parameters(self) -> dict[str, Any]:
@@ -120,7 +120,7 @@ class Comparison:
     bound: UpperBound | None = None
 
     def __post_init__(self) -> None:
-        object.__setattr__(self, "seconds", MappingProxyType(dict(self.seconds)))
+        freeze(self, seconds=dict)
 
     @property
     def succeeded(self) -> tuple[Run, ...]:

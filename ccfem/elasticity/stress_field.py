@@ -4,7 +4,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from ccfem.arrays import FloatArray, read_only
+from ccfem.arrays import FloatArray, freeze
 from ccfem.elasticity.part_stress import PartStress
 from ccfem.elasticity.problem import Problem
 from ccfem.errors import InputError
@@ -68,8 +68,7 @@ class StressField:
     record: SolveRecord
 
     def __post_init__(self) -> None:
-        for name in ("displacement", "stress", "nodal", "reactions"):
-            object.__setattr__(self, name, read_only(getattr(self, name)))
+        freeze(self, displacement=float, stress=float, nodal=float, reactions=float)
 
     @property
     def mesh(self) -> TetMesh:

@@ -2,12 +2,11 @@
 
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
-from types import MappingProxyType
 from typing import TYPE_CHECKING, NamedTuple
 
 import numpy as np
 
-from ccfem.arrays import FloatArray, IntArray, read_only
+from ccfem.arrays import FloatArray, IntArray, freeze
 from ccfem.elasticity.part_stress import PartStress
 from ccfem.errors import InputError
 from ccfem.evaluation import (
@@ -99,9 +98,7 @@ class Evaluation:
     samples: tuple[FibreSamples, ...]
 
     def __post_init__(self) -> None:
-        object.__setattr__(self, "layers", read_only(self.layers, np.int64))
-        values = {name: read_only(column) for name, column in self.values.items()}
-        object.__setattr__(self, "values", MappingProxyType(values))
+        freeze(self, layers=int, values=float)
 
     @property
     def total(self) -> Mapping[str, float]:

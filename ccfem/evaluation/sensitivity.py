@@ -1,6 +1,6 @@
 """How stiffness falls when the fibre turns away from the stress: the curve f(theta)."""
 
-from dataclasses import dataclass, field
+from dataclasses import dataclass
 from functools import cached_property
 
 import numpy as np
@@ -33,10 +33,10 @@ class OffAxis:
     """
 
     material: Material
-    _compliance: FloatArray = field(init=False, repr=False, compare=False)
 
-    def __post_init__(self) -> None:
-        object.__setattr__(self, "_compliance", read_only(plane_compliance(self.material)))
+    @cached_property
+    def _compliance(self) -> FloatArray:
+        return read_only(plane_compliance(self.material))
 
     def compliance(self, angle: FloatArray) -> FloatArray:
         """Strain along a unit stress at `angle` (...,), radians, to the fibre, 1/MPa.

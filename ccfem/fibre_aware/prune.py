@@ -12,8 +12,9 @@ import numpy as np
 from numba import njit
 
 from ccfem.arrays import BoolArray, FloatArray
+from ccfem.checks import check_number
 from ccfem.elasticity.stress_field import StressField
-from ccfem.errors import InputError
+from ccfem.geometry.polylines import along_line, points_along, runs
 from ccfem.machine.machine import Machine
 from ccfem.toolpaths import FIBRE, Toolpaths
 from ccfem.virtual_testing.equilibrium import equilibrium
@@ -74,10 +75,8 @@ def prune(
     InputError
         When the length is not positive, `rounds` is below 1, or there is no fibre.
     """
-    if not 0.0 < length < np.inf or rounds < 1:
-        raise InputError(
-            f"prune expects a length above 0 mm and at least 1 round; got {length} and {rounds}"
-        )
+    check_number("length of fibre", length, above=0.0, unit="mm")
+    check_number("rounds", rounds, at_least=1)
     laid = _fibre_length(toolpaths)
     if laid <= length:
         return toolpaths
@@ -294,12 +293,11 @@ def _stretches(
     line: FloatArray, profile: Profile, keep: BoolArray, closed: bool
 ) -> list[FloatArray]:
     """Kept stretches of a line (n, 7); those on both sides of the seam of a ring are one."""
-    turns = np.flatnonzero(np.diff(np.concatenate([[False], keep, [False]]).astype(np.int8)))
-    runs = [(int(a), int(b)) for a, b in zip(turns[::2], turns[1::2], strict=True)]
-    if closed and len(runs) > 1 and keep[0] and keep[-1]:
-        runs = [*runs[1:-1], (runs[-1][0], len(keep) + runs[0][1])]
+    spans = runs(keep)
+    if closed and len(spans) > 1 and keep[0] and keep[-1]:
+        spans = np.concatenate([spans[1:-1], [[spans[-1, 0], len(keep) + spans[0, 1]]]])
     step, origin = profile.step, profile.origin
-    return [_between(line, origin + a * step, origin + b * step) for a, b in runs]
+    return [_between(line, origin + a * step, origin + b * step) for a, b in spans]
 
 
 def _between(line: FloatArray, start: float, end: float) -> FloatArray:
@@ -307,8 +305,7 @@ def _between(line: FloatArray, start: float, end: float) -> FloatArray:
 
     Columns are the point, its normal, and whether the step to the next point is a link.
     """
-    size = np.linalg.norm(np.diff(line[:, :3], axis=0), axis=1)
-    along = np.concatenate([[0.0], np.cumsum(size)])
+    along = along_line(line[:, :3])
     if end > along[-1] * (1.0 + 1e-12):  # on past the seam, at most once round
         line = np.concatenate([line[:-1], line[:-1], line])
         along = np.concatenate([along, along[-1] + along[1:], 2.0 * along[-1] + along[1:]])
@@ -316,4 +313,4 @@ def _between(line: FloatArray, start: float, end: float) -> FloatArray:
     wanted = np.concatenate([[start], inside, [end]])
     step = np.searchsorted(along, 0.5 * (wanted[1:] + wanted[:-1]), side="right") - 1
     link = np.append(line[step, 6], 0.0)
-    return np.column_stack([*(np.interp(wanted, along, x) for x in line[:, :6].T), link])
+    return np.column_stack([points_along(line[:, :6], along, wanted), link])

@@ -1,12 +1,12 @@
 """The incompatibility filter: where neighbouring vectors disagree [Chen et al. 2021, Eq. 2]."""
 
-from typing import Literal
+from typing import Literal, get_args
 
 import numpy as np
 from numba import njit
 
 from ccfem.arrays import BoolArray, FloatArray, IntArray
-from ccfem.errors import InputError
+from ccfem.checks import check_known
 
 __all__ = ["Incompatible", "incompatible"]
 
@@ -45,10 +45,7 @@ def incompatible(
     """
     if rule == "none":
         return np.zeros(len(cells), dtype=bool)
-    if rule not in ("any", "majority", "all"):
-        raise InputError(
-            f"incompatible must be one of any, majority, all, none; got {rule!r}: choose one"
-        )
+    check_known("rule on incompatible directions", rule, get_args(Incompatible))
     nodes = cells.ravel()
     order = np.argsort(nodes, kind="stable")
     start = np.searchsorted(nodes[order], np.arange(int(nodes.max()) + 2))

@@ -5,7 +5,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from ccfem.arrays import BoolArray, FloatArray
-from ccfem.tensor import largest_in_plane, principal
+from ccfem.tensor import largest_in_plane, principal, strongest
 
 __all__ = ["UNDEFINED", "Tension", "plane_tension", "spatial_tension"]
 
@@ -86,6 +86,6 @@ def plane_tension(plane_stress: FloatArray, compression_limit: float = 3.0) -> T
     defined = (largest > 0.0) & (-smallest < compression_limit * largest)
     direction = np.stack([np.cos(angle), np.sin(angle)], axis=1)
     across = np.stack([-direction[:, 1], direction[:, 0]], axis=1)
-    compressed = ~defined & (np.abs(smallest) > np.abs(largest))
-    direction = np.where(compressed[:, None], across, direction)
+    compressed, _ = strongest(largest, smallest)
+    direction = np.where((compressed & ~defined)[:, None], across, direction)
     return Tension(direction, np.where(defined, largest, UNDEFINED), defined)

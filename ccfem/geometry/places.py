@@ -1,11 +1,12 @@
 """Where points and steps lie about a section: in it, over a void of it, or outside."""
 
-from typing import Any, NamedTuple
+from typing import NamedTuple
 
 import numpy as np
 import shapely
 
 from ccfem.arrays import FloatArray, IntArray
+from ccfem.geometry.shapes import Region
 
 __all__ = ["INSIDE", "OUTSIDE", "TOLERANCE", "VOID", "Pieces", "cut_at_section", "section_places"]
 
@@ -35,7 +36,7 @@ class Pieces(NamedTuple):
     place: IntArray
 
 
-def section_places(points: FloatArray, section: Any) -> IntArray:
+def section_places(points: FloatArray, section: Region) -> IntArray:
     """Place of points about a section; those up to `TOLERANCE` from it are inside.
 
     Parameters
@@ -52,7 +53,7 @@ def section_places(points: FloatArray, section: Any) -> IntArray:
     return _places(points, shapely.buffer(section, TOLERANCE, quad_segs=2))
 
 
-def _places(points: FloatArray, section: Any) -> IntArray:
+def _places(points: FloatArray, section: Region) -> IntArray:
     rings = shapely.get_exterior_ring(shapely.get_parts(section))
     filled = shapely.union_all(shapely.polygons(rings))
     shapely.prepare([section, filled])
@@ -62,7 +63,7 @@ def _places(points: FloatArray, section: Any) -> IntArray:
 
 
 def cut_at_section(
-    starts: FloatArray, ends: FloatArray, section: Any, tolerance: float = TOLERANCE
+    starts: FloatArray, ends: FloatArray, section: Region, tolerance: float = TOLERANCE
 ) -> Pieces:
     """Cut straight steps at the boundary of a section.
 

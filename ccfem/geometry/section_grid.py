@@ -1,14 +1,15 @@
 """A section for compiled loops: where a point lies about it, and how much room it has there."""
 
-from typing import Any, NamedTuple
+from typing import NamedTuple
 
 import numpy as np
 import shapely
 from numba import njit
 from scipy.ndimage import distance_transform_edt
 
-from ccfem.arrays import BoolArray, FloatArray, IntArray
+from ccfem.arrays import BoolArray, FloatArray, IntArray, repeated
 from ccfem.geometry.places import INSIDE, OUTSIDE, VOID
+from ccfem.geometry.shapes import Region
 
 __all__ = ["SectionGrid", "contains", "place", "place_and_room", "section_grid"]
 
@@ -45,7 +46,7 @@ class SectionGrid(NamedTuple):
     outer: BoolArray
 
 
-def section_grid(section: Any, margin: float) -> SectionGrid:
+def section_grid(section: Region, margin: float) -> SectionGrid:
     """Prepare a section for `place` and `place_and_room`.
 
     Parameters
@@ -73,8 +74,8 @@ def section_grid(section: Any, margin: float) -> SectionGrid:
     nx, ny = (np.floor((high - low) / cell) + 1).astype(int)
     rows = np.sort(((edges[:, [1, 3]] - low[1]) / cell).astype(np.int64), axis=1)
     count = rows[:, 1] - rows[:, 0] + 1
-    edge = np.repeat(np.arange(len(edges)), count)
-    row = rows[edge, 0] + np.arange(len(edge)) - np.repeat(np.cumsum(count) - count, count)
+    edge, row = repeated(count)
+    row = row + rows[edge, 0]
     starts = np.concatenate([[0], np.cumsum(np.bincount(row, minlength=ny))])
     by_row = edge[np.argsort(row, kind="stable")]
     places, room = np.empty((nx, ny), dtype=np.int64), np.empty((nx, ny))

@@ -11,8 +11,8 @@ from typing import Any
 
 import numpy as np
 
+from ccfem.checks import check_number
 from ccfem.elasticity.part_stress import PartStress
-from ccfem.errors import InputError
 from ccfem.layers.layer import Layer
 from ccfem.machine.machine import Machine
 from ccfem.planning.plan import plan
@@ -68,8 +68,7 @@ def length_per_layer(toolpaths: Toolpaths, layers: Sequence[Layer]) -> float:
 
 def check_wanted(wanted: float) -> None:
     """Refuse a wanted length per layer, mm, that is not a positive number."""
-    if not (np.isfinite(wanted) and wanted > 0.0):
-        raise InputError(f"fibre per layer must be a length above 0 mm; got {wanted:g}: correct it")
+    check_number("fibre per layer", wanted, above=0.0, unit="mm")
 
 
 def plan_to_length(

@@ -6,6 +6,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from ccfem.arrays import FloatArray
+from ccfem.checks import check_number
 from ccfem.errors import InputError
 from ccfem.plot.colours import INK, OUTLINE, palette
 
@@ -76,8 +77,7 @@ def curvature_curves(
     colours : mapping of name to colour, optional
         Default `palette`.
     """
-    if not 0.0 <= radius < np.inf:
-        raise InputError(f"the tightest radius must be a finite number >= 0 mm; got {radius:g}")
+    check_number("the tightest radius", radius, at_least=0.0, unit="mm")
     figure, axes = _axes(heading, "curvature, 1/mm", "share below it, %")
     if radius > 0.0:
         axes.axvline(1.0 / radius, color=OUTLINE, lw=0.8, ls=(0, (4, 3)), zorder=1.0)

@@ -7,7 +7,7 @@ import numpy as np
 
 from ccfem.arrays import FloatArray
 from ccfem.plates.stiffness import turned_by
-from ccfem.tensor import largest_in_plane
+from ccfem.tensor import strongest_in_plane
 from ccfem.topopt.compliance import Compliance, Response
 from ccfem.topopt.filters import ConeFilter
 
@@ -57,10 +57,8 @@ class OrientedCompliance:
         stiffness, total = self.stiffness(), np.zeros((len(factor), 2))
         for case, displacement in response.displacement.items():
             stress = factor[:, None] * self.part.stress(displacement, stiffness)
-            largest, smallest, angle = largest_in_plane(stress)
-            # Across the larger principal stress where the smaller one is larger in size.
-            angle = np.where(largest >= -smallest, angle, angle + 0.5 * np.pi)
-            size = self.part.weights[case] * np.maximum(np.abs(largest), np.abs(smallest))
+            value, angle, _ = strongest_in_plane(stress)
+            size = self.part.weights[case] * np.abs(value)
             total += size[:, None] * _doubled(angle)
         return total
 

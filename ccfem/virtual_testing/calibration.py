@@ -13,6 +13,7 @@ from pathlib import Path
 import numpy as np
 from scipy.optimize import brentq
 
+from ccfem.checks import check_number
 from ccfem.elasticity.problem import Problem
 from ccfem.elasticity.solve import solve
 from ccfem.elasticity.stress_field import StressField
@@ -226,13 +227,8 @@ def read_calibration(path: str | Path) -> Calibration:
         value = values.get(key)
         if value is None and key == "rho":
             continue
-        if (
-            isinstance(value, bool)
-            or not isinstance(value, int | float)
-            or not math.isfinite(value)
-        ):
-            raise InputError(f"{path}: expected a number for {key}; got {value!r}: correct it")
-        numbers[key] = float(value)
+        check_number(f"{path}: {key}", value)
+        numbers[key] = float(values[key])
     return Calibration(
         name=str(values.get("name", path.stem)),
         modulus=numbers["modulus"],

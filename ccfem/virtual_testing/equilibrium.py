@@ -5,9 +5,10 @@ from dataclasses import dataclass
 import numpy as np
 import scipy.sparse as sp
 
-from ccfem.arrays import BoolArray, FloatArray, read_only
+from ccfem.arrays import BoolArray, FloatArray, freeze
+from ccfem.checks import check_known, check_number
 from ccfem.elasticity.solvers import preconditioned_cg
-from ccfem.errors import InputError, SolveError
+from ccfem.errors import SolveError
 from ccfem.virtual_testing.bars import bar_matrix, strain_operator
 from ccfem.virtual_testing.specimen import Specimen
 from ccfem.virtual_testing.strands import Strands
@@ -53,9 +54,7 @@ class Equilibrium:
     residual: float
 
     def __post_init__(self) -> None:
-        object.__setattr__(self, "displacement", read_only(self.displacement))
-        object.__setattr__(self, "strain", read_only(self.strain))
-        object.__setattr__(self, "carries", read_only(self.carries, np.bool_))
+        freeze(self, displacement=float, strain=float, carries=bool)
 
 
 def equilibrium(
@@ -93,10 +92,8 @@ def equilibrium(
     SolveError
         When the residual stays above the tolerance.
     """
-    if mode not in MODES:
-        raise InputError(f"no mode named '{mode}'; there are: {', '.join(MODES)}")
-    if not 0.0 <= axial_stiffness < np.inf:
-        raise InputError(f"expected a finite axial stiffness >= 0 N; got {axial_stiffness}")
+    check_known("mode", mode, MODES)
+    check_number("axial stiffness", axial_stiffness, at_least=0.0, unit="N")
     held = specimen.system.held
     u = specimen.unreinforced.displacement if start is None else start
     x, total = held.restrict(u), 0

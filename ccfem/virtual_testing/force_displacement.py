@@ -6,7 +6,7 @@ from pathlib import Path
 
 import numpy as np
 
-from ccfem.arrays import FloatArray, read_only
+from ccfem.arrays import FloatArray, freeze
 from ccfem.errors import InputError
 from ccfem.io.whole import existing_file
 
@@ -38,8 +38,7 @@ class Curve:
     name: str = "curve"
 
     def __post_init__(self) -> None:
-        for name in ("displacement", "force"):
-            object.__setattr__(self, name, read_only(getattr(self, name)))
+        freeze(self, displacement=float, force=float)
         if self.displacement.shape != self.force.shape or self.force.ndim != 1:
             raise InputError(f"{self.name}: expected as many forces as displacements")
         if not (np.isfinite(self.force).all() and np.isfinite(self.displacement).all()):

@@ -2,9 +2,7 @@
 
 from dataclasses import dataclass
 
-import numpy as np
-
-from ccfem.errors import InputError
+from ccfem.checks import check_fields
 
 __all__ = ["RHO", "RHO_SPAN", "Strand"]
 
@@ -32,10 +30,8 @@ class Strand:
     strength: float | None = 86.0
 
     def __post_init__(self) -> None:
-        for name in ("rho", "strength"):
-            value = getattr(self, name)
-            if value is not None and not 0.0 < value < np.inf:
-                raise InputError(f"strand.{name} must be a finite number > 0; got {value}")
+        check_fields(self, "rho", above=0.0, unit="mm^2")
+        check_fields(self, "strength", above=0.0, unit="N")
 
     def stiffness(self, modulus: float) -> float:
         """EA, N, in a matrix with Young's modulus `modulus`, MPa."""

@@ -6,7 +6,7 @@ from time import perf_counter
 
 import numpy as np
 
-from ccfem.arrays import FloatArray, read_only
+from ccfem.arrays import FloatArray, freeze
 from ccfem.elasticity.stress_field import SolveRecord, StressField
 from ccfem.toolpaths import Toolpaths
 from ccfem.virtual_testing.equilibrium import BONDED, TENSION, equilibrium
@@ -65,7 +65,7 @@ class VirtualTest:
     updates: int
 
     def __post_init__(self) -> None:
-        object.__setattr__(self, "axial_force", read_only(self.axial_force))
+        freeze(self, axial_force=float)
 
     @property
     def ratio(self) -> float:
@@ -131,9 +131,8 @@ def virtual_test(
     SolveError
         When the solve misses its tolerance.
     """
-    specimen = Specimen.of(part, backend) if isinstance(part, StressField) else part
+    specimen, strands = _prepared(fibres, part, backend)
     before = specimen.unreinforced
-    strands = cut_strands(fibres, before.mesh) if isinstance(fibres, Toolpaths) else fibres
     axial = (Strand() if strand is None else strand).stiffness(specimen.modulus)
     started = perf_counter()
     found = equilibrium(specimen, strands, axial, mode)
@@ -178,6 +177,15 @@ def virtual_test(
     )
 
 
+def _prepared(
+    fibres: Toolpaths | Strands, part: StressField | Specimen, backend: str = "auto"
+) -> tuple[Specimen, Strands]:
+    specimen = Specimen.of(part, backend) if isinstance(part, StressField) else part
+    if isinstance(fibres, Toolpaths):
+        fibres = cut_strands(fibres, specimen.unreinforced.mesh)
+    return specimen, fibres
+
+
 def virtual_bracket(
     fibres: Toolpaths | Strands,
     part: StressField | Specimen,
@@ -185,8 +193,6 @@ def virtual_bracket(
     span: Sequence[float] = RHO_SPAN,
 ) -> Bracket:
     """Both tests of `virtual_test`, with one factorisation; parameters as there."""
-    specimen = Specimen.of(part) if isinstance(part, StressField) else part
-    mesh = specimen.unreinforced.mesh
-    strands = cut_strands(fibres, mesh) if isinstance(fibres, Toolpaths) else fibres
+    specimen, strands = _prepared(fibres, part)
     tension = virtual_test(strands, specimen, strand, TENSION, span)
     return Bracket(tension, virtual_test(strands, specimen, strand, BONDED, span))

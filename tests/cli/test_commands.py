@@ -286,7 +286,7 @@ HOLE = '[patches.pin]\nrule = "cylinder"\npoint = [30, 12, 0]\naxis = "z"\nradiu
         (PART.replace(SUPPORT, ""), "support"),
         (PART.replace('patch = "x_min"', 'patch = "x_min"\ncomponents = "x"'), "free"),
         (PART + HOLE, "nearest"),
-        (PART.replace('"x_max"', '"end"'), "no patch named 'end'; the mesh has: x_max, x_min"),
+        (PART.replace('"x_max"', '"end"'), "no patch named 'end'; there are: x_max, x_min"),
         (PART.replace("body.npz", "nan.tet"), "NaN"),
         (PART.replace("[1000,", "[nan,"), "nan"),
         (PART.replace("[1000,", "[0,"), "zero"),

@@ -11,7 +11,6 @@ from ccfem.evaluation.stiffness_alignment import (
     agreement,
     performance_index,
     stiffness_alignment_indices,
-    strongest,
 )
 from ccfem.machine import Machine
 from ccfem.materials import isotropic, named_material
@@ -56,12 +55,6 @@ def test_acute_angles_and_agreement():
     angle = np.radians([0.0, 45.0, 90.0, 135.0, 180.0, -30.0, 725.0])
     np.testing.assert_allclose(np.degrees(acute(angle)), [0, 45, 90, 45, 0, 30, 5], atol=1e-9)
     np.testing.assert_allclose(agreement(angle)[:4], [1.0, 0.5, 0.0, 0.5], atol=1e-12)
-
-
-def test_strongest_direction():
-    across, defined = strongest(np.array([3.0, 1.0, 1.0, 0.0]), np.array([1.0, -3.0, -1.0, 0.0]))
-    assert across.tolist() == [False, True, False, False]
-    assert defined.tolist() == [True, True, False, False]
 
 
 def test_index_in_its_three_readings_by_hand():

@@ -163,8 +163,15 @@ def test_cuts_that_save_little_are_not_made(pulled_bar):
     assert len(whole) == 2
 
 
-@pytest.mark.parametrize("options", [{"length": 0.0}, {"length": 10.0, "rounds": 0}])
-def test_impossible_requests_are_refused(pulled_bar, options):
+@pytest.mark.parametrize(
+    ("options", "message"),
+    [
+        ({"length": 0.0}, "length of fibre must be above 0 mm; got 0"),
+        ({"length": 10.0, "rounds": 0}, "rounds must be at least 1; got 0"),
+        ({"length": 10.0, "cut_cost": -1.0}, "cut_cost must be at least 0 mm; got -1"),
+    ],
+)
+def test_impossible_requests_are_refused(pulled_bar, options, message):
     stress, layers = pulled_bar
-    with pytest.raises(InputError, match="prune expects"):
+    with pytest.raises(InputError, match=message):
         prune(crossing_strands(layers[0]), stress, machine=SHORT, **options)

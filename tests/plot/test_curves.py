@@ -41,5 +41,5 @@ def test_the_curvature_curve_is_the_share_of_samples_below():
     assert png(figure).startswith(b"\x89PNG")
     assert list(figure.axes[0].lines[0].get_xdata()) == pytest.approx([1.0 / 3.85] * 2)
     assert len(curvature_curves({}, 0.0).axes[0].lines) == 0
-    with pytest.raises(InputError, match=">= 0 mm; got -1"):
+    with pytest.raises(InputError, match="at least 0 mm; got -1"):
         curvature_curves({}, -1.0)
