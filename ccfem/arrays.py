@@ -1,5 +1,6 @@
 """Array types, and how the frozen values of ccfem hold arrays and mappings that nobody changes."""
 
+import dataclasses
 from collections.abc import Mapping
 from types import MappingProxyType
 from typing import Any
@@ -7,7 +8,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import ArrayLike, DTypeLike, NDArray
 
-__all__ = ["BoolArray", "FloatArray", "IntArray", "freeze", "read_only", "repeated"]
+__all__ = ["BoolArray", "FloatArray", "IntArray", "freeze", "in_brief", "read_only", "repeated"]
 
 FloatArray = NDArray[np.float64]
 IntArray = NDArray[np.int64]
@@ -87,3 +88,36 @@ def _frozen(given: Any, kind: Any) -> Any:
         }
         return MappingProxyType(inner)
     return tuple(given) if kind is tuple else read_only(given, kind)
+
+
+def in_brief(value: Any) -> str:
+    """Show a dataclass in one line: numbers and words as they are, arrays by their shape.
+
+    For ``__repr__ = in_brief`` in the body of a dataclass with large fields.
+
+    Examples
+    --------
+    >>> from dataclasses import dataclass
+    >>> @dataclass(frozen=True)
+    ... class Line:
+    ...     name: str
+    ...     points: FloatArray
+    ...
+    ...     __repr__ = in_brief
+    >>> Line("border", np.zeros((7, 2)))
+    Line(name='border', points (7, 2))
+    """
+    parts = []
+    for name in (field.name for field in dataclasses.fields(value)):
+        given = getattr(value, name)
+        if isinstance(given, np.ndarray):
+            parts.append(f"{name} {given.shape}")
+        elif given is None or isinstance(given, bool | int | str):
+            parts.append(f"{name}={given!r}")
+        elif isinstance(given, float):
+            parts.append(f"{name}={given:.6g}")
+        elif isinstance(given, tuple | list | Mapping):
+            parts.append(f"{len(given)} {name}")
+        else:
+            parts.append(f"{name} {type(given).__name__}")
+    return f"{type(value).__name__}({', '.join(parts)})"

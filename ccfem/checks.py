@@ -8,7 +8,7 @@ from typing import Any, Literal, get_args, get_origin, get_type_hints
 
 from ccfem.errors import InputError, known_names
 
-__all__ = ["check_choices", "check_fields", "check_known", "check_number"]
+__all__ = ["check_choices", "check_fields", "check_known", "check_number", "member_name"]
 
 
 def check_number(
@@ -82,7 +82,7 @@ def check_fields(value: object, *names: str, **bounds: Any) -> None:
         given = getattr(value, name)
         if given is None and type(None) in get_args(get_type_hints(type(value))[name]):
             continue
-        check_number(f"{_name(value)}.{name}", given, **bounds)
+        check_number(f"{member_name(value)}.{name}", given, **bounds)
 
 
 def check_choices(value: object) -> None:
@@ -95,8 +95,9 @@ def check_choices(value: object) -> None:
     """
     for name, hint in get_type_hints(type(value)).items():
         if get_origin(hint) is Literal and getattr(value, name) not in get_args(hint):
+            words = ", ".join(map(repr, get_args(hint)))
             raise InputError(
-                f"{_name(value)}.{name} must be one of {', '.join(map(repr, get_args(hint)))}; got "
+                f"{member_name(value)}.{name} must be one of {words}; got "
                 f"{getattr(value, name)!r}: correct it"
             )
 
@@ -115,6 +116,6 @@ def check_known(kind: str, name: str, known: Iterable[str], cure: str = "") -> N
         raise InputError(f"no {kind} named '{name}'; there are: {there}{cure and f' ({cure})'}")
 
 
-def _name(value: object) -> str:
-    """Name of the value's class as parameters are named: ``StreamFunction`` to stream_function."""
+def member_name(value: object) -> str:
+    """Name of a value's class as modules are named: ``stream_function`` of a ``StreamFunction``."""
     return re.sub(r"(?<=[a-z])(?=[A-Z])", "_", type(value).__name__).lower()

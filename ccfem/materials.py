@@ -41,6 +41,10 @@ class Material:
     compressive_strength: float | None = None
     source: str = ""
 
+    def __repr__(self) -> str:
+        modulus = 1.0 / np.linalg.inv(self.stiffness)[0, 0]
+        return f"Material {self.name}: {modulus:.4g} MPa along axis 1"
+
     def __post_init__(self) -> None:
         freeze(self, stiffness=float)
         stiffness = self.stiffness

@@ -49,6 +49,13 @@ class Toolpaths:
     closed: BoolArray
     link: BoolArray = None  # type: ignore[assignment]
 
+    def __repr__(self) -> str:
+        length = float(self.of_kind(FIBRE).lengths.sum())
+        return (
+            f"Toolpaths: {len(self)} paths on {len(np.unique(self.layer))} layers, "
+            f"{length:.0f} mm of fibre"
+        )
+
     def __post_init__(self) -> None:
         if self.link is None:
             object.__setattr__(self, "link", np.zeros(len(self.points), dtype=np.bool_))

@@ -46,5 +46,8 @@ class Case:
     source: str = ""
     findings: tuple[str, ...] = ()
 
+    def __repr__(self) -> str:
+        return f"Case {self.name}: {self.title}"
+
     def __post_init__(self) -> None:
         freeze(self, parameters=dict)

@@ -2,11 +2,21 @@
 
 import tomllib
 from collections.abc import Sequence
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 from ccfem.errors import InputError
 
-__all__ = ["assignment", "names_of", "numbers_of", "parameters_by_strategy", "parameters_of"]
+if TYPE_CHECKING:
+    from ccfem.layers.slicer import Slicer
+
+__all__ = [
+    "assignment",
+    "names_of",
+    "numbers_of",
+    "parameters_by_strategy",
+    "parameters_of",
+    "slicer_of",
+]
 
 
 def names_of(text: str) -> tuple[str, ...]:
@@ -70,3 +80,17 @@ def parameters_of(strategy: str, texts: Sequence[str]) -> dict[str, Any]:
             )
         found[name] = value
     return found
+
+
+def slicer_of(text: str) -> "Slicer":
+    """Slicer with its parameters, written ``method:name=value,name=value``.
+
+    Raises
+    ------
+    InputError
+        For an unknown slicer, parameter or value.
+    """
+    from ccfem.layers.slicing import create
+
+    method, _, rest = text.partition(":")
+    return create(method.strip(), dict(assignment(one) for one in names_of(rest)))

@@ -1,15 +1,15 @@
-"""The command line: ``ccfem cases``, ``strategies``, ``compare``, ``plan``, ``calibrate``.
+"""The command line: what ``ccfem`` understands, a function a command.
 
 Everything heavy is imported by the command that needs it, so that ``ccfem --help`` answers at once.
 """
 
 import sys
+from importlib import metadata
 from pathlib import Path
 from typing import Annotated, Any
 
 import typer
 
-from ccfem import __version__
 from ccfem.cli.arguments import names_of, parameters_by_strategy, parameters_of
 from ccfem.cli.options import (
     Backend,
@@ -21,9 +21,10 @@ from ccfem.cli.options import (
     LoadCase,
     Out,
     SetCase,
+    Slicing,
     VirtualTest,
 )
-from ccfem.cli.run import load, options_of, run
+from ccfem.cli.run import layers_of, load, options_of, run
 from ccfem.errors import InputError, SolveError
 
 __all__ = ["app", "main"]
@@ -45,7 +46,7 @@ def _top(
     version: Annotated[bool, typer.Option("--version", help="Print the version.")] = False,
 ) -> None:
     if version:
-        print(f"ccfem {__version__}")
+        print(f"ccfem {metadata.version('ccfem')}")
         raise typer.Exit
     if context.invoked_subcommand is None:
         print(context.get_help())
@@ -59,20 +60,31 @@ def cases() -> None:
     print_cases()
 
 
+_Explained = Annotated[
+    str | None,
+    typer.Argument(metavar="NAME", help="Explain this one, and what its parameters mean."),
+]
+
+
 @app.command()
-def strategies(
-    name: Annotated[
-        str | None,
-        typer.Argument(metavar="NAME", help="Explain this one, and what its parameters mean."),
-    ] = None,
-) -> None:
+def strategies(name: _Explained = None) -> None:
     """List the strategies with their parameters and defaults, or explain one of them."""
-    from ccfem.cli.screen import print_strategies, print_strategy
+    _list("strategy", name)
+
+
+@app.command()
+def slicers(name: _Explained = None) -> None:
+    """List the slicers with their parameters and defaults, or explain one of them."""
+    _list("slicer", name)
+
+
+def _list(kind: str, name: str | None) -> None:
+    from ccfem.cli.screen import print_member, print_members
 
     if name is None:
-        print_strategies()
+        print_members(kind)
     else:
-        print_strategy(name)
+        print_member(kind, name)
 
 
 @app.command()
@@ -88,6 +100,7 @@ def compare(
     set_case: SetCase = None,
     layers: Layers = None,
     heights: Heights = None,
+    slicing: Slicing = None,
     fibre_per_layer: Fibre = None,
     natural: Annotated[
         bool, typer.Option("--natural", help="Let each strategy lay its own amount of fibre.")
@@ -107,7 +120,8 @@ def compare(
 
     names = STRATEGIES if strategies is None else names_of(strategies)
     parameters = parameters_by_strategy(set_ or ())
-    options = options_of(layers, heights, fibre_per_layer, virtual_test, load_case, backend)
+    chosen = layers_of(layers, heights, slicing)
+    options = options_of(chosen, fibre_per_layer, virtual_test, load_case, backend)
     options["natural"] = natural
     run(case, set_case, names, parameters, options, calibration, out)
 
@@ -123,6 +137,7 @@ def plan(
     set_case: SetCase = None,
     layers: Layers = None,
     heights: Heights = None,
+    slicing: Slicing = None,
     fibre_per_layer: Fibre = None,
     virtual_test: VirtualTest = True,
     load_case: LoadCase = None,
@@ -136,7 +151,8 @@ def plan(
 ) -> None:
     """Plan a part by one strategy, by default with as much fibre as it lays of its own accord."""
     parameters = {strategy: parameters_of(strategy, set_ or ())}
-    options = options_of(layers, heights, fibre_per_layer, virtual_test, load_case, backend)
+    chosen = layers_of(layers, heights, slicing)
+    options = options_of(chosen, fibre_per_layer, virtual_test, load_case, backend)
     options["natural"] = fibre_per_layer is None
     options["print_plans"] = gcode
     run(case, set_case, (strategy,), parameters, options, calibration, out, f"-{strategy}")
@@ -185,7 +201,7 @@ def calibrate(
     loaded, paths = load(case, set_case), None
     if strategy is not None:
         chosen = create_all(loaded, (strategy,), {strategy: parameters_of(strategy, set_ or ())})
-        options = options_of(layers, None, fibre_per_layer, False, load_case, "auto")
+        options = options_of(layers, fibre_per_layer, False, load_case, "auto")
         (planned,) = compare(loaded, chosen, natural=fibre_per_layer is None, **options).runs
         if not len(planned.toolpaths):
             raise InputError(f"{strategy} could not plan the part: {planned.failure}")

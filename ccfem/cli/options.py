@@ -15,6 +15,7 @@ __all__ = [
     "LoadCase",
     "Out",
     "SetCase",
+    "Slicing",
     "VirtualTest",
 ]
 
@@ -40,6 +41,15 @@ Heights = Annotated[
         "--heights",
         metavar="MM,MM,..",
         help="Heights of the layers along the build direction, instead of --layers.",
+    ),
+]
+Slicing = Annotated[
+    str | None,
+    typer.Option(
+        "--slicing",
+        metavar="METHOD[:NAME=VALUE,..]",
+        help="Slicer and its parameters instead of --layers, as planar:thickness=0.4; see ccfem "
+        "slicers.",
     ),
 ]
 Fibre = Annotated[

@@ -11,7 +11,7 @@ from dataclasses import replace
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
-from ccfem.cli.arguments import assignment, numbers_of
+from ccfem.cli.arguments import assignment, numbers_of, slicer_of
 from ccfem.errors import InputError
 from ccfem.progress import Progress, progress_bar
 
@@ -19,7 +19,7 @@ if TYPE_CHECKING:
     from ccfem.cases.case import Case
     from ccfem.comparison.result import Comparison
 
-__all__ = ["load", "options_of", "run"]
+__all__ = ["layers_of", "load", "options_of", "run"]
 
 _STARTED = time.perf_counter()
 
@@ -29,23 +29,29 @@ _SOLVED = 0.75
 
 def load(name: str, set_case: Sequence[str] | None) -> "Case":
     """Read a part file, or make a case from its name and parameters."""
-    from ccfem.cases.named import create_case
+    from ccfem.cases.read import read
 
     parameters = dict(assignment(text) for text in set_case or ())
-    if not (name.endswith(".toml") or "/" in name or "\\" in name):
-        return create_case(name, **parameters)
-    if parameters:
+    if parameters and name.endswith(".toml"):
         raise InputError(
             f"--set-case is for cases by name; '{name}' is a part file: change the file"
         )
-    from ccfem.cases.part_file import read_part
+    return read(name, **parameters)
 
-    return read_part(Path(name))
+
+def layers_of(layers: int | None, heights: str | None, slicing: str | None) -> Any:
+    """Read the layers from the one of three options that is given; None for the part's own."""
+    given = {"--layers": layers, "--heights": heights, "--slicing": slicing}
+    named = [name for name, value in given.items() if value is not None]
+    if len(named) > 1:
+        raise InputError(f"give --layers, --heights or --slicing; got {' and '.join(named)}")
+    if heights is not None:
+        return numbers_of(heights)
+    return layers if slicing is None else slicer_of(slicing)
 
 
 def options_of(
-    layers: int | None,
-    heights: str | None,
+    layers: Any,
     fibre_per_layer: float | None,
     virtual_test: bool,
     load_case: str | None,
@@ -54,10 +60,8 @@ def options_of(
     """Keyword arguments of `ccfem.comparison.compare.compare`."""
     from ccfem.comparison.compare import DEFAULT_STRAND
 
-    if layers is not None and heights is not None:
-        raise InputError("give either --layers or --heights, not both")
     return {
-        "layers": layers if heights is None else numbers_of(heights),
+        "layers": layers,
         "fibre_per_layer": fibre_per_layer,
         "strand": DEFAULT_STRAND if virtual_test else None,
         "load_case": load_case,

@@ -22,10 +22,7 @@ from ccfem.comparison.remarks import remarks, verdict
 from ccfem.comparison.result import Comparison, Run
 from ccfem.virtual_testing.stiffer import HONEST_PROMISE
 
-if typing.TYPE_CHECKING:
-    from ccfem.planning.strategy import Strategy
-
-__all__ = ["print_cases", "print_comparison", "print_strategies", "print_strategy"]
+__all__ = ["print_cases", "print_comparison", "print_member", "print_members"]
 
 _TITLES, _NUMBERS = 30, 20
 """Characters that a table is given for its titles and for each strategy, where neither a terminal
@@ -44,49 +41,60 @@ def print_cases() -> None:
         console.print(f"    {given}", markup=False)
 
 
-def print_strategies() -> None:
-    """Print the strategies with their parameters, defaults and choices; the amount is marked."""
-    from ccfem.strategies import named
+def print_members(kind: str) -> None:
+    """Print strategies or slicers with their parameters, defaults and choices.
 
+    Parameters
+    ----------
+    kind : {"strategy", "slicer"}
+    """
     console = Console(highlight=False)
-    for name, strategy in sorted(named().items()):
-        console.print(f"[bold]{name}[/bold]  {_first_line(strategy)}")
+    for name, member in sorted(_members(kind).items()):
+        console.print(f"[bold]{name}[/bold]  {_first_line(member)}")
         table = Table(box=None, show_header=False, padding=(0, 2, 0, 4))
-        hints = typing.get_type_hints(strategy)
-        for field in dataclasses.fields(strategy):  # type: ignore[arg-type]
-            note = _amount(strategy, field.name) or _choices(hints[field.name])
+        hints = typing.get_type_hints(member)
+        for field in dataclasses.fields(member):
+            note = _amount(member, field.name) or _choices(hints[field.name])
             table.add_row(field.name, repr(field.default), note)
         console.print(table)
 
 
-def print_strategy(name: str) -> None:
-    """Print what one strategy does, and what each of its parameters means, in its own words.
+def print_member(kind: str, name: str) -> None:
+    """Print what one strategy or slicer does, and what each of its parameters means.
 
     Raises
     ------
     InputError
-        For an unknown strategy.
+        For an unknown name.
     """
-    from ccfem.strategies import named
-
-    known = named()
-    check_known("strategy", name, sorted(known))
-    strategy, by_class = known[name], {each.__name__: each for each in known.values()}
+    known = _members(kind)
+    check_known(kind, name, sorted(known))
+    member, by_class = known[name], {each.__name__: each for each in known.values()}
     console = Console(highlight=False)
     console.print(f"[bold]{name}[/bold]")
-    for paragraph in about(strategy):
+    for paragraph in about(member):
         console.print(paragraph, markup=False)
     table = Table(box=box.SIMPLE_HEAD, header_style="bold")
     for column in ("parameter", "default", "type, unit", "meaning"):
         table.add_column(column, overflow="fold")
-    said = attributes(strategy)
-    for field in dataclasses.fields(strategy):  # type: ignore[arg-type]
-        kind = said[field.name].kind if field.name in said else ""
-        note = _amount(strategy, field.name)
-        meaning = _meaning(strategy, field.name, by_class)
+    said = attributes(member)
+    for field in dataclasses.fields(member):
+        what = said[field.name].kind if field.name in said else ""
+        note = _amount(member, field.name)
+        meaning = _meaning(member, field.name, by_class)
         text = f"{meaning} {note and f'It {note}.'}".strip()
-        table.add_row(*map(escape, (field.name, repr(field.default), kind, text)))
+        table.add_row(*map(escape, (field.name, repr(field.default), what, text)))
     console.print(table)
+
+
+def _members(kind: str) -> Mapping[str, typing.Any]:
+    if kind == "slicer":
+        from ccfem.layers import slicing
+
+        return slicing.named()
+    from ccfem import strategies
+
+    return strategies.named()
 
 
 def _meaning(of: type, parameter: str, by_class: Mapping[str, type]) -> str:
@@ -98,10 +106,10 @@ def _meaning(of: type, parameter: str, by_class: Mapping[str, type]) -> str:
     return _meaning(by_class[same[1]], parameter, by_class).rstrip(".") + text[same.end() :]
 
 
-def _amount(strategy: "type[Strategy]", parameter: str) -> str:
-    """Say that a parameter sets the amount of fibre, where it does."""
-    amount = strategy.amount
-    if parameter != amount.parameter:
+def _amount(member: typing.Any, parameter: str) -> str:
+    """Say that a parameter of a strategy sets the amount of fibre, where it does."""
+    amount = getattr(member, "amount", None)
+    if amount is None or parameter != amount.parameter:
         return ""
     return f"sets the amount of fibre: {amount.most:g} most, {amount.least:g} least"
 

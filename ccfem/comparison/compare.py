@@ -4,12 +4,14 @@
 print, test, bound.
 """
 
+import os
 from collections.abc import Mapping, Sequence
 from itertools import count
 from typing import Any
 
 from ccfem.cases.case import Case
-from ccfem.checks import check_known
+from ccfem.cases.read import read
+from ccfem.checks import check_known, member_name
 from ccfem.comparison.result import Comparison, Run
 from ccfem.comparison.stages import (
     Part,
@@ -50,7 +52,7 @@ _BOUND_ITERATIONS = 7
 
 def create_all(
     case: Case,
-    names: Sequence[str] = STRATEGIES,
+    strategies: Sequence[str | Strategy] = STRATEGIES,
     parameters: Mapping[str, Mapping[str, Any]] | None = None,
 ) -> dict[str, Strategy]:
     """Strategies by name, with the parameters of the case and, above these, those given.
@@ -58,7 +60,9 @@ def create_all(
     Parameters
     ----------
     case : Case
-    names : sequence of str
+    strategies : sequence of str or Strategy
+        One that is given itself keeps its parameters, and has the name of its module; a second one
+        of a name gets a number.
     parameters : mapping of strategy name to parameters, optional
 
     Raises
@@ -67,9 +71,10 @@ def create_all(
         For an unknown strategy or parameter, or one named twice.
     """
     given = dict(parameters or {})
-    if not names:
+    names = [one for one in strategies if isinstance(one, str)]
+    if not strategies:
         raise InputError("name at least one strategy to compare; got none")
-    repeated = {name for name in names if list(names).count(name) > 1}
+    repeated = {name for name in names if names.count(name) > 1}
     if repeated:
         raise InputError(f"name each strategy once; got '{min(repeated)}' more than once")
     for name in given:
@@ -78,10 +83,16 @@ def create_all(
                 f"parameters are given for '{name}', which is not among the strategies: "
                 f"{known_names(name, names)}"
             )
-    return {
-        name: create(name, {**case.parameters.get(name, {}), **given.get(name, {})})
-        for name in names
-    }
+    found: dict[str, Strategy] = {}
+    for one in strategies:
+        if isinstance(one, str):
+            found[one] = create(one, {**case.parameters.get(one, {}), **given.get(one, {})})
+            continue
+        name = member_name(one)
+        numbers = (f"{name}_{k}" for k in count(2))
+        taken = {*found, *names}
+        found[name if name not in taken else next(n for n in numbers if n not in taken)] = one
+    return found
 
 
 def solve_and_slice(
@@ -119,8 +130,8 @@ def solve_and_slice(
 
 
 def compare(
-    case: Case,
-    strategies: Mapping[str, Strategy] | Sequence[str] = STRATEGIES,
+    case: Case | str | os.PathLike[str],
+    strategies: Mapping[str, Strategy] | Sequence[str | Strategy] = STRATEGIES,
     layers: int | Sequence[float] | str | Slicer | None = None,
     fibre_per_layer: float | None = None,
     natural: bool = False,
@@ -139,9 +150,10 @@ def compare(
 
     Parameters
     ----------
-    case : Case
-    strategies : mapping of name to Strategy, or sequence of names
-        Named ones take the parameters of the case.
+    case : Case, str or path
+        A case, the name of one, or a part file.
+    strategies : sequence of str or Strategy, or mapping of name to Strategy
+        Those by name take the parameters of the case.
     layers : int, sequence of float, str or Slicer, optional
         Instead of the case's own slicing: a number of flat layers, their heights along the build
         direction in mm, the name of a slicer, or a slicer.
@@ -172,6 +184,7 @@ def compare(
     SolveError
         When the solve misses its tolerance.
     """
+    case = read(case)
     if natural and fibre_per_layer is not None:
         raise InputError("give either a fibre length per layer or the natural amount, not both")
     if fibre_per_layer is not None:

@@ -9,7 +9,6 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from ccfem import __version__
 from ccfem.comparison.headline import TEST_COLUMNS, headline_values
 from ccfem.comparison.result import Comparison, Run
 from ccfem.elasticity.stress_field import StressField
@@ -72,7 +71,7 @@ def record(comparison: Comparison, command: str, seconds: Mapping[str, float]) -
     mesh = case.problem.mesh
     return _plain(
         {
-            "ccfem": __version__,
+            "ccfem": version("ccfem"),
             "command": command,
             "made": datetime.now(UTC).isoformat(timespec="seconds"),
             "versions": _versions(),

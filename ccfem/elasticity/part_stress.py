@@ -54,6 +54,9 @@ class GivenStress:
     nodal: FloatArray
     held_or_loaded: tuple[str, ...] = ()
 
+    def __repr__(self) -> str:
+        return f"GivenStress on {self.mesh!r}"
+
     def __post_init__(self) -> None:
         freeze(self, stress=float, nodal=float)
         for name, count in (("stress", len(self.mesh.cells)), ("nodal", len(self.mesh.points))):

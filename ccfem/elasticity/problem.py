@@ -122,6 +122,12 @@ class Problem:
     density: FloatArray | None = None
     stiffness: FloatArray | None = None
 
+    def __repr__(self) -> str:
+        return (
+            f"Problem of {self.material.name} on {self.mesh!r}; {len(self.supports)} supports, "
+            f"load cases {', '.join(self.loads) or 'none'}"
+        )
+
     def __post_init__(self) -> None:
         freeze(self, supports=tuple, loads=tuple, axes=float, density=float, stiffness=float)
         m = len(self.mesh.cells)

@@ -70,6 +70,13 @@ class StressField:
     def __post_init__(self) -> None:
         freeze(self, displacement=float, stress=float, nodal=float, reactions=float)
 
+    def __repr__(self) -> str:
+        largest = float(np.linalg.norm(self.displacement, axis=1).max())
+        return (
+            f"StressField of load case {self.case}: {len(self.stress):,} cells, largest "
+            f"displacement {largest:.4g} mm, strain energy {self.strain_energy:.4g} N mm"
+        )
+
     @property
     def mesh(self) -> TetMesh:
         """Mesh of the problem."""

@@ -97,6 +97,12 @@ class Evaluation:
     values: Mapping[str, FloatArray]
     samples: tuple[FibreSamples, ...]
 
+    def __repr__(self) -> str:
+        return f"Evaluation of {len(self.layers)} layers by {len(self.values)} indices"
+
+    def _repr_html_(self) -> str:
+        return str(self.to_frame().T.to_html(float_format="{:.4g}".format))
+
     def __post_init__(self) -> None:
         freeze(self, layers=int, values=float)
 

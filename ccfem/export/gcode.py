@@ -8,12 +8,12 @@ comes that length before the end of the path; the rest is dragged out and laid b
 all, a path is fed exactly its own length.
 """
 
+from importlib.metadata import version
 from itertools import pairwise
 from pathlib import Path
 
 import numpy as np
 
-from ccfem import __version__
 from ccfem.arrays import FloatArray
 from ccfem.export.print_plan import COORDINATE_DIGITS, PrintPlan
 from ccfem.geometry.polylines import arc_lengths, line_length, point_at, subdivide
@@ -70,7 +70,7 @@ def gcode(plan: PrintPlan, machine: Machine) -> str:
     program.lines += machine.gcode.fill(machine.gcode.end, program.values)
     fibre = paths.of_kind(FIBRE)
     head = [
-        f"; ccfem {__version__}",
+        f"; ccfem {version('ccfem')}",
         "; mm, mm/min; X Y Z absolute, E relative; T0 matrix, T1 fibre (E in mm of fibre)",
         f"; {len(plan.top)} layers, {plan.top.max():g} mm high",
         f"; {fibre.lengths.sum():.1f} mm of fibre in {len(fibre)} paths, each cut "

@@ -6,7 +6,7 @@ from itertools import pairwise
 
 import numpy as np
 
-from ccfem.arrays import FloatArray, freeze
+from ccfem.arrays import FloatArray, freeze, in_brief
 from ccfem.errors import InputError
 from ccfem.geometry.hatch import zigzag
 from ccfem.geometry.offsets import offset_rings
@@ -51,6 +51,8 @@ class PrintPlan:
     paths: Toolpaths
     top: FloatArray
     thickness: FloatArray
+
+    __repr__ = in_brief
 
     def __post_init__(self) -> None:
         freeze(self, top=float, thickness=float)

@@ -13,7 +13,7 @@ from typing import Any
 import numpy as np
 from numba import njit
 
-from ccfem.arrays import FloatArray, IntArray, freeze, read_only
+from ccfem.arrays import FloatArray, IntArray, freeze, in_brief, read_only
 from ccfem.elasticity.assembly import cell_gradients
 from ccfem.elasticity.solve import solve
 from ccfem.elasticity.solvers import preconditioned_cg
@@ -83,6 +83,8 @@ class SmearedPart:
 
     specimen: Specimen
     frame: FloatArray
+
+    __repr__ = in_brief
 
     @classmethod
     def of(

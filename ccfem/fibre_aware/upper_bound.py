@@ -17,7 +17,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from ccfem.arrays import FloatArray, freeze
+from ccfem.arrays import FloatArray, freeze, in_brief
 from ccfem.checks import check_known, check_number
 from ccfem.elasticity.stress_field import StressField
 from ccfem.fibre_aware.heights import fibre_capacity
@@ -62,6 +62,8 @@ class UpperBound:
     density: FloatArray
     angles: FloatArray
     bounds: tuple[float, ...]
+
+    __repr__ = in_brief
 
     def __post_init__(self) -> None:
         freeze(self, density=float, angles=float)

@@ -29,6 +29,9 @@ class LayerStress:
     nodal: FloatArray
     held_or_loaded: tuple[str, ...] = ()
 
+    def __repr__(self) -> str:
+        return f"LayerStress on {self.layer!r}"
+
     def __post_init__(self) -> None:
         freeze(self, cell=float, nodal=float)
 

@@ -58,6 +58,13 @@ class CellMesh(ABC):
                 f"{self.cells.min()} to {self.cells.max()}: check the numbering of the file"
             )
 
+    def __repr__(self) -> str:
+        size = " x ".join(f"{side:.4g}" for side in np.ptp(self.bounds, axis=0))
+        return (
+            f"{type(self).__name__}: {len(self.points):,} nodes, {len(self.cells):,} cells of "
+            f"{self.cells.shape[1]}, {size} mm, patches {', '.join(sorted(self.patches)) or 'none'}"
+        )
+
     @property
     @abstractmethod
     def facets(self) -> IntArray:

@@ -20,7 +20,7 @@ _EDGES = np.array([[0, 1], [1, 2], [0, 2], [0, 3], [1, 3], [2, 3]])
 """Corner nodes of the edge that carries mid-side node 4 + k (VTK order)."""
 
 
-@dataclass(frozen=True)
+@dataclass(frozen=True, repr=False)
 class TetMesh(CellMesh):
     """A tetrahedral mesh, linear (P1) or quadratic (P2), with named boundary patches.
 

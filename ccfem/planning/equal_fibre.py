@@ -11,6 +11,7 @@ from typing import Any
 
 import numpy as np
 
+from ccfem.arrays import in_brief
 from ccfem.checks import check_number
 from ccfem.elasticity.part_stress import PartStress
 from ccfem.layers.layer import Layer
@@ -59,6 +60,8 @@ class Planned:
     toolpaths: Toolpaths
     length_per_layer: float
     note: str = ""
+
+    __repr__ = in_brief
 
 
 def length_per_layer(toolpaths: Toolpaths, layers: Sequence[Layer]) -> float:

@@ -14,7 +14,7 @@ from ccfem.mesh.facets import positions
 __all__ = ["PlaneMesh", "Sheet"]
 
 
-@dataclass(frozen=True)
+@dataclass(frozen=True, repr=False)
 class PlaneMesh(CellMesh):
     """A mesh of linear triangles or of bilinear quadrilaterals in the plane.
 

@@ -6,7 +6,7 @@ from functools import cached_property
 
 import numpy as np
 
-from ccfem.arrays import FloatArray, freeze, read_only
+from ccfem.arrays import FloatArray, freeze, in_brief, read_only
 from ccfem.elasticity.problem import Load, Pressure, Support, patches_in_use
 from ccfem.errors import InputError
 from ccfem.plates.mesh import PlaneMesh, Sheet
@@ -37,6 +37,8 @@ class PlaneProblem:
     thickness: FloatArray | float
     supports: tuple[Support, ...]
     loads: Mapping[str, tuple[Load, ...]] = field(default_factory=dict)
+
+    __repr__ = in_brief
 
     def __post_init__(self) -> None:
         m = len(self.mesh.cells)

@@ -5,7 +5,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 from scipy.spatial import cKDTree
 
-from ccfem.arrays import BoolArray, FloatArray, freeze
+from ccfem.arrays import BoolArray, FloatArray, freeze, in_brief
 from ccfem.elasticity.problem import Problem
 from ccfem.errors import InputError
 from ccfem.plates.problem import PlaneProblem
@@ -53,6 +53,8 @@ class Design:
     change: FloatArray
     converged: str
     angle: FloatArray | None = None
+
+    __repr__ = in_brief
 
     def __post_init__(self) -> None:
         freeze(self, density=float, variables=float, factor=float, angle=float)

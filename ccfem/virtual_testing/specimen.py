@@ -6,7 +6,7 @@ from functools import cached_property
 import numpy as np
 import scipy.sparse as sp
 
-from ccfem.arrays import BoolArray, FloatArray
+from ccfem.arrays import BoolArray, FloatArray, in_brief
 from ccfem.elasticity.solve import System, prepare
 from ccfem.elasticity.solvers import Solver
 from ccfem.elasticity.stress_field import StressField
@@ -35,6 +35,8 @@ class Specimen:
     system: System
     matrix: sp.bsr_array
     backend: str = "auto"
+
+    __repr__ = in_brief
 
     @classmethod
     def of(cls, unreinforced: StressField, backend: str = "auto") -> "Specimen":

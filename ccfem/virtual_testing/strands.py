@@ -5,7 +5,7 @@ from dataclasses import dataclass
 import numpy as np
 from numba import njit
 
-from ccfem.arrays import FloatArray, IntArray, freeze
+from ccfem.arrays import FloatArray, IntArray, freeze, in_brief
 from ccfem.errors import InputError
 from ccfem.geometry.buckets import Buckets, bucket
 from ccfem.geometry.polylines import starts_segment
@@ -51,6 +51,8 @@ class Strands:
     arc: FloatArray
     middle: FloatArray
     outside: float
+
+    __repr__ = in_brief
 
     def __post_init__(self) -> None:
         freeze(self, cell=int, path=int, length=float, tangent=float, arc=float, middle=float)

@@ -6,7 +6,7 @@ from time import perf_counter
 
 import numpy as np
 
-from ccfem.arrays import FloatArray, freeze
+from ccfem.arrays import FloatArray, freeze, in_brief
 from ccfem.elasticity.stress_field import SolveRecord, StressField
 from ccfem.toolpaths import Toolpaths
 from ccfem.virtual_testing.equilibrium import BONDED, TENSION, equilibrium
@@ -63,6 +63,8 @@ class VirtualTest:
     unreinforced_stiffness: float
     span: tuple[tuple[float, float], ...]
     updates: int
+
+    __repr__ = in_brief
 
     def __post_init__(self) -> None:
         freeze(self, axial_force=float)
