@@ -330,7 +330,7 @@ def test_bad_parts_end_in_one_line(ccfem, folder, text, message):
         (["part.toml", "--layers", "2", "--heights", "1"], "not both"),
         (["part.toml", "--fibre-per-layer", "-3"], "above 0 mm; got -3"),
         (["part.toml", "--fibre-per-layer", "9", "--natural"], "not both"),
-        (["part.toml", "--load-case", "twist"], "no load case named 'twist'; the case has: pull"),
+        (["part.toml", "--load-case", "twist"], "no load case named 'twist'; there are: pull"),
         (["part.toml", "--backend", "magic"], "magic"),
         (["part.toml", "--out", "part.toml/results"], "cannot write results to part.toml/results"),
         (["part.toml", "--ouput", "x"], "No such option"),

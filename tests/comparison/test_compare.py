@@ -222,7 +222,7 @@ def test_thin_fibre_is_reported_not_dropped():
         ({"layers": 0}, "at least 1; got 0"),
         ({"fibre_per_layer": -1.0}, "above 0 mm; got -1"),
         ({"fibre_per_layer": 10.0, "natural": True}, "not both"),
-        ({"load_case": "twist"}, "no load case named 'twist'; the case has: pull, push"),
+        ({"load_case": "twist"}, "no load case named 'twist'; there are: pull, push"),
     ],
 )
 def test_bad_input(arguments, message):

@@ -283,9 +283,16 @@ def test_strand_of_a_material():
         Strand.of(carbon, Machine(filament_area=0.0))
 
 
-@pytest.mark.parametrize("values", [{"rho": 0.0}, {"axial_stiffness": -1.0}, {"strength": np.inf}])
-def test_impossible_strands_are_refused(values):
-    with pytest.raises(InputError, match="finite number > 0"):
+@pytest.mark.parametrize(
+    ("values", "message"),
+    [
+        ({"rho": 0.0}, r"strand\.rho must be above 0 mm\^2; got 0"),
+        ({"axial_stiffness": -1.0}, r"strand\.axial_stiffness must be above 0 N; got -1"),
+        ({"strength": np.inf}, r"strand\.strength must be a finite number, above 0 N; got inf"),
+    ],
+)
+def test_impossible_strands_are_refused(values, message):
+    with pytest.raises(InputError, match=message):
         Strand(**values)
 
 
