@@ -56,9 +56,12 @@ def check_number(
         return
     named = {"at least": at_least, "above": above, "at most": at_most, "below": below}
     bounds = [f"{word} {bound:g}" for word, bound in named.items() if bound is not None]
-    expected = "" if finite else "a finite number, " if bounds else "a finite number of "
-    expected += f"{' and '.join(bounds)} {unit}".strip()
-    raise InputError(f"{what} must be {expected}; got {value!r}: correct it")
+    words = [] if finite else ["a finite number"]
+    if bounds:
+        words.append(f"{' and '.join(bounds)} {unit}".strip())
+    elif unit:
+        words = [f"a finite number of {unit}"]
+    raise InputError(f"{what} must be {', '.join(words)}; got {value!r}: correct it")
 
 
 def check_fields(value: object, *names: str, **bounds: Any) -> None:

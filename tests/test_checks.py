@@ -40,6 +40,7 @@ def test_numbers_within_bounds_pass(value, bounds):
         (1.0, {"above": 0.0, "below": 1.0}, "above 0 and below 1; got 1.0: correct it"),
         (1.5, {"at_most": 1.0}, "at most 1; got 1.5: correct it"),
         (np.inf, {"above": 0.0, "unit": "N"}, "a finite number, above 0 N; got inf: correct it"),
+        ("a", {}, "a finite number; got 'a': correct it"),
         (np.nan, {"unit": "degrees"}, "a finite number of degrees; got nan: correct it"),
         ("2", {"at_least": 1}, "a finite number, at least 1; got '2': correct it"),
         (True, {"at_least": 1}, "a finite number, at least 1; got True: correct it"),

@@ -269,9 +269,16 @@ def test_neither_is_stiffer_where_the_tests_disagree():
     assert min(ratios) < more.tension.ratio < max(ratios)
 
 
-@pytest.mark.parametrize("values", [{"rho": 0.0}, {"rho": -1.0}, {"strength": np.inf}])
-def test_impossible_strands_are_refused(values):
-    with pytest.raises(InputError, match="finite number > 0"):
+@pytest.mark.parametrize(
+    ("values", "message"),
+    [
+        ({"rho": 0.0}, r"strand\.rho must be above 0 mm\^2; got 0"),
+        ({"rho": -1.0}, r"strand\.rho must be above 0 mm\^2; got -1"),
+        ({"strength": np.inf}, r"strand\.strength must be a finite number, above 0 N; got inf"),
+    ],
+)
+def test_impossible_strands_are_refused(values, message):
+    with pytest.raises(InputError, match=message):
         Strand(**values)
 
 
