@@ -9,7 +9,7 @@ from ccfem.arrays import BoolArray, FloatArray
 from ccfem.elasticity.stress_field import LayerStress, StressField
 from ccfem.fields.compatibility import Incompatible, incompatible
 from ccfem.fields.orientation import orient
-from ccfem.fields.tensile import UNDEFINED, Tension, plane_tension, spatial_tension
+from ccfem.fields.tensile import Tension, plane_tension, spatial_tension
 from ccfem.layers.layer import Layer
 from ccfem.tensor import in_plane
 
@@ -122,7 +122,7 @@ def mesh_tension(
     tension = spatial_tension(tensors, compression_limit)
     if sense == "absolute":
         pushed = spatial_tension(-tensors, _ANY_COMPRESSION)
-        push = pushed.stress > np.where(tension.defined, tension.stress, UNDEFINED)
+        push = pushed.stress > tension.stress
         tension = Tension(
             np.where(push[:, None], pushed.direction, tension.direction),
             np.where(push, pushed.stress, tension.stress),
