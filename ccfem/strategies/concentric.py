@@ -1,7 +1,8 @@
 """Baseline: rings parallel to the border, from the outside in."""
 
+from collections.abc import Mapping
 from dataclasses import dataclass
-from typing import ClassVar, Literal
+from typing import Any, ClassVar, Literal
 
 import numpy as np
 
@@ -62,6 +63,12 @@ class Concentric:
     mode: Literal["polyline", "raster"] = "polyline"
 
     amount: ClassVar[Amount] = Amount("spacing", most=1.0, least=20.0)
+    variants: ClassVar[Mapping[str, Mapping[str, Any]]] = {
+        "single": {"joined": False, "rings": 3},
+        "start": {"start": (0.0, 0.0)},
+        "filled": {"joined": False, "filled": True},
+        "raster": {"joined": False, "mode": "raster"},
+    }
 
     def __post_init__(self) -> None:
         if self.mode not in ("polyline", "raster"):
@@ -82,6 +89,11 @@ class Concentric:
             raise InputError(
                 f"concentric.minimum_length must be a finite number >= 0; got {self.minimum_length}"
             )
+
+    @property
+    def on_axes(self) -> bool:
+        """Whether paths keep to the axes of the layer."""
+        return self.mode == "raster"
 
     def __call__(self, layer: Layer, stress: LayerStress, machine: Machine) -> Toolpaths:
         """Plan the paths of one layer; none where the section is thinner than a fibre."""

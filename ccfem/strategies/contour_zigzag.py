@@ -1,7 +1,8 @@
 """Baseline: contours along the border, a zigzag inside."""
 
+from collections.abc import Mapping
 from dataclasses import dataclass
-from typing import ClassVar
+from typing import Any, ClassVar
 
 import numpy as np
 
@@ -45,6 +46,7 @@ class ContourZigzag:
 
     amount: ClassVar[Amount] = Amount("spacing", most=1.0, least=20.0)
     direction: ClassVar[str] = "angle"
+    variants: ClassVar[Mapping[str, Mapping[str, Any]]] = {"single": {"joined": False}}
 
     def __post_init__(self) -> None:
         if not 1.0 <= self.spacing < float("inf"):

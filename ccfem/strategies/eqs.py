@@ -5,6 +5,7 @@ Papapetrou, C. Patel, A. Y. Tamijani, Stiffness-based optimization framework for
 fiber paths of continuous fiber composites, Composites Part B 183 (2020) 107681 (EQS).
 """
 
+from collections.abc import Mapping
 from dataclasses import dataclass
 from typing import Any, ClassVar
 
@@ -58,6 +59,7 @@ class Eqs:
     minimum_length: float | None = None
 
     amount: ClassVar[Amount] = Amount("spacing", most=1.0, least=20.0)
+    variants: ClassVar[Mapping[str, Mapping[str, Any]]] = {"seed": {"seed": (0.0, 0.0)}}
 
     def __post_init__(self) -> None:
         if not 1.0 <= self.spacing < float("inf"):

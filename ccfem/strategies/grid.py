@@ -5,8 +5,9 @@ guidelines and investigation into the influence of infill patterns, Rapid Protot
 (2022) 1241.
 """
 
+from collections.abc import Mapping
 from dataclasses import dataclass
-from typing import ClassVar, Literal
+from typing import Any, ClassVar, Literal
 
 import numpy as np
 
@@ -65,6 +66,12 @@ class Grid:
 
     amount: ClassVar[Amount] = Amount("spacing", most=1.0, least=20.0)
     direction: ClassVar[str] = "angle"
+    variants: ClassVar[Mapping[str, Mapping[str, Any]]] = {
+        "both": {"families": "both"},
+        "paper": {"lines": "paper"},
+        "raster": {"mode": "raster"},
+        "raster_paper": {"mode": "raster", "lines": "paper"},
+    }
 
     def __post_init__(self) -> None:
         if self.mode not in ("polyline", "raster"):
@@ -89,6 +96,16 @@ class Grid:
             raise InputError(
                 f"grid.minimum_length must be a finite number >= 0; got {self.minimum_length}"
             )
+
+    @property
+    def on_axes(self) -> bool:
+        """Whether paths keep to the axes of the layer, or their distance does."""
+        return self.mode == "raster" or self.lines == "paper"
+
+    @property
+    def crosses(self) -> bool:
+        """Whether strands cross each other by intention."""
+        return self.families == "both"
 
     def __call__(self, layer: Layer, stress: LayerStress, machine: Machine) -> Toolpaths:
         """Plan the paths of one layer; none where the section is thinner than a fibre."""

@@ -5,8 +5,9 @@ guidelines and investigation into the influence of infill patterns, Rapid Protot
 (2022) 1241.
 """
 
+from collections.abc import Mapping
 from dataclasses import dataclass
-from typing import ClassVar, Literal
+from typing import Any, ClassVar, Literal
 
 from ccfem.elasticity.stress_field import LayerStress
 from ccfem.errors import InputError
@@ -52,6 +53,7 @@ class Mat:
     mode: Literal["polyline", "raster"] = "polyline"
 
     amount: ClassVar[Amount] = Amount("spacing", most=1.0, least=20.0)
+    variants: ClassVar[Mapping[str, Mapping[str, Any]]] = {"raster": {"mode": "raster"}}
 
     def __post_init__(self) -> None:
         if self.mode not in ("polyline", "raster"):
@@ -66,6 +68,11 @@ class Mat:
             raise InputError(
                 f"mat.minimum_length must be a finite number >= 0; got {self.minimum_length}"
             )
+
+    @property
+    def on_axes(self) -> bool:
+        """Whether paths keep to the axes of the layer."""
+        return self.mode == "raster"
 
     def __call__(self, layer: Layer, stress: LayerStress, machine: Machine) -> Toolpaths:
         """Plan the paths of one layer; none where the section is thinner than a fibre."""

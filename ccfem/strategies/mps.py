@@ -5,6 +5,7 @@ guidelines and investigation into the influence of infill patterns, Rapid Protot
 (2022) 1241.
 """
 
+from collections.abc import Mapping
 from dataclasses import dataclass
 from functools import lru_cache
 from typing import Any, ClassVar, Literal
@@ -79,6 +80,11 @@ class Mps:
     mode: Literal["polyline", "raster"] = "polyline"
 
     amount: ClassVar[Amount] = Amount("spacing", most=1.0, least=20.0)
+    variants: ClassVar[Mapping[str, Mapping[str, Any]]] = {
+        "ends": {"seeds": "ends"},
+        "raster": {"mode": "raster"},
+        "raster_ends": {"mode": "raster", "seeds": "ends"},
+    }
 
     def __post_init__(self) -> None:
         if self.mode not in ("polyline", "raster"):
@@ -97,6 +103,11 @@ class Mps:
             raise InputError(
                 f"mps.minimum_length must be a finite number >= 0; got {self.minimum_length}"
             )
+
+    @property
+    def on_axes(self) -> bool:
+        """Whether paths keep to the axes of the layer."""
+        return self.mode == "raster"
 
     def __call__(self, layer: Layer, stress: LayerStress, machine: Machine) -> Toolpaths:
         """Plan the paths of one layer; none where the section is thinner than a fibre."""
@@ -189,12 +200,16 @@ def _middles(interior: Any, pitch: float) -> FloatArray:
 
 
 def _patch_middles(layer: Layer, patches: tuple[str, ...]) -> FloatArray:
-    """Point of the layer nearest to the middle of each named patch, (k, 2)."""
-    found: list[tuple[float, FloatArray]] = []
+    """Node or middle of an edge nearest to the middle of each named patch, (k, 2).
+
+    Of several that are equally near, as on the border of a hole, the first.
+    """
+    found: list[FloatArray] = []
     for name in patches:
-        nodes = np.unique(layer.patches.get(name, np.zeros((0, 2), dtype=np.int64)))
-        if len(nodes):
-            places = layer.plane_points[nodes]
-            gap = np.linalg.norm(places - places.mean(axis=0), axis=1)
-            found.append(places[np.argmin(gap)])
+        edges = layer.patches.get(name, np.zeros((0, 2), dtype=np.int64))
+        if len(edges):
+            nodes = layer.plane_points[np.unique(edges)]
+            places = np.concatenate([nodes, layer.plane_points[edges].mean(axis=1)])
+            gap = np.linalg.norm(places - nodes.mean(axis=0), axis=1)
+            found.append(places[np.argmin(np.round(gap, 6))])
     return np.array(found, dtype=np.float64).reshape(-1, 2)

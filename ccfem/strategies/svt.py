@@ -5,6 +5,7 @@ planning method for 3D printing of continuous fiber reinforced plastics, Composi
 (2021) 106181. The tracks and the links are reconstructed: the paper shows them and gives no rule.
 """
 
+from collections.abc import Mapping
 from dataclasses import dataclass
 from typing import Any, ClassVar, Literal
 
@@ -92,6 +93,11 @@ class Svt:
 
     amount: ClassVar[Amount] = Amount("spacing", most=1.0, least=20.0)
     crosses: ClassVar[bool] = True
+    variants: ClassVar[Mapping[str, Mapping[str, Any]]] = {
+        "points": {"mode": "points"},
+        "plain": {"links": "none", "crossings": False, "aligned": False},
+        "cut": {"longest_inside": 0.0, "longest_over_void": 0.0},
+    }
 
     def __post_init__(self) -> None:
         if self.mode not in ("graph", "points"):
