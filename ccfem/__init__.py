@@ -25,7 +25,7 @@ from typing import TYPE_CHECKING, Any
 
 if TYPE_CHECKING:
     from ccfem.cases.case import Case
-    from ccfem.cases.read import read
+    from ccfem.cases.reading import read
     from ccfem.comparison.compare import compare
     from ccfem.comparison.result import Comparison
     from ccfem.elasticity import Problem, solve

@@ -2,6 +2,6 @@
 
 from ccfem.cases.case import Case
 from ccfem.cases.named import create_case, named_cases
-from ccfem.cases.read import read
+from ccfem.cases.reading import read
 
 __all__ = ["Case", "create_case", "named_cases", "read"]

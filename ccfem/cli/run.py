@@ -29,7 +29,7 @@ _SOLVED = 0.75
 
 def load(name: str, set_case: Sequence[str] | None) -> "Case":
     """Read a part file, or make a case from its name and parameters."""
-    from ccfem.cases.read import read
+    from ccfem.cases.reading import read
 
     parameters = dict(assignment(text) for text in set_case or ())
     if parameters and name.endswith(".toml"):

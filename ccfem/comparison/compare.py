@@ -10,7 +10,7 @@ from itertools import count
 from typing import Any
 
 from ccfem.cases.case import Case
-from ccfem.cases.read import read
+from ccfem.cases.reading import read
 from ccfem.checks import check_known, member_name
 from ccfem.comparison.result import Comparison, Run
 from ccfem.comparison.stages import (

@@ -9,7 +9,7 @@ from ccfem.arrays import BoolArray, FloatArray
 from ccfem.elasticity.part_stress import PartStress
 from ccfem.fields.compatibility import Incompatible, incompatible
 from ccfem.fields.orientation import orient
-from ccfem.fields.tensile import UNDEFINED, Tension, plane_tension, spatial_tension
+from ccfem.fields.tensile import Tension, plane_tension, spatial_tension
 from ccfem.layers.layer import Layer
 from ccfem.layers.layer_stress import LayerStress
 from ccfem.tensor import in_plane, strongest_in_plane
@@ -73,7 +73,7 @@ def _absolute(plane: FloatArray) -> Tension:
     value, angle, _ = strongest_in_plane(plane)
     size = np.abs(value)
     direction = np.stack([np.cos(angle), np.sin(angle)], axis=1)
-    return Tension(direction, np.where(size > 0.0, size, UNDEFINED), size > 0.0)
+    return Tension(direction, size, size > 0.0)
 
 
 @dataclass(frozen=True)
@@ -119,7 +119,7 @@ def mesh_tension(
     tension = spatial_tension(tensors, compression_limit)
     if sense == "absolute":
         pushed = spatial_tension(-tensors, _ANY_COMPRESSION)
-        push = pushed.stress > np.where(tension.defined, tension.stress, UNDEFINED)
+        push = pushed.stress > tension.stress
         tension = Tension(
             np.where(push[:, None], pushed.direction, tension.direction),
             np.where(push, pushed.stress, tension.stress),

@@ -152,7 +152,8 @@ def fit_cone(
     import cvxpy
 
     count = len(surface.points)
-    density = np.minimum(density, 1.0 / width)
+    # In widths, so that the bound is 1: the solver judges its accuracy by sizes near 1.
+    target = np.minimum(density * width, 1.0)
     normal = np.column_stack([-direction[:, 1], direction[:, 0]])
     rows = np.repeat(np.arange(len(surface.triangles)), 3)
     shape = (len(surface.triangles), count)
@@ -165,19 +166,19 @@ def fit_cone(
     field = cvxpy.Variable(count)
     ones = np.ones((len(root), 1))
     misaligned = cvxpy.multiply(root, along(direction) @ field)
-    uneven = cvxpy.multiply(np.sqrt(spacing_weight) * root, along(normal) @ field - density)
+    uneven = cvxpy.multiply(np.sqrt(spacing_weight) * root, along(normal) @ field - target)
     gradient = cvxpy.vstack(
         [along(ones * np.array([1.0, 0.0])) @ field, along(ones * np.array([0.0, 1.0])) @ field]
     )
     usable = np.flatnonzero(np.abs(surface.gradients).max(axis=(1, 2)) > 0.0)
     problem = cvxpy.Problem(
         cvxpy.Minimize(cvxpy.sum_squares(misaligned) + cvxpy.sum_squares(uneven)),
-        [cvxpy.norm(gradient[:, usable], axis=0) <= 1.0 / width, field[0] == 0.0],
+        [cvxpy.norm(gradient[:, usable], axis=0) <= 1.0, field[0] == 0.0],
     )
     problem.solve(solver=cvxpy.CLARABEL)
     if problem.status != cvxpy.OPTIMAL or field.value is None:
         raise SolveError(f"the constrained scalar field ended as '{problem.status}' (Clarabel)")
-    return np.asarray(field.value)
+    return np.asarray(field.value) / width
 
 
 def _weighted_form(

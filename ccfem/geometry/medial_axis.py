@@ -36,7 +36,7 @@ class MedialSegment:
     Attributes
     ----------
     points : (m, 2) array, mm
-        A closed one repeats its first point.
+        A closed one repeats its first point; one that meets no other starts where it is widest.
     radius : (m,) array, mm
         Distance of each point to the border.
     left, right : (m - 1, 2) arrays, mm
@@ -329,6 +329,12 @@ def _pruned(graph: _Graph, chains: list[list[int]], prune: float, step: float) -
         chains = _chains(edges, np.ones(len(edges), dtype=bool), len(graph.points))
 
 
+def _from_widest(chain: list[int], radius: FloatArray) -> list[int]:
+    """Return a closed chain from its place of the largest radius on."""
+    widest = int(np.argmax(np.round(radius[chain[:-1]], 6)))
+    return [*chain[widest:-1], *chain[: widest + 1]]
+
+
 def _as_axis(section: Region, graph: _Graph, chains: list[list[int]]) -> MedialAxis:
     """Values of the chains, and a node for every part of the section that has none."""
     ends = {end for chain in chains if chain[0] != chain[-1] for end in (chain[0], chain[-1])}
@@ -345,6 +351,8 @@ def _as_axis(section: Region, graph: _Graph, chains: list[list[int]]) -> MedialA
     edge_of = dict(zip(zip(a.tolist(), b.tolist(), strict=True), range(len(a)), strict=True))
     segments = []
     for chain in chains:
+        if chain[0] == chain[-1] and chain[0] not in index:
+            chain = _from_widest(chain, graph.radius)
         places = graph.points[chain]
         rows = [edge_of[(min(p, q), max(p, q))] for p, q in pairwise(chain)]
         feet, along = graph.feet[rows], np.diff(places, axis=0)

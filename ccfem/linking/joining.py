@@ -8,9 +8,9 @@ import numpy as np
 import shapely
 from scipy.spatial import cKDTree
 
-from ccfem.arrays import FloatArray
+from ccfem.arrays import FloatArray, IntArray
 from ccfem.geometry.polylines import along_line, is_closed, points_along
-from ccfem.geometry.shapes import Region, strings
+from ccfem.geometry.shapes import Region, Shapes, strings
 
 __all__ = ["Joint", "join", "link_ends", "ring_arc"]
 
@@ -82,7 +82,7 @@ _CLOSING_TURN = np.deg2rad(60.0)
 neighbouring strands that closes on itself can no longer join the next."""
 
 _ON_BORDER = 1e-6
-"""Links that leave the section by no more than this, mm, are inside."""
+"""Distance, mm, up to which rounding may carry what lies on a border off it."""
 
 
 @dataclass(frozen=True)
@@ -138,7 +138,8 @@ def link_ends(
         links += _boundary_links(
             lines, points, outward, ends, section, 0.5 * width, limit, turn_cost
         )
-    links.sort(key=lambda link: (link.cost, link.first, link.second))
+    # Rounding orders no equal costs: a straight link comes before the same one along the boundary.
+    links.sort(key=lambda link: (round(link.cost, 6), link.first, link.second))
     return _accept(list(lines), links, section, _CLEARANCE * width)
 
 
@@ -257,15 +258,10 @@ def _boundary_links(
     )
     for ring in shapely.get_rings(shapely.buffer(section, -inset)):
         near = np.flatnonzero(shapely.dwithin(ring, starts, 1.5 * inset))
-        crossing = shapely.intersection(heads[near], ring)
-        crossed, index = shapely.get_coordinates(crossing, return_index=True)
-        if not len(crossed):
+        meeting, met = _first_meetings(heads[near], starts[near], ring)
+        if not len(met):
             continue
-        # Where a head meets the ring more than once, the link leaves at the first meeting.
-        passed = shapely.line_locate_point(heads[near][index], shapely.points(crossed))
-        order = np.lexsort((passed, index))
-        _, first = np.unique(index[order], return_index=True)
-        meeting, end = crossed[order[first]], near[index[order[first]]]
+        end = near[met]
         position = shapely.line_locate_point(ring, shapely.points(meeting))
         around = np.lexsort((end, position))
         for k, after in zip(around, np.roll(around, -1), strict=True):
@@ -279,6 +275,26 @@ def _boundary_links(
             cost = gap + turn_cost * turn / (0.5 * np.pi)
             links.append(_Link(cost, turn, int(ends[end[k]]), int(ends[end[after]]), arc))
     return links
+
+
+def _first_meetings(
+    heads: Shapes, starts: Shapes, ring: shapely.LinearRing
+) -> tuple[FloatArray, IntArray]:
+    """Points (k, 2) where heads first meet a ring, and the numbers (k,) of the heads that do.
+
+    A head that starts on the ring meets it there: strands that are kept half a width off the border
+    end on it, and rounding puts one end just inside and the next just outside.
+    """
+    starts_on = shapely.dwithin(ring, starts, _ON_BORDER)
+    on, off = np.flatnonzero(starts_on), np.flatnonzero(~starts_on)
+    crossed, index = shapely.get_coordinates(
+        shapely.intersection(heads[off], ring), return_index=True
+    )
+    passed = shapely.line_locate_point(heads[off][index], shapely.points(crossed))
+    order = np.lexsort((passed, index))
+    _, first = np.unique(index[order], return_index=True)
+    meeting = np.concatenate([shapely.get_coordinates(starts[on]), crossed[order[first]]])
+    return meeting, np.concatenate([on, off[index[order[first]]]])
 
 
 def ring_arc(ring: shapely.LinearRing, start: float, length: float) -> FloatArray:

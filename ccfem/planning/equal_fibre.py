@@ -302,6 +302,8 @@ def _search(
         high = min((v for v in known if known[v] > target), key=known.__getitem__, default=None)
         if low is None or high is None:
             value = _by_proportion(known, amount, target, 0.05)
+            if step == _STEPS - 2:  # out of proportion: the end itself is the last to be tried
+                value = amount.most if high is None else amount.least
         elif known[low] >= enough or abs(high - low) <= _FINEST * (ends[1] - ends[0]):
             return low
         else:
@@ -311,7 +313,7 @@ def _search(
             value = low + share * (high - low)
         if value in known:
             break
-    return low if low is not None else value
+    return low if low is not None else min(known, key=known.__getitem__)
 
 
 def _by_power(lengths: Mapping[float, float], amount: Amount, target: float) -> float:

@@ -74,6 +74,11 @@ class Infill(ABC):
     def __post_init__(self) -> None:
         check_fill(self)
 
+    @property
+    def on_axes(self) -> bool:
+        """Whether paths keep to the axes of the layer, as those of pixels do."""
+        return self.mode == "raster"
+
     def prepare(self, section: Region, machine: Machine) -> Any:
         """Make what layers of equal sections share; `strands` gets it, in several threads."""
         return None

@@ -1,7 +1,8 @@
 """Baseline: rings parallel to the border, from the outside in."""
 
+from collections.abc import Mapping
 from dataclasses import dataclass
-from typing import Literal
+from typing import Any, ClassVar, Literal
 
 import numpy as np
 
@@ -60,6 +61,13 @@ class Concentric(Infill):
     filled: bool = False
     minimum_length: float | None = None
     mode: Literal["polyline", "raster"] = "polyline"
+
+    variants: ClassVar[Mapping[str, Mapping[str, Any]]] = {
+        "single": {"joined": False, "rings": 3},
+        "start": {"start": (0.0, 0.0)},
+        "filled": {"joined": False, "filled": True},
+        "raster": {"joined": False, "mode": "raster"},
+    }
 
     def __post_init__(self) -> None:
         super().__post_init__()

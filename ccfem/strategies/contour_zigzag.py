@@ -1,7 +1,8 @@
 """Baseline: contours along the border, a zigzag inside."""
 
+from collections.abc import Mapping
 from dataclasses import dataclass
-from typing import ClassVar
+from typing import Any, ClassVar
 
 import numpy as np
 
@@ -47,6 +48,7 @@ class ContourZigzag:
     amount: ClassVar[Amount] = SPACING
     flat_layers_only: ClassVar[bool] = True
     direction: ClassVar[str] = "angle"
+    variants: ClassVar[Mapping[str, Mapping[str, Any]]] = {"single": {"joined": False}}
 
     def __post_init__(self) -> None:
         check_fill(self)

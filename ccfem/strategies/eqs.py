@@ -5,8 +5,9 @@ Papapetrou, C. Patel, A. Y. Tamijani, Stiffness-based optimization framework for
 fiber paths of continuous fiber composites, Composites Part B 183 (2020) 107681 (EQS).
 """
 
+from collections.abc import Mapping
 from dataclasses import dataclass
-from typing import ClassVar
+from typing import Any, ClassVar
 
 import numpy as np
 import shapely
@@ -60,6 +61,7 @@ class Eqs:
 
     amount: ClassVar[Amount] = SPACING
     flat_layers_only: ClassVar[bool] = True
+    variants: ClassVar[Mapping[str, Mapping[str, Any]]] = {"seed": {"seed": (0.0, 0.0)}}
 
     def __post_init__(self) -> None:
         check_fill(self)

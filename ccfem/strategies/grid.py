@@ -5,8 +5,9 @@ guidelines and investigation into the influence of infill patterns, Rapid Protot
 (2022) 1241.
 """
 
+from collections.abc import Mapping
 from dataclasses import dataclass
-from typing import ClassVar, Literal
+from typing import Any, ClassVar, Literal
 
 import numpy as np
 import shapely
@@ -66,6 +67,12 @@ class Grid(Infill):
     mode: Literal["polyline", "raster"] = "polyline"
 
     direction: ClassVar[str] = "angle"
+    variants: ClassVar[Mapping[str, Mapping[str, Any]]] = {
+        "both": {"families": "both"},
+        "paper": {"lines": "paper"},
+        "raster": {"mode": "raster"},
+        "raster_paper": {"mode": "raster", "lines": "paper"},
+    }
 
     def __post_init__(self) -> None:
         super().__post_init__()
@@ -73,6 +80,16 @@ class Grid(Infill):
         check_fields(self, "angle", "turn", unit="degrees")
         if self.mode == "raster" and self.families == "both":
             raise InputError("grid.mode raster lays one family a layer: set families to alternate")
+
+    @property
+    def on_axes(self) -> bool:
+        """Whether paths keep to the axes of the layer, or their distance does."""
+        return self.mode == "raster" or self.lines == "paper"
+
+    @property
+    def crosses(self) -> bool:
+        """Whether strands cross each other by intention."""
+        return self.families == "both"
 
     def prepare(self, section: Region, machine: Machine) -> tuple[list[FloatArray], Region]:
         """Shells, and what they leave."""

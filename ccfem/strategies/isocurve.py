@@ -7,7 +7,7 @@ continuous fibre reinforced thermoplastic composites, Additive Manufacturing 49 
 """
 
 import itertools
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
 from typing import Any, ClassVar, Literal
 
@@ -57,6 +57,22 @@ _TRIM = 0.98
 each other at one width differ by their chords."""
 _SPIRAL_LIMIT = 4.0
 """Largest distance, in strand widths, of closed isocurves that are joined to a spiral."""
+
+_LITERAL: Mapping[str, Any] = {
+    "cap": 100.0,
+    "floor": 0.0,
+    "link_limit": 2.0,
+    "conformal": "loaded",
+    "stress": "cell",
+    "field": "mesh",
+    "incompatible": "any",
+    "fill": "laplacian",
+    "fit": "literal",
+    "spacing": "search",
+    "spiral": False,
+    "boundary_links": False,
+    "trim": False,
+}
 
 
 @dataclass(frozen=True)
@@ -115,7 +131,7 @@ class Isocurve:
         Cut branches that come nearer than a strand's width to a longer one.
     inset : float, default 0
         Least distance of strands from the boundary, in strand widths. At 0 they may run along the
-        boundary with half of their width outside; 0.45 keeps them in, and their ends still meet
+        boundary with half of their width outside; 0.5 keeps them in, and their ends still meet
         the links along the boundary.
     """
 
@@ -143,6 +159,18 @@ class Isocurve:
 
     amount: ClassVar[Amount] = Amount("density", most=4.0, least=0.05)
     flat_layers_only: ClassVar[bool] = True
+    variants: ClassVar[Mapping[str, Mapping[str, Any]]] = {
+        "literal": _LITERAL,
+        "inset": {"inset": 0.5},
+        "search": {"spacing": "search"},
+        "cone": {"spacing": "cone"},
+        "mesh": {
+            "field": "mesh",
+            "sense": "absolute",
+            "incompatible": "majority",
+            "conformal": "loaded",
+        },
+    }
 
     def __post_init__(self) -> None:
         check_choices(self)
@@ -159,21 +187,7 @@ class Isocurve:
     @classmethod
     def literal(cls) -> "Isocurve":
         """Return the algorithm as the paper prints it."""
-        return cls(
-            cap=100.0,
-            floor=0.0,
-            link_limit=2.0,
-            conformal="loaded",
-            stress="cell",
-            field="mesh",
-            incompatible="any",
-            fill="laplacian",
-            fit="literal",
-            spacing="search",
-            spiral=False,
-            boundary_links=False,
-            trim=False,
-        )
+        return cls(**_LITERAL)
 
     def for_part(
         self, stress: PartStress, layers: Sequence[Layer], machine: Machine

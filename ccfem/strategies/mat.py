@@ -5,8 +5,9 @@ guidelines and investigation into the influence of infill patterns, Rapid Protot
 (2022) 1241.
 """
 
+from collections.abc import Mapping
 from dataclasses import dataclass
-from typing import Literal
+from typing import Any, ClassVar, Literal
 
 from ccfem.arrays import FloatArray
 from ccfem.geometry.medial_fill import medial_fill
@@ -49,6 +50,8 @@ class Mat(Infill):
     closest: float = 0.6
     minimum_length: float | None = None
     mode: Literal["polyline", "raster"] = "polyline"
+
+    variants: ClassVar[Mapping[str, Mapping[str, Any]]] = {"raster": {"mode": "raster"}}
 
     def __post_init__(self) -> None:
         super().__post_init__()

@@ -5,8 +5,9 @@ guidelines and investigation into the influence of infill patterns, Rapid Protot
 (2022) 1241.
 """
 
+from collections.abc import Mapping
 from dataclasses import dataclass
-from typing import Literal, NamedTuple
+from typing import Any, ClassVar, Literal, NamedTuple
 
 import numpy as np
 import shapely
@@ -84,6 +85,12 @@ class Mps(Infill):
     closest: float = 0.6
     minimum_length: float | None = None
     mode: Literal["polyline", "raster"] = "polyline"
+
+    variants: ClassVar[Mapping[str, Mapping[str, Any]]] = {
+        "ends": {"seeds": "ends"},
+        "raster": {"mode": "raster"},
+        "raster_ends": {"mode": "raster", "seeds": "ends"},
+    }
 
     def __post_init__(self) -> None:
         super().__post_init__()
@@ -181,12 +188,16 @@ def _middles(interior: Region, pitch: float) -> FloatArray:
 
 
 def _patch_middles(layer: Layer, patches: tuple[str, ...]) -> FloatArray:
-    """Point of the layer nearest to the middle of each named patch, (k, 2)."""
-    found: list[tuple[float, FloatArray]] = []
+    """Node or middle of an edge nearest to the middle of each named patch, (k, 2).
+
+    Of several that are equally near, as on the border of a hole, the first.
+    """
+    found: list[FloatArray] = []
     for name in patches:
-        nodes = np.unique(layer.patches.get(name, np.zeros((0, 2), dtype=np.int64)))
-        if len(nodes):
-            places = layer.plane.points[nodes]
-            gap = np.linalg.norm(places - places.mean(axis=0), axis=1)
-            found.append(places[np.argmin(gap)])
+        edges = layer.patches.get(name, np.zeros((0, 2), dtype=np.int64))
+        if len(edges):
+            nodes = layer.plane.points[np.unique(edges)]
+            places = np.concatenate([nodes, layer.plane.points[edges].mean(axis=1)])
+            gap = np.linalg.norm(places - nodes.mean(axis=0), axis=1)
+            found.append(places[np.argmin(np.round(gap, 6))])
     return np.array(found, dtype=np.float64).reshape(-1, 2)

@@ -4,9 +4,9 @@ Beyond the papers: the part is tested virtually with the fibre in it, and the st
 least work go, until the wanted length is left (`ccfem.fibre_aware.prune`).
 """
 
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
-from typing import ClassVar
+from typing import Any, ClassVar
 
 import numpy as np
 
@@ -56,6 +56,7 @@ class Pruned:
 
     amount: ClassVar[Amount] = Amount("coverage", most=0.9, least=0.1)
     flat_layers_only: ClassVar[bool] = True
+    variants: ClassVar[Mapping[str, Mapping[str, Any]]] = {"concentric": {"of": "concentric"}}
 
     def __post_init__(self) -> None:
         if self.of in ("pruned", "stream_function"):

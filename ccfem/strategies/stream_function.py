@@ -5,9 +5,9 @@ field, as in `isocurve`, but the field is not fitted to the stress of the part w
 optimised for the compliance of the part with the fibre that its isocurves lay.
 """
 
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
-from typing import ClassVar
+from typing import Any, ClassVar
 
 import numpy as np
 
@@ -91,7 +91,7 @@ class StreamFunction:
     inset : float, default 0
         Least distance of strands from the boundary, in strand widths. At 0, as in the other
         strategies of isocurves, strands may run along the boundary with half of their width
-        outside; 0.45 keeps them in, and their ends still meet the links along the boundary.
+        outside; 0.5 keeps them in, and their ends still meet the links along the boundary.
     """
 
     coverage: float = 0.45
@@ -107,6 +107,10 @@ class StreamFunction:
 
     amount: ClassVar[Amount] = Amount("coverage", most=0.85, least=0.1)
     flat_layers_only: ClassVar[bool] = True
+    variants: ClassVar[Mapping[str, Mapping[str, Any]]] = {
+        "inset": {"inset": 0.5, "evaluations": 5},
+        "groups": {"groups": 2, "evaluations": 5},
+    }
 
     def __post_init__(self) -> None:
         check_fields(self, "coverage", above=0.0, at_most=1.0)

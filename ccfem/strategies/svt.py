@@ -5,8 +5,9 @@ planning method for 3D printing of continuous fiber reinforced plastics, Composi
 (2021) 106181. The tracks and the links are reconstructed: the paper shows them and gives no rule.
 """
 
+from collections.abc import Mapping
 from dataclasses import dataclass
-from typing import ClassVar, Literal
+from typing import Any, ClassVar, Literal
 
 import numpy as np
 import shapely
@@ -95,6 +96,11 @@ class Svt:
     amount: ClassVar[Amount] = SPACING
     flat_layers_only: ClassVar[bool] = True
     crosses: ClassVar[bool] = True
+    variants: ClassVar[Mapping[str, Mapping[str, Any]]] = {
+        "points": {"mode": "points"},
+        "plain": {"links": "none", "crossings": False, "aligned": False},
+        "cut": {"longest_inside": 0.0, "longest_over_void": 0.0},
+    }
 
     def __post_init__(self) -> None:
         check_fill(self)
