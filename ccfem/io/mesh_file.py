@@ -56,7 +56,7 @@ def read_mesh(path: str | os.PathLike[str], scale: float = 1.0, check: bool = Tr
     Raises
     ------
     InputError
-        When the file is missing or no tetrahedral mesh, or nothing sensible can follow from it.
+        When the file is missing, or is not a valid tetrahedral mesh.
     """
     path = existing_file(path, "mesh file")
     suffix = path.suffix.lower()
