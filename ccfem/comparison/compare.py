@@ -144,8 +144,9 @@ def compare(
     """Solve a case once, and plan and evaluate each strategy on it.
 
     Strategies are compared at equal length of fibre: more fibre wins almost any comparison. When no
-    length is given, it is the shortest natural length of any of them, and all others
-    are thinned to it, each by its own parameter (`LayerStrategy.amount`). A strategy that fails stays in the result, with the reason.
+    length is given, it is the shortest natural length of any of them, and all others are thinned to
+    it, each by its own parameter (`LayerStrategy.amount`). A strategy that fails stays in the
+    result, with the reason.
 
     Parameters
     ----------
