@@ -12,7 +12,8 @@ from typing import Any
 from ccfem.cases.case import Case
 from ccfem.cases.reading import read
 from ccfem.checks import check_known, member_name
-from ccfem.comparison.result import Comparison, Run
+from ccfem.comparison.result import Comparison
+from ccfem.comparison.runs import Run
 from ccfem.comparison.stages import (
     Part,
     Tell,
