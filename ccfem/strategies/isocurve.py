@@ -244,10 +244,10 @@ class _Planner:
     ) -> list[FloatArray]:
         """Isocurves of the field, at least a width apart."""
         s = self.strategy
-        cap = np.quantile(
+        percentile = np.quantile(
             tension.stress, s.cap / 100.0, weights=surface.areas, method="inverted_cdf"
         )
-        cap = max(float(cap), 1e-300)
+        cap = max(float(percentile), 1e-300)
         confidence = np.where(tension.defined, np.minimum(tension.stress / cap, 1.0), 0.0)
         direction = tension.direction
         if s.fill == "screened":
