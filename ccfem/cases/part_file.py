@@ -66,6 +66,7 @@ them with a minus ("-z"), or three numbers.
     rule = "box"                      # facets inside a box; inf is allowed
     lower = [0, 0, 0]
     upper = [10, 10, inf]
+    normal = "x"                      # optional: only facets that face this way
 
     [patches.tip]
     rule = "nearest"                  # the facets nearest to a point
@@ -75,6 +76,15 @@ them with a minus ("-z"), or three numbers.
     [patches.grip]
     rule = "group"                    # a group of the mesh file under another name
     name = "Surface_12"
+
+    [patches.bore]
+    rule = "face"                     # smooth faces by their numbers (ccfem faces BODY)
+    number = [3, 4]
+
+    [patches.bolts]
+    rule = "holes"                    # the walls of all holes of a radius
+    radius = 2.75
+    axis = "z"                        # optional: only those along it
 
     [[supports]]                      # at least one
     patch = "foot"
@@ -136,6 +146,8 @@ from ccfem.layers.slicer import Slicer
 from ccfem.layers.slicing.planar import Planar
 from ccfem.machine.machine import Machine
 from ccfem.materials import Material, isotropic, named_material, transversely_isotropic
+from ccfem.mesh.face_rules import Faces, Holes
+from ccfem.mesh.patch_findings import about_patches
 from ccfem.mesh.patches import (
     Box,
     Cylinder,
@@ -156,6 +168,8 @@ _RULES: dict[str, Callable[..., PatchRule]] = {
     "cylinder": Cylinder,
     "nearest": Nearest,
     "group": Group,
+    "face": Faces,
+    "holes": Holes,
 }
 _LOADS: dict[str, Callable[..., Load]] = {
     "force": Force,
@@ -246,7 +260,7 @@ def _case(content: Mapping[str, Any], path: Path) -> Case:
         machine=machine,
         parameters=part.strategies,
         source=part.source,
-        findings=findings,
+        findings=(*findings, *about_patches(mesh, rules)),
     )
 
 

@@ -94,7 +94,9 @@ class Plane:
         else:
             offset = float(self.offset)
         missed = np.abs(height - offset)[mesh.boundary].max(axis=1)
-        facing = np.abs(_normals(mesh) @ normal) > _ALONG
+        facing = np.abs(cosine := _normals(mesh) @ normal) > _ALONG
+        if isinstance(self.offset, str):  # the end of the part faces outward: of a sheet one side
+            facing &= (cosine > 0.0) == (self.offset == "max")
         tolerance = _default(self.tolerance, mesh)
         return _choose(mesh, missed, tolerance, facing, f"plane {self.normal} at {offset:g} mm")
 
@@ -107,12 +109,17 @@ class Box:
     ----------
     lower, upper : tuple of 3 floats, mm
         Opposite corners; infinite where the box has no end.
+    normal : str or tuple of 3 floats, optional
+        Only facets that face this way, within 45 degrees.
     """
 
     lower: Vector
     upper: Vector
+    normal: str | Vector | None = None
 
     def __post_init__(self) -> None:
+        if self.normal is not None:
+            unit_vector(self.normal, "box normal")
         lower, upper = _vector(self.lower, "box lower"), _vector(self.upper, "box upper")
         if not (lower <= upper).all():
             raise InputError(
@@ -123,9 +130,11 @@ class Box:
         """Boundary facets (k, 3) in the box."""
         beyond = np.maximum(np.array(self.lower) - mesh.points, mesh.points - np.array(self.upper))
         missed = np.maximum(beyond.max(axis=1), 0.0)[mesh.boundary].max(axis=1)
-        everywhere = np.ones(len(missed), dtype=bool)
+        wanted = np.ones(len(missed), dtype=bool)
+        if self.normal is not None:
+            wanted = _normals(mesh) @ unit_vector(self.normal, "box normal") > _ALONG
         tolerance = 1e-9 * _diagonal(mesh)
-        return _choose(mesh, missed, tolerance, everywhere, f"box {self.lower} to {self.upper}")
+        return _choose(mesh, missed, tolerance, wanted, f"box {self.lower} to {self.upper}")
 
 
 @dataclass(frozen=True)

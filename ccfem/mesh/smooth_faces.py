@@ -1,0 +1,240 @@
+"""Smooth faces of a boundary, as a designer sees them: planes, round walls, others."""
+
+from dataclasses import dataclass
+from typing import Literal
+
+import numpy as np
+from numpy.typing import ArrayLike
+from scipy.sparse import coo_array
+from scipy.sparse.csgraph import connected_components
+
+from ccfem.arrays import BoolArray, FloatArray, IntArray, freeze
+from ccfem.checks import check_number
+from ccfem.mesh.facets import facet_keys
+
+__all__ = ["FEATURE_ANGLE", "Face", "smooth_faces"]
+
+FEATURE_ANGLE = 30.0
+"""Angle between facets, degrees, from which an edge separates two faces."""
+_FLAT = 1.0
+"""Root mean square angle, degrees, of the normals of a plane to their mean."""
+_SEAM = 0.5
+"""Angle between facets, degrees, up to which they lie in one plane."""
+_ROUND = 0.02
+"""Distance of the nodes of a round wall from a cylinder, in radii."""
+_STRAIGHT = 0.02
+"""Share of the normals of a round wall that may lie along its axis."""
+_WIDE = 4.0
+"""Area of a plane that runs smoothly into a round wall, in areas of the wall's flat strips."""
+_DIGITS = 6
+"""Digits of area and centre by which faces are ordered, so that rounding orders none."""
+
+
+@dataclass(frozen=True)
+class Face:
+    """A smooth face.
+
+    Attributes
+    ----------
+    facets : (k,) int array
+        Rows of the triangles that were given.
+    kind : {"plane", "cylinder", "other"}
+    area : float, mm^2
+    centre : (3,) array, mm
+        Of the area; of a cylinder, the point of its axis at the middle of its length.
+    direction : (3,) array
+        Of length 1: the outward normal of a plane, the axis of a cylinder (its first component
+        that is not zero is positive), the mean normal of another face (zero where it closes).
+    radius : float, mm
+        Of a cylinder; NaN for other faces.
+    hollow : bool
+        Whether a cylinder is the wall of a hole, not of a pin.
+    turn : float, degrees
+        How far a cylinder goes round its axis: 360 for a whole wall; NaN for other faces.
+    """
+
+    facets: IntArray
+    kind: Literal["plane", "cylinder", "other"]
+    area: float
+    centre: FloatArray
+    direction: FloatArray
+    radius: float = np.nan
+    hollow: bool = False
+    turn: float = np.nan
+
+    def __post_init__(self) -> None:
+        freeze(self, facets=int, centre=float, direction=float)
+
+    @property
+    def about(self) -> str:
+        """One phrase: what it is, how large, and where."""
+        at = _numbers(self.centre)
+        if self.kind == "cylinder":
+            what = "wall of a hole" if self.hollow else "wall of a pin"
+            if self.turn < 180.0:
+                what = "hollow round" if self.hollow else "outer round"
+            part = "" if self.turn > 359.0 else f", {self.turn:.0f} degrees of it"
+            return f"{what} of radius {self.radius:.3g} mm{part}, axis {self.along} through {at}"
+        if self.kind == "plane":
+            return f"plane of {self.area:.4g} mm^2, normal {self.along}, centre {at}"
+        return f"face of {self.area:.4g} mm^2, centre {at}"
+
+    @property
+    def along(self) -> str:
+        """Direction as a part file has it: x, -y, or three numbers."""
+        for name, axis in zip("xyz", np.eye(3), strict=True):
+            cosine = float(self.direction @ axis)
+            if abs(cosine) > 1.0 - 1e-6:
+                return name if cosine > 0.0 else f"-{name}"
+        return "[" + ", ".join(f"{x:.4g}" for x in self.direction + 0.0) + "]"
+
+
+def smooth_faces(
+    points: ArrayLike, triangles: ArrayLike, angle: float = FEATURE_ANGLE
+) -> tuple[Face, ...]:
+    """Split a closed surface into its smooth faces.
+
+    Two triangles belong to one face where the surface turns by less than the feature angle from one
+    to the other. A face that is neither a plane nor a round wall gives up the wide planes in it: so
+    a plane that runs smoothly into a fillet, as in a slot, is a face of its own.
+
+    Parameters
+    ----------
+    points : (n, 3) array, mm
+    triangles : (t, 3) int array
+        Outward.
+    angle : float, degrees, default 30
+        Feature angle, above 0 and below 180.
+
+    Returns
+    -------
+    tuple of Face
+        The largest first, those of equal area by their centres: the order depends on the shape
+        alone.
+
+    Raises
+    ------
+    InputError
+        For an angle out of range.
+    """
+    check_number("feature angle", angle, above=0.0, below=180.0, unit="degrees")
+    points = np.asarray(points, dtype=np.float64)
+    triangles = np.asarray(triangles, dtype=np.int64)
+    a, b, c = np.moveaxis(points[triangles], 1, 0)
+    across = 0.5 * np.cross(b - a, c - a)
+    area = np.linalg.norm(across, axis=1)
+    surface = _Surface(points, triangles, area, across / np.maximum(area, 1e-300)[:, None])
+    pairs = _neighbours(triangles)
+    cosine = np.einsum("ij,ij->i", surface.normal[pairs[:, 0]], surface.normal[pairs[:, 1]])
+    label = _components(len(triangles), pairs[cosine > np.cos(np.radians(angle))])
+    flat = _components(len(triangles), pairs[cosine > np.cos(np.radians(_SEAM))])
+    faces: list[Face] = []
+    for group in _groups(label):
+        face = _face(surface, group)
+        if face.kind != "other":
+            faces.append(face)
+            continue
+        wide = _wide_planes(flat[group], area[group])
+        smooth = pairs[np.isin(pairs, group[~wide]).all(axis=1)]
+        smooth = smooth[np.isin(smooth[:, 0], group)]
+        parts = _components(len(triangles), smooth)
+        faces += [_face(surface, piece) for piece in _groups(flat, group[wide])]
+        faces += [_face(surface, piece) for piece in _groups(parts, group[~wide])]
+    size = float(np.linalg.norm(np.ptp(points, axis=0))) or 1.0
+    return tuple(sorted(faces, key=lambda face: _order(face, size)))
+
+
+@dataclass(frozen=True)
+class _Surface:
+    """Triangles with their areas (t,) and normals (t, 3)."""
+
+    points: FloatArray
+    triangles: IntArray
+    area: FloatArray
+    normal: FloatArray
+
+
+def _order(face: Face, size: float) -> tuple[float, ...]:
+    """Return what faces are ordered by."""
+    place = np.round(face.centre / size, _DIGITS - 2) + 0.0
+    return (-round(face.area / size**2, _DIGITS), *place.tolist())
+
+
+def _neighbours(triangles: IntArray) -> IntArray:
+    """Pairs (k, 2) of triangles that share an edge."""
+    edges = triangles[:, [[0, 1], [1, 2], [2, 0]]].reshape(-1, 2)
+    (key,) = facet_keys(edges)
+    order = np.argsort(key, kind="stable")
+    same = np.flatnonzero(np.diff(key[order]) == 0)
+    return np.stack([order[same], order[same + 1]], axis=1) // 3
+
+
+def _components(count: int, pairs: IntArray) -> IntArray:
+    """Label things (count,) by the piece that pairs (k, 2) of them connect."""
+    ones = np.ones(len(pairs), dtype=bool)
+    graph = coo_array((ones, (pairs[:, 0], pairs[:, 1])), shape=(count, count))
+    return np.asarray(connected_components(graph, directed=False)[1], dtype=np.int64)
+
+
+def _groups(label: IntArray, among: IntArray | None = None) -> list[IntArray]:
+    """Rows of each label, among some rows or all."""
+    rows = np.arange(len(label)) if among is None else among
+    order = rows[np.argsort(label[rows], kind="stable")]
+    return np.split(order, np.flatnonzero(np.diff(label[order])) + 1) if len(order) else []
+
+
+def _wide_planes(flat: IntArray, area: FloatArray) -> BoolArray:
+    """Which triangles lie in flat pieces much larger than most flat pieces of their face."""
+    _, piece = np.unique(flat, return_inverse=True)
+    size = np.bincount(piece, weights=area)
+    return np.asarray(size > _WIDE * np.median(size))[piece]
+
+
+def _face(surface: _Surface, rows: IntArray) -> Face:
+    """Face of some triangles, with what kind it is."""
+    area, normal = surface.area[rows], surface.normal[rows]
+    total = float(area.sum())
+    middles = surface.points[surface.triangles[rows]].mean(axis=1)
+    centre = np.average(middles, axis=0, weights=area) if total > 0.0 else middles.mean(axis=0)
+    mean = area @ normal
+    size = float(np.linalg.norm(mean))
+    direction = mean / size if size > 1e-6 * total else np.zeros(3)
+    if size > 0.5 * total:
+        away = 2.0 * (1.0 - np.clip(normal @ direction, -1.0, 1.0))  # angle^2
+        if area @ away <= np.radians(_FLAT) ** 2 * total:
+            return Face(rows, "plane", total, centre, direction)
+    return _cylinder(surface, rows) or Face(rows, "other", total, centre, direction)
+
+
+def _cylinder(surface: _Surface, rows: IntArray) -> Face | None:
+    """Face of triangles that lie on a cylinder; None where they do not."""
+    area, normal = surface.area[rows], surface.normal[rows]
+    spread, axes = np.linalg.eigh((area * normal.T) @ normal / area.sum())
+    if spread[0] > _STRAIGHT**2 or spread[1] < 1e-3:
+        return None
+    axis = axes[:, 0] * np.sign(axes[np.argmax(np.abs(axes[:, 0]) > 1e-6), 0])
+    nodes = np.unique(surface.triangles[rows])
+    plane = surface.points[nodes] @ axes[:, 1:]
+    # The circle |p|^2 = 2 m p + c through the nodes, by least squares.
+    shift = plane.mean(axis=0)
+    system = np.column_stack([2.0 * (plane - shift), np.ones(len(plane))])
+    squares = ((plane - shift) ** 2).sum(axis=1)
+    (*middle, constant), _, rank, _ = np.linalg.lstsq(system, squares)
+    radius = float(np.sqrt(max(constant + np.dot(middle, middle), 0.0)))
+    arm = plane - shift - middle
+    if rank < 3 or np.abs(np.linalg.norm(arm, axis=1) - radius).max() > _ROUND * radius:
+        return None
+    height = surface.points[nodes] @ axis
+    centre = axes[:, 1:] @ (shift + middle) + 0.5 * (height.min() + height.max()) * axis
+    outward = surface.points[surface.triangles[rows]].mean(axis=1) - centre
+    inward = float(np.einsum("i,ij,ij->", area, normal, outward)) < 0.0
+    turn = np.sort(np.arctan2(arm[:, 1], arm[:, 0]))
+    gap = float(np.diff(np.append(turn, turn[0] + 2.0 * np.pi)).max())
+    step = float(np.median(np.diff(np.unique(np.round(turn, 6)))))
+    degrees = 360.0 if gap < 2.5 * step else 360.0 - float(np.degrees(gap))
+    return Face(rows, "cylinder", float(area.sum()), centre, axis, radius, inward, degrees)
+
+
+def _numbers(place: FloatArray) -> str:
+    """Write a place, mm, as a part file has it."""
+    return "[" + ", ".join(f"{x:.4g}" for x in np.round(place, 9) + 0.0) + "]"
