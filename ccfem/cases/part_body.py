@@ -92,9 +92,10 @@ class _Planform:
 def _filled(body: Body, folder: Path) -> TetMesh:
     """Mesh of a surface or a planform."""
     if body.surface is not None and body.edge_length is not None:
-        from ccfem.meshing import tetrahedralise
+        from ccfem.meshing import tetrahedralise, with_faces_of
 
-        return tetrahedralise(read_surface(folder / body.surface, body.scale), body.edge_length)
+        surface = read_surface(folder / body.surface, body.scale)
+        return with_faces_of(surface, tetrahedralise(surface, body.edge_length))
     from ccfem.meshing import extrude
 
     plan = from_table(_Planform, body.planform, "planform")

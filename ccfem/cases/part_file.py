@@ -77,7 +77,7 @@ them with a minus ("-z"), or three numbers.
     rule = "group"                    # a group of the mesh file under another name
     name = "Surface_12"
 
-    [patches.bore]
+    [patches.bore]                    # a surface's faces also are groups: face_1, face_2, ...
     rule = "face"                     # smooth faces by their numbers (ccfem faces BODY)
     number = [3, 4]
 
@@ -121,7 +121,7 @@ them with a minus ("-z"), or three numbers.
 
 import os
 import tomllib
-from collections.abc import Callable, Mapping
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Any
@@ -146,7 +146,7 @@ from ccfem.layers.slicer import Slicer
 from ccfem.layers.slicing.planar import Planar
 from ccfem.machine.machine import Machine
 from ccfem.materials import Material, isotropic, named_material, transversely_isotropic
-from ccfem.mesh.face_rules import Faces, Holes
+from ccfem.mesh.face_rules import Faces, Holes, without_faces
 from ccfem.mesh.patch_findings import about_patches
 from ccfem.mesh.patches import (
     Box,
@@ -247,9 +247,10 @@ def _case(content: Mapping[str, Any], path: Path) -> Case:
     _check_strategies(part.strategies)
     mesh, findings = part.read(path.parent)
     mesh = patches_from_rules(mesh, rules)
-    for value in (*supports, *(load for case in loads.values() for load in case)):
-        if not isinstance(value, PointForce):
-            mesh.patch(value.patch)
+    findings = (*findings, *about_patches(mesh, rules))
+    mesh = without_faces(mesh, (*rules, *_patches_of(supports, loads)))
+    for patch in _patches_of(supports, loads):
+        mesh.patch(patch)
     name = part.name or path.stem
     return Case(
         name=name,
@@ -260,8 +261,16 @@ def _case(content: Mapping[str, Any], path: Path) -> Case:
         machine=machine,
         parameters=part.strategies,
         source=part.source,
-        findings=(*findings, *about_patches(mesh, rules)),
+        findings=findings,
     )
+
+
+def _patches_of(
+    supports: Sequence[Support], loads: Mapping[str, Sequence[Load]]
+) -> tuple[str, ...]:
+    """Patches that supports and loads name."""
+    values = (*supports, *(load for case in loads.values() for load in case))
+    return tuple(value.patch for value in values if not isinstance(value, PointForce))
 
 
 def _slicing(part: _Part) -> Slicer:

@@ -88,6 +88,28 @@ def _list(kind: str, name: str | None) -> None:
 
 
 @app.command()
+def faces(
+    body: Annotated[
+        Path,
+        typer.Argument(metavar="BODY", help="Surface (.stl ...), mesh, part file or case."),
+    ],
+    angle: Annotated[
+        float, typer.Option(metavar="DEGREES", help="Angle from which an edge separates faces.")
+    ] = 30.0,
+    scale: Annotated[
+        float, typer.Option(metavar="S", help="Factor that makes a file's coordinates mm.")
+    ] = 1.0,
+    out: Annotated[
+        Path, typer.Option("--out", metavar="PICTURE", help="Picture (.png, .pdf, .svg).")
+    ] = Path("faces.png"),
+) -> None:
+    """List the smooth faces of a body with numbers to choose patches by, and draw them."""
+    from ccfem.cli.faces import list_faces
+
+    list_faces(body, angle, scale, out)
+
+
+@app.command()
 def compare(
     case: CasePath,
     strategies: Annotated[

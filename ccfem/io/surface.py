@@ -2,6 +2,7 @@
 
 import os
 from dataclasses import dataclass
+from pathlib import Path
 
 import numpy as np
 
@@ -11,7 +12,7 @@ from ccfem.errors import InputError
 from ccfem.io.quiet import read_quietly
 from ccfem.io.whole import existing_file
 
-__all__ = ["Surface", "read_surface"]
+__all__ = ["Surface", "is_surface", "read_surface"]
 
 _SUFFIXES = (".obj", ".ply", ".stl")
 
@@ -54,6 +55,11 @@ class Surface:
         return float(np.einsum("ij,ij->", np.cross(a, b), c)) / 6.0
 
 
+def is_surface(path: str | os.PathLike[str]) -> bool:
+    """Whether the name of a file is that of a surface."""
+    return Path(path).suffix.lower() in _SUFFIXES
+
+
 def read_surface(path: str | os.PathLike[str], scale: float = 1.0) -> Surface:
     """Read a closed surface.
 
@@ -75,7 +81,7 @@ def read_surface(path: str | os.PathLike[str], scale: float = 1.0) -> Surface:
         edges are open and where.
     """
     path = existing_file(path, "surface file")
-    if path.suffix.lower() not in _SUFFIXES:
+    if not is_surface(path):
         raise InputError(
             f"cannot tell the format of surface file {path}: its name must end in "
             f"{', '.join(_SUFFIXES)}"

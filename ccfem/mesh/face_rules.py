@@ -1,6 +1,7 @@
 """Rules that choose patches by smooth faces: by their numbers, or all holes of a radius."""
 
-from dataclasses import dataclass
+from collections.abc import Iterable
+from dataclasses import dataclass, replace
 
 import numpy as np
 
@@ -11,7 +12,7 @@ from ccfem.mesh.patches import Vector, match_boundary, unit_vector
 from ccfem.mesh.smooth_faces import FEATURE_ANGLE, Face, smooth_faces
 from ccfem.mesh.tet_mesh import TetMesh
 
-__all__ = ["GROUP", "Faces", "Holes"]
+__all__ = ["GROUP", "Faces", "Holes", "without_faces"]
 
 GROUP = "face_{}"
 """Name of the group that holds a numbered face of the surface that a mesh was made from."""
@@ -111,6 +112,13 @@ class Holes:
             return True
         across = np.cross(face.direction, unit_vector(self.axis, "holes axis"))
         return float(np.linalg.norm(across)) <= _PARALLEL
+
+
+def without_faces(mesh: TetMesh, kept: Iterable[str]) -> TetMesh:
+    """Mesh without the groups of a surface's faces, but for those with a name that is kept."""
+    wanted, prefix = set(kept), GROUP.format("")
+    patches = {n: f for n, f in mesh.patches.items() if n in wanted or not n.startswith(prefix)}
+    return replace(mesh, patches=patches)
 
 
 def _check_count(numbers: tuple[int, ...], count: int) -> None:

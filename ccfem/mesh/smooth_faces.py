@@ -26,6 +26,8 @@ _STRAIGHT = 0.02
 """Share of the normals of a round wall that may lie along its axis."""
 _WIDE = 4.0
 """Area of a plane that runs smoothly into a round wall, in areas of the wall's flat strips."""
+_LARGE = 0.03
+"""Least area of such a plane, as a share of the face: a free-form face has small flat places."""
 _DIGITS = 6
 """Digits of area and centre by which faces are ordered, so that rounding orders none."""
 
@@ -187,7 +189,8 @@ def _wide_planes(flat: IntArray, area: FloatArray) -> BoolArray:
     """Which triangles lie in flat pieces much larger than most flat pieces of their face."""
     _, piece = np.unique(flat, return_inverse=True)
     size = np.bincount(piece, weights=area)
-    return np.asarray(size > _WIDE * np.median(size))[piece]
+    least = max(_WIDE * float(np.median(size)), _LARGE * float(size.sum()))
+    return np.asarray(size > least)[piece]
 
 
 def _face(surface: _Surface, rows: IntArray) -> Face:

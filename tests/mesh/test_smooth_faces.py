@@ -8,13 +8,14 @@ import pytest
 import shapely
 
 from ccfem.errors import InputError
+from ccfem.io.surface import Surface
 from ccfem.mesh import TetMesh
 from ccfem.mesh.box import box_mesh
-from ccfem.mesh.face_rules import Faces, Holes
+from ccfem.mesh.face_rules import Faces, Holes, without_faces
 from ccfem.mesh.patch_findings import about_patches
 from ccfem.mesh.patches import Box, Cylinder, Plane, patches_from_rules
 from ccfem.mesh.smooth_faces import smooth_faces
-from ccfem.meshing import extrude
+from ccfem.meshing import extrude, with_faces_of
 
 TURN = np.radians(37.0)
 ROTATION = np.array(
@@ -23,12 +24,12 @@ ROTATION = np.array(
 MIRROR = np.diag([-1.0, 1.0, 1.0])
 
 
-def bracket() -> TetMesh:
-    """A plate of 60 x 30 x 5 mm with holes of radius 4, 4 and 6 mm."""
+def plan_of_plate() -> shapely.Polygon:
+    """A plate of 60 x 30 mm with holes of radius 4, 4 and 6 mm."""
     outline = shapely.box(0.0, 0.0, 60.0, 30.0)
     for x, radius in ((10.0, 4.0), (30.0, 6.0), (50.0, 4.0)):
         outline = outline.difference(shapely.Point(x, 15.0).buffer(radius, 32))
-    return extrude(outline, 5.0, 2.0)
+    return outline
 
 
 def slot() -> TetMesh:
@@ -44,7 +45,7 @@ def moved(mesh: TetMesh, turn: np.ndarray) -> TetMesh:
 
 @pytest.fixture(scope="module")
 def plate():
-    return bracket()
+    return extrude(plan_of_plate(), 5.0, 2.0)
 
 
 def test_faces_of_a_box():
@@ -157,3 +158,17 @@ def test_the_end_of_a_thin_sheet_is_its_outer_side():
     turned = replace(sheet, points=sheet.points @ ROTATION.T)
     facets = Plane(tuple(ROTATION[:, 2]), "max")(turned)
     assert turned.facet_areas(facets)[0].sum() == pytest.approx(400.0 * 300.0)
+
+
+def test_a_mesh_takes_the_faces_of_its_surface(plate):
+    """Whatever its own faces are: here a finer mesh of the same part, turned as the surface is."""
+    coarse, fine = moved(plate, ROTATION), moved(extrude(plan_of_plate(), 5.0, 1.2), ROTATION)
+    surface = Surface(coarse.points, coarse.boundary)
+    mesh = with_faces_of(surface, fine)
+    faces = smooth_faces(surface.points, surface.triangles)
+    for number, face in enumerate(faces, 1):
+        facets = Faces(number)(mesh)
+        assert mesh.facet_areas(facets)[0].sum() == pytest.approx(face.area, rel=0.02)
+    assert without_faces(mesh, ("face_3",)).patches.keys() == {"face_3"}
+    with pytest.raises(InputError, match="the part has 9 faces; got number 10"):
+        Faces((1, 10))(mesh)
