@@ -11,7 +11,7 @@ from ccfem.cases.reading import read
 from ccfem.io.mesh_file import read_mesh
 from ccfem.io.surface import is_surface, read_surface
 from ccfem.mesh.smooth_faces import Face, smooth_faces
-from ccfem.plot.part import Label, draw_part
+from ccfem.plot.part_views import Label, draw_part
 
 __all__ = ["list_faces"]
 
