@@ -5,7 +5,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from ccfem.comparison.result import Run
+from ccfem.comparison.runs import Run
 from ccfem.evaluation.column import Column
 
 __all__ = ["HEADLINE", "TEST_COLUMNS", "Headline", "cell_text", "headline_values"]

@@ -7,7 +7,8 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from ccfem.arrays import FloatArray
-from ccfem.comparison.result import Comparison, Run
+from ccfem.comparison.result import Comparison
+from ccfem.comparison.runs import Run
 from ccfem.evaluation.matching import THRESHOLDS, along_fibre, matching_curve
 from ccfem.evaluation.plane_paths import pool
 from ccfem.layers import Layer

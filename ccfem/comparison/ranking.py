@@ -1,40 +1,48 @@
 """The order of the runs of a comparison, and where an order cannot be told."""
 
+from collections.abc import Sequence
+
 import numpy as np
 
 from ccfem.comparison.headline import HEADLINE, headline_values
-from ccfem.comparison.result import Comparison, Run
+from ccfem.comparison.runs import Run
 from ccfem.planning.equal_fibre import TOLERANCE
 from ccfem.virtual_testing.stiffer import UNDECIDED, stiffer
 
 __all__ = ["best_values", "ranking", "stiffness_ratio", "stiffness_ratios", "too_long", "undecided"]
 
 
-def ranking(comparison: Comparison) -> tuple[Run, ...]:
+def ranking(runs: Sequence[Run], wanted: float | None) -> tuple[Run, ...]:
     """Return the runs from the best to the worst, failed ones last.
 
     By the predicted stiffness with fibres that carry tension only; those without a virtual test
     come after, by efficiency. A run that lays more than the wanted fibre comes after all that do
     not.
+
+    Parameters
+    ----------
+    runs : sequence of Run
+    wanted : float, mm, or None
+        Length of fibre per layer that all were held to; None where each laid its own.
     """
 
     def score(run: Run) -> tuple[bool, bool, float, bool, float]:
         ratio, efficiency = stiffness_ratio(run), headline_values(run).get("efficiency", np.nan)
         return (
-            too_long(run, comparison),
+            too_long(run, wanted),
             not np.isfinite(ratio),
             -np.nan_to_num(ratio),
             run.evaluation is None,
             -np.nan_to_num(efficiency),
         )
 
-    return tuple(sorted(comparison.runs, key=score))
+    return tuple(sorted(runs, key=score))
 
 
-def best_values(comparison: Comparison) -> dict[str, float]:
+def best_values(runs: Sequence[Run], wanted: float | None) -> dict[str, float]:
     """Best value of each headline column where the runs differ; too much fibre does not count."""
     best = {}
-    equal = [run for run in comparison.succeeded if not too_long(run, comparison)]
+    equal = [run for run in runs if run.evaluation is not None and not too_long(run, wanted)]
     for head in HEADLINE:
         values = [headline_values(run).get(head.column, np.nan) for run in equal]
         known = [value for value in values if np.isfinite(value)]
@@ -43,9 +51,8 @@ def best_values(comparison: Comparison) -> dict[str, float]:
     return best
 
 
-def too_long(run: Run, comparison: Comparison) -> bool:
+def too_long(run: Run, wanted: float | None) -> bool:
     """Whether a run lays more fibre than all were held to."""
-    wanted = comparison.fibre_per_layer
     return wanted is not None and run.length_per_layer > (1.0 + TOLERANCE) * wanted
 
 

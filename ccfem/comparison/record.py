@@ -10,7 +10,8 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from ccfem.comparison.headline import TEST_COLUMNS, headline_values
-from ccfem.comparison.result import Comparison, Run
+from ccfem.comparison.result import Comparison
+from ccfem.comparison.runs import Run
 from ccfem.elasticity.stress_field import StressField
 
 if TYPE_CHECKING:

@@ -9,9 +9,9 @@ import numpy as np
 
 from ccfem.comparison.headline import HEADLINE, TEST_COLUMNS, cell_text, headline_values
 from ccfem.comparison.pictures import Pictures
-from ccfem.comparison.ranking import best_values, ranking, stiffness_ratios
-from ccfem.comparison.remarks import remarks, verdict
-from ccfem.comparison.result import Comparison, Run
+from ccfem.comparison.ranking import best_values, stiffness_ratios
+from ccfem.comparison.result import Comparison
+from ccfem.comparison.runs import Run
 from ccfem.evaluation import COLUMNS, Column
 from ccfem.virtual_testing.stiffer import HONEST_PROMISE
 
@@ -121,7 +121,7 @@ def _header(comparison: Comparison, record: Mapping[str, Any]) -> str:
 
 
 def _headline(comparison: Comparison) -> str:
-    best, runs = best_values(comparison), ranking(comparison)
+    best, runs = best_values(comparison.runs, comparison.fibre_per_layer), comparison.ranking
     values = {run.name: headline_values(run) for run in runs}
     heads = [h for h in HEADLINE if any(h.column in found for found in values.values())]
     rows = []
@@ -137,11 +137,11 @@ def _headline(comparison: Comparison) -> str:
         first = ' class="first"' if not rows else ""
         rows.append(f"<tr{first}><td>{escape(run.name)}</td>{cells}</tr>")
     titles = "".join(f"<th>{escape(h.title)}</th>" for h in heads)
-    notes = "".join(f"<li>{escape(line)}.</li>" for line in remarks(comparison))
+    notes = "".join(f"<li>{escape(line)}.</li>" for line in comparison.remarks)
     notes = f'<ul class="note">{notes}</ul>' if notes else ""
     if any(run.tested is not None for run in runs):
         notes += f'<p class="note"><b>{escape(HONEST_PROMISE)}</b></p>'
-    said = verdict(comparison)
+    said = comparison.verdict
     return (
         (f'<p class="verdict">{escape(said)}</p>\n' if said else "")
         + f'<div class="scroll"><table><tr><th>strategy</th>{titles}</tr>\n'
@@ -161,7 +161,7 @@ def _cell(text: str, extra: str, best: bool) -> str:
 
 def _against_each_other(comparison: Comparison) -> str:
     """Return the table of stiffness of each strategy over that of each other."""
-    runs = [run for run in ranking(comparison) if run.tested is not None]
+    runs = [run for run in comparison.ranking if run.tested is not None]
     if len(runs) < 2:
         return ""
     head = "".join(f"<th>over {escape(run.name)}</th>" for run in runs)
@@ -182,7 +182,7 @@ def _against_each_other(comparison: Comparison) -> str:
 
 
 def _pictures(comparison: Comparison, pictures: Pictures) -> str:
-    runs = [run for run in ranking(comparison) if run.evaluation is not None]
+    runs = [run for run in comparison.ranking if run.evaluation is not None]
     heights = {layer.index: layer.plane.height for layer in comparison.layers}
     rows = [_layer(index, height, runs, pictures) for index, height in heights.items()]
     every = ""
@@ -249,7 +249,7 @@ def _figure(image: bytes, about: str) -> str:
 
 
 def _all_indices(comparison: Comparison) -> str:
-    runs = [run for run in ranking(comparison) if run.evaluation is not None]
+    runs = [run for run in comparison.ranking if run.evaluation is not None]
     head = "".join(f"<th>{escape(run.name)}</th>" for run in runs)
     rows = []
     values = [headline_values(run) for run in runs]

@@ -52,7 +52,7 @@ def read_mesh(path: str | os.PathLike[str], scale: float = 1.0, check: bool = Tr
     Raises
     ------
     InputError
-        When the file is missing, holds no tetrahedral mesh, or holds an invalid one.
+        When the file is missing, or is not a valid tetrahedral mesh.
     """
     path = existing_file(path, "mesh file")
     suffix = path.suffix.lower()

@@ -14,7 +14,7 @@ from typing import Any, ClassVar, Literal
 import numpy as np
 from scipy.spatial import cKDTree
 
-from ccfem.arrays import BoolArray, FloatArray
+from ccfem.arrays import FloatArray
 from ccfem.checks import check_choices, check_fields
 from ccfem.elasticity.part_stress import PartStress
 from ccfem.errors import InputError
@@ -28,7 +28,7 @@ from ccfem.fields.orientation import orient
 from ccfem.fields.scalar import fit_cone, fit_constrained, fit_literal, fit_weighted
 from ccfem.fields.tensile import Tension
 from ccfem.geometry.isocontours import Isocontours
-from ccfem.geometry.polylines import is_closed, runs
+from ccfem.geometry.polylines import is_closed, middle_of_longest_run
 from ccfem.layers.holes import holes_on
 from ccfem.layers.layer import Layer
 from ccfem.layers.layer_stress import LayerStress, stress_on
@@ -243,7 +243,10 @@ class _Planner:
     def isocurves(self, surface: Surface, tension: Tension, width: float) -> list[FloatArray]:
         """Isocurves of the field, at least a width apart."""
         s = self.strategy
-        cap = max(_percentile(tension.stress, surface.areas, s.cap), 1e-300)
+        percentile = np.quantile(
+            tension.stress, s.cap / 100.0, weights=surface.areas, method="inverted_cdf"
+        )
+        cap = max(float(percentile), 1e-300)
         confidence = np.where(tension.defined, np.minimum(tension.stress / cap, 1.0), 0.0)
         direction = tension.direction
         if s.fill == "screened":
@@ -286,7 +289,7 @@ class _Planner:
                 if worth.mean() >= 0.5:
                     kept.append(line)
                     continue
-                middle = _longest_run(~worth[:-1])
+                middle = middle_of_longest_run(~worth[:-1])
                 line = np.roll(line[:-1], -middle, axis=0)
                 worth = np.roll(worth[:-1], -middle)
             inside = np.flatnonzero(worth)
@@ -328,18 +331,3 @@ def _nearest(layer: Layer, values: FloatArray) -> Callable[[FloatArray], FloatAr
     """Return a function that gives points (k, 2) the value of the nearest triangle."""
     tree = cKDTree(layer.plane.points[layer.triangles].mean(axis=1))
     return lambda points: values[tree.query(points)[1]]
-
-
-def _longest_run(mask: BoolArray) -> int:
-    """Index of the middle of the longest run of true values on a ring of values."""
-    starts, ends = runs(np.concatenate([mask, mask])).T
-    longest = int(np.argmax(ends - starts))
-    return int(starts[longest] + ends[longest]) // 2 % len(mask)
-
-
-def _percentile(values: FloatArray, weight: FloatArray, share: float) -> float:
-    """Value that `share` percent of the weight lies at or below."""
-    order = np.argsort(values, kind="stable")
-    below = np.cumsum(weight[order])
-    place: Any = np.searchsorted(below, share / 100.0 * below[-1] * (1.0 - 1e-12))
-    return float(values[order[min(int(place), len(order) - 1)]])
