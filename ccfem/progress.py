@@ -23,6 +23,7 @@ def progress_bar() -> Iterator[Progress]:
     ...     progress("half of it", 0.5)
     """
     from rich.console import Console
+    from rich.markup import escape
     from rich.progress import BarColumn, Progress, TextColumn, TimeElapsedColumn
 
     console = Console(stderr=True)
@@ -34,6 +35,6 @@ def progress_bar() -> Iterator[Progress]:
         task = bar.add_task("", total=1.0)
 
         def tell(what: str, share: float) -> None:
-            bar.update(task, description=what, completed=share)
+            bar.update(task, description=escape(what), completed=share)
 
         yield tell

@@ -1,11 +1,13 @@
 """A case: a problem with everything that a comparison of strategies needs."""
 
+import re
 from collections.abc import Mapping
 from dataclasses import dataclass, field
 from typing import Any
 
 from ccfem.arrays import freeze
 from ccfem.elasticity.problem import Problem
+from ccfem.errors import InputError
 from ccfem.layers.slicer import Slicer
 from ccfem.layers.slicing.planar import Planar
 from ccfem.machine.machine import Machine
@@ -20,6 +22,8 @@ class Case:
     Attributes
     ----------
     name : str
+        Letters, digits, spaces and ``._+-``, at most 80, the first a letter, digit or ``_``: it
+        becomes the name of a folder.
     title : str
         One line for tables and reports.
     problem : Problem
@@ -51,3 +55,10 @@ class Case:
 
     def __post_init__(self) -> None:
         freeze(self, parameters=dict)
+        if not re.fullmatch(r"\w[\w .+-]{0,79}", self.name):
+            raise InputError(
+                "the name of a case must have letters, digits, spaces and ._+- alone, at most 80, "
+                f"and begin with a letter or digit; got {self.name[:90]!r}: rename it"
+            )
+        if not self.title.isprintable():
+            raise InputError(f"the title of a case must be one printable line; got {self.title!r}")

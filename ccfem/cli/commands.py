@@ -3,6 +3,8 @@
 Everything heavy is imported by the command that needs it, so that ``ccfem --help`` answers at once.
 """
 
+import os
+import signal
 import sys
 from importlib import metadata
 from pathlib import Path
@@ -16,6 +18,7 @@ from ccfem.cli.options import (
     Calibration,
     CasePath,
     Fibre,
+    Force,
     Heights,
     Layers,
     LoadCase,
@@ -136,6 +139,7 @@ def compare(
     calibration: Calibration = None,
     backend: Backend = "auto",
     out: Out = None,
+    force: Force = False,
 ) -> None:
     """Plan a part by several strategies and show which is best, with numbers and pictures."""
     from ccfem.comparison.compare import STRATEGIES
@@ -145,7 +149,7 @@ def compare(
     chosen = layers_of(layers, heights, slicing)
     options = options_of(chosen, fibre_per_layer, virtual_test, load_case, backend)
     options["natural"] = natural
-    run(case, set_case, names, parameters, options, calibration, out)
+    run(case, set_case, names, parameters, options, calibration, out, force=force)
 
 
 @app.command()
@@ -170,6 +174,7 @@ def plan(
         typer.Option("--gcode", help="Also write STRATEGY.gcode, matrix and fibre of the part."),
     ] = False,
     out: Out = None,
+    force: Force = False,
 ) -> None:
     """Plan a part by one strategy, by default with its natural amount of fibre."""
     parameters = {strategy: parameters_of(strategy, set_ or ())}
@@ -177,7 +182,8 @@ def plan(
     options = options_of(chosen, fibre_per_layer, virtual_test, load_case, backend)
     options["natural"] = fibre_per_layer is None
     options["print_plans"] = gcode
-    run(case, set_case, (strategy,), parameters, options, calibration, out, f"-{strategy}")
+    suffix = f"-{strategy}"
+    run(case, set_case, (strategy,), parameters, options, calibration, out, suffix, force)
 
 
 @app.command()
@@ -241,6 +247,7 @@ def main() -> None:
     """Run the command line; bad input and failed solves end in one line and exit code 2."""
     # The base class of a wrong option or argument, wherever typer keeps it.
     usage_error: Any = typer.BadParameter.__mro__[1]
+    signal.signal(signal.SIGTERM, signal.default_int_handler)
     try:
         code = typer.main.get_command(app)(standalone_mode=False)
     except (InputError, SolveError) as error:
@@ -249,6 +256,12 @@ def main() -> None:
         code = _complain(error.format_message())
     except (typer.Abort, KeyboardInterrupt):
         code = 130
+    except BrokenPipeError:  # as under `ccfem cases | head -1`: nobody reads on
+        os.dup2(os.open(os.devnull, os.O_WRONLY), sys.stdout.fileno())
+        code = 141
+    except OSError as error:
+        where = f" {error.filename}" if error.filename else ""
+        code = _complain(f"cannot go on{where}: {error.strerror or error}: see to it and repeat")
     sys.exit(code if isinstance(code, int) else 0)
 
 

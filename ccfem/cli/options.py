@@ -61,6 +61,10 @@ Fibre = Annotated[
         "takes the shortest natural length of any of them; plan takes the natural length.",
     ),
 ]
+Force = Annotated[
+    bool,
+    typer.Option("--force", help="Replace files in the folder that ccfem did not write, too."),
+]
 VirtualTest = Annotated[
     bool,
     typer.Option(

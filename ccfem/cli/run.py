@@ -78,6 +78,7 @@ def run(
     calibration: Path | None,
     out: Path | None,
     suffix: str = "",
+    force: bool = False,
 ) -> None:
     """Compare strategies, write the results and print the table; a failure leaves nothing behind.
 
@@ -96,10 +97,13 @@ def run(
     out : Path, optional
         Folder; default ``results/`` and the name of the case with `suffix`.
     suffix : str
+    force : bool
+        Replace files in the folder that ccfem did not write, too.
     """
     from ccfem.cli.screen import print_comparison
     from ccfem.comparison.compare import compare, create_all
-    from ccfem.comparison.files import staged, write_results
+    from ccfem.comparison.files import write_results
+    from ccfem.io.result_folder import whole_folder
 
     imported = time.perf_counter()
     case = load(name, set_case)
@@ -108,7 +112,7 @@ def run(
         case, options = _calibrated(case, options, calibration)
     chosen = create_all(case, strategies, parameters)
     where = out if out is not None else Path("results") / f"{case.name}{suffix}"
-    with staged(where) as folder, progress_bar() as progress:
+    with whole_folder(where, force) as folder, progress_bar() as progress:
         comparison = compare(case, chosen, progress=_part(progress, 0.0, _SOLVED), **options)
         _check(comparison)
         command = shlex.join(["ccfem", *sys.argv[1:]])

@@ -1,12 +1,8 @@
-"""Results on disk: tables, record, paths and pictures, written whole or not at all."""
+"""Results on disk: tables, record, paths and pictures."""
 
 import json
-import os
-import shutil
-import tempfile
 import time
-from collections.abc import Iterator, Mapping
-from contextlib import contextmanager
+from collections.abc import Mapping
 from pathlib import Path
 from typing import TYPE_CHECKING
 
@@ -14,80 +10,13 @@ import numpy as np
 
 from ccfem.comparison.record import record, results_frame
 from ccfem.comparison.result import Comparison
-from ccfem.errors import InputError
 from ccfem.progress import Progress, silent
 from ccfem.toolpaths import Toolpaths
 
 if TYPE_CHECKING:
     from ccfem.comparison.pictures import Pictures
 
-__all__ = ["staged", "write_results"]
-
-
-@contextmanager
-def staged(directory: Path) -> Iterator[Path]:
-    """Yield a temporary folder whose files move to `directory` when the block ends well.
-
-    What earlier results left there, by the list "files" of their ``results.json``, is removed, so
-    that the folder holds one run and no paths or G-code of another.
-    The temporary folder is made before the block runs, inside `directory` or else its nearest
-    existing parent, so that a folder that cannot be written to is found before any work is done.
-    When the block raises, `directory` is as it was.
-
-    Raises
-    ------
-    InputError
-        When `directory` cannot be written to.
-    """
-    directory = Path(directory)
-    parent = directory
-    while not parent.exists() and parent != parent.parent:
-        parent = parent.parent
-    try:
-        folder = Path(tempfile.mkdtemp(prefix=".ccfem-", dir=parent))
-    except OSError as error:
-        raise _unwritable(directory, error) from error
-    try:
-        yield folder
-        _move(folder, directory)
-    finally:
-        shutil.rmtree(folder, ignore_errors=True)
-
-
-def _move(folder: Path, directory: Path) -> None:
-    try:
-        directory.mkdir(parents=True, exist_ok=True)
-        earlier = _written(directory)
-        new = sorted(path.name for path in folder.iterdir())
-        for name in new:
-            os.replace(folder / name, directory / name)
-        for name in earlier.difference(new):
-            (directory / name).unlink(missing_ok=True)
-    except OSError as error:
-        raise _unwritable(directory, error) from error
-
-
-def _written(directory: Path) -> set[str]:
-    """Names of the files that the results in a folder consist of, as far as they tell."""
-    try:
-        about = json.loads((directory / "results.json").read_text(encoding="utf-8"))
-        names = about["files"]
-    except (OSError, ValueError, KeyError, TypeError):
-        return set()
-    if not isinstance(names, list):
-        return set()
-    return {
-        name
-        for name in names
-        if isinstance(name, str) and (directory / name).is_file() and Path(name).name == name
-    }
-
-
-def _unwritable(directory: Path, error: OSError) -> InputError:
-    return InputError(
-        f"cannot write results to {directory}: {error.strerror or error}: choose another folder "
-        "with --out"
-    )
+__all__ = ["write_results"]
 
 
 def write_results(
@@ -106,7 +35,7 @@ def write_results(
     ----------
     comparison : Comparison
     folder : Path
-        An existing folder; use `staged` to have all files or none.
+        An existing folder; use `ccfem.io.result_folder.whole_folder` to have all files or none.
     command : str
         What was typed; the report tells how to repeat it.
     seconds : mapping of stage to float, optional

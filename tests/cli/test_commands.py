@@ -12,7 +12,6 @@ import pytest
 
 from ccfem import __version__
 from ccfem.cli.commands import main
-from ccfem.comparison.files import staged
 from ccfem.export.waypoints import read_waypoints
 from ccfem.io import write_mesh
 from ccfem.mesh import TetMesh
@@ -46,6 +45,7 @@ FILES = {
     "results.json",
     "paths.vtp",
     "report.html",
+    ".ccfem.json",
 }
 
 CUBE = "v 0 0 0\nv 9 0 0\nv 9 9 0\nv 0 9 0\nv 0 0 9\nv 9 0 9\nv 9 9 9\nv 0 9 9\n" + "".join(
@@ -92,7 +92,7 @@ def test_compare_writes_everything(ccfem, folder):
     where = folder / "results" / "new"
     written = {path.name for path in where.iterdir()}
     assert written == FILES
-    assert [p.name for p in folder.rglob(".ccfem*")] == []
+    assert [p.name for p in folder.rglob(".ccfem-*")] == []
 
     about = json.loads((where / "results.json").read_text())
     assert about["ccfem"] == __version__
@@ -171,20 +171,33 @@ def test_a_second_run_leaves_nothing_of_the_first(ccfem, folder):
     assert names >= {"contour_zigzag_layer_00.png", "report.html", "results.json", "zigzag.gcode"}
     assert not [name for name in names - {"zigzag.gcode"} if name.startswith("zigzag")]
     files = json.loads((where / "results.json").read_text())["files"]
-    assert set(files) == names - {"zigzag.gcode"}
+    assert set(files) == names - {"zigzag.gcode", ".ccfem.json"}
 
 
-@pytest.mark.parametrize("files", ['["../kept.txt", 3]', '"kept.txt"', "{}", "nonsense"])
-def test_only_files_of_the_folder_are_removed(tmp_path, files):
-    where = tmp_path / "results"
+def test_files_of_others_are_replaced_by_force_alone(ccfem, folder):
+    where = folder / "others"
     where.mkdir()
-    (tmp_path / "kept.txt").write_text("kept")
-    (where / "results.json").write_text('{"files": ' + files + "}")
-    with staged(where) as new:
-        (new / "report.html").write_text("new")
-    assert (tmp_path / "kept.txt").exists()
-    assert (where / "report.html").read_text() == "new"
-    assert (where / "results.json").exists()
+    (where / "report.html").write_text("mine")
+    (where / "thesis.docx").write_text("three years")
+    plan = ("plan", "part.toml", "--strategy", "zigzag", "--layers", 1, "--no-virtual-test",
+            "--out", "others")  # fmt: skip
+    code, _, err = ccfem(*plan)
+    assert code == 2
+    assert "did not write, such as report.html" in err
+    assert (where / "report.html").read_text() == "mine"
+    assert ccfem(*plan, "--force")[0] == 0
+    assert "ccfem" in (where / "report.html").read_text()
+    assert (where / "thesis.docx").read_text() == "three years"
+
+
+def test_a_name_that_is_no_folder_is_refused(ccfem, folder):
+    for name in ("../../X", "[/red]", "", "x" * 300, "\\u001b[31m"):
+        (folder / "named.toml").write_text(f'name = "{name}"\n' + PART)
+        code, _, err = ccfem("plan", "named.toml", "--strategy", "zigzag")
+        if name:
+            assert (code, err.count("\n")) == (2, 1)
+            assert "the name of a case must have letters" in err
+    assert not (folder.parent.parent / "X").exists()
 
 
 def test_a_failed_strategy_is_shown(ccfem, folder):
@@ -364,4 +377,4 @@ def refused(ccfem, folder, message, *arguments):
     assert re.search(message, err), err
     after = {path: path.stat().st_mtime_ns for path in folder.rglob("*") if path.is_file()}
     assert after == before
-    assert not list(folder.rglob(".ccfem*"))
+    assert not list(folder.rglob(".ccfem-*"))
