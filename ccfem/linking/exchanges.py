@@ -16,11 +16,11 @@ from ccfem.errors import InputError
 __all__ = ["Clusters", "greedy_order", "improved_order", "strands"]
 
 _BLOCK = 3
-"""Most clusters that Or-opt moves at once."""
+"""Maximum number of clusters that Or-opt moves at once."""
 _MANY = 50
-"""Clusters above which fewer rounds are made."""
+"""Number of clusters above which fewer rounds are made."""
 _TIME_LIMIT = 30.0
-"""No further round begins after this, s: up to some hundred clusters take less."""
+"""Time, s, after which no further round begins; about a hundred clusters take less."""
 
 
 class Clusters(NamedTuple):

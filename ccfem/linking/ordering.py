@@ -1,4 +1,4 @@
-"""Order in which things with several ends are visited, so that what joins them costs least.
+"""Order in which things with several ends are visited so that the links between them cost least.
 
 A cluster is visited once: entered at one of its terminals, left at another. A strand is a cluster
 of two terminals; a group of strands that are laid together is one of all their ends. The order of
@@ -18,7 +18,7 @@ from ccfem.linking.exchanges import Clusters, greedy_order, improved_order, stra
 __all__ = ["costs_between_ends", "order_clusters"]
 
 _EXACT = 12
-"""Clusters up to which the order is the best there is."""
+"""Maximum number of clusters for which the order is the best there is."""
 
 
 def order_clusters(clusters: Clusters, exact: int = _EXACT, rounds: int = 30) -> IntArray:
@@ -28,7 +28,7 @@ def order_clusters(clusters: Clusters, exact: int = _EXACT, rounds: int = 30) ->
     ----------
     clusters : Clusters
     exact : int, default 12
-        Up to so many clusters the order is the best there is; the work is 2^p t^2.
+        Up to this many clusters the order is the best there is; the work is 2^p t^2.
     rounds : int, default 30
         Of the search above that (`improved_order`); fewer for more than fifty clusters.
 

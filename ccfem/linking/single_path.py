@@ -1,4 +1,4 @@
-"""All tracks of a section as one continuous path, its turns outside the section as far as can be.
+"""All tracks of a section as one continuous path that turns outside the section where it can.
 
 T. Wang, N. Li, G. Link, J. Jelonnek, J. Fleischer, J. Dittus, D. Kupzik, Load-dependent path
 planning method for 3D printing of continuous fiber reinforced plastics, Composites Part A 140
@@ -32,16 +32,16 @@ __all__ = ["LinkedPath", "link_tracks"]
 _REACH = (1.0, 3.0, 6.0)
 """Straight extensions, mm, of tracks before a link turns."""
 _EXACT_GROUPS = 10
-"""Most groups of which the best order is found for sure."""
+"""Maximum number of groups whose order is the best there is."""
 _ROUNDS = 15
-"""Of the search among single tracks."""
+"""Rounds of the search among single tracks."""
 _WEIGHTS = (8.0, 4.0, 0.0)
 """Extra cost of each mm of a link inside the section, over its holes, where nothing holds the
 fibre, and outside."""
 _STEP = 0.5
 """Longest distance, mm, between neighbouring points of a link."""
 _ON_BORDER = 1e-3
-"""Length, mm, of a link that begins on the border, by which it may seem to lie inside."""
+"""Length, mm, of a link on the border that may count as inside through rounding."""
 
 
 @dataclass(frozen=True)
@@ -65,9 +65,9 @@ class LinkedPath:
     def without_long_links(
         self, section: Region, inside: float, over_void: float = np.inf
     ) -> "list[LinkedPath]":
-        """Leave out links of which more than so many mm lies inside a section or over its voids.
+        """Leave out links with more than a length, mm, inside a section or over its voids.
 
-        The path falls into one piece more than there are such links.
+        The path falls into one more piece than there are such links.
         """
         stretches = runs(self.link)
         steps = np.flatnonzero(self.link)
@@ -96,10 +96,11 @@ def link_tracks(
 ) -> LinkedPath:
     """Join the tracks of all groups to one path.
 
-    First each group is laid in one go: the order of the tracks in a group, that of the groups, and
-    the ends at which each is begun and left are those whose links cost least, exactly so for up to
-    12 tracks in a group and 10 groups, else as found by a search. A second search moves stretches
-    of single tracks where that makes the links cheaper still. The same input gives the same path.
+    First each group is laid without a break: the order of the tracks in a group, that of the
+    groups, and the ends at which each is begun and left are those whose links cost least, exactly
+    so for up to 12 tracks in a group and 10 groups, else as found by a search. A second search
+    moves stretches of single tracks where that makes the links cheaper still. The same input gives
+    the same path.
 
     A link is the cheapest of the Dubins curves between the ends, extended straight, and of the ways
     along a ring round the section. It costs its length, plus 8 mm for each mm inside the section
@@ -158,9 +159,9 @@ def _clean(track: FloatArray) -> FloatArray:
 def _opened(
     groups: Sequence[Sequence[FloatArray]], radius: float, width: float
 ) -> list[list[FloatArray]]:
-    """Open closed tracks side by side, as near to the other groups as can be.
+    """Open closed tracks side by side, as near to the other groups as possible.
 
-    Each is left out for as long as two arcs take to the next track, one `width` aside.
+    The gap in each is as long as two arcs that lead to the next track, one `width` sideways.
     """
     aside = min(width, 2.0 * radius)
     gap = max(width, 1.1 * float(np.sqrt(aside * (4.0 * radius - aside))))
