@@ -82,6 +82,11 @@ class Machine:
         check_fields(self, *numbers, at_least=0.0)
 
     @property
+    def strand_height(self) -> float:
+        """Least height of a layer of strands a fibre width apart, mm: what their volume needs."""
+        return max(self.fibre_height, self.filament_area / self.fibre_width)
+
+    @property
     def tail(self) -> float:
         """Fibre that is still to be laid after a cut, mm."""
         if self.cutter_distance is None:
