@@ -10,6 +10,7 @@ from ccfem.comparison.runs import Run, Tested
 from ccfem.elasticity.stress_field import StressField
 from ccfem.errors import InputError, SolveError
 from ccfem.evaluation import evaluate
+from ccfem.evaluation.printable import why_not
 from ccfem.export.print_plan import plan_print
 from ccfem.layers import Layer
 from ccfem.machine.machine import Machine
@@ -103,7 +104,8 @@ def evaluated(run: Run, part: Part, tell: Tell) -> Run:
 
     def work() -> Run:
         found = evaluate(run.toolpaths, part.layers, part.stress, part.machine)
-        return replace(run, evaluation=found)
+        broken = why_not(found.total, part.machine)
+        return replace(run, evaluation=found, why_not="; ".join(broken))
 
     return _stage(run, "evaluate", work)
 

@@ -12,7 +12,7 @@ from ccfem.geometry.polylines import starts_segment
 from ccfem.machine.machine import Machine
 from ccfem.mesh.tet_mesh import TetMesh
 from ccfem.toolpaths import FIBRE, Toolpaths
-from ccfem.virtual_testing.room import room_of
+from ccfem.virtual_testing.strand_room import room_of
 
 __all__ = ["Strands", "cut_strands"]
 
@@ -46,7 +46,7 @@ class Strands:
         Length of fibre, links left out, that lies outside the mesh and carries nothing.
     share : (s,) array in [0, 1]
         How much of its stiffness each piece lends: fibre on other fibre has no room, and lends
-        nothing (`ccfem.virtual_testing.room`).
+        nothing (`ccfem.virtual_testing.strand_room`).
     """
 
     cell: IntArray

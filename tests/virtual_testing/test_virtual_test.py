@@ -18,7 +18,7 @@ from ccfem.toolpaths import Toolpaths
 from ccfem.virtual_testing import equilibrium as equilibrium_module
 from ccfem.virtual_testing.equilibrium import BONDED, MODES, TENSION, equilibrium
 from ccfem.virtual_testing.specimen import Specimen
-from ccfem.virtual_testing.stiffer import FIRST, SECOND, UNDECIDED, stiffer
+from ccfem.virtual_testing.stiffer import FIRST, RESOLUTION, SAME, SECOND, UNDECIDED, stiffer
 from ccfem.virtual_testing.strand import Strand
 from ccfem.virtual_testing.strands import cut_strands
 from ccfem.virtual_testing.virtual_test import (
@@ -263,7 +263,13 @@ def test_neither_is_stiffer_where_the_tests_disagree():
     more = virtual_bracket(toolpaths(*low, *high), field)
     assert stiffer(more, below) == FIRST
     assert stiffer(below, more) == SECOND
-    assert stiffer(below, below) == UNDECIDED
+    assert stiffer(below, below) == SAME
+    # the resolution of the test: gains of both modes below it are no difference
+    for share, said in ((0.5, SAME), (2.0, FIRST)):
+        gain = 1.0 + share * RESOLUTION
+        tests = {name: getattr(below, name) for name in ("tension", "bonded")}
+        tests = {n: dataclasses.replace(t, stiffness=gain * t.stiffness) for n, t in tests.items()}
+        assert stiffer(dataclasses.replace(below, **tests), below) == said
     with pytest.raises(InputError, match="one part under one load case"):
         stiffer(below, virtual_bracket(low, solve(clamped())["load"], span=()))
     ratios = [ratio for _, ratio in more.tension.span]
