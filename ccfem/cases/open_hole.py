@@ -14,16 +14,14 @@ from ccfem.meshing import extrude
 __all__ = ["open_hole", "open_hole_mesh", "open_hole_outline"]
 
 ELEMENT_SIZE = 2.0
+LENGTH, WIDTH, THICKNESS = 200.0, 36.0, 4.0
 RADIUS = 6.0
-THICKNESS = 4.0
 
 
-def open_hole_outline(
-    length: float = 200.0, width: float = 36.0, radius: float = RADIUS
-) -> shapely.Polygon:
-    """Planform of the plate, mm, the hole in its middle: a shapely Polygon."""
-    plate = shapely.box(-0.5 * length, -0.5 * width, 0.5 * length, 0.5 * width)
-    return plate.difference(shapely.Point(0.0, 0.0).buffer(radius, quad_segs=32))
+def open_hole_outline() -> shapely.Polygon:
+    """Planform of the plate, mm, with the hole in its middle."""
+    plate = shapely.box(-0.5 * LENGTH, -0.5 * WIDTH, 0.5 * LENGTH, 0.5 * WIDTH)
+    return plate.difference(shapely.Point(0.0, 0.0).buffer(RADIUS, quad_segs=32))
 
 
 def open_hole_mesh(element_size: float) -> TetMesh:

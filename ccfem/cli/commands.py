@@ -149,7 +149,7 @@ def plan(
     ] = False,
     out: Out = None,
 ) -> None:
-    """Plan a part by one strategy, by default with as much fibre as it lays of its own accord."""
+    """Plan a part by one strategy, by default with its natural amount of fibre."""
     parameters = {strategy: parameters_of(strategy, set_ or ())}
     chosen = layers_of(layers, heights, slicing)
     options = options_of(chosen, fibre_per_layer, virtual_test, load_case, backend)

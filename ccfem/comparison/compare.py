@@ -145,9 +145,9 @@ def compare(
     """Solve a case once, and plan and evaluate each strategy on it.
 
     Strategies are compared at equal length of fibre: more fibre wins almost any comparison. When no
-    length is given, it is the smallest that any of them lays of its own accord, so that nobody has
-    to lay more than it would, and all others are thinned to it by the parameter that each names for
-    the purpose. A strategy that fails stays in the result, with the reason.
+    length is given, it is the shortest natural length of any of them, and all others are thinned to
+    it, each by its own parameter (`LayerStrategy.amount`). A strategy that fails stays in the
+    result, with the reason.
 
     Parameters
     ----------

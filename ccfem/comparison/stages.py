@@ -82,7 +82,7 @@ def levelled(runs: Sequence[Run], part: Part, tell: Tell) -> tuple[list[Run], fl
 
     def level(run: Run) -> Run:
         if run is setter:
-            return replace(run, note="lays the least of its own accord: sets the length")
+            return replace(run, note="has the shortest natural length: sets the length")
         own = Planned(run.strategy, run.toolpaths, run.length_per_layer)
         return planned(run, part, setter.length_per_layer, tell, own)
 

@@ -1,7 +1,7 @@
 """Order of many clusters by exchanges of stretches of it (2-opt, Or-opt).
 
 Every order is judged by its best terminals, found by dynamic programming along it; only what an
-exchange changes is computed anew. See `ordering` for what a cluster is.
+exchange changes is recomputed. See `ordering` for what a cluster is.
 """
 
 import time

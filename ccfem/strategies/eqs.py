@@ -42,8 +42,8 @@ class Eqs:
     layer, or the one through a given point. The others are iso-lines of the Euclidean distance from
     it, to its sides and round its ends: exactly parallel, whatever voids lie between. Distance
     measured within the section would lay them across every member that leads away from the seed
-    line, and break them behind every hole, where two fronts meet. Away from the seed line the
-    stress has no say.
+    line, and break them behind every hole, where two fronts meet. Away from the seed line
+    the stress has no influence.
 
     Attributes
     ----------

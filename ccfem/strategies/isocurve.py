@@ -14,7 +14,7 @@ from typing import Any, ClassVar, Literal
 import numpy as np
 from scipy.spatial import cKDTree
 
-from ccfem.arrays import BoolArray, FloatArray
+from ccfem.arrays import FloatArray
 from ccfem.checks import check_choices, check_fields
 from ccfem.elasticity.part_stress import PartStress
 from ccfem.errors import InputError
@@ -22,12 +22,13 @@ from ccfem.fields.compatibility import Incompatible
 from ccfem.fields.crease import orient_along
 from ccfem.fields.fill import fill_laplacian, fill_screened
 from ccfem.fields.layer_elements import Surface
-from ccfem.fields.layer_tension import MeshTension, SampledTension, layer_tension, mesh_tension
+from ccfem.fields.layer_tension import layer_tension, mesh_tension
 from ccfem.fields.levels import extract_levels, unit_levels
 from ccfem.fields.orientation import orient
 from ccfem.fields.scalar import fit_cone, fit_constrained, fit_literal, fit_weighted
+from ccfem.fields.tensile import Tension
 from ccfem.geometry.isocontours import Isocontours
-from ccfem.geometry.polylines import is_closed, runs
+from ccfem.geometry.polylines import is_closed, middle_of_longest_run
 from ccfem.layers.holes import holes_on
 from ccfem.layers.layer import Layer
 from ccfem.layers.layer_stress import LayerStress, stress_on
@@ -222,9 +223,9 @@ class _Planner:
     """The strategy once it has seen the whole part."""
 
     strategy: Isocurve
-    part: MeshTension | None
+    part: Tension | None
 
-    def tension(self, layer: Layer, stress: LayerStress) -> SampledTension:
+    def tension(self, layer: Layer, stress: LayerStress) -> Tension:
         s = self.strategy
         if self.part is not None:
             return self.part.on(layer)
@@ -239,12 +240,13 @@ class _Planner:
         lines = self.connected(lines, layer, tension, stress.held_or_loaded, machine)
         return Toolpaths.from_plane(lines, layer)
 
-    def isocurves(
-        self, surface: Surface, tension: SampledTension, width: float
-    ) -> list[FloatArray]:
+    def isocurves(self, surface: Surface, tension: Tension, width: float) -> list[FloatArray]:
         """Isocurves of the field, at least a width apart."""
         s = self.strategy
-        cap = max(_percentile(tension.stress, surface.areas, s.cap), 1e-300)
+        percentile = np.quantile(
+            tension.stress, s.cap / 100.0, weights=surface.areas, method="inverted_cdf"
+        )
+        cap = max(float(percentile), 1e-300)
         confidence = np.where(tension.defined, np.minimum(tension.stress / cap, 1.0), 0.0)
         direction = tension.direction
         if s.fill == "screened":
@@ -287,7 +289,7 @@ class _Planner:
                 if worth.mean() >= 0.5:
                     kept.append(line)
                     continue
-                middle = _longest_run(~worth[:-1])
+                middle = middle_of_longest_run(~worth[:-1])
                 line = np.roll(line[:-1], -middle, axis=0)
                 worth = np.roll(worth[:-1], -middle)
             inside = np.flatnonzero(worth)
@@ -299,7 +301,7 @@ class _Planner:
         self,
         lines: list[FloatArray],
         layer: Layer,
-        tension: SampledTension,
+        tension: Tension,
         patches: tuple[str, ...],
         machine: Machine,
     ) -> list[FloatArray]:
@@ -329,18 +331,3 @@ def _nearest(layer: Layer, values: FloatArray) -> Callable[[FloatArray], FloatAr
     """Return a function that gives points (k, 2) the value of the nearest triangle."""
     tree = cKDTree(layer.plane.points[layer.triangles].mean(axis=1))
     return lambda points: values[tree.query(points)[1]]
-
-
-def _longest_run(mask: BoolArray) -> int:
-    """Index of the middle of the longest run of true values on a ring of values."""
-    starts, ends = runs(np.concatenate([mask, mask])).T
-    longest = int(np.argmax(ends - starts))
-    return int(starts[longest] + ends[longest]) // 2 % len(mask)
-
-
-def _percentile(values: FloatArray, weight: FloatArray, share: float) -> float:
-    """Value that `share` percent of the weight lies at or below."""
-    order = np.argsort(values, kind="stable")
-    below = np.cumsum(weight[order])
-    place: Any = np.searchsorted(below, share / 100.0 * below[-1] * (1.0 - 1e-12))
-    return float(values[order[min(int(place), len(order) - 1)]])

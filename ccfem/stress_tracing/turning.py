@@ -1,6 +1,6 @@
 """Tracks turned to the stress where no rails guide them: in joints and beside free ends.
 
-A track may move sidewise by u(s). What is least is the sum over its length of ::
+A track may move sideways by u(s). The turned track minimises the sum, over its length, of ::
 
     cos(2 r) (u' - tan r)^2 + (c u'')^2 + (u / l)^2
 

@@ -33,8 +33,8 @@ def walk(
 
     From an end of the axis under the largest stress, or else the point under the largest stress,
     the next point is always the one with the least smoothness, within the limits of the criterion
-    and without leaving the section. The walk ends where there is none; it starts anew until no
-    point is left. Joints may be passed once for every two members.
+    and without leaving the section. The walk ends where there is none; a new one starts
+    until no point is left. Joints may be passed once for every two members.
 
     Parameters
     ----------

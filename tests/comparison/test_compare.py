@@ -9,7 +9,7 @@ import pytest
 
 from ccfem.cases.case import Case
 from ccfem.comparison.compare import compare, create_all
-from ccfem.comparison.headline import headline_values
+from ccfem.comparison.headline import HEADLINE, headline_values
 from ccfem.comparison.pictures import caption
 from ccfem.comparison.ranking import best_values
 from ccfem.elasticity.problem import Force, Problem, Support
@@ -90,6 +90,17 @@ def test_fibre_along_the_pull_wins_by_the_rule_of_mixtures():
     best = best_values(result.runs, result.fibre_per_layer)
     assert best["stiffness_ratio_tension"] == along["stiffness_ratio_tension"]
     assert best["efficiency"] == along["efficiency"]
+
+
+def test_best_values_are_the_largest_or_the_smallest_as_each_column_says(compared):
+    best, sides = best_values(compared), set()
+    for head in HEADLINE:
+        values = sorted(headline_values(run)[head.column] for run in compared.runs)
+        if head.better and values[0] < values[-1]:
+            assert best.pop(head.column) == values[{"low": 0, "high": -1}[head.better]]
+            sides.add(head.better)
+    assert not best
+    assert sides == {"low", "high"}
 
 
 def test_opposite_orders_are_undecided(compared):

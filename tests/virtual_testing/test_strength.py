@@ -107,6 +107,11 @@ def test_fibre_peak_is_the_length_weighted_percentile():
     piece = np.linalg.norm(test.strands.middle - where, axis=1).argmin()
     assert test.axial_force[piece] == pytest.approx(index)
     assert fibre_peak(test, 1.0)[0] == test.axial_force.max()
+    # By default that of 99 % of the length.
+    index = fibre_peak(test)[0]
+    below = test.strands.length[test.axial_force < index].sum() / test.strands.total
+    upto = test.strands.length[test.axial_force <= index].sum() / test.strands.total
+    assert 0.9 < below <= 0.99 <= upto
 
 
 def test_failure_load_does_not_depend_on_the_load_of_the_test():
