@@ -117,6 +117,14 @@ class TetMesh:
         return read_only(np.stack([order[first], order[first + 1]], axis=1) // 4, np.int64)
 
     @cached_property
+    def across(self) -> IntArray:
+        """Cell across the face opposite to each corner, (m, 4); -1 where there is none."""
+        order, first, _ = self._facet_pairing
+        table = np.full(4 * len(self.cells), -1, dtype=np.int64)
+        table[order[first]], table[order[first + 1]] = order[first + 1] // 4, order[first] // 4
+        return read_only(table.reshape(-1, 4), np.int64)
+
+    @cached_property
     def bounds(self) -> FloatArray:
         """Smallest and largest coordinates, (2, 3), mm."""
         return read_only(np.stack([self.points.min(axis=0), self.points.max(axis=0)]))
