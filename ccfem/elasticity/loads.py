@@ -1,7 +1,6 @@
 """Nodal forces of loads, consistent with linear and quadratic facets."""
 
 from collections.abc import Callable
-from functools import reduce
 
 import numpy as np
 
@@ -16,6 +15,7 @@ from ccfem.elasticity.problem import (
     Traction,
 )
 from ccfem.errors import InputError
+from ccfem.mesh.facets import positions
 
 __all__ = ["load_case", "load_cases", "nodal_forces"]
 
@@ -30,16 +30,9 @@ def _facets(mesh: LoadedBody, name: str) -> IntArray:
 
 def _outward(mesh: LoadedBody, name: str) -> tuple[IntArray, FloatArray, FloatArray]:
     """Facets of a patch with their areas and outward unit normals."""
-    facets, n = _facets(mesh, name), len(mesh.points)
-
-    def key(corners: IntArray) -> IntArray:
-        columns = np.sort(corners, axis=1).T
-        return np.asarray(reduce(lambda high, low: high * n + low, columns))
-
-    known, wanted = key(mesh.boundary), key(facets)
-    order = np.argsort(known)
-    at = order[np.minimum(np.searchsorted(known, wanted, sorter=order), len(order) - 1)]
-    if (known[at] != wanted).any():
+    facets = _facets(mesh, name)
+    at = positions(facets, mesh.boundary)
+    if (at < 0).any():
         raise InputError(
             f"patch '{name}' has facets inside the part: pressure and bearing need boundary facets"
         )

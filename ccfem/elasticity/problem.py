@@ -2,11 +2,10 @@
 
 from collections.abc import Mapping
 from dataclasses import dataclass, field
-from types import MappingProxyType
 
 import numpy as np
 
-from ccfem.arrays import FloatArray, read_only
+from ccfem.arrays import FloatArray, freeze
 from ccfem.errors import InputError
 from ccfem.materials import Material
 from ccfem.mesh.tet_mesh import TetMesh
@@ -123,17 +122,19 @@ class Problem:
     density: FloatArray | None = None
     stiffness: FloatArray | None = None
 
+    def __repr__(self) -> str:
+        return (
+            f"Problem of {self.material.name} on {self.mesh!r}; {len(self.supports)} supports, "
+            f"load cases {', '.join(self.loads) or 'none'}"
+        )
+
     def __post_init__(self) -> None:
-        object.__setattr__(self, "supports", tuple(self.supports))
-        loads = {name: tuple(case) for name, case in self.loads.items()}
-        object.__setattr__(self, "loads", MappingProxyType(loads))
+        freeze(self, supports=tuple, loads=tuple, axes=float, density=float, stiffness=float)
         m = len(self.mesh.cells)
         for name, shape in (("axes", (m, 3, 3)), ("density", (m,)), ("stiffness", (m, 6, 6))):
             value = getattr(self, name)
             if value is None:
                 continue
-            value = read_only(value)
-            object.__setattr__(self, name, value)
             if value.shape != shape:
                 raise InputError(
                     f"problem.{name} must have shape {shape}, one entry a cell; got {value.shape}"

@@ -115,7 +115,7 @@ def prepare(problem: Problem) -> System:
     Raises
     ------
     InputError
-        For supports or loads that nothing sensible can follow from.
+        For an invalid mesh, support or load.
     """
     if not np.isfinite(problem.mesh.points).all():
         raise InputError("the mesh has points that are NaN or infinite: correct its coordinates")
@@ -151,7 +151,7 @@ def solve(
     Raises
     ------
     InputError
-        For supports, loads or a backend that nothing sensible can follow from.
+        For an invalid mesh, support, load or backend.
     SolveError
         When a relative residual stays above the tolerance; very flat cells are named.
     """

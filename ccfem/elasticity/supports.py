@@ -5,11 +5,12 @@ from dataclasses import dataclass
 
 import numpy as np
 import scipy.sparse as sp
-from scipy.sparse.csgraph import connected_components
 
 from ccfem.arrays import BoolArray, FloatArray, IntArray, read_only
-from ccfem.elasticity.body import Cells, SupportedProblem
+from ccfem.elasticity.body import SupportedProblem
 from ccfem.errors import InputError
+from ccfem.mesh.cell_mesh import CellMesh
+from ccfem.mesh.measures import connected
 
 __all__ = ["Held", "check_support", "held", "rigid_modes"]
 
@@ -128,7 +129,7 @@ def rigid_modes(points: FloatArray) -> FloatArray:
     return modes.reshape(-1, 6)
 
 
-def check_support(mesh: Cells, fixed: BoolArray) -> None:
+def check_support(mesh: CellMesh, fixed: BoolArray) -> None:
     """Check that no piece of the part can move as a rigid body.
 
     Bodies are cells joined through faces (edges in the plane); bodies that share only an edge or a
@@ -145,9 +146,8 @@ def check_support(mesh: Cells, fixed: BoolArray) -> None:
     InputError
         Names the free motion.
     """
-    pairs, m = mesh.neighbours, len(mesh.cells)
-    links = sp.coo_array((np.ones(len(pairs), dtype=bool), pairs.T), shape=(m, m))
-    count, body = connected_components(links, directed=False)
+    body = connected(mesh.neighbours, len(mesh.cells))
+    count = int(body.max()) + 1
     corner_body = np.repeat(body, mesh.corners.shape[1])
     points = mesh.points
     if points.shape[1] == 2:  # the plane z = 0 in space, every node held across it
@@ -163,10 +163,7 @@ def check_support(mesh: Cells, fixed: BoolArray) -> None:
         return
     members = np.unique(mesh.corners.reshape(-1) * count + corner_body)
     node, owner = members // count, members % count
-    links = sp.coo_array(
-        (np.ones(len(node), dtype=bool), (owner, count + node)), shape=(2 * [count + len(fixed)])
-    )
-    _, piece = connected_components(links, directed=False)
+    piece = connected(np.stack([owner, count + node], axis=1), count + len(fixed))
     named = np.unique(piece[:count])
     for k in named:
         chosen = piece[owner] == k

@@ -3,17 +3,15 @@
 from collections.abc import Mapping
 from dataclasses import dataclass, field
 from functools import cached_property
-from types import MappingProxyType
-from typing import Any
 
 import numpy as np
-import scipy.sparse as sparse
 import shapely
-from scipy.sparse.csgraph import connected_components
 
-from ccfem.arrays import FloatArray, IntArray, read_only
+from ccfem.arrays import FloatArray, IntArray, freeze, read_only
 from ccfem.errors import InputError
+from ccfem.geometry.shapes import Region
 from ccfem.layers.plane import Plane
+from ccfem.mesh.measures import connected
 
 __all__ = ["FlatLayer", "Layer"]
 
@@ -64,21 +62,12 @@ class Layer:
     local_thickness: FloatArray = None  # type: ignore[assignment]
 
     def __post_init__(self) -> None:
-        for name, dtype in (
-            ("points", np.float64),
-            ("triangles", np.int64),
-            ("cell", np.int64),
-            ("nodes", np.int64),
-            ("weights", np.float64),
-        ):
-            object.__setattr__(self, name, read_only(getattr(self, name), dtype))
         if self.local_thickness is None:
             everywhere = np.full(len(self.points), float(self.thickness))
             object.__setattr__(self, "local_thickness", everywhere)
-        object.__setattr__(self, "local_thickness", read_only(self.local_thickness))
+        freeze(self, points=float, triangles=int, cell=int, nodes=int, weights=float, patches=int)
+        freeze(self, local_thickness=float)
         object.__setattr__(self, "loops", tuple(read_only(x, np.int64) for x in self.loops))
-        patches = {name: read_only(edges, np.int64) for name, edges in self.patches.items()}
-        object.__setattr__(self, "patches", MappingProxyType(patches))
 
     def __repr__(self) -> str:
         shape = "curved" if self.flat is None else f"flat at {self.flat.height:.6g} mm"
@@ -123,12 +112,10 @@ class Layer:
     @cached_property
     def component(self) -> IntArray:
         """Number of the piece that each triangle belongs to, (t,), from 0 on."""
-        n, t = len(self.points), self.triangles
-        ends = (np.repeat(t[:, 0], 2), t[:, 1:].ravel())
-        graph = sparse.coo_array((np.ones(2 * len(t), dtype=np.int8), ends), shape=(n, n))
-        _, piece = connected_components(graph, directed=False)
+        t = self.triangles
+        piece = connected(np.concatenate([t[:, :2], t[:, 1:]]), len(self.points))
         _, number = np.unique(piece[t[:, 0]], return_inverse=True)
-        return read_only(number, np.int64)
+        return read_only(number, int)
 
     @cached_property
     def plane(self) -> "FlatLayer":
@@ -165,10 +152,10 @@ class FlatLayer(Plane):
 
     def __post_init__(self) -> None:
         super().__post_init__()
-        object.__setattr__(self, "points", read_only(self.points))
+        freeze(self, points=float)
 
     @cached_property
-    def polygon(self) -> Any:
+    def polygon(self) -> Region:
         """Section: a valid (Multi)Polygon with holes, mm."""
         rings = [shapely.Polygon(self.points[loop]) for loop in self.loops if len(loop) > 2]
         outer = [ring for ring in rings if ring.exterior.is_ccw]

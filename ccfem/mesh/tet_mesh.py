@@ -1,16 +1,17 @@
 """Tetrahedral meshes with named patches."""
 
-from collections.abc import Mapping
-from dataclasses import dataclass, field, replace
+from dataclasses import dataclass
 from functools import cached_property
-from types import MappingProxyType
 
 import numpy as np
 
 from ccfem.arrays import FloatArray, IntArray, read_only
 from ccfem.errors import InputError
+from ccfem.mesh.cell_mesh import CellMesh
+from ccfem.mesh.facets import positions, unique_edges
+from ccfem.mesh.measures import signed_volumes
 
-__all__ = ["TetMesh", "signed_volumes"]
+__all__ = ["TetMesh"]
 
 _FACES = np.array([[1, 2, 3], [0, 3, 2], [0, 1, 3], [0, 2, 1]])
 """Corner nodes of the face opposite to each corner, outward for a positive cell."""
@@ -19,8 +20,8 @@ _EDGES = np.array([[0, 1], [1, 2], [0, 2], [0, 3], [1, 3], [2, 3]])
 """Corner nodes of the edge that carries mid-side node 4 + k (VTK order)."""
 
 
-@dataclass(frozen=True)
-class TetMesh:
+@dataclass(frozen=True, repr=False)
+class TetMesh(CellMesh):
     """A tetrahedral mesh, linear (P1) or quadratic (P2), with named boundary patches.
 
     Attributes
@@ -32,32 +33,11 @@ class TetMesh:
         Boundary facets by their corner nodes.
     """
 
-    points: FloatArray
-    cells: IntArray
-    patches: Mapping[str, IntArray] = field(default_factory=dict)
-
+    dimension = 3
+    sizes = (4, 10)
+    kinds = "linear or quadratic tetrahedra"
     edges = _EDGES
     faces = _FACES
-
-    def __post_init__(self) -> None:
-        object.__setattr__(self, "points", read_only(self.points))
-        object.__setattr__(self, "cells", read_only(self.cells, np.int64))
-        patches = {name: read_only(facets, np.int64) for name, facets in self.patches.items()}
-        object.__setattr__(self, "patches", MappingProxyType(patches))
-        if self.points.ndim != 2 or self.points.shape[1] != 3:
-            raise InputError(
-                f"mesh points must have shape (n, 3); got {self.points.shape}: give x, y, z a node"
-            )
-        if self.cells.ndim != 2 or self.cells.shape[1] not in (4, 10) or not len(self.cells):
-            raise InputError(
-                f"mesh cells must have shape (m, 4) or (m, 10) with m >= 1; got "
-                f"{self.cells.shape}: give linear or quadratic tetrahedra"
-            )
-        if self.cells.min() < 0 or self.cells.max() >= len(self.points):
-            raise InputError(
-                f"mesh cells must name nodes 0 to {len(self.points) - 1}; got "
-                f"{self.cells.min()} to {self.cells.max()}: check the numbering of the file"
-            )
 
     @property
     def order(self) -> int:
@@ -85,49 +65,18 @@ class TetMesh:
         with np.errstate(divide="ignore"):
             return read_only(longest * largest / (3.0 * np.abs(self.volumes)))
 
-    @cached_property
-    def _facet_pairing(self) -> tuple[IntArray, IntArray, IntArray]:
-        """Facets sorted so that equal ones are adjacent: order, first of a pair, single ones."""
-        facets = np.sort(self.corners[:, _FACES].reshape(-1, 3), axis=1)
-        n = len(self.points)
-        key = (facets[:, 0] * n + facets[:, 1]) * n + facets[:, 2]
-        order = np.argsort(key, kind="stable")
-        same = key[order[1:]] == key[order[:-1]]
-        first = np.flatnonzero(same)
-        single = np.ones(len(key), dtype=bool)
-        single[first] = single[first + 1] = False
-        return order, first, np.sort(order[single])
-
-    @cached_property
-    def boundary(self) -> IntArray:
-        """Corner nodes of the boundary facets, (b, 3), outward."""
-        _, _, single = self._facet_pairing
-        return read_only(self.corners[:, _FACES].reshape(-1, 3)[single], np.int64)
-
-    @cached_property
-    def boundary_cells(self) -> IntArray:
-        """Cell of each boundary facet, (b,)."""
-        _, _, single = self._facet_pairing
-        return read_only(single // 4, np.int64)
-
-    @cached_property
-    def neighbours(self) -> IntArray:
-        """Pairs of cells that share a face, (f, 2)."""
-        order, first, _ = self._facet_pairing
-        return read_only(np.stack([order[first], order[first + 1]], axis=1) // 4, np.int64)
+    @property
+    def facets(self) -> IntArray:
+        """Corner nodes of the faces of all cells, (4 m, 3), outward."""
+        return self.corners[:, _FACES].reshape(-1, 3)
 
     @cached_property
     def across(self) -> IntArray:
         """Cell across the face opposite to each corner, (m, 4); -1 where there is none."""
-        order, first, _ = self._facet_pairing
+        first, second = self._pairing[0].T
         table = np.full(4 * len(self.cells), -1, dtype=np.int64)
-        table[order[first]], table[order[first + 1]] = order[first + 1] // 4, order[first] // 4
-        return read_only(table.reshape(-1, 4), np.int64)
-
-    @cached_property
-    def bounds(self) -> FloatArray:
-        """Smallest and largest coordinates, (2, 3), mm."""
-        return read_only(np.stack([self.points.min(axis=0), self.points.max(axis=0)]))
+        table[first], table[second] = second // 4, first // 4
+        return read_only(table.reshape(-1, 4), int)
 
     def facet_areas(self, facets: IntArray) -> tuple[FloatArray, FloatArray]:
         """Areas (k,), mm^2, and unit normals (k, 3) of facets (k, 3)."""
@@ -150,55 +99,32 @@ class TetMesh:
         """
         if self.order == 1 or not len(facets):
             return facets
-        n = len(self.points)
-        on_facet = np.zeros(n, dtype=bool)
+        on_facet = np.zeros(len(self.points), dtype=bool)
         on_facet[facets] = True
         ends = self.cells[:, self.edges].reshape(-1, 2)
         chosen = np.flatnonzero(on_facet[ends].all(axis=1))
-        ends = np.sort(ends[chosen], axis=1)
-        keys, first = np.unique(ends[:, 0] * n + ends[:, 1], return_index=True)
-        middle = self.cells[:, 4:].reshape(-1)[chosen[first]]
-        sides = np.sort(facets[:, [[0, 1], [1, 2], [2, 0]]], axis=2)
-        wanted = sides[..., 0] * n + sides[..., 1]
-        at = np.minimum(np.searchsorted(keys, wanted), len(keys) - 1)
-        if (keys[at] != wanted).any():
+        at = positions(facets[:, [[0, 1], [1, 2], [2, 0]]].reshape(-1, 2), ends[chosen])
+        if (at < 0).any():
             raise InputError(
                 "a patch has facets that no cell of the mesh has: name boundary facets"
             )
-        return np.hstack([facets, middle[at]])
-
-    def with_patches(self, patches: Mapping[str, IntArray]) -> "TetMesh":
-        """Return the same mesh with more named patches, (k, 3) facets each."""
-        return replace(self, patches={**self.patches, **patches})
-
-    def patch(self, name: str) -> IntArray:
-        """Facets (k, 3) of a named patch.
-
-        Raises
-        ------
-        InputError
-            When there is no patch of that name; the known ones are listed.
-        """
-        if name not in self.patches:
-            known = ", ".join(sorted(self.patches)) or "none"
-            raise InputError(f"no patch named '{name}'; the mesh has: {known}")
-        return self.patches[name]
+        return np.hstack([facets, self.cells[:, 4:].reshape(-1)[chosen[at]].reshape(-1, 3)])
 
     def quadratic(self) -> "TetMesh":
         """Return the P2 mesh with a node at the middle of every edge; patches stay."""
         if self.order == 2:
             return self
-        pairs = np.sort(self.cells[:, _EDGES].reshape(-1, 2), axis=1)
-        key = pairs[:, 0] * len(self.points) + pairs[:, 1]
-        _, first, inverse = np.unique(key, return_index=True, return_inverse=True)
-        middle = self.points[pairs[first]].mean(axis=1)
-        extra = len(self.points) + inverse.reshape(-1, 6)
-        return TetMesh(
-            np.concatenate([self.points, middle]), np.hstack([self.cells, extra]), self.patches
-        )
+        edges, edge = unique_edges(self.cells[:, _EDGES].reshape(-1, 2))
+        points = np.concatenate([self.points, self.points[edges].mean(axis=1)])
+        extra = len(self.points) + edge.reshape(-1, 6)
+        return TetMesh(points, np.hstack([self.cells, extra]), self.patches)
 
-
-def signed_volumes(points: FloatArray, cells: IntArray) -> FloatArray:
-    """Signed volume (m,), mm^3, of straight-sided tetrahedra (m, 4) between points (n, 3), mm."""
-    a, b, c, d = np.moveaxis(points[cells], 1, 0)
-    return np.asarray(np.einsum("ij,ij->i", np.cross(b - a, c - a), d - a) / 6.0)
+    def linear(self) -> "TetMesh":
+        """Return the P1 mesh of the corners alone; nodes are renumbered, patches stay."""
+        if self.order == 1:
+            return self
+        kept, cells = np.unique(self.corners, return_inverse=True)
+        number = np.full(len(self.points), -1)
+        number[kept] = np.arange(len(kept))
+        patches = {name: number[facets] for name, facets in self.patches.items()}
+        return TetMesh(self.points[kept], cells.reshape(-1, 4), patches)

@@ -111,7 +111,7 @@ def join(
 
 
 def _border_tree(points: FloatArray, outer: Sequence[IntArray]) -> cKDTree | None:
-    """Samples of the outer border."""
+    """Tree of samples of the outer border; none where there is no such border."""
     samples = []
     for loop in outer:
         a, b = points[loop], points[np.roll(loop, -1)]
@@ -173,7 +173,7 @@ def _refined(
     # Edges of the border, of the tree and of the loop are not crossed.
     count = np.bincount(side.ravel(), minlength=len(edges))
     open_ = (count == 2) & ~fixed[edges].all(axis=1)
-    share = (np.arange(_PER_EDGE) + 1.0) / (_PER_EDGE + 1.0)
+    share: FloatArray = (np.arange(_PER_EDGE) + 1.0) / (_PER_EDGE + 1.0)
     a, b = mesh.points[edges[:, 0]], mesh.points[edges[:, 1]]
     places = a[:, None] + share[None, :, None] * (b - a)[:, None]
     # Nodes of the graph: crossings, then the points of the mesh at which the curve may end.
@@ -216,6 +216,6 @@ def _refined(
         int(ends[found[0] - first]),
         int(ends[found[-1] - first]),
         edges[inner // _PER_EDGE],
-        share[inner % _PER_EDGE],
+        np.asarray(share[inner % _PER_EDGE], dtype=np.float64),
     )
     return straighten(mesh.points, path, _KEEP)

@@ -13,9 +13,7 @@ __all__ = ["straighten"]
 _SWEEPS = 20
 
 
-def straighten(
-    points: FloatArray, path: EdgePath, keep: float, sweeps: int = _SWEEPS
-) -> EdgePath:
+def straighten(points: FloatArray, path: EdgePath, keep: float, sweeps: int = _SWEEPS) -> EdgePath:
     """Move the crossings of a curve along their edges so that it gets shorter.
 
     Each crossing in turn goes to where the straight line between its neighbours crosses its edge,

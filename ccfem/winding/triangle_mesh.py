@@ -49,9 +49,7 @@ class EdgePath:
         """Return the points of the curve, (k + 2, 3), mm."""
         a, b = mesh.points[self.edges[:, 0]], mesh.points[self.edges[:, 1]]
         crossed = (1.0 - self.share)[:, None] * a + self.share[:, None] * b
-        return np.concatenate(
-            [mesh.points[self.start, None], crossed, mesh.points[self.end, None]]
-        )
+        return np.concatenate([mesh.points[self.start, None], crossed, mesh.points[self.end, None]])
 
 
 def insert(mesh: TriangleMesh, path: EdgePath) -> tuple[TriangleMesh, IntArray]:
@@ -112,7 +110,9 @@ def _split(corners: list[int], cuts: list[int | None]) -> list[list[int]]:
         return [[a, b, p], [a, p, c]]
     if number == 3:
         p, q, r = cuts
-        assert p is not None and q is not None and r is not None
+        assert p is not None
+        assert q is not None
+        assert r is not None
         a, b, c = corners
         return [[a, r, q], [r, b, p], [q, p, c], [p, q, r]]
     # The corner between the two sides that are cut.
@@ -120,5 +120,6 @@ def _split(corners: list[int], cuts: list[int | None]) -> list[list[int]]:
     a, b, c = corners[i], corners[(i + 1) % 3], corners[(i + 2) % 3]
     # Side b-c is opposite to a and whole: cuts lie on c-a (opposite to b) and on a-b.
     q, r = cuts[(i + 1) % 3], cuts[(i + 2) % 3]
-    assert q is not None and r is not None
+    assert q is not None
+    assert r is not None
     return [[a, r, q], [r, b, c], [r, c, q]]

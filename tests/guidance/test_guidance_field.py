@@ -94,7 +94,7 @@ def test_joint_without_a_cylinder_has_no_direction_but_takes_one(plate):
     np.testing.assert_allclose(joint_of(plane, "end", direction=[0, 0, 2]).direction, [0, 0, 1])
     with pytest.raises(InputError, match="must be three numbers"):
         joint_of(plane, "end", direction=[0.0, 0.0, 0.0])
-    with pytest.raises(InputError, match="no patch named 'ends'; the mesh has"):
+    with pytest.raises(InputError, match="no patch named 'ends'; there are: end, half"):
         joint_of(plane, "ends")
 
 
