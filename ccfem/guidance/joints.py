@@ -1,16 +1,19 @@
 """Joints of a part: where bolts sit, found from the patches that are held or loaded."""
 
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
+from typing import Any
 
 import numpy as np
 import scipy.sparse as sp
 from scipy.sparse.csgraph import connected_components
 
 from ccfem.arrays import FloatArray, IntArray, read_only
+from ccfem.elasticity.part_stress import PartStress
 from ccfem.errors import InputError
 from ccfem.mesh.tet_mesh import TetMesh
 
-__all__ = ["Joint", "joint_of"]
+__all__ = ["Joint", "joining_pairs", "joint_of", "joints_of"]
 
 _FLAT = 0.02
 """Share of a patch's squared normals that may lie along the axis of a cylinder."""
@@ -83,6 +86,61 @@ def joint_of(
             raise InputError(f"direction of joint '{name}' must be three numbers; got {direction}")
         axis = axis / np.linalg.norm(axis)
     return Joint(name, wall, _cells_within(mesh, wall, rings), axis, radius)
+
+
+def joints_of(
+    stress: PartStress,
+    names: Sequence[str] = (),
+    rings: int = 4,
+    directions: Mapping[str, Any] | None = None,
+) -> tuple[Joint, ...]:
+    """Find the joints of a part in the order of their names, each hole once.
+
+    Parameters
+    ----------
+    stress : PartStress
+    names : sequence of str, default ()
+        Patches; by default all that are held or loaded.
+    rings : int, default 4
+    directions : mapping of patch to three numbers, optional
+        As in `joint_of`.
+
+    Raises
+    ------
+    InputError
+    """
+    names, directions = tuple(names) or stress.held_or_loaded, directions or {}
+    for name in directions:
+        if name not in names:
+            raise InputError(
+                f"directions names '{name}', which is no joint; the joints are: "
+                f"{', '.join(names) or 'none'}"
+            )
+    found: list[Joint] = []
+    for name in names:
+        joint = joint_of(stress.mesh, name, rings, directions.get(name))
+        shared = [len(np.intersect1d(joint.wall, other.wall)) for other in found]
+        if not any(
+            both > 0.5 * min(len(joint.wall), len(other.wall))
+            for both, other in zip(shared, found, strict=True)
+        ):
+            found.append(joint)
+    return tuple(found)
+
+
+def joining_pairs(joints: Sequence[Joint], stress: PartStress) -> list[tuple[int, int]] | None:
+    """Pairs of a held joint and a loaded one; None where these are not told apart."""
+    loaded = [set(np.unique(stress.mesh.patch(name)).tolist()) for name in stress.loaded]
+    if not loaded:
+        return None
+    is_loaded = [any(len(nodes & set(j.wall.tolist())) for nodes in loaded) for j in joints]
+    pairs = [
+        (i, k)
+        for i, one in enumerate(is_loaded)
+        for k, other in enumerate(is_loaded)
+        if one and not other
+    ]
+    return pairs or None
 
 
 def _cylinder(mesh: TetMesh, facets: IntArray) -> tuple[FloatArray, FloatArray, float] | None:

@@ -18,7 +18,7 @@ from ccfem.errors import InputError
 from ccfem.winding.straighten import straighten
 from ccfem.winding.triangle_mesh import EdgePath, TriangleMesh, insert
 
-__all__ = ["join"]
+__all__ = ["border_tree", "join"]
 
 _PER_EDGE = 3
 """Points of an edge at which a curve may cross it."""
@@ -77,7 +77,7 @@ def join(
     closed = np.zeros(len(mesh.points), dtype=bool)
     for loop in outer:
         closed[loop] = True
-    cost = _Cost(_border_tree(mesh.points, outer), repulsion)
+    cost = _Cost(border_tree(mesh.points, outer), repulsion)
     graph = _edge_graph(mesh, cost, closed)
     far, _ = _ways(graph, loops)
     if len(loops) == 3:
@@ -110,7 +110,7 @@ def join(
     return mesh, curves
 
 
-def _border_tree(points: FloatArray, outer: Sequence[IntArray]) -> cKDTree | None:
+def border_tree(points: FloatArray, outer: Sequence[IntArray]) -> cKDTree | None:
     """Tree of samples of the outer border; none where there is no such border."""
     samples = []
     for loop in outer:
@@ -173,7 +173,7 @@ def _refined(
     # Edges of the border, of the tree and of the loop are not crossed.
     count = np.bincount(side.ravel(), minlength=len(edges))
     open_ = (count == 2) & ~fixed[edges].all(axis=1)
-    share: FloatArray = (np.arange(_PER_EDGE) + 1.0) / (_PER_EDGE + 1.0)
+    share = np.asarray((np.arange(_PER_EDGE) + 1.0) / (_PER_EDGE + 1.0), dtype=np.float64)
     a, b = mesh.points[edges[:, 0]], mesh.points[edges[:, 1]]
     places = a[:, None] + share[None, :, None] * (b - a)[:, None]
     # Nodes of the graph: crossings, then the points of the mesh at which the curve may end.

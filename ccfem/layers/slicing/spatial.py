@@ -16,14 +16,13 @@ from ccfem.arrays import FloatArray
 from ccfem.elasticity.part_stress import PartStress
 from ccfem.errors import InputError
 from ccfem.guidance.guidance_field import GuidanceField, JointForm, Weights, guidance_field
-from ccfem.guidance.joints import Joint, joint_of
+from ccfem.guidance.joints import Joint, joining_pairs, joints_of
 from ccfem.guidance.quality import FieldQuality, field_quality
 from ccfem.layers.layer import Layer
 from ccfem.layers.level_surfaces import level_surfaces
 from ccfem.layers.slicer import Vector
 from ccfem.layers.slicing.planar import Planar
 from ccfem.machine.machine import Machine
-from ccfem.mesh.tet_mesh import TetMesh
 from ccfem.principal_lines.critical import CriticalRegion, Keep, critical_region
 from ccfem.principal_lines.strongest import strongest_stress
 from ccfem.principal_lines.trace import mean_edge
@@ -164,13 +163,13 @@ class Spatial:
             fold back on themselves.
         """
         mesh = stress.mesh
-        joints = self._joints(mesh, stress)
+        joints = joints_of(stress, self.joints, self.rings, self.directions)
         strongest = strongest_stress(stress.stress)
         region = critical_region(
             mesh,
             strongest.direction,
             [joint.wall for joint in joints],
-            _pairs(joints, stress),
+            joining_pairs(joints, stress),
             self.lines,
         )
         diagonal = float(np.linalg.norm(mesh.bounds[1] - mesh.bounds[0]))
@@ -224,41 +223,6 @@ class Spatial:
                 "along the field: give a smaller thickness, or a count"
             )
         return count
-
-    def _joints(self, mesh: TetMesh, stress: PartStress) -> tuple[Joint, ...]:
-        """Joints in the order of their names, each hole once."""
-        names = self.joints or stress.held_or_loaded
-        for name in self.directions:
-            if name not in names:
-                raise InputError(
-                    f"directions names '{name}', which is no joint; the joints are: "
-                    f"{', '.join(names) or 'none'}"
-                )
-        found: list[Joint] = []
-        for name in names:
-            joint = joint_of(mesh, name, self.rings, self.directions.get(name))
-            shared = [len(np.intersect1d(joint.wall, other.wall)) for other in found]
-            if not any(
-                both > 0.5 * min(len(joint.wall), len(other.wall))
-                for both, other in zip(shared, found, strict=True)
-            ):
-                found.append(joint)
-        return tuple(found)
-
-
-def _pairs(joints: Sequence[Joint], stress: PartStress) -> list[tuple[int, int]] | None:
-    """Pairs of a held joint and a loaded one; None where these are not told apart."""
-    loaded = [set(np.unique(stress.mesh.patch(name)).tolist()) for name in stress.loaded]
-    if not loaded:
-        return None
-    is_loaded = [any(len(nodes & set(j.wall.tolist())) for nodes in loaded) for j in joints]
-    pairs = [
-        (i, k)
-        for i, one in enumerate(is_loaded)
-        for k, other in enumerate(is_loaded)
-        if one and not other
-    ]
-    return pairs or None
 
 
 def _flat(
