@@ -144,12 +144,18 @@ def _write_pictures(pictures: "Pictures", folder: Path) -> None:
 def _write_paths(comparison: Comparison, folder: Path) -> None:
     """Write the paths of every strategy in the formats of other programs."""
     from ccfem.export.gcode import write_gcode
+    from ccfem.export.robot_waypoints import write_robot_waypoints
     from ccfem.export.vtk import write_paths
     from ccfem.export.waypoints import write_waypoints
 
     runs = comparison.succeeded
     for run in runs:
-        write_waypoints(folder / f"{run.name}_waypoints.txt", run.toolpaths, comparison.layers)
+        layers, paths = comparison.layers, run.toolpaths
+        if all(layer.flat is not None for layer in layers):
+            write_waypoints(folder / f"{run.name}_waypoints.txt", paths, layers)
+        else:
+            file = folder / f"{run.name}_waypoints.csv"
+            write_robot_waypoints(file, paths, layers, comparison.case.machine)
         if run.print_plan is not None:
             write_gcode(folder / f"{run.name}.gcode", run.print_plan, comparison.case.machine)
     every = Toolpaths.concatenate(run.toolpaths for run in runs)

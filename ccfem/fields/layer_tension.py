@@ -93,7 +93,10 @@ class MeshTension:
 
     def on(self, layer: Layer) -> SampledTension:
         """Project to a layer: each triangle takes the vector and stress of its tetrahedron."""
-        plane = self.direction[layer.cell] @ layer.plane.frame[:2].T
+        direction = self.direction[layer.cell]
+        if layer.turns is not None:
+            direction = np.einsum("tij,tj->ti", layer.turns, direction)
+        plane = direction @ layer.plane.frame[:2].T
         length = np.linalg.norm(plane, axis=1)
         defined = self.defined[layer.cell] & (length > 1e-6)
         unit = plane / np.maximum(length, 1e-300)[:, None]

@@ -47,6 +47,11 @@ class Layer:
         takes the flat view `plane`.
     local_thickness : (n,) array, mm, optional
         Thickness at each point; by default `thickness` everywhere.
+    turns : (t, 3, 3) array, optional
+        Of the flat view of a curved layer: rows are the axes, in the frame of the mesh, that each
+        triangle's own x, y and normal stand for. Tensors are turned by it (`stress_on`).
+    point_turns : (n, 3, 3) array, optional
+        The same at the points.
     """
 
     points: FloatArray
@@ -60,13 +65,15 @@ class Layer:
     patches: Mapping[str, IntArray] = field(default_factory=dict)
     flat: Plane | None = None
     local_thickness: FloatArray = None  # type: ignore[assignment]
+    turns: FloatArray | None = None
+    point_turns: FloatArray | None = None
 
     def __post_init__(self) -> None:
         if self.local_thickness is None:
             everywhere = np.full(len(self.points), float(self.thickness))
             object.__setattr__(self, "local_thickness", everywhere)
         freeze(self, points=float, triangles=int, cell=int, nodes=int, weights=float, patches=int)
-        freeze(self, local_thickness=float)
+        freeze(self, local_thickness=float, turns=float, point_turns=float)
         object.__setattr__(self, "loops", tuple(read_only(x, np.int64) for x in self.loops))
 
     def __repr__(self) -> str:

@@ -158,7 +158,7 @@ class Isocurve:
     inset: float = 0.0
 
     amount: ClassVar[Amount] = Amount("density", most=4.0, least=0.05)
-    flat_layers_only: ClassVar[bool] = True
+    in_plane: ClassVar[bool] = True
     variants: ClassVar[Mapping[str, Mapping[str, Any]]] = {
         "literal": _LITERAL,
         "inset": {"inset": 0.5},

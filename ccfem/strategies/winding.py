@@ -31,7 +31,6 @@ from ccfem.toolpaths import Toolpaths
 from ccfem.winding.annulus import annulus_field
 from ccfem.winding.bends import limit_bends
 from ccfem.winding.even_levels import evened, steep
-from ccfem.winding.joint_loops import joint_loops
 from ccfem.winding.piece import Piece, pieces_with_joints
 
 __all__ = ["Winding"]
@@ -42,15 +41,11 @@ _REACH = 4.0
 """How far along the curves the lift of the holes reaches, mm."""
 _KEPT = 0.6
 """Share of the length of the strands that keeps the spacing asked for."""
-_MANY = 2
-"""Joints that a piece must hold to get fibre, where any piece of the part holds as many."""
 
 
 @dataclass(frozen=True)
 class Winding:
     """Closed strands round all joints of a piece of a layer, along the strongest stress.
-
-    Pieces that hold one joint get none where others hold several.
 
     Attributes
     ----------
@@ -78,6 +73,9 @@ class Winding:
         not spread there.
     sharpest : float, 1/mm, default 0.13
         Strands that bend more sharply are smoothed there.
+    joined : int, optional
+        Joints that a piece must hold to get fibre; by default as many as any piece of the part
+        does, which are the layers that the paper lays fibre on.
     minimum_length : float, mm, optional
         Shorter strands are dropped; by default the shortest that the machine can cut.
     """
@@ -93,6 +91,7 @@ class Winding:
     lift: float = 0.1
     rise: float = 0.4
     sharpest: float = 0.13
+    joined: int | None = None
     minimum_length: float | None = None
 
     amount: ClassVar[Amount] = SPACING
@@ -106,6 +105,8 @@ class Winding:
         check_fill(self)
         check_choices(self)
         check_fields(self, "isotropy", "sharpest", above=0.0)
+        if self.joined is not None:
+            check_fields(self, "joined", at_least=1)
         check_fields(self, "smoothness", "repulsion", "lift", "rise", at_least=0.0)
 
     def for_part(
@@ -121,7 +122,8 @@ class Winding:
         names = self.joints or stress.held_or_loaded
         for name in self.joints:
             stress.mesh.patch(name)
-        most = max((len(joint_loops(layer, names)) for layer in layers), default=0)
+        pieces = (piece for layer in layers for piece in pieces_with_joints(layer, names))
+        most = max((len(piece.loops) for piece in pieces), default=0)
         if not most:
             raise InputError(
                 "winding needs joints: patches that lie round a hole of a layer; none of "
@@ -142,7 +144,8 @@ class Winding:
             weight = np.abs(strongest.value)
         else:
             weight = np.ones(len(stress.mesh.cells))
-        return _Planner(self, tuple(names), strongest.direction, weight, min(most, _MANY))
+        least = most if self.joined is None else self.joined
+        return _Planner(self, tuple(names), strongest.direction, weight, least)
 
 
 @dataclass(frozen=True)
