@@ -1,10 +1,12 @@
 """Flat layers across the build direction."""
 
 from dataclasses import dataclass
+from typing import Literal
 
 import numpy as np
 
 from ccfem.arrays import FloatArray, IntArray
+from ccfem.checks import check_choices
 from ccfem.elasticity.part_stress import PartStress
 from ccfem.errors import InputError
 from ccfem.layers.cutting import border_edges, chain, cut_at_zero, patch_edges
@@ -23,6 +25,8 @@ _SNAP = 2e-6
 _COUNT = 12
 """Layers where nothing else is asked for: those of the Loop of Chen et al. 2021."""
 
+_AXES = {"x": (1.0, 0.0, 0.0), "y": (0.0, 1.0, 0.0), "z": (0.0, 0.0, 1.0)}
+
 
 @dataclass(frozen=True)
 class Planar:
@@ -38,13 +42,17 @@ class Planar:
         Height of a slab; the last one may stand out at the top.
     heights : tuple of float, mm, optional
         Heights ``points @ direction`` of the layers themselves.
+    axis : {"build", "x", "y", "z"}
+        What the layers lie across: the build direction of the part, or an axis of its mesh.
     """
 
     count: int | None = None
     thickness: float | None = None
     heights: tuple[float, ...] | None = None
+    axis: Literal["build", "x", "y", "z"] = "build"
 
     def __post_init__(self) -> None:
+        check_choices(self)
         given = [n for n in ("count", "thickness", "heights") if getattr(self, n) is not None]
         if len(given) > 1:
             raise InputError(
@@ -84,7 +92,7 @@ class Planar:
         InputError
             When a height lies outside the part, or a slab is higher than the part.
         """
-        frame = plane_frame(build)
+        frame = plane_frame(_AXES.get(self.axis, build))
         level = mesh.points @ frame[2]
         lowest, highest = float(level[mesh.corners].min()), float(level[mesh.corners].max())
         if self.heights is None:
