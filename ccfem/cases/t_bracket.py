@@ -27,6 +27,13 @@ _DEPTH = 15.0
 """Half of the thickness of the head, along z, and of the width of the base, mm."""
 _TOLERANCE = 5e-4
 """Of the mesher, in the diagonal of the part."""
+HOLES = {
+    "base_left": Cylinder((-50.0, 0.0, 0.0), "y", HOLE_RADIUS),
+    "base_right": Cylinder((50.0, 0.0, 0.0), "y", HOLE_RADIUS),
+    "head": Cylinder((0.0, 50.0, 0.0), "z", HOLE_RADIUS),
+    "pull": Cylinder((0.0, 50.0, 0.0), "z", HOLE_RADIUS, half="y"),
+}
+"""Patches: the walls of the holes, and the half of the head's that a bolt pulls."""
 
 
 def _arc(x: float, y: float, radius: float, first: float, last: float) -> FloatArray:
@@ -87,7 +94,7 @@ def t_bracket_mesh(element_size: float) -> TetMesh:
         )
     cells = np.asarray(grid.cells).reshape(-1, 5)[:, 1:]
     mesh = check_mesh(TetMesh(np.asarray(grid.points), cells))[0]
-    return patches_from_rules(mesh, _PATCHES)
+    return patches_from_rules(mesh, HOLES)
 
 
 def _write_surface(name: str, points: FloatArray, mesh: TetMesh) -> None:
@@ -96,14 +103,6 @@ def _write_surface(name: str, points: FloatArray, mesh: TetMesh) -> None:
 
     faces = np.column_stack([np.full(len(mesh.boundary), 3), mesh.boundary])
     pyvista.PolyData(points, faces.ravel()).save(name)
-
-
-_PATCHES = {
-    "base_left": Cylinder((-50.0, 0.0, 0.0), "y", HOLE_RADIUS),
-    "base_right": Cylinder((50.0, 0.0, 0.0), "y", HOLE_RADIUS),
-    "head": Cylinder((0.0, 50.0, 0.0), "z", HOLE_RADIUS),
-    "pull": Cylinder((0.0, 50.0, 0.0), "z", HOLE_RADIUS, half="y"),
-}
 
 
 def t_bracket(element_size: float = ELEMENT_SIZE, order: int = 2, force: float = 1000.0) -> Case:

@@ -99,8 +99,10 @@ def write_results(
 ) -> None:
     """Write ``results.csv``, ``results.json``, ``report.html``, pictures and paths.
 
-    Runs with a print plan get ``STRATEGY.gcode`` too. In ``paths.vtp`` the cell array "strategy"
-    numbers the strategies that did not fail, in the order of ``results.json``.
+    Where layers are curved, also ``STRATEGY_space.png`` and a page that turns,
+    ``STRATEGY_space.html``. Runs with a print plan get ``STRATEGY.gcode`` too. In ``paths.vtp`` the
+    cell array "strategy" numbers the strategies that did not fail, in the order of
+    ``results.json``.
 
     Parameters
     ----------
@@ -123,6 +125,8 @@ def write_results(
     _write_pictures(pictures, folder)
     results_frame(comparison).to_csv(folder / "results.csv", index=False)
     _write_paths(comparison, folder)
+    if any(layer.flat is None for layer in comparison.layers):
+        _write_in_space(comparison, folder)
     about = record(comparison, command, spent)
     page = report_html(comparison, about, pictures)
     (folder / "report.html").write_text(page, encoding="utf-8")
@@ -139,6 +143,20 @@ def _write_pictures(pictures: "Pictures", folder: Path) -> None:
         (folder / f"{name}_force.png").write_bytes(image)
     (folder / "tension.png").write_bytes(pictures.tension)
     (folder / "overview.png").write_bytes(pictures.overview)
+
+
+def _write_in_space(comparison: Comparison, folder: Path) -> None:
+    """Write a picture of the strands of every strategy in space, and a page on which they turn."""
+    from ccfem.plot.canvas import png
+    from ccfem.plot.space import space_picture, turning_page
+
+    layers, build = comparison.layers, comparison.case.build
+    for run in comparison.succeeded:
+        title = f"{comparison.case.name}, {run.name}"
+        picture = space_picture(layers, run.toolpaths, title, build)
+        (folder / f"{run.name}_space.png").write_bytes(png(picture))
+        page = turning_page(layers, run.toolpaths, title, build)
+        (folder / f"{run.name}_space.html").write_text(page, encoding="utf-8")
 
 
 def _write_paths(comparison: Comparison, folder: Path) -> None:
