@@ -17,7 +17,7 @@ if TYPE_CHECKING:
 
 __all__ = ["space_picture", "turning_page"]
 
-_VIEWS = ((25.0, -60.0), (5.0, -90.0), (80.0, -90.0))
+_VIEWS = ((25.0, -35.0), (5.0, 0.0), (70.0, 0.0))
 """Elevation and azimuth, degrees, of each view."""
 _STEP = 1.5
 """Distance of the points that are drawn, mm."""
@@ -80,7 +80,7 @@ def space_picture(
         axes.add_collection3d(Line3DCollection(strands, colors=shades, linewidths=0.7))
         axes.set_proj_type("ortho")
         axes.view_init(elevation, azimuth)
-        axes.set_box_aspect(np.maximum(high - low, 1e-3), zoom=1.35)
+        axes.set_box_aspect(np.maximum(high - low, 1e-3), zoom=1.15)
         for axis, a, b in zip("xyz", low, high, strict=True):
             getattr(axes, f"set_{axis}lim")(a, max(b, a + 1e-3))
         axes.set_axis_off()

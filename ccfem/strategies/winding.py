@@ -71,7 +71,7 @@ class Winding:
         Where the field starts: below 0 on the holes, so that the innermost strand keeps off them;
         and below 0 where curves are further from the border than the holes are, so that strands do
         not spread there.
-    sharpest : float, 1/mm, default 0.13
+    sharpest : float, 1/mm, default 0.125
         Strands that bend more sharply are smoothed there.
     joined : int, optional
         Joints that a piece must hold to get fibre; by default as many as any piece of the part
@@ -90,7 +90,7 @@ class Winding:
     repulsion: float = 4.0
     lift: float = 0.1
     rise: float = 0.4
-    sharpest: float = 0.13
+    sharpest: float = 0.125
     joined: int | None = None
     minimum_length: float | None = None
 
