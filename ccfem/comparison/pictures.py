@@ -17,8 +17,14 @@ from ccfem.plot.canvas import png
 from ccfem.plot.colours import palette
 from ccfem.plot.curves import curvature_curves, matching_curves
 from ccfem.plot.fields import tension_picture
-from ccfem.plot.forces import force_on_paths
-from ccfem.plot.paths import Coloured, compare_layer, layer_picture, mark_failure, tension_limit
+from ccfem.plot.paths import (
+    Coloured,
+    compare_layer,
+    force_on_paths,
+    layer_picture,
+    mark_failure,
+    tension_limit,
+)
 from ccfem.progress import Progress, silent
 
 if TYPE_CHECKING:

@@ -27,7 +27,7 @@ def medial_fill(section: Region, pitch: float, closest: float) -> list[FloatArra
     pitch : float, mm
         Distance of neighbouring strands.
     closest : float
-        As in `geometry.parallel_strands.parallels`.
+        As in `geometry.parallel_strands.grow`.
     """
     axis = medial_axis(section, 0.5 * pitch)
     segments = [s for s in axis.segments if s.length >= _SHORTEST * pitch]

@@ -10,7 +10,7 @@ from ccfem.geometry.polylines import is_closed, line_length, runs, straight_piec
 from ccfem.geometry.sections import corners_only
 from ccfem.geometry.shapes import Region
 
-__all__ = ["concentric", "middle_lines", "shells"]
+__all__ = ["concentric", "shells"]
 
 _LEAST_GAP = 0.5
 """Narrowest strip, in pitches, that a strand is laid along, the rest of it on its neighbours: gap
@@ -84,7 +84,8 @@ def concentric(
     Returns
     -------
     list of (k, 2) arrays, mm
-        Closed rings from the border inward, then `middle_lines` in what they leave.
+        Closed rings from the border inward, then lines along the middle of what they leave; those
+        that go round a hole are closed.
     """
     first = 0.5 * pitch if first is None else first
     section = corners_only(section)
@@ -101,7 +102,7 @@ def concentric(
     if count is not None and not _narrow(section, first, pitch, closest, count):
         return lines
     axis = medial_axis(section, 0.5 * min(pitch, 2.0 * first))
-    return lines + middle_lines(axis, lines, pitch, closest, first, count, walls)
+    return lines + _middle_lines(axis, lines, pitch, closest, first, count, walls)
 
 
 def _opened(section: Region, distance: float, width: float) -> Region:
@@ -129,33 +130,20 @@ def _narrow(section: Region, first: float, pitch: float, closest: float, count: 
     return not shapely.is_empty(rest)
 
 
-def middle_lines(
+def _middle_lines(
     axis: MedialAxis,
     laid: list[FloatArray],
     pitch: float,
     closest: float,
     first: float,
-    count: int | None = None,
-    walls: bool = True,
+    count: int | None,
+    walls: bool,
 ) -> list[FloatArray]:
-    """Lines along the medial axis of a section where its rings leave a strip.
+    """Lines along the medial axis of a section where the rings that are laid leave a strip.
 
     Between the innermost rings at both sides of the axis there is a strip, at most two pitches
-    wide; a strand is laid along its middle where it is at least half a pitch wide.
-
-    Parameters
-    ----------
-    axis : MedialAxis
-        Of the section.
-    laid : list of (k, 2) arrays, mm
-        The rings.
-    pitch, closest, first, count, walls
-        As in `concentric`. With a `count`, only where there is room for fewer rings.
-
-    Returns
-    -------
-    list of (k, 2) arrays, mm
-        A line that goes round a hole is closed.
+    wide; a strand is laid along its middle where it is at least half a pitch wide, and with a
+    `count` only where there is room for fewer rings. Parameters as in `concentric`.
     """
     pieces = []
     degree = np.bincount([end for s in axis.segments for end in s.ends if end >= 0])
