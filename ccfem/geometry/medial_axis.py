@@ -109,9 +109,10 @@ def medial_axis(
         under less than this; 105 takes off the spurs of corners of 90 degrees. None: no such rule.
     arc_chord : float, optional
         Ends are taken off as long as the border between their two nearest points is no longer than
-        so many chords, or than 6 steps; a square corner has 1.41.
+        this many chords, or than 6 steps; a square corner has 1.41.
     prune : float, default 1
-        Branches with a free end shorter than so many radii of the disc at their junction go.
+        Branches with a free end that are shorter than this many radii of the disc at their
+        junction are removed.
 
     Returns
     -------
@@ -345,8 +346,7 @@ def _as_axis(section: Region, graph: _Graph, chains: list[list[int]]) -> MedialA
                 ends.add(int(members[np.argmax(graph.radius[members])]))
     nodes = sorted(ends)
     index = {node: k for k, node in enumerate(nodes)}
-    a, b = graph.edges.T
-    edge_of = dict(zip(zip(a.tolist(), b.tolist(), strict=True), range(len(a)), strict=True))
+    edge_of = {(a, b): k for k, (a, b) in enumerate(graph.edges.tolist())}
     segments = []
     for chain in chains:
         if chain[0] == chain[-1] and chain[0] not in index:

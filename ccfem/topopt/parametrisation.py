@@ -43,13 +43,7 @@ class Parametrisation:
         solid: BoolArray | None,
         void: BoolArray | None,
     ) -> "Parametrisation":
-        """Make the filter of a part, and check its passive cells.
-
-        Parameters
-        ----------
-        parameters : Parameters
-        part : Compliance
-        solid, void : (m,) bool arrays or None
+        """Make the filter of a part, and check its passive cells, (m,) bool arrays or None.
 
         Raises
         ------

@@ -19,20 +19,7 @@ DESIGNED = ("bridge", "suspension", "cantilever", "m_shape", "l_shape")
 
 
 def build(folder: Path, names: Sequence[str] = (*CASES, *DESIGNED)) -> Path:
-    """Make the stored meshes and outlines, and their manifest.
-
-    Parameters
-    ----------
-    folder : Path
-        Where to write; it must exist.
-    names : sequence of str
-        Cases to make.
-
-    Returns
-    -------
-    Path
-        The manifest.
-    """
+    """Make the stored meshes and outlines of cases in a folder, and their manifest: its path."""
     text = (
         "# Meshes of the cases at their default element size, mm, and outlines of the optimised\n"
         f"# plates. Made by: {COMMAND}\n"
