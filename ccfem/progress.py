@@ -1,4 +1,4 @@
-"""How long work tells its caller where it stands."""
+"""How long-running work reports its progress."""
 
 from collections.abc import Callable, Iterator
 from contextlib import contextmanager
@@ -10,12 +10,12 @@ Progress = Callable[[str, float], None]
 
 
 def silent(what: str, share: float) -> None:
-    """Tell nobody."""
+    """Report nothing."""
 
 
 @contextmanager
 def progress_bar() -> Iterator[Progress]:
-    """Progress bar on the terminal's stderr or in a notebook, or silence where nobody watches.
+    """Progress bar on the terminal's stderr or in a notebook, or none where nobody watches.
 
     Examples
     --------

@@ -25,7 +25,7 @@ _STEP = 0.1
 _LEAST = 0.02
 """As `least` of `streamlines`."""
 _SLACK = 1e-3
-"""By how much less than the separation a new line may be off, for rounding and finite steps."""
+"""Share of the separation by which a new line may be too near: rounding and finite steps."""
 _MOST_POINTS = 20_000_000
 
 
@@ -48,16 +48,14 @@ def evenly_spaced_streamlines(
 
     Parameters
     ----------
-    points : (n, 2) array, mm
-    triangles : (t, 3) int array
-    plane_stress : (n, 3) array, MPa
-        s11, s22, s12 at the points.
+    points, triangles, plane_stress
+        As in `streamlines`.
     region : shapely (Multi)Polygon, mm
         Lines stay in it.
     separation : float, mm
         Distance at which lines begin beside each other (d_sep), > 0.
     closest : float in (0, 1), default 0.5
-        Least distance of lines in separations (d_test / d_sep).
+        Minimum distance of lines in separations (d_test / d_sep).
 
     Returns
     -------
@@ -222,7 +220,7 @@ def _add(laid, p, x, y, dx, dy, home, along, number):  # type: ignore[no-untyped
 
 @njit(cache=True, nogil=True)
 def _take_back(laid, first, end):  # type: ignore[no-untyped-def]
-    """Forget points, the last ones that were added."""
+    """Remove points, the last ones that were added."""
     for p in range(end - 1, first - 1, -1):
         i, j = _cell(laid, laid.spot[p, 0], laid.spot[p, 1])
         laid.head[i, j] = laid.following[p]

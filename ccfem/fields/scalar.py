@@ -88,8 +88,8 @@ def fit_constrained(
     convex problem is solved by the alternating direction method of multipliers (Boyd et al.,
     Foundations and Trends in Machine Learning 3 (2011) 1, section 3): one factorisation, and a
     back-substitution and a projection an iteration. After 20 iterations the objective is within
-    1 % of the optimum and single triangles exceed the bound by some per cent, so that strands are
-    still to be trimmed.
+    1 % of the optimum and single triangles exceed the bound by some per cent, so that strands
+    still have to be trimmed.
 
     Parameters
     ----------

@@ -101,7 +101,7 @@ def _round(angle):  # type: ignore[no-untyped-def]
 
 @njit(cache=True, nogil=True)
 def word_sizes(start, end, radius, sizes):  # type: ignore[no-untyped-def]
-    """Fill `sizes` (6, 3), mm, with the pieces of each of `WORDS`; inf where it cannot be.
+    """Fill `sizes` (6, 3), mm, with the pieces of each of `WORDS`; inf where there is no curve.
 
     An arc that would turn almost all the way round is a tiny negative one instead.
     """

@@ -47,7 +47,7 @@ def spaced_guides(
         Point of each curve that its guide has to hold.
     region : shapely (Multi)Polygon, mm
     distance : float, mm
-        Minimum distance of guides.
+        Minimum distance between guides.
     least_length : float, mm
         Shorter guides are dropped.
     """
@@ -70,7 +70,7 @@ def spaced_guides(
 
 
 def fitted_guides(guides: Sequence[FloatArray], region: Region, pitch: float) -> list[FloatArray]:
-    """Guides moved sideways by at most half a pitch, so that gaps and overlaps become least.
+    """Guides moved sideways by at most half a pitch, so that gaps and overlaps are smallest.
 
     Parameters
     ----------
@@ -97,13 +97,13 @@ def fitted_guides(guides: Sequence[FloatArray], region: Region, pitch: float) ->
             others = straight_pieces([other for j, other in enumerate(moved) if j != k])
             gap, parallel, to_guide = _nearer(fixed[k], _first_hits(start, normal, others, pitch))
             shifts[k] = _best_shift(gap / pitch - np.where(to_guide, 0.0, 0.5), parallel)
-            moved[k] = _aside(guides[k], shifts[k] * pitch)
+            moved[k] = _shifted(guides[k], shifts[k] * pitch)
         if (shifts == before).all():
             break
     found = []
     for guide, shift in zip(guides, shifts, strict=True):
         ways = (-0.5, 0.5) if shift == 0.5 else (shift,)
-        found += [_aside(guide, way * pitch) for way in ways]
+        found += [_shifted(guide, way * pitch) for way in ways]
     return found
 
 
@@ -172,7 +172,7 @@ def _nearer(
     return np.where(np.isfinite(gap), gap, 0.0), np.where(np.isfinite(gap), parallel, 0.0), second
 
 
-def _aside(guide: FloatArray, way: float) -> FloatArray:
+def _shifted(guide: FloatArray, way: float) -> FloatArray:
     """Curve parallel to a guide, to its left by `way`, mm."""
     if way == 0.0:
         return guide

@@ -1,8 +1,8 @@
 """Medial axis of a section: the centres of its largest inscribed discs, as a graph of curves.
 
 Voronoi diagram of points along the border (Brandt, Convergence and continuity criteria for
-discrete approximations of the continuous planar skeleton, CVGIP 59, 1994); spurs are told from
-limbs by the angle under which the border is seen from the axis, or by the way along the border
+discrete approximations of the continuous planar skeleton, CVGIP 59, 1994); spurs are told apart
+from limbs by the angle under which the border is seen from the axis, or by the way along the border
 against its chord.
 """
 
@@ -105,10 +105,10 @@ def medial_axis(
         ends of every straight side are among them, the rest at equal distances, so that a
         symmetric section has symmetric samples.
     object_angle : float, degrees, optional
-        Ends of the axis are taken off as long as they see their two nearest points of the border
-        under less than this; 105 takes off the spurs of corners of 90 degrees. None: no such rule.
+        Ends of the axis are removed as long as they see their two nearest points of the border
+        under less than this; 105 removes the spurs of corners of 90 degrees. None: no such rule.
     arc_chord : float, optional
-        Ends are taken off as long as the border between their two nearest points is no longer than
+        Ends are removed as long as the border between their two nearest points is no longer than
         this many chords, or than 6 steps; a square corner has 1.41.
     prune : float, default 1
         Branches with a free end that are shorter than this many radii of the disc at their
@@ -270,7 +270,7 @@ def _equidistant(
 
 
 def _without_soft_ends(edges: IntArray, firm: BoolArray, count: int) -> BoolArray:
-    """Edges that stay when free ends that are not firm are taken off until there are none."""
+    """Edges that stay when free ends that are not firm are removed until there are none."""
     kept = np.ones(len(edges), dtype=bool)
     while True:
         degree = np.bincount(edges[kept].ravel(), minlength=count)

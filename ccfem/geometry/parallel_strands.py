@@ -1,4 +1,4 @@
-"""Strands parallel to given curves, outward from them, and strands in what those leave open."""
+"""Strands parallel to given curves, outward from them, and strands in the rest."""
 
 from collections.abc import Sequence
 from itertools import pairwise
@@ -7,7 +7,7 @@ import numpy as np
 import shapely
 
 from ccfem.arrays import FloatArray, IntArray
-from ccfem.geometry.free_ends import lead_on
+from ccfem.geometry.free_ends import extend_free_ends
 from ccfem.geometry.polylines import is_closed, line_length, straight_pieces
 from ccfem.geometry.shapes import Region, open_lines
 from ccfem.geometry.shells import concentric
@@ -24,7 +24,7 @@ _OFF = 0.02
 """Deviation of the distance to the nearest curve, in pitches, up to which a piece of a border
 counts as parallel to that curve."""
 _REACH = 2.0
-"""Longest way, in pitches, by which a strand is led on where it ends in the open."""
+"""Maximum length, in pitches, by which the free end of a strand is extended."""
 _TOLERANCE = 2e-3
 """Deviation, in pitches, up to which points of a curve are left out."""
 
@@ -78,7 +78,7 @@ def grow(
         )
         if line_length(line) >= pitch
     ]
-    lines, rest = lead_on(lines, region, pitch, closest, _REACH * pitch)
+    lines, rest = extend_free_ends(lines, region, pitch, closest, _REACH * pitch)
     return lines + _fill_rest(rest, pitch, closest)
 
 

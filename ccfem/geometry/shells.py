@@ -13,8 +13,8 @@ from ccfem.geometry.shapes import Region
 __all__ = ["concentric", "shells"]
 
 _LEAST_GAP = 0.5
-"""Narrowest strip, in pitches, that a strand is laid along, the rest of it on its neighbours: gap
-and overlap together are then least."""
+"""Narrowest strip, in pitches, that a strand is laid along, overlapping its neighbours: the sum of
+gap and overlap is then smallest."""
 _SAME = 1e-4
 """Neighbouring points of a ring nearer than this, in widths, are one."""
 _STRAIGHT = 0.03
@@ -31,11 +31,9 @@ def shells(
     section : shapely (Multi)Polygon, mm
     width : float, mm
         Of a strand; the first ring lies half of it inside the border.
-    pitch : float, mm
-        Distance of neighbouring rings.
     count : int
         Number of rings. Parts thinner than twice as many are filled by them.
-    closest : float
+    pitch, closest
         As in `concentric`.
 
     Returns
@@ -49,7 +47,7 @@ def shells(
     if count == 0:
         return [], section
     interior = inset(section, 0.5 * width + (count - 0.5) * pitch)
-    parts = shapely.get_parts(interior)  # without those of no width but for rounding
+    parts = shapely.get_parts(interior)  # without those that only rounding gives a width
     wide = ~shapely.is_empty(shapely.buffer(parts, -1e-3 * pitch, join_style="mitre"))
     interior = interior if wide.all() else shapely.multipolygons(parts[wide])
     return concentric(section, pitch, closest, 0.5 * width, count), interior
@@ -71,7 +69,7 @@ def concentric(
     pitch : float, mm
         Distance of neighbouring rings.
     closest : float
-        Least distance of opposite sides of a ring, in pitches; where the section is narrower the
+        Minimum distance of opposite sides of a ring, in pitches; where the section is narrower the
         ring is cut short.
     first : float, mm, optional
         Distance of the first ring to the border; default half a pitch.
@@ -122,7 +120,7 @@ def _opened(section: Region, distance: float, width: float) -> Region:
 
 
 def _narrow(section: Region, first: float, pitch: float, closest: float, count: int) -> bool:
-    """Whether some part of the section is too narrow for `count` rings, corners left aside."""
+    """Whether some part of the section is too narrow for `count` rings, apart from its corners."""
     depth = first + (count - 1 + 0.5 * closest) * pitch
     core = shapely.buffer(section, -depth, join_style="mitre")
     reached = shapely.buffer(core, 1.05 * depth + 0.1 * pitch, join_style="mitre")

@@ -127,8 +127,8 @@ def _check_closed(points: FloatArray, triangles: IntArray) -> None:
     if len(turned):
         at = _place(points[edges[turned[0]]].mean(axis=0))
         raise InputError(
-            f"the surface's triangles are not all turned outward: {len(turned)} edges are run "
-            f"along twice in one direction, the first at {at} mm: unify the normals"
+            f"the surface's triangles do not all face outward: {len(turned)} edges are traversed "
+            f"twice in one direction, the first at {at} mm: unify the normals"
         )
 
 

@@ -1,4 +1,4 @@
-"""Figures of sections: size, scale bar, colour bar, and files. No state of pyplot is touched."""
+"""Figures of sections: size, scale bar, colour bar, and files. Pyplot's state is left alone."""
 
 import io
 from collections.abc import Sequence

@@ -208,7 +208,7 @@ def mark_failure(axes: "Axes", point: FloatArray, label: str = "") -> None:
 
 
 def _points(axes: "Axes", length: float) -> float:
-    """Size in points of a length, mm, on the axes, at least a hair."""
+    """Size in points of a length, mm, on the axes, at least that of a hairline."""
     return max(72.0 * inches_per_mm(axes) * length, 0.3)
 
 
@@ -243,11 +243,6 @@ def layer_picture(
         Pieces drawn instead of the paths in one colour.
     colour : str, optional
         Of the mark before the heading: that of the strategy.
-
-    Returns
-    -------
-    Figure
-        For `plot.canvas.png` or `plot.canvas.save`.
     """
     figure, (axes,) = new_figure(picture_extents(layer, [paths]))
     _draw(axes, layer, stress, paths, width, limit, coloured)

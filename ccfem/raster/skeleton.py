@@ -49,7 +49,7 @@ class Segment:
 def skeleton(mask: BoolArray) -> BoolArray:
     """Medial axis of the solid pixels.
 
-    Branches that are spurs are taken off and the rest is thinned again, until none is left. Then
+    Branches that are spurs are removed and the rest is thinned again, until none is left. Then
     one half of a bitmap that is its own mirror image is copied onto the other; a line along an
     axis that falls between two rows of pixels becomes two pixels wide.
 
@@ -61,7 +61,7 @@ def skeleton(mask: BoolArray) -> BoolArray:
     Returns
     -------
     (H, W) bool array
-        A pixel at least for every connected piece.
+        At least one pixel for every connected piece.
     """
     line = thin(np.where(mask, 0, -1))
     far = depth(mask)

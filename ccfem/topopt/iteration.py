@@ -18,7 +18,7 @@ from ccfem.topopt.parametrisation import Parametrisation
 __all__ = ["iterate"]
 
 _WINDOW = 10
-"""Iterations over which the objective must stand still."""
+"""Iterations over which the objective must not change."""
 
 ModelT = TypeVar("ModelT", bound=Callable[[FloatArray], Response])
 """Response of a part to factors (g,) on the stiffness of its groups of cells."""

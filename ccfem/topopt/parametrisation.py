@@ -49,7 +49,7 @@ class Parametrisation:
         ------
         InputError
             For cells that are both solid and void, a volume fraction that the passive cells make
-            impossible, and a radius so large that every cell sees most others.
+            impossible, and a radius so large that it reaches too many cells.
         """
         cells = part.cells
         solid, void = _mask(cells, "solid", solid), _mask(cells, "void", void)
