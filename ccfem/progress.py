@@ -1,4 +1,4 @@
-"""How long-running work reports its progress."""
+"""How long tasks report their progress."""
 
 from collections.abc import Callable, Iterator
 from contextlib import contextmanager
@@ -6,7 +6,7 @@ from contextlib import contextmanager
 __all__ = ["Progress", "progress_bar", "silent"]
 
 Progress = Callable[[str, float], None]
-"""Called with what is being done now and the share, in [0, 1], of all work that is done."""
+"""Called with the name of the current step and the share of all work, in [0, 1], that is done."""
 
 
 def silent(what: str, share: float) -> None:
@@ -15,7 +15,7 @@ def silent(what: str, share: float) -> None:
 
 @contextmanager
 def progress_bar() -> Iterator[Progress]:
-    """Progress bar on the terminal's stderr or in a notebook, or none where nobody watches.
+    """Progress bar on the terminal's stderr or in a notebook; nothing anywhere else.
 
     Examples
     --------

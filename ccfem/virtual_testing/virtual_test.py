@@ -8,6 +8,7 @@ import numpy as np
 
 from ccfem.arrays import FloatArray, freeze, in_brief
 from ccfem.elasticity.stress_field import SolveRecord, StressField
+from ccfem.machine.machine import Machine
 from ccfem.toolpaths import Toolpaths
 from ccfem.virtual_testing.equilibrium import BONDED, TENSION, equilibrium
 from ccfem.virtual_testing.specimen import Specimen
@@ -38,7 +39,7 @@ class VirtualTest:
     strands : Strands
         Pieces of fibre.
     axial_force : (s,) array, N
-        Force in the strand at each piece; tension is positive.
+        Force in a strand that has room, at each piece; tension is positive.
     fibre_energy : float, N mm
         Strain energy of the fibres.
     force : float, N
@@ -101,6 +102,7 @@ def virtual_test(
     mode: str = TENSION,
     span: Sequence[float] = RHO_SPAN,
     backend: str = "auto",
+    machine: Machine | None = None,
 ) -> VirtualTest:
     """Test a part with its fibres under the load case that it was solved for.
 
@@ -121,6 +123,9 @@ def virtual_test(
         Further values of rho to report the ratio at; () for none.
     backend : str, default "auto"
         Solver, where `part` is a StressField.
+    machine : Machine, optional
+        Whose strands keep their room, where `fibres` are Toolpaths: fibre on other fibre lends
+        nothing. Default: every strand counts in full.
 
     Returns
     -------
@@ -133,7 +138,7 @@ def virtual_test(
     SolveError
         When the solve misses its tolerance.
     """
-    specimen, strands = _prepared(fibres, part, backend)
+    specimen, strands = _prepared(fibres, part, backend, machine)
     before = specimen.unreinforced
     axial = (Strand() if strand is None else strand).stiffness(specimen.modulus)
     started = perf_counter()
@@ -170,7 +175,7 @@ def virtual_test(
         solution=after,
         strands=strands,
         axial_force=force,
-        fibre_energy=0.5 * float(np.vdot(force * strands.length, found.strain)),
+        fibre_energy=0.5 * float(np.vdot(force * strands.length * strands.share, found.strain)),
         force=specimen.force(after.reactions),
         stiffness=specimen.stiffness(after.displacement, after.strain_energy),
         unreinforced_stiffness=unreinforced,
@@ -180,11 +185,14 @@ def virtual_test(
 
 
 def _prepared(
-    fibres: Toolpaths | Strands, part: StressField | Specimen, backend: str = "auto"
+    fibres: Toolpaths | Strands,
+    part: StressField | Specimen,
+    backend: str = "auto",
+    machine: Machine | None = None,
 ) -> tuple[Specimen, Strands]:
     specimen = Specimen.of(part, backend) if isinstance(part, StressField) else part
     if isinstance(fibres, Toolpaths):
-        fibres = cut_strands(fibres, specimen.unreinforced.mesh)
+        fibres = cut_strands(fibres, specimen.unreinforced.mesh, machine=machine)
     return specimen, fibres
 
 
@@ -193,8 +201,9 @@ def virtual_bracket(
     part: StressField | Specimen,
     strand: Strand | None = None,
     span: Sequence[float] = RHO_SPAN,
+    machine: Machine | None = None,
 ) -> Bracket:
     """Both tests of `virtual_test`, with one factorisation; parameters as there."""
-    specimen, strands = _prepared(fibres, part)
+    specimen, strands = _prepared(fibres, part, machine=machine)
     tension = virtual_test(strands, specimen, strand, TENSION, span)
     return Bracket(tension, virtual_test(strands, specimen, strand, BONDED, span))
