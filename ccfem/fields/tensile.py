@@ -75,14 +75,7 @@ def plane_tension(plane_stress: FloatArray, compression_limit: float = 3.0) -> T
 
     A fibre that lies in a flat layer carries the stress in that plane only, so this is what the
     planning uses by default; for stress in the plane it equals the projection of
-    `spatial_tension`.
-
-    Parameters
-    ----------
-    plane_stress : (k, 3) array, MPa
-        s11, s22, s12 in the plane.
-    compression_limit : float, default 3.0
-        The paper's mu.
+    `spatial_tension`. The plane stress (k, 3), MPa, is s11, s22, s12; the limit is the paper's mu.
     """
     largest, smallest, angle = largest_in_plane(plane_stress)
     defined = (largest > 0.0) & (-smallest < compression_limit * largest)

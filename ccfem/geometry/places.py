@@ -39,16 +39,7 @@ class Pieces(NamedTuple):
 def section_places(points: FloatArray, section: Region) -> IntArray:
     """Where points lie relative to a section; those up to `TOLERANCE` from it are inside.
 
-    Parameters
-    ----------
-    points : (n, 2) array, mm
-    section : Polygon or MultiPolygon
-        Such as `Layer.polygon`.
-
-    Returns
-    -------
-    (n,) int array
-        INSIDE, VOID or OUTSIDE.
+    INSIDE, VOID or OUTSIDE for each of the points (n, 2), mm: an (n,) int array.
     """
     return _places(points, shapely.buffer(section, TOLERANCE, quad_segs=2))
 
