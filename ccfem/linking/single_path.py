@@ -89,10 +89,7 @@ class LinkedPath:
 
 
 def link_tracks(
-    groups: Sequence[Sequence[FloatArray]],
-    section: Region,
-    radius: float,
-    width: float,
+    groups: Sequence[Sequence[FloatArray]], section: Region, radius: float, width: float
 ) -> LinkedPath:
     """Join the tracks of all groups to one path.
 
@@ -193,7 +190,6 @@ class _Network:
     cost : (t, t) array, mm
     curves : LinkCurves
     routes : RingRoutes
-    by_ring : (t, t) bool array
     way : (t, t) int array
         On the ring.
     """
@@ -203,16 +199,11 @@ class _Network:
     cost: FloatArray
     curves: LinkCurves
     routes: RingRoutes
-    by_ring: BoolArray
     way: IntArray
 
     @classmethod
     def between(
-        cls,
-        tracks: Sequence[FloatArray],
-        closed: BoolArray,
-        section: Region,
-        radius: float,
+        cls, tracks: Sequence[FloatArray], closed: BoolArray, section: Region, radius: float
     ) -> "_Network":
         ends = _end_poses(tracks)
         grid, weights = section_grid(section, 30.0), np.array(_WEIGHTS)
@@ -224,11 +215,11 @@ class _Network:
         around = around + reach[:, 0] + reach[:, :1]
         curves = link_curves(ends, reach, radius, grid, weights, around)
         cost = np.minimum(curves.cost, np.minimum(around, around.T))
-        return cls(ends, reach[:, 0], cost, curves, routes, ~np.isfinite(curves.cost), way)
+        return cls(ends, reach[:, 0], cost, curves, routes, way)
 
     def link(self, a: int, b: int) -> FloatArray:
         """Points (n, 2), mm, from end a to end b."""
-        if not self.by_ring[a, b]:
+        if np.isfinite(self.curves.cost[a, b]):
             return link_curve(self.ends, a, b, self.curves, self.routes.radius, _STEP)
         curve = ring_curve(self.routes, a, b, int(self.way[a, b]), _STEP)
         before, after = (stub_points(self.ends[k], self.reach[k], _STEP) for k in (a, b))
