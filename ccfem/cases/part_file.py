@@ -259,9 +259,7 @@ def _slicing(part: _Part) -> Slicer:
             "one"
         )
     if part.slicing is not None:
-        known = slicers.named()
-        name, parameters = _named(part.slicing, "method", known, "slicing")
-        return slicers.create(name, parameters)
+        return slicers.create(*_named(part.slicing, "method", slicers.named(), "slicing"))
     return Planar(count=part.layers, heights=part.heights)
 
 

@@ -13,12 +13,7 @@ from numba import njit
 from ccfem.arrays import FloatArray, IntArray
 from ccfem.checks import check_number
 from ccfem.errors import InputError
-from ccfem.fields.streamlines import (
-    direction_at,
-    mean_and_shear,
-    streamline_step,
-    triangle_neighbours,
-)
+from ccfem.fields.streamlines import direction_at, line_field, streamline_step
 from ccfem.geometry.section_grid import SectionGrid, contains, section_grid
 from ccfem.geometry.shapes import Region
 from ccfem.tensor import strongest_in_plane
@@ -74,8 +69,8 @@ def evenly_spaced_streamlines(
     check_number("closest", closest, above=0.0, below=1.0)
     if shapely.is_empty(region) or not len(triangles):
         return []
-    field, sizes = mean_and_shear(plane_stress), np.abs(strongest_in_plane(plane_stress)[0])
     middles = points[triangles].mean(axis=1)
+    sizes = np.abs(strongest_in_plane(plane_stress)[0])
     seeds = np.argsort(-sizes[triangles].mean(axis=1), kind="stable")
     seeds = seeds[shapely.contains_xy(region, middles[seeds])]
     step = _STEP * separation
@@ -87,12 +82,7 @@ def evenly_spaced_streamlines(
         )
     grid = section_grid(region, 2.0 * separation)
     found, spans, closed = _lay(
-        _Field(
-            np.ascontiguousarray(points[triangles]),
-            np.ascontiguousarray(field[triangles]),
-            triangle_neighbours(triangles),
-            _LEAST * float(sizes.max()),
-        ),
+        line_field(points, triangles, plane_stress, _LEAST),
         grid,
         _empty(grid, separation, int(room)),
         middles[seeds],
@@ -106,15 +96,6 @@ def evenly_spaced_streamlines(
         ahead, back = found[start:turn], found[turn:end]
         lines.append(np.concatenate([ahead, ahead[:1]] if ring else [back[::-1], ahead]))
     return lines
-
-
-class _Field(NamedTuple):
-    """Corners (t, 3, 2), values there, neighbours of the triangles, and the least stress."""
-
-    corners: FloatArray
-    values: FloatArray
-    beside: IntArray
-    least: float
 
 
 class _Laid(NamedTuple):
@@ -192,9 +173,8 @@ def _trace(field, grid, laid, first, number, x0, y0, home, test, step):  # type:
 
     The numbers of the points start at `first`.
     """
-    corners, values, beside, least = field
     way = np.zeros(2)
-    dx, dy, home, fine = direction_at(corners, values, beside, home, x0, y0, True, least, way)
+    dx, dy, home, fine = direction_at(field, home, x0, y0, True, way)
     count = first
     if not fine:
         return count, count, False
@@ -205,9 +185,7 @@ def _trace(field, grid, laid, first, number, x0, y0, home, test, step):  # type:
         x, y, cell, along = x0, y0, home, 0.0
         way[0], way[1] = sense * dx, sense * dy
         while count < len(laid.line):
-            x, y, cell, fine = streamline_step(
-                corners, values, beside, cell, x, y, step, least, way
-            )
+            x, y, cell, fine = streamline_step(field, cell, x, y, step, way)
             along += sense * step
             if not fine or not contains(grid, x, y):
                 break

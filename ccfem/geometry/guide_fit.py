@@ -1,4 +1,4 @@
-"""Guides moved aside by a part of a pitch, so that whole strands fit beside them.
+"""Guides moved sideways by a part of a pitch, so that whole strands fit beside them.
 
 Strands lie at whole multiples of the pitch from their guide. What is left between the last of them
 and the border, or the strands of the next guide, is a gap or an overlap of up to half a pitch along
@@ -18,7 +18,7 @@ from ccfem.geometry.shapes import Region
 __all__ = ["fitted_guides"]
 
 _SHIFTS = np.array([0.0, 0.5, 0.25, -0.25, 0.125, -0.125, 0.375, -0.375])
-"""Ways aside that are tried, in pitches, the preferred ones first."""
+"""Shifts sideways that are tried, in pitches, the preferred ones first."""
 _BETTER = 0.01
 """Mean misfit a side, in pitches, by which a shift must be better than one before it."""
 _STEP = 1.0
@@ -29,7 +29,7 @@ _ROUNDS = 3
 
 
 def fitted_guides(guides: Sequence[FloatArray], region: Region, pitch: float) -> list[FloatArray]:
-    """Guides moved aside by at most half a pitch, so that gaps and overlaps become least.
+    """Guides moved sideways by at most half a pitch, so that gaps and overlaps become least.
 
     Parameters
     ----------

@@ -20,6 +20,8 @@ def spaced_guides(
 ) -> list[FloatArray]:
     """Clip curves to a region and cut each where it comes near to one before it.
 
+    Of each curve at most one piece, a (m, 2) array in mm, is left.
+
     Parameters
     ----------
     curves : sequence of (m, 2) arrays, mm
@@ -28,13 +30,9 @@ def spaced_guides(
         Point of each curve that its guide has to hold.
     region : shapely (Multi)Polygon, mm
     distance : float, mm
-        Least distance of guides.
+        Minimum distance of guides.
     least_length : float, mm
         Shorter guides are dropped.
-
-    Returns
-    -------
-    list of (m, 2) arrays, mm
     """
     guides: list[FloatArray] = []
     free = region

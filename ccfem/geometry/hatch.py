@@ -86,8 +86,7 @@ def hatch(section: Region, angle: float, pitch: float) -> Hatch:
         return Hatch(np.zeros((0, 2)), none, pitch, angle, (), none, np.zeros(0))
     a = np.concatenate([ring[:-1] for ring in border])
     b = np.concatenate([ring[1:] for ring in border])
-    ring = np.repeat(np.arange(len(border)), [len(ring) - 1 for ring in border])
-    number = np.concatenate([np.arange(len(ring) - 1) for ring in border])
+    ring, number = repeated(np.array([len(ring) - 1 for ring in border]))
     lowest = float(a[:, 1].min()) + 0.5 * pitch
     # Rows that an edge crosses: those from `first` up to, not including, `end`.
     level_a, level_b = np.ceil((a[:, 1] - lowest) / pitch), np.ceil((b[:, 1] - lowest) / pitch)
@@ -143,7 +142,7 @@ def link_hatch(lines: Hatch, section: Region, width: float) -> list[FloatArray]:
 def zigzag(
     section: Region, distance: float, width: float, pitch: float, angle: float
 ) -> list[FloatArray]:
-    """Linked hatch lines at least `distance` inside a section.
+    """Linked hatch lines, (k, 2) arrays in mm, at least `distance` inside a section.
 
     Parameters
     ----------
@@ -156,10 +155,6 @@ def zigzag(
         Distance of the lines.
     angle : float, radians
         Direction of the lines to the first axis.
-
-    Returns
-    -------
-    list of (k, 2) arrays, mm
     """
     inner = inset(section, distance, width)
     return link_hatch(hatch(inner, angle, pitch), inner, width)

@@ -17,8 +17,8 @@ _SHORTEST = 4.0
 def medial_fill(section: Region, pitch: float, closest: float) -> list[FloatArray]:
     """Strands along the medial axis and parallel to it, and concentric ones in what they leave.
 
-    Parallel strands follow until the first of them would touch the border. A section without a
-    medial axis (a disc) is filled by concentric strands alone.
+    Each is a (k, 2) array, mm. Parallel strands follow until the first of them would touch the
+    border. A section without a medial axis (a disc) is filled by concentric strands alone.
 
     Parameters
     ----------
@@ -27,11 +27,7 @@ def medial_fill(section: Region, pitch: float, closest: float) -> list[FloatArra
     pitch : float, mm
         Distance of neighbouring strands.
     closest : float
-        As in `geometry.dilation.parallels`.
-
-    Returns
-    -------
-    list of (k, 2) arrays, mm
+        As in `geometry.parallel_strands.parallels`.
     """
     axis = medial_axis(section, 0.5 * pitch)
     segments = [s for s in axis.segments if s.length >= _SHORTEST * pitch]

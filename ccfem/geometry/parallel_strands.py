@@ -46,18 +46,15 @@ def grow(
     region : shapely (Multi)Polygon, mm
         Its border is the edge of other strands.
     pitch, closest, count, whole
-        As in `parallels`.
-
-    Returns
-    -------
-    list of (k, 2) arrays, mm
+        As in `parallels`; so is the result.
     """
     if shapely.is_empty(region):
         return []
-    smooth = [_smooth(curve, _TOLERANCE * pitch) for curve in curves]
+    strings = [shapely.LineString(curve).simplify(_TOLERANCE * pitch) for curve in curves]
     slack = (closest - 0.5) * pitch
     room = shapely.buffer(region, -slack, join_style="mitre")
-    inner = open_lines(shapely.intersection([shapely.LineString(c) for c in smooth], room))
+    inner = open_lines(shapely.intersection(strings, room))
+    smooth = [shapely.get_coordinates(string) for string in strings]
     inner += parallels(smooth, room, pitch, closest, count, whole)
     # The sides of a strand keep their distance to the border; its ends may reach it.
     lines = [
@@ -116,14 +113,13 @@ def parallels(
     if whole:
         strings = np.array([shapely.multilinestrings(strings)])
         owners = np.zeros_like(owners)
-    half = 0.5 * closest * pitch
+    cap, half = "round" if whole else "flat", 0.5 * closest * pitch
     lines: list[FloatArray] = []
     level = idle = 0
     # Where a channel is closed there may be no line at one distance and some at the next.
     while (count is None or level < count) and idle < 3:
         level += 1
         distance = level * pitch
-        cap = "round" if whole else "flat"
         covered = shapely.union_all(
             shapely.buffer(strings, distance, cap_style=cap, quad_segs=_ARC)
         )
@@ -149,9 +145,8 @@ def _own_pieces(
 ) -> list[FloatArray]:
     """Pieces of a ring that lie at a distance from their nearest curve, split where that changes.
 
-    `sides` holds the straight pieces of all curves, `owners` the curve of each.
-
-    Straight ends of buffers and rounded cusps drop out.
+    `sides` holds the straight pieces of all curves, `owners` the curve of each. Straight ends of
+    buffers and rounded cusps drop out.
     """
     middle = shapely.points(0.5 * (ring[1:] + ring[:-1]))
     (_, side), gaps = sides.query_nearest(middle, return_distance=True, all_matches=False)
@@ -222,7 +217,3 @@ def lengthened(line: FloatArray, region: Region, near: float, length: float) -> 
         way = line[-1] - line[-2]
         parts.append(line[-1:] + length * way / np.linalg.norm(way))
     return np.concatenate(parts)
-
-
-def _smooth(line: FloatArray, tolerance: float) -> FloatArray:
-    return shapely.get_coordinates(shapely.simplify(shapely.LineString(line), tolerance))

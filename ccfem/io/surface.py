@@ -64,14 +64,10 @@ def read_surface(path: str | os.PathLike[str], scale: float = 1.0) -> Surface:
     scale : float, default 1
         Factor on the coordinates, to make them mm.
 
-    Returns
-    -------
-    Surface
-
     Raises
     ------
     InputError
-        When the file is missing, no surface, or the surface is open; the message says how many
+        When the file is missing or holds no surface, or the surface is open; it says how many
         edges are open and where.
     """
     path = existing_file(path, "surface file")

@@ -7,7 +7,6 @@ from scipy import ndimage
 
 from ccfem.arrays import BoolArray, FloatArray, IntArray
 from ccfem.fields.streamlines import streamlines
-from ccfem.layers.layer import Layer
 from ccfem.layers.layer_stress import LayerStress
 from ccfem.raster.bands import depth
 from ccfem.raster.bitmap import Bitmap
@@ -15,7 +14,7 @@ from ccfem.raster.skeleton import segments, skeleton
 from ccfem.raster.thinning import thin
 from ccfem.tensor import in_plane
 
-__all__ = ["guide_pixels", "nearest_pixels", "segment_seeds", "stress_guides"]
+__all__ = ["guide_pixels", "segment_seeds", "stress_guides"]
 
 _STEP = 0.5
 _APART = 2.0
@@ -99,18 +98,8 @@ def guide_pixels(
     return guides
 
 
-def nearest_pixels(inside: BoolArray, pixels: IntArray) -> IntArray:
-    """Pixel (k, 2) of those inside, some at least, that is nearest to each of some pixels."""
-    nearest = ndimage.distance_transform_edt(~inside, return_distances=False, return_indices=True)
-    return np.stack([index[tuple(pixels.T)] for index in nearest], axis=1).astype(np.int64)
-
-
 def stress_guides(
-    raster: Bitmap,
-    inside: BoolArray,
-    layer: Layer,
-    stress: LayerStress,
-    points: FloatArray | None = None,
+    raster: Bitmap, inside: BoolArray, stress: LayerStress, points: FloatArray | None = None
 ) -> IntArray:
     """Guides along streamlines of the principal stress of the largest size.
 
@@ -119,7 +108,6 @@ def stress_guides(
     raster : Bitmap
     inside : (H, W) bool array
         Pixels that guides stay in.
-    layer : Layer
     stress : LayerStress
     points : (k, 2) array, mm, optional
         Where streamlines start, at the nearest pixel inside; by default `segment_seeds`.
@@ -134,7 +122,9 @@ def stress_guides(
     if points is None:
         seeds = segment_seeds(inside)
     else:
-        seeds = nearest_pixels(inside, raster.pixels(points))
+        _, nearest = ndimage.distance_transform_edt(~inside, return_indices=True)
+        seeds = nearest[:, *raster.pixels(points).T].T.astype(np.int64)
+    layer = stress.layer
     plane = in_plane(stress.nodal, layer.plane.frame)
     starts = raster.centres(seeds)
     step = _STEP * raster.pixel

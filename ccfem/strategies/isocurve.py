@@ -22,10 +22,11 @@ from ccfem.fields.compatibility import Incompatible
 from ccfem.fields.crease import orient_along
 from ccfem.fields.fill import fill_laplacian, fill_screened
 from ccfem.fields.layer_elements import Surface
-from ccfem.fields.layer_tension import MeshTension, SampledTension, layer_tension, mesh_tension
+from ccfem.fields.layer_tension import layer_tension, mesh_tension
 from ccfem.fields.levels import extract_levels, unit_levels
 from ccfem.fields.orientation import orient
 from ccfem.fields.scalar import fit_cone, fit_constrained, fit_literal, fit_weighted
+from ccfem.fields.tensile import Tension
 from ccfem.geometry.isocontours import Isocontours
 from ccfem.geometry.polylines import is_closed, middle_of_longest_run
 from ccfem.layers.holes import holes_on
@@ -222,9 +223,9 @@ class _Planner:
     """The strategy once it has seen the whole part."""
 
     strategy: Isocurve
-    part: MeshTension | None
+    part: Tension | None
 
-    def tension(self, layer: Layer, stress: LayerStress) -> SampledTension:
+    def tension(self, layer: Layer, stress: LayerStress) -> Tension:
         s = self.strategy
         if self.part is not None:
             return self.part.on(layer)
@@ -239,9 +240,7 @@ class _Planner:
         lines = self.connected(lines, layer, tension, stress.held_or_loaded, machine)
         return Toolpaths.from_plane(lines, layer)
 
-    def isocurves(
-        self, surface: Surface, tension: SampledTension, width: float
-    ) -> list[FloatArray]:
+    def isocurves(self, surface: Surface, tension: Tension, width: float) -> list[FloatArray]:
         """Isocurves of the field, at least a width apart."""
         s = self.strategy
         percentile = np.quantile(
@@ -302,7 +301,7 @@ class _Planner:
         self,
         lines: list[FloatArray],
         layer: Layer,
-        tension: SampledTension,
+        tension: Tension,
         patches: tuple[str, ...],
         machine: Machine,
     ) -> list[FloatArray]:

@@ -120,7 +120,7 @@ class Mps(Infill):
         """Shells of pixels, guides and rings round them."""
         inside = inside_shells(image.mask, self.shells)
         points = None if self.seeds == "segments" else self._points(layer, stress)
-        guides = stress_guides(image, inside, layer, stress, points)
+        guides = stress_guides(image, inside, stress, points)
         return stress_regions(image.mask, guides, self.shells)
 
     def _guides(

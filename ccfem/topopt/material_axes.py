@@ -4,7 +4,7 @@ import numpy as np
 
 from ccfem.arrays import FloatArray
 from ccfem.errors import InputError
-from ccfem.plates.stiffness import fitted_harmonics, plane_harmonics, turned_by
+from ccfem.plates.stiffness import fitted_harmonics, rotate_plane, turned_by
 from ccfem.tensor import rotate_stiffness
 
 __all__ = ["axes_about_z", "harmonics", "sheet"]
@@ -40,9 +40,13 @@ def axes_about_z(angle: FloatArray) -> FloatArray:
 def harmonics(material: FloatArray) -> FloatArray:
     """Five matrices (5, k, k) that give the stiffness turned about z, as `turned_by` combines them.
 
+    Constant, cos 2a, sin 2a, cos 4a, sin 4a; for an orthotropic sheet the invariants U1 to U5 of
+    Tsai and Pagano (1968).
+
     Parameters
     ----------
     material : (3, 3) or (6, 6) array, MPa
+        In material axes.
 
     Raises
     ------
@@ -50,7 +54,7 @@ def harmonics(material: FloatArray) -> FloatArray:
         For a solid that is not alike on both sides of the x-y plane.
     """
     if material.shape == (3, 3):
-        return plane_harmonics(material)
+        return fitted_harmonics(lambda angle: rotate_plane(material, angle))
 
     def turned(angle: FloatArray) -> FloatArray:
         return rotate_stiffness(material, axes_about_z(angle))

@@ -4,7 +4,6 @@ from scipy import ndimage
 from scipy.spatial.distance import cdist
 
 from ccfem.raster.bands import bands, depth
-from ccfem.raster.dilation import first_touch, rings_round
 from ccfem.raster.guides import segment_seeds
 from ccfem.raster.hatch import hatch_lines
 from ccfem.raster.patterns import (
@@ -12,9 +11,11 @@ from ccfem.raster.patterns import (
     INFILL,
     SHELL,
     concentric_regions,
+    first_touch,
     grid_regions,
     inside_shells,
     medial_regions,
+    rings_round,
     stress_regions,
 )
 
