@@ -100,7 +100,6 @@ def virtual_test(
     strand: Strand | None = None,
     mode: str = TENSION,
     span: Sequence[float] = RHO_SPAN,
-    backend: str = "auto",
 ) -> VirtualTest:
     """Test a part with its fibres under the load case that it was solved for.
 
@@ -112,15 +111,14 @@ def virtual_test(
     fibres : Toolpaths or Strands
         In the frame of the mesh; only fibre counts.
     part : StressField or Specimen
-        The part without fibres; a specimen shares its factorisation among tests.
+        The part without fibres. A specimen shares its factorisation, by the solver that it was
+        made with, among tests.
     strand : Strand, optional
         Stiffness of a strand; default rho = EA/E = 4 mm^2.
     mode : str, default "tension"
         "tension": fibres in compression carry nothing. "bonded": all fibres carry.
     span : sequence of float, mm^2, default (2, 6)
         Further values of rho to report the ratio at; () for none.
-    backend : str, default "auto"
-        Solver, where `part` is a StressField.
 
     Returns
     -------
@@ -133,7 +131,7 @@ def virtual_test(
     SolveError
         When the solve misses its tolerance.
     """
-    specimen, strands = _prepared(fibres, part, backend)
+    specimen, strands = _prepared(fibres, part)
     before = specimen.unreinforced
     axial = (Strand() if strand is None else strand).stiffness(specimen.modulus)
     started = perf_counter()
@@ -180,9 +178,9 @@ def virtual_test(
 
 
 def _prepared(
-    fibres: Toolpaths | Strands, part: StressField | Specimen, backend: str = "auto"
+    fibres: Toolpaths | Strands, part: StressField | Specimen
 ) -> tuple[Specimen, Strands]:
-    specimen = Specimen.of(part, backend) if isinstance(part, StressField) else part
+    specimen = Specimen.of(part) if isinstance(part, StressField) else part
     if isinstance(fibres, Toolpaths):
         fibres = cut_strands(fibres, specimen.unreinforced.mesh)
     return specimen, fibres
