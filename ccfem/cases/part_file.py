@@ -101,6 +101,8 @@ them with a minus ("-z"), or three numbers.
     length = [15, 25]
     angle = [90, 135]
 
+    [machine.limits]                  # what differs from ccfem.machine.limits.Limits
+    on_fibre = 0.05
     [machine.gcode]                   # what differs from ccfem.machine.gcode_profile.GcodeProfile
     cut = ["M42 P4 S255", "G4 P{wait}", "M42 P4 S0"]
     bed = [250, 210, 200]             # mm

@@ -208,7 +208,7 @@ def compare(
     if print_plans:
         runs = [with_print(run, part, tell) for run in runs]
     if strand is not None:
-        runs = all_tested(runs, stress, strand, backend, tell)
+        runs = all_tested(runs, part, strand, backend, tell)
     lengths = [float(run.toolpaths.lengths.sum()) for run in runs if run.tested is not None]
     bound = None
     if lengths:

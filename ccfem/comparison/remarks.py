@@ -1,20 +1,16 @@
-"""What is said of a comparison: remarks beside the table, and the verdict in one sentence."""
+"""What is said of a comparison: remarks that stand beside the table."""
 
 from collections.abc import Mapping, Sequence
 
 import numpy as np
 
-from ccfem.comparison.headline import headline_values
-from ccfem.comparison.ranking import ranking, stiffness_ratio, too_long, undecided
+from ccfem.comparison.ranking import order_of, ranking, stiffness_ratio, too_long
 from ccfem.comparison.runs import Run
 from ccfem.evaluation.evaluation import Evaluation
 from ccfem.fibre_aware.upper_bound import UpperBound
+from ccfem.virtual_testing.stiffer import RESOLUTION, SAME, UNDECIDED
 
-__all__ = ["bound_remark", "remarks", "verdict"]
-
-
-_EQUAL = 0.02
-"""Difference in length up to which two runs count as laying equally much."""
+__all__ = ["bound_remark", "remarks"]
 
 
 def remarks(
@@ -53,6 +49,10 @@ def _about(run: Run, wanted: float | None, bounded: bool) -> list[str]:
         lines += _about_links(run.evaluation.total)
         if getattr(run.strategy, "crosses", False):
             lines += _about_crossings(run.evaluation, bounded)
+    if run.why_not:
+        lines.append(f"not printable as planned: {run.why_not}")
+    if run.empty_layers and run.evaluation is not None:
+        lines.append(f"no fibre on {run.empty_layers} of {len(run.evaluation.layers)} layers")
     if run.note:
         placed = ", so it is placed last" if too_long(run, wanted) else ""
         lines.append(f"{run.note}{placed}")
@@ -61,14 +61,17 @@ def _about(run: Run, wanted: float | None, bounded: bool) -> list[str]:
 
 def _about_orders(tested: Sequence[Run]) -> list[str]:
     """Say which runs, best first, cannot be put in an order."""
+    reasons = {
+        UNDECIDED: "undecided against {}, for tension-only and bonded fibres do not agree on an "
+        "order",
+        SAME: f"no difference to {{}}: less than {RESOLUTION:.0%}, the resolution of the test",
+    }
     lines = []
     for k, run in enumerate(tested):
-        unclear = [other.name for other in tested[k + 1 :] if undecided(run, other)]
-        if unclear:
-            lines.append(
-                f"{run.name}: undecided against {', '.join(unclear)}, for tension-only and bonded "
-                "fibres do not agree on an order"
-            )
+        for found, reason in reasons.items():
+            others = [other.name for other in tested[k + 1 :] if order_of(run, other) == found]
+            if others:
+                lines.append(f"{run.name}: {reason.format(', '.join(others))}")
     return lines
 
 
@@ -124,46 +127,3 @@ def bound_remark(tested: Sequence[Run], bound: UpperBound) -> str:
     if share > 1.0:
         return f"only where strands overlap, as those of {name} do, {most}"
     return f"no {most}: {name} reaches {share:.0%} of that gain"
-
-
-def verdict(runs: Sequence[Run], wanted: float | None) -> str:
-    """One sentence that says which strategy is best, by what, and at how much fibre.
-
-    Empty where fewer than two strategies kept to the wanted length.
-    """
-    order = [run for run in ranking(runs, wanted) if run.evaluation is not None]
-    order = [run for run in order if not too_long(run, wanted)]
-    if len(order) < 2:
-        return ""
-    first, second = order[0], order[1]
-    amount = _amounts(first, second, wanted)
-    if first.tested is None or second.tested is None:
-        best, following = (headline_values(run)["efficiency"] for run in (first, second))
-        return (
-            f"By efficiency alone (no virtual test): {first.name} with {best:.3f}, then "
-            f"{second.name} with {following:.3f}, {amount}."
-        )
-    if undecided(first, second):
-        return (
-            f"Undecided between {first.name} and {second.name}, {amount}: "
-            f"{stiffness_ratio(first):.2f} and {stiffness_ratio(second):.2f} times the "
-            f"unreinforced stiffness where fibres carry tension only, "
-            f"{stiffness_ratio(first, 'bonded'):.2f} and "
-            f"{stiffness_ratio(second, 'bonded'):.2f} where they are bonded."
-        )
-    return (
-        f"{first.name} makes the stiffest part, {amount}: {stiffness_ratio(first):.2f} times the "
-        f"unreinforced one, and {stiffness_ratio(first) / stiffness_ratio(second):.2f} times "
-        f"{second.name} (predicted, fibres carrying tension only; bonded fibres agree on the "
-        "order)."
-    )
-
-
-def _amounts(first: Run, second: Run, wanted: float | None) -> str:
-    """Say how much fibre two runs lay, mm per layer, where they were held to a length."""
-    more = first.length_per_layer / second.length_per_layer - 1.0
-    if wanted is None:
-        return "each with its own amount of fibre"
-    if abs(more) <= _EQUAL:
-        return f"at {wanted:.0f} mm of fibre per layer"
-    return f"with {abs(more):.0%} {'more' if more > 0.0 else 'less'} fibre than {second.name}"

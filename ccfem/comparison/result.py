@@ -2,16 +2,22 @@
 
 from collections.abc import Mapping
 from dataclasses import dataclass
+from typing import TYPE_CHECKING
 
 from ccfem.arrays import freeze
 from ccfem.cases.case import Case
 from ccfem.comparison.ranking import ranking
-from ccfem.comparison.remarks import remarks, verdict
+from ccfem.comparison.remarks import remarks
 from ccfem.comparison.runs import Run
 from ccfem.comparison.summary import summary_html, summary_text
+from ccfem.comparison.table import frame
+from ccfem.comparison.verdict import verdict
 from ccfem.elasticity.stress_field import StressField
 from ccfem.fibre_aware.upper_bound import UpperBound
 from ccfem.layers import Layer
+
+if TYPE_CHECKING:
+    import pandas as pd
 
 __all__ = ["Comparison"]
 
@@ -80,3 +86,8 @@ class Comparison:
     def remarks(self) -> list[str]:
         """What has to stand next to the numbers, a line each."""
         return remarks(self.runs, self.fibre_per_layer, self.bound)
+
+    @property
+    def frame(self) -> "pd.DataFrame":
+        """One row a strategy in order of rank: rank, printable, why_not and every index."""
+        return frame(self.ranking)

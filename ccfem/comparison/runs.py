@@ -59,6 +59,9 @@ class Run:
         One line that says why there are no paths, or why they could not be evaluated; else empty.
     untested : str
         Why there is no virtual test though one was asked for; else empty.
+    why_not : str
+        What keeps the paths from being printed as they are: lengths, turns, room, what lies outside
+        or on nothing; empty where they can be.
     unprinted : str
         Why the part cannot be printed as planned though a print was asked for; else empty.
     seconds : mapping of stage to float
@@ -74,6 +77,7 @@ class Run:
     note: str = ""
     failure: str = ""
     untested: str = ""
+    why_not: str = ""
     unprinted: str = ""
     seconds: Mapping[str, float] = field(default_factory=dict)
 
@@ -87,6 +91,18 @@ class Run:
         if self.tested is None:
             return f"Run {self.name!r}: {laid}"
         return f"Run {self.name!r}: {laid}, {self.tested.bracket.tension.ratio:.2f} times as stiff"
+
+    @property
+    def printable(self) -> bool:
+        """Whether there are paths, within all limits of the machine."""
+        return self.evaluation is not None and not self.why_not
+
+    @property
+    def empty_layers(self) -> int:
+        """Layers on which the run lays no fibre."""
+        if self.evaluation is None:
+            return 0
+        return int((self.evaluation.values["paths"][:-1] == 0.0).sum())
 
     @property
     def parameters(self) -> dict[str, Any]:

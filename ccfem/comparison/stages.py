@@ -10,6 +10,7 @@ from ccfem.comparison.runs import Run, Tested
 from ccfem.elasticity.stress_field import StressField
 from ccfem.errors import InputError, SolveError
 from ccfem.evaluation import evaluate
+from ccfem.evaluation.printable import why_not
 from ccfem.export.print_plan import plan_print
 from ccfem.layers import Layer
 from ccfem.machine.machine import Machine
@@ -103,7 +104,8 @@ def evaluated(run: Run, part: Part, tell: Tell) -> Run:
 
     def work() -> Run:
         found = evaluate(run.toolpaths, part.layers, part.stress, part.machine)
-        return replace(run, evaluation=found)
+        broken = why_not(found.total, part.machine)
+        return replace(run, evaluation=found, why_not="; ".join(broken))
 
     return _stage(run, "evaluate", work)
 
@@ -121,24 +123,25 @@ def with_print(run: Run, part: Part, tell: Tell) -> Run:
 
 
 def all_tested(
-    runs: Sequence[Run], stress: StressField, strand: Strand, backend: str, tell: Tell
+    runs: Sequence[Run], part: Part, strand: Strand, backend: str, tell: Tell
 ) -> list[Run]:
     """Test every run that did not fail virtually, all on one factorisation."""
     try:
-        specimen = Specimen.of(stress, backend)
+        specimen = Specimen.of(part.stress, backend)
     except InputError as error:
         return [replace(run, untested=str(error)) for run in runs]
-    return [_tested(run, specimen, strand, tell) for run in runs]
+    return [_tested(run, specimen, strand, part.machine, tell) for run in runs]
 
 
-def _tested(run: Run, specimen: Specimen, strand: Strand, tell: Tell) -> Run:
+def _tested(run: Run, specimen: Specimen, strand: Strand, machine: Machine, tell: Tell) -> Run:
     """Test a run virtually, or say why it cannot be tested."""
     tell(f"testing {run.name}")
     if run.evaluation is None:
         return run
 
     def work() -> Run:
-        strands = cut_strands(run.toolpaths, specimen.unreinforced.mesh)
+        mesh = specimen.unreinforced.mesh
+        strands = cut_strands(run.toolpaths, mesh, machine=machine)
         tension = virtual_test(strands, specimen, strand, TENSION)
         bracket = Bracket(tension, virtual_test(strands, specimen, strand, BONDED, span=()))
         try:

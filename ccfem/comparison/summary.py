@@ -9,6 +9,7 @@ from ccfem.comparison.runs import Run
 __all__ = ["SUMMARY", "summary_html", "summary_text"]
 
 SUMMARY = (
+    Headline("printable", "printable", "", "{}"),
     Headline("stiffness", "stiffness, N/mm", "high", "{:.4g}"),
     Headline("stiffness_ratio_tension", "times unreinforced", "high", "{:.2f}"),
     Headline("first_failure_load", "first failure, N", "high", "{:.0f}"),

@@ -18,6 +18,7 @@ from ccfem.evaluation import (
     links,
     manufacture,
     matching,
+    room,
     sinuosity,
     spacing,
     stiffness_alignment,
@@ -31,12 +32,13 @@ from ccfem.evaluation.curvature import CurvatureSamples
 from ccfem.evaluation.links import LinkSamples
 from ccfem.evaluation.manufacture import ManufactureSamples
 from ccfem.evaluation.plane_paths import plane_paths, pool
+from ccfem.evaluation.room import RoomSamples
 from ccfem.evaluation.sinuosity import SinuositySamples
 from ccfem.evaluation.spacing import SpacingSamples
 from ccfem.layers.layer import Layer
 from ccfem.layers.layer_stress import stress_on
 from ccfem.machine.machine import Machine
-from ccfem.toolpaths import Toolpaths
+from ccfem.toolpaths import FIBRE, Toolpaths
 
 if TYPE_CHECKING:
     import pandas as pd
@@ -51,6 +53,7 @@ COLUMNS: tuple[Column, ...] = (
     *matching.COLUMNS,
     *stiffness_alignment.COLUMNS,
     *spacing.COLUMNS,
+    *room.COLUMNS,
     *coverage.COLUMNS,
     *containment.COLUMNS,
     *links.COLUMNS,
@@ -169,7 +172,19 @@ def evaluate(
     if not layers:
         raise InputError("expected at least one layer to evaluate; got none: slice the part")
     _check_layers(toolpaths, layers)
-    samples = [_sample(toolpaths.on_layer(k.index), k, stress, machine) for k in layers]
+    fibre = toolpaths.of_kind(FIBRE).layer
+    late = fibre[fibre < np.maximum.accumulate(fibre)]
+    samples = [
+        _sample(
+            toolpaths.on_layer(k.index),
+            k,
+            stress,
+            machine,
+            _below(k, layers),
+            int(np.count_nonzero(late == k.index)),
+        )
+        for k in layers
+    ]
     rows = [_indices(each, machine) for each in samples]
     rows.append(_indices(_pooled(samples), machine))
     return Evaluation(
@@ -199,6 +214,12 @@ def _check_layers(toolpaths: Toolpaths, layers: Sequence[Layer]) -> None:
             )
 
 
+def _below(layer: Layer, layers: Sequence[Layer]) -> Layer | None:
+    """Find the layer under one; None where it is the lowest."""
+    lower = [each for each in layers if each.plane.height < layer.plane.height]
+    return max(lower, key=lambda each: each.plane.height, default=None)
+
+
 class _Samples(NamedTuple):
     """Samples of one layer, or of all together: every index is computed of them."""
 
@@ -207,13 +228,21 @@ class _Samples(NamedTuple):
     curvature: CurvatureSamples
     alignment: AlignmentSamples
     spacing: SpacingSamples
+    room: RoomSamples
     coverage: CoverageSamples
     containment: ContainmentSamples
     links: LinkSamples
     crossings: CrossingSamples
 
 
-def _sample(toolpaths: Toolpaths, layer: Layer, stress: PartStress, machine: Machine) -> _Samples:
+def _sample(
+    toolpaths: Toolpaths,
+    layer: Layer,
+    stress: PartStress,
+    machine: Machine,
+    below: Layer | None,
+    late: int,
+) -> _Samples:
     """Take the samples of one layer."""
     width = machine.fibre_width
     paths = plane_paths(toolpaths, layer)
@@ -224,6 +253,7 @@ def _sample(toolpaths: Toolpaths, layer: Layer, stress: PartStress, machine: Mac
         curvature.sample_curvature(paths, width),
         alignment.sample_alignment(paths, on_layer, width),
         spacing.sample_spacing(paths, width),
+        room.sample_room(paths, machine, below, late),
         coverage.sample_coverage(paths, on_layer, width),
         containment.sample_containment(paths),
         links.sample_links(paths),
@@ -246,6 +276,7 @@ def _indices(samples: _Samples, machine: Machine) -> dict[str, float]:
         **matching.matching_indices(samples.alignment),
         **stiffness_alignment.stiffness_alignment_indices(samples.alignment),
         **spacing.spacing_indices(samples.spacing, machine),
+        **room.room_indices(samples.room),
         **coverage.coverage_indices(samples.coverage),
         **containment.containment_indices(samples.containment),
         **links.link_indices(samples.links),

@@ -8,6 +8,7 @@ from ccfem.elasticity.part_stress import PartStress
 from ccfem.errors import InputError
 from ccfem.layers.layer import Layer
 from ccfem.layers.layer_stress import stress_on
+from ccfem.layers.pitch import check_pitch
 from ccfem.machine.machine import Machine
 from ccfem.planning.strategy import PartStrategy, Strategy
 from ccfem.toolpaths import Toolpaths
@@ -40,10 +41,11 @@ def plan(
     Raises
     ------
     InputError
-        When the strategy plans on flat layers only and a layer is curved; and whatever the
-        strategy raises.
+        When the strategy plans on flat layers only and a layer is curved, when layers are nearer
+        than a strand is high; and whatever the strategy raises.
     """
     _check_layers(strategy, layers)
+    check_pitch(layers, machine)
     if isinstance(strategy, PartStrategy):
         planner = strategy.for_part(stress, layers, machine)
     else:

@@ -117,7 +117,7 @@ def first_failure(
 def fibre_peak(test: VirtualTest, share: float = FIBRE_SHARE) -> tuple[float, FloatArray]:
     """Axial force, N, that `share` of the fibre length stays below, and a place (3,) of it."""
     order = np.argsort(test.axial_force, kind="stable")
-    reached = np.cumsum(test.strands.length[order])
+    reached = np.cumsum((test.strands.length * test.strands.share)[order])
     at = order[min(np.searchsorted(reached, share * reached[-1]), len(order) - 1)]
     return float(test.axial_force[at]), test.strands.middle[at]
 
