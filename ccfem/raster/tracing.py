@@ -56,13 +56,12 @@ class PixelPaths:
         return len(self.closed)
 
 
-def trace(regions: IntArray, linked: BoolArray) -> PixelPaths:
+def trace(regions: IntArray, linked: BoolArray, seed: int = 0) -> PixelPaths:
     """Trace paths through regions of pixels.
 
     Each region is thinned, and its lines are followed, without spurs and straight on where they
     fork. Pixels left over come back as corners of diagonal steps, then as paths of their own;
     single ones stay isolated. Paths of one region whose ends meet are joined. No two paths cross.
-    Closed paths start at random pixels (with a fixed seed), so that their starts make no seam.
 
     Parameters
     ----------
@@ -71,6 +70,8 @@ def trace(regions: IntArray, linked: BoolArray) -> PixelPaths:
         columns are empty.
     linked : (H, W, 8) bool array
         `Bitmap.linked`.
+    seed : int
+        Of the random pixel that each closed path starts at, so that starts make no seam.
     """
     regions = np.ascontiguousarray(regions, dtype=np.int64)
     linked = np.ascontiguousarray(linked)
@@ -91,7 +92,7 @@ def trace(regions: IntArray, linked: BoolArray) -> PixelPaths:
     join_ends(regions, linked, used, following, before)
     fill_corners(regions, linked, used, following, before)
     pixels, offsets, closed = chains(regions, used, following, before)
-    random = np.random.default_rng(0)
+    random = np.random.default_rng(seed)
     for k in np.flatnonzero(closed):
         own = slice(offsets[k], offsets[k + 1])
         pixels[own] = np.roll(pixels[own], random.integers(offsets[k + 1] - offsets[k]), axis=0)

@@ -17,7 +17,7 @@ FREE = -1
 """Joint of an end that meets no other member."""
 
 _ARC_CHORD = 1.6
-"""Way along the border over its chord up to which a branch is the bisector of a corner; a square
+"""Maximum ratio of the length along the border to its chord for the bisector of a corner; a square
 corner has 1.41."""
 
 _CONTRACTION = 1.25
@@ -133,7 +133,7 @@ def _joints(axis: MedialAxis) -> tuple[IntArray, BoolArray]:
 
 
 def _joined(members: list[Member], joint: int) -> list[Member]:
-    """Members with those two joined that are alone in a joint; one that is alone is a ring."""
+    """Members, with the two joined that alone meet in a joint; a single one becomes a ring."""
     ends = ends_at(members, joint)
     if len(ends) != 2:
         return members
