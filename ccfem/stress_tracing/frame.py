@@ -11,12 +11,12 @@ from ccfem.geometry.medial_axis import MedialAxis, MedialSegment, medial_axis
 from ccfem.geometry.shapes import Region
 from ccfem.mesh.measures import connected
 
-__all__ = ["FREE", "Frame", "Member", "ends_at", "frame"]
+__all__ = ["ARC_CHORD", "FREE", "Frame", "Member", "ends_at", "frame"]
 
 FREE = -1
 """Joint of an end that meets no other member."""
 
-_ARC_CHORD = 1.6
+ARC_CHORD = 1.6
 """Maximum ratio of the length along the border to its chord for the bisector of a corner; a square
 corner has 1.41."""
 
@@ -100,7 +100,7 @@ def frame(section: Region, step: float) -> Frame:
     step : float, mm
         Largest distance of the samples along the border.
     """
-    axis = medial_axis(section, step, object_angle=None, arc_chord=_ARC_CHORD)
+    axis = medial_axis(section, step, object_angle=None, arc_chord=ARC_CHORD)
     joint, short = _joints(axis)
     members = []
     for segment, within in zip(axis.segments, short, strict=True):
