@@ -12,6 +12,10 @@ from ccfem.linking.joining import link_ends
 
 __all__ = ["close_short_ring", "keep_off_border", "linked_paths"]
 
+_OVERLAP = 0.1
+"""Largest part of a ring's length that is laid twice [Chen et al. 2021: the ring round a hole of
+10.9 mm is 40.8 mm long, against a minimum of 42 mm]."""
+
 
 def keep_off_border(lines: Sequence[FloatArray], section: Region, inset: float) -> list[FloatArray]:
     """Parts of lines that keep a distance from the border of a section.
@@ -71,17 +75,14 @@ def linked_paths(
     return [line for line in lines if line_length(line) >= least_length]
 
 
-def close_short_ring(line: FloatArray, least_length: float, overlap: float = 0.1) -> FloatArray:
-    """Let a closed line that is just too short run on over its own start.
+def close_short_ring(line: FloatArray, least_length: float) -> FloatArray:
+    """Let a closed line that is too short by up to a tenth run on over its own start.
 
     Parameters
     ----------
     line : (n, 2) array, mm
-        Returned as it is when it is open, long enough, or shorter than the overlap can mend.
+        Returned as it is when it is open, long enough, or shorter than that.
     least_length : float, mm
-    overlap : float, default 0.1
-        Largest part of the ring's length that is laid twice [Chen et al. 2021: the ring round a
-        hole of 10.9 mm is 40.8 mm long, against a minimum of 42 mm].
 
     Returns
     -------
@@ -90,7 +91,7 @@ def close_short_ring(line: FloatArray, least_length: float, overlap: float = 0.1
     """
     length = line_length(line)
     missing = least_length - length
-    if not is_closed(line) or not 0.0 < missing <= overlap * length:
+    if not is_closed(line) or not 0.0 < missing <= _OVERLAP * length:
         return line
     along = along_line(line)
     again = along[(along > 0.0) & (along < missing)]
