@@ -2,11 +2,9 @@
 
 import shapely
 
-from ccfem.cases.case import Case
+from ccfem.cases.case import Case, pulled
 from ccfem.cases.stored import mesh_of_case
-from ccfem.elasticity.problem import Force, Problem, Support
 from ccfem.layers.slicing.planar import Planar
-from ccfem.materials import printed_pla
 from ccfem.mesh.patches import Plane, patches_from_rules
 from ccfem.mesh.tet_mesh import TetMesh
 from ccfem.meshing import extrude
@@ -47,16 +45,11 @@ def bar(element_size: float = ELEMENT_SIZE, order: int = 1, force: float = 1000.
         Linear or quadratic cells.
     force : float, N
     """
-    problem = Problem(
-        mesh_of_case("bar", element_size, order, bar_mesh),
-        printed_pla(),
-        (Support("support"),),
-        {"pull": (Force("load", (force, 0.0, 0.0)),)},
-    )
+    mesh = mesh_of_case("bar", element_size, order, bar_mesh)
     return Case(
         name="bar",
         title="Tensile bar, 125 x 25 x 5 mm, pulled at its ends",
-        problem=problem,
+        problem=pulled(mesh, (force, 0.0, 0.0)),
         slicing=Planar(count=10),
         source="size of the tensile bar of Chen et al. 2021 (Additive Manufacturing 49, 102470); "
         "own outline of lines and quarter circles",

@@ -4,10 +4,8 @@ import numpy as np
 import shapely
 
 from ccfem.arrays import FloatArray
-from ccfem.cases.case import Case
+from ccfem.cases.case import Case, pulled
 from ccfem.cases.stored import mesh_of_case
-from ccfem.elasticity.problem import Force, Problem, Support
-from ccfem.materials import printed_pla
 from ccfem.mesh.patches import Cylinder, patches_from_rules
 from ccfem.mesh.tet_mesh import TetMesh
 from ccfem.meshing import extrude
@@ -80,16 +78,11 @@ def loop(element_size: float = ELEMENT_SIZE, order: int = 1, force: float = 1000
         Linear or quadratic cells.
     force : float, N
     """
-    problem = Problem(
-        mesh_of_case("loop", element_size, order, loop_mesh),
-        printed_pla(),
-        (Support("support"),),
-        {"pull": (Force("load", (0.0, force, 0.0)),)},
-    )
+    mesh = mesh_of_case("loop", element_size, order, loop_mesh)
     return Case(
         name="loop",
         title="Ring with two lugs, 140 x 100 x 10 mm, pulled at its two holes",
-        problem=problem,
+        problem=pulled(mesh, (0.0, force, 0.0)),
         source="size and loading of the Loop of Chen et al. 2021 (Additive Manufacturing 49, "
         "102470); own outline of circles",
     )

@@ -2,11 +2,9 @@
 
 import shapely
 
-from ccfem.cases.case import Case
+from ccfem.cases.case import Case, pulled
 from ccfem.cases.stored import mesh_of_case
-from ccfem.elasticity.problem import Force, Problem, Support
 from ccfem.layers.slicing.planar import Planar
-from ccfem.materials import printed_pla
 from ccfem.mesh.patches import Cylinder, PatchRule, Plane, patches_from_rules
 from ccfem.mesh.tet_mesh import TetMesh
 from ccfem.meshing import extrude
@@ -45,16 +43,11 @@ def open_hole(element_size: float = ELEMENT_SIZE, order: int = 1, force: float =
         Linear or quadratic cells.
     force : float, N
     """
-    problem = Problem(
-        mesh_of_case("open_hole", element_size, order, open_hole_mesh),
-        printed_pla(),
-        (Support("support"),),
-        {"pull": (Force("load", (force, 0.0, 0.0)),)},
-    )
+    mesh = mesh_of_case("open_hole", element_size, order, open_hole_mesh)
     return Case(
         name="open_hole",
         title="Plate 200 x 36 x 4 mm with a hole of radius 6 mm, in tension",
-        problem=problem,
+        problem=pulled(mesh, (force, 0.0, 0.0)),
         slicing=Planar(count=8),
         source="open-hole tension of laminates; the plate of ASTM D5766 with a hole twice as wide",
     )

@@ -10,7 +10,7 @@ from typing import Annotated, Any
 
 import typer
 
-from ccfem.cli.arguments import names_of, parameters_by_strategy, parameters_of
+from ccfem.cli.arguments import names_of, parameters_by_strategy
 from ccfem.cli.options import (
     Backend,
     Calibration,
@@ -177,7 +177,7 @@ def plan(
     out: Out = None,
 ) -> None:
     """Plan a part by one strategy, by default with its natural amount of fibre."""
-    parameters = {strategy: parameters_of(strategy, set_ or ())}
+    parameters = parameters_by_strategy(set_ or (), strategy)
     chosen = layers_of(layers, heights, slicing)
     options = options_of(chosen, fibre_per_layer, virtual_test, load_case, backend)
     options["natural"] = fibre_per_layer is None
@@ -227,7 +227,7 @@ def calibrate(
         raise InputError("--reinforced and --strategy belong together; got only one of them")
     loaded, paths = load(case, set_case), None
     if strategy is not None:
-        chosen = create_all(loaded, (strategy,), {strategy: parameters_of(strategy, set_ or ())})
+        chosen = create_all(loaded, (strategy,), parameters_by_strategy(set_ or (), strategy))
         options = options_of(layers, fibre_per_layer, False, load_case, "auto")
         (planned,) = compare(loaded, chosen, natural=fibre_per_layer is None, **options).runs
         if not len(planned.toolpaths):

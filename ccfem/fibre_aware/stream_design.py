@@ -226,7 +226,7 @@ def design(problem: StreamProblem, start: FloatArray, evaluations: int = 50) -> 
     problem : StreamProblem
     start : (c,) array
     evaluations : int, default 50
-        Most evaluations of the objective, one or a few solves each; at least 1.
+        Maximum number of evaluations of the objective, one or a few solves each; at least 1.
 
     Returns
     -------

@@ -81,8 +81,4 @@ def _at_points(surface: Surface, direction: FloatArray) -> FloatArray:
 def _turned_energy(surface: Surface, metric: FloatArray, sign: FloatArray) -> sparse.csc_array:
     """As `Surface.energy`, the value at each corner of each triangle times a sign (t, 3)."""
     slopes = surface.gradients * sign[:, :, None]
-    blocks = np.einsum("tid,tde,tje->tij", slopes, metric, slopes)
-    rows = np.repeat(surface.triangles, 3, axis=1).ravel()
-    columns = np.tile(surface.triangles, (1, 3)).ravel()
-    n = len(surface.points)
-    return sparse.coo_array((blocks.ravel(), (rows, columns)), shape=(n, n)).tocsc()
+    return surface.matrix(np.einsum("tid,tde,tje->tij", slopes, metric, slopes))

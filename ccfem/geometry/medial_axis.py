@@ -6,6 +6,7 @@ limbs by the angle under which the border is seen from the axis, or by the way a
 against its chord.
 """
 
+from collections import Counter
 from dataclasses import dataclass
 from itertools import pairwise
 
@@ -305,10 +306,7 @@ def _chains(edges: IntArray, kept: BoolArray, count: int) -> list[list[int]]:
 def _pruned(graph: _Graph, chains: list[list[int]], prune: float, step: float) -> list[list[int]]:
     """Chains without short branches at free ends, shortest first, and without specks."""
     while True:
-        degree: dict[int, int] = {}
-        for chain in chains:
-            for end in (chain[0], chain[-1]):
-                degree[end] = degree.get(end, 0) + 1
+        degree = Counter(end for chain in chains for end in (chain[0], chain[-1]))
         short = []
         for number, chain in enumerate(chains):
             free = [degree[end] == 1 for end in (chain[0], chain[-1])]

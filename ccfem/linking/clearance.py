@@ -16,9 +16,8 @@ def trim_to_clearance(
 ) -> list[FloatArray]:
     """Cut strands so that no two are nearer than a clearance, the longest first.
 
-    Strands are laid in the order of their length. Of each, only the stretches that keep the
-    clearance from those laid before, and from earlier parts of itself, remain; stretches shorter
-    than `least_length` are dropped.
+    Of each strand, only the stretches that keep the clearance from those laid before, and from
+    earlier parts of itself, remain; stretches shorter than `least_length` are dropped.
 
     Parameters
     ----------
@@ -40,11 +39,9 @@ def trim_to_clearance(
     order = np.lexsort((-length, np.arange(len(lines)) >= first))
     ordered = [lines[k] for k in order]
     points, offsets = pack(ordered)
-    keep = _lay(points, offsets, clearance, least_length)
+    masks = np.split(_lay(points, offsets, clearance, least_length), offsets[1:-1])
     kept: list[FloatArray] = []
-    for k in range(len(ordered)):
-        mask = keep[offsets[k] : offsets[k + 1]]
-        line = ordered[k]
+    for line, mask in zip(ordered, masks, strict=True):
         if mask.all():
             kept.append(line)
             continue

@@ -22,14 +22,12 @@ class Machine:
     """A printer of continuous fibre.
 
     The defaults are the machine of Chen et al. 2021 (section 5 and table 3). What the
-    paper does not give is marked "our choice".
+    paper does not state is marked "our choice".
 
     Attributes
     ----------
     fibre_width : float, mm
-        W, the least distance between neighbouring strands.
-    deposited_width : float, mm
-        Width of a strand once pressed.
+        W, the minimum distance between neighbouring strands.
     fibre_height : float, mm
         Height of a fibre layer.
     matrix_height : float, mm
@@ -66,7 +64,6 @@ class Machine:
     """
 
     fibre_width: float = 1.0
-    deposited_width: float = 1.2
     fibre_height: float = 0.05
     matrix_height: float = 0.8
     filament_area: float = 0.1075
@@ -100,7 +97,7 @@ class Machine:
 
     @property
     def tail(self) -> float:
-        """Fibre that is still to be laid after a cut, mm."""
+        """Length of fibre still to be laid after a cut, mm."""
         if self.cutter_distance is None:
             return min(_CUTTER_DISTANCE, self.minimum_length)
         return self.cutter_distance

@@ -22,9 +22,7 @@ if TYPE_CHECKING:
 __all__ = [
     "Coloured",
     "compare_layer",
-    "draw_paths",
     "draw_section",
-    "draw_segments",
     "draw_stress",
     "layer_picture",
     "mark_failure",
@@ -121,18 +119,8 @@ def draw_stress(axes: "Axes", stress: LayerStress, limit: float) -> Any:
     return colours
 
 
-def draw_paths(axes: "Axes", layer: Layer, paths: Toolpaths, width: float) -> None:
-    """Draw the fibre paths of a layer in one colour, and their links in another.
-
-    Parameters
-    ----------
-    axes : Axes
-    layer : Layer
-    paths : Toolpaths
-        Of the whole part, or of this layer.
-    width : float, mm
-        Of a strand.
-    """
+def _draw_paths(axes: "Axes", layer: Layer, paths: Toolpaths, width: float) -> None:
+    """Draw the fibre paths of a layer in one colour, and their links in another."""
     from matplotlib.collections import LineCollection
 
     wanted = paths.select((paths.layer == layer.index) & (paths.kind == FIBRE))
@@ -165,7 +153,7 @@ def _strands_and_links(paths: Toolpaths, layer: Layer) -> tuple[list[FloatArray]
     return found
 
 
-def draw_segments(axes: "Axes", coloured: Coloured, width: float) -> Any:
+def _draw_segments(axes: "Axes", coloured: Coloured, width: float) -> Any:
     """Draw pieces of fibre coloured by their values; returns the colour map."""
     from matplotlib.collections import LineCollection
 
@@ -266,10 +254,6 @@ def compare_layer(
     paths : mapping of strategy name to Toolpaths
     captions : mapping of strategy name to str, optional
         Lines with key numbers.
-
-    Returns
-    -------
-    Figure
     """
     figure, columns = new_figure(picture_extents(layer, paths.values()), columns=len(paths))
     colours = palette(paths)
@@ -291,12 +275,12 @@ def _draw(
     """One picture without its title."""
     draw_section(axes, layer, filled=stress is None or coloured is not None)
     if coloured is not None:
-        colours = draw_segments(axes, coloured, width)
+        colours = _draw_segments(axes, coloured, width)
         colour_bar(axes, colours, coloured.limits, coloured.label)
     else:
         if stress is not None:
             end = tension_limit(stress) if limit is None else limit
             colours = draw_stress(axes, stress, end)
             colour_bar(axes, colours, (0.0, end), "MPa tension")
-        draw_paths(axes, layer, paths, width)
+        _draw_paths(axes, layer, paths, width)
     scale_bar(axes)

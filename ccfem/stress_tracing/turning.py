@@ -4,9 +4,9 @@ A track may move sideways by u(s). The turned track minimises the sum, over its 
 
     cos(2 r) (u' - tan r)^2 + (c u'')^2 + (u / l)^2
 
-with the angle r from the track to the stress: misalignment, curvature, and the distance from where
-it was, which counts much in members, where tracks share out the width, and little in joints. Where
-r is over 45 degrees, in the joints that it crosses, a track is left alone.
+with the angle r from the track to the stress: misalignment, curvature, and the distance from its
+old place. That distance counts much in members, whose width the tracks fill evenly, and little in
+joints. Where r is over 45 degrees, in joints that it crosses, a track is left alone.
 """
 
 from typing import Any
@@ -31,7 +31,7 @@ _HELD = 2.0
 _FREE = 12.0
 """Lengths, mm: c, and l in members and in joints."""
 _CLOSEST = 0.6
-"""Share of their distance that tracks keep."""
+"""Share of their distance from each other that tracks keep."""
 _ROUNDS = 2
 
 
@@ -92,7 +92,7 @@ def _wanted(
 
 
 def _least(weight: FloatArray, slope: FloatArray, hold: FloatArray, closed: bool) -> FloatArray:
-    """Move (n,) of one line for which the sum is least."""
+    """Move (n,) of one line that minimises the sum."""
     count = len(hold)
     first = np.arange(len(weight))
     bent = np.arange(count) if closed else np.arange(1, count - 1)

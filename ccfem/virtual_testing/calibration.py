@@ -5,6 +5,7 @@ more, of the same part printed with known fibre paths, gives rho = EA/E of a str
 values are far off for printed parts, which deflect a lot and are not solid.
 """
 
+import json
 import math
 import tomllib
 from dataclasses import dataclass, replace
@@ -70,7 +71,7 @@ class Calibration:
 
     def strand(self, default: Strand | None = None) -> Strand:
         """Return the strand: `default` (rho = 4) with the calibrated rho, where there is one."""
-        default = Strand() if default is None else default
+        default = default or Strand()
         return default if self.rho is None else replace(default, rho=self.rho)
 
     def write(self, path: str | Path) -> None:
@@ -121,7 +122,7 @@ def calibrate(
     Raises
     ------
     InputError
-        For curves that nothing can be fitted to, with the cure.
+        For curves that do not suit each other or the part.
     """
     if (reinforced is None) != (toolpaths is None):
         raise InputError(
@@ -222,27 +223,18 @@ def read_calibration(path: str | Path) -> Calibration:
             f"expected a material file at {path}; it cannot be read: {error}: write it by ccfem "
             "calibrate"
         ) from None
-    numbers = {}
-    for key in ("modulus", "poisson", "tensile_strength", "rho"):
-        value = values.get(key)
-        if value is None and key == "rho":
-            continue
-        check_number(f"{path}: {key}", value)
-        numbers[key] = float(values[key])
+    for key in ("modulus", "poisson", "tensile_strength", *(["rho"] if "rho" in values else [])):
+        check_number(f"{path}: {key}", values.get(key))
     return Calibration(
         name=str(values.get("name", path.stem)),
-        modulus=numbers["modulus"],
-        poisson=numbers["poisson"],
-        matrix_strength=numbers["tensile_strength"],
-        rho=numbers.get("rho"),
+        modulus=float(values["modulus"]),
+        poisson=float(values["poisson"]),
+        matrix_strength=float(values["tensile_strength"]),
+        rho=float(values["rho"]) if "rho" in values else None,
         source=str(values.get("source", "")),
     )
 
 
 def _quoted(text: str) -> str:
-    """Text as a TOML basic string."""
-    escaped = "".join(
-        f"\\u{ord(c):04x}" if ord(c) < 32 or ord(c) == 127 else "\\" + c if c in '"\\' else c
-        for c in text
-    )
-    return f'"{escaped}"'
+    """Text as a TOML string: as in JSON, which leaves the delete character as it is."""
+    return json.dumps(text, ensure_ascii=False).replace("\x7f", "\\u007f")

@@ -93,7 +93,7 @@ def test_fibre_along_the_pull_wins_by_the_rule_of_mixtures():
 
 
 def test_best_values_are_the_largest_or_the_smallest_as_each_column_says(compared):
-    best, sides = best_values(compared), set()
+    best, sides = best_values(compared.runs, compared.fibre_per_layer), set()
     for head in HEADLINE:
         values = sorted(headline_values(run)[head.column] for run in compared.runs)
         if head.better and values[0] < values[-1]:

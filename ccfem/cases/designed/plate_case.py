@@ -29,7 +29,6 @@ def prepreg_printer() -> Machine:
     """
     return Machine(
         fibre_width=0.9,
-        deposited_width=0.9,
         minimum_length=10.0,
         minimum_radius=1.5,
         speeds=SpeedTable(),
