@@ -109,6 +109,22 @@ def compare(
         list[str] | None,
         typer.Option("--set", metavar="STRATEGY.NAME=VALUE", help="Set a parameter; repeatable."),
     ] = None,
+    paths: Annotated[
+        str | None,
+        typer.Option(
+            metavar="FILE,..",
+            help="Paths of other programs, judged beside the strategies: waypoints, or CSV with "
+            "x,y,z,path,layer.",
+        ),
+    ] = None,
+    paths_frame: Annotated[
+        str | None,
+        typer.Option(
+            metavar="mesh|tool",
+            help="What their coordinates are in; default mesh for CSV, the printer's tool for "
+            "waypoints.",
+        ),
+    ] = None,
     virtual_test: VirtualTest = True,
     load_case: LoadCase = None,
     calibration: Calibration = None,
@@ -123,7 +139,18 @@ def compare(
     chosen = layers_of(layers, heights, slicing)
     options = options_of(chosen, fibre_per_layer, virtual_test, load_case, backend)
     options["natural"] = natural
-    run(case, set_case, names, parameters, options, calibration, out)
+    files = names_of(paths) if paths is not None else ()
+    run(
+        case,
+        set_case,
+        names,
+        parameters,
+        options,
+        calibration,
+        out,
+        paths=files,
+        frame=paths_frame,
+    )
 
 
 @app.command()

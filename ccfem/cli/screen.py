@@ -158,7 +158,7 @@ def _headline_table(runs: Sequence[Run], best: Mapping[str, float]) -> Table:
         cells = []
         for run, found in zip(runs, values, strict=True):
             text, extra = cell_text(run, head)
-            if found.get(head.column) == best.get(head.column, np.nan):
+            if run.printable and found.get(head.column) == best.get(head.column, np.nan):
                 text = f"[bold green]{text}[/]"
             cells.append(f"{text} [dim]({extra})[/]" if extra else text)
         table.add_row(head.title, *cells)

@@ -118,6 +118,8 @@ def _run_record(run: Run) -> dict[str, Any]:
         "length_per_layer": run.length_per_layer,
         "note": run.note,
         "failure": run.failure,
+        "printable": run.printable,
+        "why_not": run.why_not,
         "seconds": run.seconds,
         "untested": run.untested,
         "total": headline_values(run),

@@ -131,7 +131,10 @@ def _headline(comparison: Comparison) -> str:
             rows.append(f"<tr><td>{escape(run.name)}</td>{reason}</tr>")
             continue
         cells = "".join(
-            _cell(*cell_text(run, h), values[run.name].get(h.column) == best.get(h.column, np.nan))
+            _cell(
+                *cell_text(run, h),
+                run.printable and values[run.name].get(h.column) == best.get(h.column, np.nan),
+            )
             for h in heads
         )
         first = ' class="first"' if not rows else ""
@@ -147,7 +150,8 @@ def _headline(comparison: Comparison) -> str:
         + f'<div class="scroll"><table><tr><th>strategy</th>{titles}</tr>\n'
         + "\n".join(rows)
         + f"</table></div>\n{notes}"
-        '<p class="note">Best values are marked. Alignment and efficiency are measured on the '
+        '<p class="note">Best values are marked where they really are: of runs that can be '
+        "printed, of stiffnesses that the test tells apart. Alignment and efficiency are of the "
         "stress that a strategy may itself have followed: they say how well the paths do what they "
         "set out to do, not how strong the printed part is.</p>\n"
     )

@@ -14,7 +14,8 @@ from ccfem.evaluation.printable import why_not
 from ccfem.export.print_plan import plan_print
 from ccfem.layers import Layer
 from ccfem.machine.machine import Machine
-from ccfem.planning.equal_fibre import Planned, length_per_layer, plan_to_length
+from ccfem.planning.equal_fibre import TOLERANCE, Planned, length_per_layer, plan_to_length
+from ccfem.planning.given_paths import GivenPaths
 from ccfem.planning.plan import plan
 from ccfem.toolpaths import Toolpaths
 from ccfem.virtual_testing.equilibrium import BONDED, TENSION
@@ -49,9 +50,10 @@ def planned(
 
     def work() -> Run:
         layers, stress, machine = part.layers, part.stress, part.machine
-        if wanted is None:
+        if wanted is None or isinstance(run.strategy, GivenPaths):
             paths = plan(run.strategy, layers, stress, machine)
-            found = Planned(run.strategy, paths, length_per_layer(paths, layers))
+            laid = length_per_layer(paths, layers)
+            found = Planned(run.strategy, paths, laid, _as_given(laid, wanted))
         else:
             found = plan_to_length(run.strategy, layers, stress, machine, wanted, start=start)
         return replace(
@@ -66,6 +68,13 @@ def planned(
     return _stage(bare, "plan", work)
 
 
+def _as_given(laid: float, wanted: float | None) -> str:
+    """Note on paths that stay as they are, where they miss the wanted length, mm per layer."""
+    if wanted is None or abs(laid / wanted - 1.0) <= TOLERANCE:
+        return ""
+    return f"given paths stay as they are: lays {laid:.0f} of {wanted:.0f} mm per layer"
+
+
 def levelled(runs: Sequence[Run], part: Part, tell: Tell) -> tuple[list[Run], float | None]:
     """Bring runs with their natural amounts to the smallest of them.
 
@@ -78,11 +87,13 @@ def levelled(runs: Sequence[Run], part: Part, tell: Tell) -> tuple[list[Run], fl
     laid = [run for run in runs if len(run.toolpaths)]
     if not laid:
         return list(runs), None
-    setter = min(laid, key=lambda run: run.length_per_layer)
+    given = [run for run in laid if isinstance(run.strategy, GivenPaths)]
+    setter = min(given or laid, key=lambda run: run.length_per_layer)
 
     def level(run: Run) -> Run:
         if run is setter:
-            return replace(run, note="has the shortest natural length: sets the length")
+            how = "given" if given else "has the shortest natural length"
+            return replace(run, note=f"{how}: sets the length")
         own = Planned(run.strategy, run.toolpaths, run.length_per_layer)
         return planned(run, part, setter.length_per_layer, tell, own)
 
