@@ -36,6 +36,7 @@ def evenly_spaced_streamlines(
     region: Region,
     separation: float,
     closest: float = 0.5,
+    least_length: float = 0.0,
 ) -> list[FloatArray]:
     """Lines along the principal stress of the largest size, a distance apart.
 
@@ -56,6 +57,8 @@ def evenly_spaced_streamlines(
         Distance at which lines begin beside each other (d_sep), > 0.
     closest : float in (0, 1), default 0.5
         Minimum distance of lines in separations (d_test / d_sep).
+    least_length : float, mm, default 0
+        Shorter lines are not laid and block no other line; never below one separation.
 
     Returns
     -------
@@ -88,6 +91,7 @@ def evenly_spaced_streamlines(
         separation,
         closest * separation,
         step,
+        max(least_length, separation),
     )
     lines = []
     for (start, turn, end), ring in zip(spans, closed, strict=True):
@@ -131,7 +135,7 @@ def _empty(grid: SectionGrid, cell: float, room: int) -> _Laid:
 
 
 @njit(cache=True, nogil=True)
-def _lay(field, grid, laid, seeds, homes, apart, test, step):  # type: ignore[no-untyped-def]
+def _lay(field, grid, laid, seeds, homes, apart, test, step, least):  # type: ignore[no-untyped-def]
     """Points of all lines, (start, turn, end) of each among them, and whether it is closed.
 
     From start to turn the points run ahead from the seed, from turn to end back from it.
@@ -155,7 +159,7 @@ def _lay(field, grid, laid, seeds, homes, apart, test, step):  # type: ignore[no
         if taken or not contains(grid, x, y):
             continue
         turn, end, ring = _trace(field, grid, laid, count, lines, x, y, home, test, step)
-        if end - count < apart / step:
+        if (end - count) * step < least:
             _take_back(laid, count, end)
             continue
         spans[lines, 0], spans[lines, 1], spans[lines, 2] = count, turn, end

@@ -10,6 +10,7 @@ from ccfem.layers.layer import Layer
 from ccfem.layers.layer_stress import stress_on
 from ccfem.layers.pitch import check_pitch
 from ccfem.machine.machine import Machine
+from ccfem.planning.steps import in_even_steps
 from ccfem.planning.strategy import PartStrategy, Strategy
 from ccfem.toolpaths import Toolpaths
 
@@ -36,7 +37,7 @@ def plan(
     Returns
     -------
     Toolpaths
-        The paths of all layers, in their order.
+        The paths of all layers, in their order, in steps of at most a fibre width.
 
     Raises
     ------
@@ -52,7 +53,8 @@ def plan(
         planner = strategy
 
     def planned(layer: Layer) -> Toolpaths:
-        return planner(layer, stress_on(layer, stress), machine)
+        paths = planner(layer, stress_on(layer, stress), machine)
+        return in_even_steps(paths, machine.fibre_width)
 
     with ThreadPoolExecutor(min(os.cpu_count() or 1, _MOST_THREADS)) as pool:
         return Toolpaths.concatenate(pool.map(planned, layers))
