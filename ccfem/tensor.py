@@ -11,6 +11,7 @@ from ccfem.arrays import BoolArray, FloatArray
 __all__ = [
     "bond_matrix",
     "from_voigt",
+    "in_axes",
     "in_plane",
     "largest_in_plane",
     "principal",
@@ -131,6 +132,11 @@ def in_plane(stress: FloatArray, frame: FloatArray) -> FloatArray:
     e1, e2 = frame[0], frame[1]
     first, second = stress @ e1, stress @ e2
     return np.stack([first @ e1, second @ e2, first @ e2], axis=-1)
+
+
+def in_axes(tensor: FloatArray, axes: FloatArray) -> FloatArray:
+    """Components of tensors (..., 3, 3) along other axes (..., 3, 3), whose rows they are."""
+    return np.asarray(axes @ tensor @ np.swapaxes(axes, -1, -2))
 
 
 def largest_in_plane(plane_stress: FloatArray) -> tuple[FloatArray, FloatArray, FloatArray]:

@@ -36,7 +36,10 @@ class Tension:
 
     def on(self, layer: Layer) -> "Tension":
         """Project from tetrahedra to a flat layer: each triangle takes the values of its own."""
-        plane = self.direction[layer.cell] @ layer.plane.frame[:2].T
+        direction = self.direction[layer.cell]
+        if layer.turns is not None:
+            direction = np.einsum("tij,tj->ti", layer.turns, direction)
+        plane = direction @ layer.plane.frame[:2].T
         length = np.linalg.norm(plane, axis=1)
         defined = self.defined[layer.cell] & (length > 1e-6)
         unit = plane / np.maximum(length, 1e-300)[:, None]

@@ -6,6 +6,7 @@ from concurrent.futures import ThreadPoolExecutor
 
 from ccfem.elasticity.part_stress import PartStress
 from ccfem.errors import InputError
+from ccfem.fields.chart import chart_of, flat_view
 from ccfem.layers.layer import Layer
 from ccfem.layers.layer_stress import stress_on
 from ccfem.layers.pitch import check_pitch
@@ -24,6 +25,8 @@ def plan(
     strategy: Strategy, layers: Sequence[Layer], stress: PartStress, machine: Machine
 ) -> Toolpaths:
     """Plan the paths of a whole part, several layers at a time.
+
+    A strategy that works in a plane (`in_plane`) plans on curved layers by their charts.
 
     Parameters
     ----------
@@ -47,17 +50,20 @@ def plan(
     """
     _check_layers(strategy, layers)
     check_pitch(layers, machine)
-    if isinstance(strategy, PartStrategy):
-        planner = strategy.for_part(stress, layers, machine)
-    else:
-        planner = strategy
-
-    def planned(layer: Layer) -> Toolpaths:
-        paths = planner(layer, stress_on(layer, stress), machine)
-        return in_even_steps(paths, machine.fibre_width)
-
     with ThreadPoolExecutor(min(os.cpu_count() or 1, _MOST_THREADS)) as pool:
-        return Toolpaths.concatenate(pool.map(planned, layers))
+        in_plane = getattr(strategy, "in_plane", False)
+        views = tuple(pool.map(flat_view, layers)) if in_plane else tuple(layers)
+        if isinstance(strategy, PartStrategy):
+            planner = strategy.for_part(stress, views, machine)
+        else:
+            planner = strategy
+
+        def planned(layer: Layer, view: Layer) -> Toolpaths:
+            paths = planner(view, stress_on(view, stress), machine)
+            paths = in_even_steps(paths, machine.fibre_width)
+            return paths if view is layer else chart_of(layer).lifted(paths)
+
+        return Toolpaths.concatenate(pool.map(planned, layers, views))
 
 
 def _check_layers(strategy: Strategy, layers: Sequence[Layer]) -> None:

@@ -65,7 +65,7 @@ class Eqs:
     minimum_length: float | None = None
 
     amount: ClassVar[Amount] = SPACING
-    flat_layers_only: ClassVar[bool] = True
+    in_plane: ClassVar[bool] = True
     variants: ClassVar[Mapping[str, Mapping[str, Any]]] = {"seed": {"seed": (0.0, 0.0)}}
 
     def __post_init__(self) -> None:

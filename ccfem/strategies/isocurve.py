@@ -165,7 +165,7 @@ class Isocurve:
     smooth: bool = True
 
     amount: ClassVar[Amount] = Amount("density", most=4.0, least=0.05)
-    flat_layers_only: ClassVar[bool] = True
+    in_plane: ClassVar[bool] = True
     variants: ClassVar[Mapping[str, Mapping[str, Any]]] = {
         "literal": _LITERAL,
         "border": {"inset": 0.0},
