@@ -1,4 +1,4 @@
-"""Symmetric tensors: component order, rotations, principal values. Known here only.
+"""Symmetric tensors: component order, rotations, principal values.
 
 Voigt order is 11, 22, 33, 23, 13, 12; strains in Voigt form carry engineering shear (twice the
 tensor component).
@@ -31,7 +31,7 @@ _ENGINEERING = np.array([1.0, 1.0, 1.0, 2.0, 2.0, 2.0])
 
 _EQUAL = 0.02
 """Principal values whose sizes differ by no more than this share of the larger size have no
-strongest direction: in pure shear two directions at right angles are as strong."""
+strongest direction: in pure shear two directions at right angles are equally strong."""
 
 
 def to_voigt(stress: FloatArray) -> FloatArray:
@@ -161,7 +161,7 @@ def largest_in_plane(plane_stress: FloatArray) -> tuple[FloatArray, FloatArray, 
 
 
 def strongest(largest: FloatArray, smallest: FloatArray) -> tuple[BoolArray, BoolArray]:
-    """Tell which of two principal values in a plane is the larger in size.
+    """Find which of two principal values in a plane is the larger in size.
 
     Parameters
     ----------
@@ -171,8 +171,8 @@ def strongest(largest: FloatArray, smallest: FloatArray) -> tuple[BoolArray, Boo
     Returns
     -------
     across : (...,) bool array
-        True where ``|smallest| > |largest|``: the strongest direction is square to that of
-        `largest`.
+        True where ``|smallest| > |largest|``: the strongest direction is perpendicular to
+        that of `largest`.
     defined : (...,) bool array
         True where the sizes differ by more than 2 % of the larger one.
     """

@@ -5,7 +5,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from ccfem.comparison.result import Run
+from ccfem.comparison.runs import Run
 from ccfem.evaluation.column import Column
 
 __all__ = ["HEADLINE", "TEST_COLUMNS", "Headline", "cell_text", "headline_values"]
@@ -43,6 +43,12 @@ TEST_COLUMNS = (
         "N/mm",
         "Size of the load squared over its work, fibres carrying tension only.",
         "> 0, higher is better",
+    ),
+    Column(
+        "displacement",
+        "mm",
+        "Size of the load over the stiffness: how far the load moves along itself.",
+        "> 0, lower is better under forces",
     ),
     Column(
         "gain_per_metre",
@@ -91,17 +97,22 @@ class Headline:
 
 
 HEADLINE = (
+    Headline("printable", "printable", "", "{}"),
+    Headline("stiffness", "stiffness, N/mm", "high", "{:.4g}"),
     Headline("stiffness_ratio_tension", "stiffness ×, tension only", "high", "{:.2f}"),
     Headline("stiffness_ratio_bonded", "stiffness ×, bonded", "high", "{:.2f}"),
+    Headline("displacement", "displacement, mm", "low", "{:.3g}"),
     Headline("first_failure_load", "first failure, N", "high", "{:.0f}"),
     Headline("fibre_per_layer", "fibre, mm a layer", "", "{:.0f}"),
+    Headline("fibre_mass", "fibre, g", "", "{:.3g}"),
+    Headline("print_time_nearest", "print time, min", "low", "{:.0f}"),
     Headline("efficiency", "efficiency", "high", "{:.3f}"),
     Headline("aligned_stress_10", "within 10°, by stress", "high", "{:.1%}"),
     Headline("coverage_top_20", "coverage of top 20 % stress", "high", "{:.1%}"),
     Headline("curvature_95", "curvature 95 %, 1/mm", "low", "{:.3f}"),
     Headline("paths_per_layer", "paths a layer", "low", "{:.1f}"),
-    Headline("spacing_below", "nearer than W", "low", "{:.1%}"),
-    Headline("outside_length", "outside, mm", "low", "{:.2f}"),
+    Headline("on_fibre", "on other fibre", "low", "{:.1%}"),
+    Headline("outside_width", "outside, by width", "low", "{:.1%}"),
     Headline("all_crossings", "crossings", "low", "{:.0f}"),
 )
 """The columns of the headline table; those that no run has are left out."""
@@ -118,6 +129,7 @@ def headline_values(run: Run) -> Mapping[str, float]:
         "fibre_per_layer": total["fibre_length"] / layers,
         "paths_per_layer": total["paths"] / layers,
         "all_crossings": total["crossings"] + total["self_crossings"],
+        "printable": float(run.printable),
     }
 
 
@@ -129,6 +141,7 @@ def _test_values(run: Run) -> dict[str, float]:
         "stiffness_ratio_tension": tension.ratio,
         "stiffness_ratio_bonded": bonded.ratio,
         "stiffness": tension.stiffness,
+        "displacement": tension.force / tension.stiffness,
         "gain_per_metre": tension.gain_per_metre,
         "strain_energy": tension.solution.strain_energy,
     }
@@ -147,6 +160,10 @@ def cell_text(run: Run, head: Headline) -> tuple[str, str]:
     value, extra = values.get(head.column, np.nan), ""
     if not np.isfinite(value):
         return "–", ""
+    if head.column == "printable":
+        return ("yes" if run.printable else "no"), ""
+    if head.column == "print_time_nearest":
+        value /= 60.0
     if head.column == "stiffness_ratio_tension" and "stiffness_ratio_low" in values:
         extra = f"{values['stiffness_ratio_low']:.2f}–{values['stiffness_ratio_high']:.2f}"
     if head.column == "first_failure_load" and run.tested is not None and run.tested.failure:

@@ -7,7 +7,8 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from ccfem.arrays import FloatArray
-from ccfem.comparison.result import Comparison, Run
+from ccfem.comparison.result import Comparison
+from ccfem.comparison.runs import Run
 from ccfem.evaluation.matching import THRESHOLDS, along_fibre, matching_curve
 from ccfem.evaluation.plane_paths import pool
 from ccfem.fields.chart import chart_of, flat_view, in_charts
@@ -17,8 +18,14 @@ from ccfem.plot.canvas import png
 from ccfem.plot.colours import palette
 from ccfem.plot.curves import curvature_curves, matching_curves
 from ccfem.plot.fields import tension_picture
-from ccfem.plot.forces import force_on_paths
-from ccfem.plot.paths import Coloured, compare_layer, layer_picture, mark_failure, tension_limit
+from ccfem.plot.paths import (
+    Coloured,
+    compare_layer,
+    force_on_paths,
+    layer_picture,
+    mark_failure,
+    tension_limit,
+)
 from ccfem.progress import Progress, silent
 
 if TYPE_CHECKING:

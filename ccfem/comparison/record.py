@@ -10,7 +10,8 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from ccfem.comparison.headline import TEST_COLUMNS, headline_values
-from ccfem.comparison.result import Comparison, Run
+from ccfem.comparison.result import Comparison
+from ccfem.comparison.runs import Run
 from ccfem.elasticity.stress_field import StressField
 
 if TYPE_CHECKING:
@@ -119,6 +120,8 @@ def _run_record(run: Run) -> dict[str, Any]:
         "length_per_layer": run.length_per_layer,
         "note": run.note,
         "failure": run.failure,
+        "printable": run.printable,
+        "why_not": run.why_not,
         "seconds": run.seconds,
         "untested": run.untested,
         "total": headline_values(run),

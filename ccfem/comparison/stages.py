@@ -6,14 +6,16 @@ from contextlib import contextmanager
 from dataclasses import dataclass, replace
 from typing import Any
 
-from ccfem.comparison.result import Run, Tested
+from ccfem.comparison.runs import Run, Tested
 from ccfem.elasticity.stress_field import StressField
 from ccfem.errors import InputError, SolveError
 from ccfem.evaluation import evaluate
+from ccfem.evaluation.printable import why_not
 from ccfem.export.print_plan import plan_print
 from ccfem.layers import Layer
 from ccfem.machine.machine import Machine
-from ccfem.planning.equal_fibre import Planned, length_per_layer, plan_to_length
+from ccfem.planning.equal_fibre import TOLERANCE, Planned, length_per_layer, plan_to_length
+from ccfem.planning.given_paths import GivenPaths
 from ccfem.planning.plan import plan
 from ccfem.toolpaths import Toolpaths
 from ccfem.virtual_testing.equilibrium import BONDED, TENSION
@@ -48,9 +50,10 @@ def planned(
 
     def work() -> Run:
         layers, stress, machine = part.layers, part.stress, part.machine
-        if wanted is None:
+        if wanted is None or isinstance(run.strategy, GivenPaths):
             paths = plan(run.strategy, layers, stress, machine)
-            found = Planned(run.strategy, paths, length_per_layer(paths, layers))
+            laid = length_per_layer(paths, layers)
+            found = Planned(run.strategy, paths, laid, _as_given(laid, wanted))
         else:
             found = plan_to_length(run.strategy, layers, stress, machine, wanted, start=start)
         return replace(
@@ -65,6 +68,13 @@ def planned(
     return _stage(bare, "plan", work)
 
 
+def _as_given(laid: float, wanted: float | None) -> str:
+    """Note on paths that stay as they are, where they miss the wanted length, mm per layer."""
+    if wanted is None or abs(laid / wanted - 1.0) <= TOLERANCE:
+        return ""
+    return f"given paths stay as they are: lays {laid:.0f} of {wanted:.0f} mm per layer"
+
+
 def levelled(runs: Sequence[Run], part: Part, tell: Tell) -> tuple[list[Run], float | None]:
     """Bring runs with their natural amounts to the smallest of them.
 
@@ -77,11 +87,13 @@ def levelled(runs: Sequence[Run], part: Part, tell: Tell) -> tuple[list[Run], fl
     laid = [run for run in runs if len(run.toolpaths)]
     if not laid:
         return list(runs), None
-    setter = min(laid, key=lambda run: run.length_per_layer)
+    given = [run for run in laid if isinstance(run.strategy, GivenPaths)]
+    setter = min(given or laid, key=lambda run: run.length_per_layer)
 
     def level(run: Run) -> Run:
         if run is setter:
-            return replace(run, note="lays the least of its own accord: sets the length")
+            how = "given" if given else "has the shortest natural length"
+            return replace(run, note=f"{how}: sets the length")
         own = Planned(run.strategy, run.toolpaths, run.length_per_layer)
         return planned(run, part, setter.length_per_layer, tell, own)
 
@@ -103,7 +115,8 @@ def evaluated(run: Run, part: Part, tell: Tell) -> Run:
 
     def work() -> Run:
         found = evaluate(run.toolpaths, part.layers, part.stress, part.machine)
-        return replace(run, evaluation=found)
+        broken = why_not(found.total, part.machine)
+        return replace(run, evaluation=found, why_not="; ".join(broken))
 
     return _stage(run, "evaluate", work)
 
@@ -121,24 +134,25 @@ def with_print(run: Run, part: Part, tell: Tell) -> Run:
 
 
 def all_tested(
-    runs: Sequence[Run], stress: StressField, strand: Strand, backend: str, tell: Tell
+    runs: Sequence[Run], part: Part, strand: Strand, backend: str, tell: Tell
 ) -> list[Run]:
     """Test every run that did not fail virtually, all on one factorisation."""
     try:
-        specimen = Specimen.of(stress, backend)
+        specimen = Specimen.of(part.stress, backend)
     except InputError as error:
         return [replace(run, untested=str(error)) for run in runs]
-    return [_tested(run, specimen, strand, tell) for run in runs]
+    return [_tested(run, specimen, strand, part.machine, tell) for run in runs]
 
 
-def _tested(run: Run, specimen: Specimen, strand: Strand, tell: Tell) -> Run:
+def _tested(run: Run, specimen: Specimen, strand: Strand, machine: Machine, tell: Tell) -> Run:
     """Test a run virtually, or say why it cannot be tested."""
     tell(f"testing {run.name}")
     if run.evaluation is None:
         return run
 
     def work() -> Run:
-        strands = cut_strands(run.toolpaths, specimen.unreinforced.mesh)
+        mesh = specimen.unreinforced.mesh
+        strands = cut_strands(run.toolpaths, mesh, machine=machine)
         tension = virtual_test(strands, specimen, strand, TENSION)
         bracket = Bracket(tension, virtual_test(strands, specimen, strand, BONDED, span=()))
         try:

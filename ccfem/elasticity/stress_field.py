@@ -8,7 +8,7 @@ from ccfem.arrays import FloatArray, freeze
 from ccfem.elasticity.part_stress import PartStress
 from ccfem.elasticity.problem import Problem, patches_in_use
 from ccfem.errors import InputError
-from ccfem.geometry.locate import locate_tets
+from ccfem.geometry.locate import locate
 from ccfem.mesh.tet_mesh import TetMesh
 
 __all__ = ["SolveRecord", "StressField", "solved"]
@@ -111,7 +111,7 @@ class StressField:
         InputError
             When a point lies further outside.
         """
-        cell, weights = locate_tets(self.mesh.points, self.mesh.corners, points, tolerance)
+        cell, weights = locate(self.mesh.points, self.mesh.corners, points, tolerance)
         if (cell < 0).any():
             first = int(np.flatnonzero(cell < 0)[0])
             raise InputError(

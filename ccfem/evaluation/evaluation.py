@@ -18,6 +18,7 @@ from ccfem.evaluation import (
     links,
     manufacture,
     matching,
+    room,
     sinuosity,
     space,
     spacing,
@@ -32,6 +33,7 @@ from ccfem.evaluation.curvature import CurvatureSamples
 from ccfem.evaluation.links import LinkSamples
 from ccfem.evaluation.manufacture import ManufactureSamples
 from ccfem.evaluation.plane_paths import PlanePaths, plane_paths, pool
+from ccfem.evaluation.room import RoomSamples
 from ccfem.evaluation.sinuosity import SinuositySamples
 from ccfem.evaluation.space import SpaceSamples
 from ccfem.evaluation.spacing import SpacingSamples
@@ -55,6 +57,7 @@ COLUMNS: tuple[Column, ...] = (
     *matching.COLUMNS,
     *stiffness_alignment.COLUMNS,
     *spacing.COLUMNS,
+    *room.COLUMNS,
     *coverage.COLUMNS,
     *containment.COLUMNS,
     *links.COLUMNS,
@@ -176,7 +179,19 @@ def evaluate(
     if not layers:
         raise InputError("expected at least one layer to evaluate; got none: slice the part")
     _check_layers(toolpaths, layers)
-    samples = [_sample(toolpaths.on_layer(k.index), k, stress, machine) for k in layers]
+    fibre = toolpaths.of_kind(FIBRE).layer
+    late = fibre[fibre < np.maximum.accumulate(fibre)]
+    samples = [
+        _sample(
+            toolpaths.on_layer(k.index),
+            k,
+            stress,
+            machine,
+            _below(k, layers),
+            int(np.count_nonzero(late == k.index)),
+        )
+        for k in layers
+    ]
     rows = [_indices(each, machine) for each in samples]
     rows.append(_indices(_pooled(samples), machine))
     return Evaluation(
@@ -208,6 +223,15 @@ def _check_layers(toolpaths: Toolpaths, layers: Sequence[Layer]) -> None:
             )
 
 
+def _below(layer: Layer, layers: Sequence[Layer]) -> Layer | None:
+    """Find the flat layer under a flat one; None where it is the lowest, and for curved layers."""
+    if layer.flat is None:
+        return None
+    height = layer.flat.height
+    flat = [each for each in layers if each.flat is not None and each.plane.height < height]
+    return max(flat, key=lambda each: each.plane.height, default=None)
+
+
 class _Samples(NamedTuple):
     """Samples of one layer, or of all together: every index is computed of them."""
 
@@ -216,6 +240,7 @@ class _Samples(NamedTuple):
     curvature: CurvatureSamples
     alignment: AlignmentSamples
     spacing: SpacingSamples
+    room: RoomSamples
     coverage: CoverageSamples
     containment: ContainmentSamples
     links: LinkSamples
@@ -223,7 +248,14 @@ class _Samples(NamedTuple):
     space: SpaceSamples
 
 
-def _sample(toolpaths: Toolpaths, layer: Layer, stress: PartStress, machine: Machine) -> _Samples:
+def _sample(
+    toolpaths: Toolpaths,
+    layer: Layer,
+    stress: PartStress,
+    machine: Machine,
+    below: Layer | None,
+    late: int,
+) -> _Samples:
     """Take the samples of one layer."""
     width = machine.fibre_width
     seen, view = toolpaths, layer
@@ -245,6 +277,7 @@ def _sample(toolpaths: Toolpaths, layer: Layer, stress: PartStress, machine: Mac
         curvature.sample_curvature(paths, width),
         alignment.sample_alignment(paths, on_layer, width),
         spacing.sample_spacing(paths, width),
+        room.sample_room(paths, machine, below, late),
         coverage.sample_coverage(paths, on_layer, width),
         containment.sample_containment(paths),
         links.sample_links(paths),
@@ -274,6 +307,7 @@ def _indices(samples: _Samples, machine: Machine) -> dict[str, float]:
         **matching.matching_indices(samples.alignment),
         **stiffness_alignment.stiffness_alignment_indices(samples.alignment),
         **spacing.spacing_indices(samples.spacing, machine),
+        **room.room_indices(samples.room),
         **coverage.coverage_indices(samples.coverage),
         **containment.containment_indices(samples.containment),
         **links.link_indices(samples.links),

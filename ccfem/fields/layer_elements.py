@@ -120,7 +120,10 @@ class Surface:
         gx, gy = self.gradients[:, :, 0], self.gradients[:, :, 1]
         fx = metric[:, 0, 0, None] * gx + metric[:, 0, 1, None] * gy
         fy = metric[:, 1, 0, None] * gx + metric[:, 1, 1, None] * gy
-        blocks = gx[:, :, None] * fx[:, None, :] + gy[:, :, None] * fy[:, None, :]
+        return self.matrix(gx[:, :, None] * fx[:, None, :] + gy[:, :, None] * fy[:, None, :])
+
+    def matrix(self, blocks: FloatArray) -> sparse.csc_array:
+        """Sum matrices (t, 3, 3) of the triangles to one (n, n) of the points."""
         rows = np.repeat(self.triangles, 3, axis=1).ravel()
         columns = np.tile(self.triangles, (1, 3)).ravel()
         n = len(self.points)

@@ -49,14 +49,10 @@ def read_mesh(path: str | os.PathLike[str], scale: float = 1.0, check: bool = Tr
         Normalise and mend the mesh with `ccfem.mesh.check.check_mesh`, which also says what it
         did; without it the mesh comes as it stands in the file.
 
-    Returns
-    -------
-    TetMesh
-
     Raises
     ------
     InputError
-        When the file is missing or no tetrahedral mesh, or nothing sensible can follow from it.
+        When the file is missing, or is not a valid tetrahedral mesh.
     """
     path = existing_file(path, "mesh file")
     suffix = path.suffix.lower()
@@ -75,9 +71,7 @@ def read_mesh(path: str | os.PathLike[str], scale: float = 1.0, check: bool = Tr
         mesh = _READERS[suffix](path)
         if scale != 1.0:
             mesh = TetMesh(mesh.points * scale, mesh.cells, mesh.patches)
-        if not check:
-            return mesh
-        return check_mesh(mesh)[0]
+        return check_mesh(mesh)[0] if check else mesh
     except InputError as error:
         message = str(error)
         raise InputError(message if str(path) in message else f"{path}: {message}") from None

@@ -4,7 +4,7 @@ import numpy as np
 
 from ccfem.arrays import FloatArray, IntArray
 from ccfem.errors import InputError
-from ccfem.geometry.locate import locate_tets
+from ccfem.geometry.locate import locate
 from ccfem.geometry.nearest_on_triangles import nearest_on_triangles
 from ccfem.layers.cutting import border_edges, chain
 from ccfem.layers.layer import Layer
@@ -46,7 +46,7 @@ def layer_from_surface(
     """
     used, triangles = np.unique(triangles, return_inverse=True)
     points, triangles = points[used], triangles.reshape(-1, 3)
-    holder, weights = locate_tets(mesh.points, mesh.corners, points, tolerance)
+    holder, weights = locate(mesh.points, mesh.corners, points, tolerance)
     outside = holder < 0
     if outside.mean() > 0.01:
         raise InputError(
@@ -58,7 +58,7 @@ def layer_from_surface(
     points, triangles = points[used], triangles.reshape(-1, 3)
     holder, weights = holder[used], weights[used]
     middle = points[triangles].mean(axis=1)
-    cell, _ = locate_tets(mesh.points, mesh.corners, middle, tolerance)
+    cell, _ = locate(mesh.points, mesh.corners, middle, tolerance)
     cell = np.where(cell < 0, holder[triangles[:, 0]], cell)
     border = border_edges(triangles, len(points))
     patches = {}

@@ -115,7 +115,7 @@ def check_mesh(mesh: TetMesh, merge: bool = False) -> tuple[TetMesh, MeshReport]
     Raises
     ------
     InputError
-        When nothing sensible can follow: a coordinate of a used node is not finite, all cells are
+        For an invalid mesh: a coordinate of a used node is not finite, all cells are
         flat, or more than two cells share a face.
     """
     used = np.zeros(len(mesh.points), dtype=bool)

@@ -112,16 +112,15 @@ def turning_page(
     """
     up = np.asarray(build, dtype=np.float64)
     place = {layer.index: k for k, layer in enumerate(layers)}
-    shown = [[k, _axes_up(line, up)] for k, line in _lines(layers, paths)]
-    step = max(1, len(layers) // 30)
     rims = [
-        [place[layer.index], _axes_up(layer.points[np.append(loop, loop[:1])], up)]
-        for layer in layers[::step]
+        (place[layer.index], _axes_up(layer.points[np.append(loop, loop[:1])], up))
+        for layer in layers[:: max(1, len(layers) // 30)]
         for loop in layer.loops
     ]
+    strands = [(k, _axes_up(line, up)) for k, line in _lines(layers, paths)]
     data = {
         name: [[k, line.round(2).tolist()] for k, line in lines]
-        for name, lines in (("strands", shown), ("rims", rims))
+        for name, lines in (("strands", strands), ("rims", rims))
     }
     text = json.dumps({**data, "count": len(layers)}, separators=(",", ":"))
     return _PAGE.replace("@TITLE@", escape(title)).replace("@DATA@", text)

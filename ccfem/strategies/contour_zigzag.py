@@ -24,7 +24,7 @@ class ContourZigzag:
     """Rings along every border, and linked parallel lines in what is left.
 
     What commercial fibre slicers lay, and the load-independent paths that Chen et al. 2021 compare
-    theirs with (table 2). The stress is unseen.
+    theirs with (table 2). It ignores the stress.
 
     Attributes
     ----------

@@ -30,7 +30,7 @@ __all__ = ["Grid"]
 
 @dataclass(frozen=True)
 class Grid(Infill):
-    """Shells along the border, and inside straight lines in two directions. The stress is unseen.
+    """Shells along the border, and inside straight lines in two directions. It ignores the stress.
 
     Every line is a path of its own, as in the paper; `Zigzag` links them.
 

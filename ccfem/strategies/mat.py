@@ -29,7 +29,7 @@ class Mat(Infill):
 
     Strands parallel to the medial axis follow, until the first of them would touch a shell;
     concentric strands fill the rest. A part without holes and limbs (a disc) is filled by
-    concentric strands alone. The stress is unseen.
+    concentric strands alone. It ignores the stress.
 
     Attributes
     ----------

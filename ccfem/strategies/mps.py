@@ -15,8 +15,7 @@ import shapely
 from ccfem.arrays import FloatArray
 from ccfem.errors import InputError
 from ccfem.fields.streamlines import streamlines
-from ccfem.geometry.guide_fit import fitted_guides
-from ccfem.geometry.guides import spaced_guides
+from ccfem.geometry.guide_fit import fitted_guides, spaced_guides
 from ccfem.geometry.medial_axis import medial_axis
 from ccfem.geometry.parallel_strands import grow, lengthened
 from ccfem.geometry.polylines import along_line, points_along
@@ -120,7 +119,7 @@ class Mps(Infill):
         """Shells of pixels, guides and rings round them."""
         inside = inside_shells(image.mask, self.shells)
         points = None if self.seeds == "segments" else self._points(layer, stress)
-        guides = stress_guides(image, inside, layer, stress, points)
+        guides = stress_guides(image, inside, stress, points)
         return stress_regions(image.mask, guides, self.shells)
 
     def _guides(

@@ -1,7 +1,7 @@
 """Planning to a wanted length: never more, as near as the strategy's steps allow, and honest."""
 
 import re
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import ClassVar
 
 import numpy as np
@@ -85,6 +85,22 @@ def test_mixed_layers_are_those_of_the_two_values(plate):
         np.testing.assert_allclose(mine, same, atol=1e-3)
         matched += same is more
     assert f"on {matched} of 8 layers" in planned.note
+
+
+@pytest.mark.parametrize("count", [2, 3, 5, 8, 11])
+def test_layers_that_take_more_are_spread_over_the_stack(plate, count):
+    """No gap between them, and none to the ends of the stack, is wider than thrice the mean."""
+    stress, _ = plate
+    layers = Planar(count=16).cut(stress.mesh)
+    wanted = LENGTH * (2.0 + (count + 0.5) / 16.0)
+    lines = replace(Lines(), spacing=WIDTH / 2.5)
+    planned = plan_to_length(lines, layers, stress, MACHINE, wanted)
+    per_layer = np.array([len(planned.toolpaths.on_layer(k)) for k in range(16)])
+    more = np.flatnonzero(per_layer == 3)
+    assert len(more) == count
+    assert np.all((per_layer == 2) | (per_layer == 3))
+    assert np.diff([-1, *more, 16]).max() < 3.0 * 17.0 / (count + 1.0)
+    assert abs(np.mean(more) - 7.5) < 3.0
 
 
 @pytest.mark.parametrize("wanted", [30.0, 20.0, 10.0, 3.0, 1.0])

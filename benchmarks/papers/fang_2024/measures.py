@@ -10,7 +10,7 @@ from scipy.spatial import cKDTree
 from ccfem.arrays import FloatArray
 from ccfem.elasticity.part_stress import PartStress
 from ccfem.fields.chart import chart_of
-from ccfem.geometry.locate import locate_tets
+from ccfem.geometry.locate import locate
 from ccfem.geometry.polylines import resample, sample_midpoints, turning_angles
 from ccfem.layers.layer import Layer
 from ccfem.principal_lines import strongest_stress
@@ -104,7 +104,7 @@ def measured(
 def _angles(paths: Toolpaths, stress: PartStress) -> tuple[FloatArray, FloatArray, FloatArray]:
     """Angle to the strongest stress of the cell, degrees, length and cell of samples."""
     points, tangent, length, _ = sample_midpoints(paths.points, paths.offsets, 0.7)
-    cell, _ = locate_tets(stress.mesh.points, stress.mesh.corners, points, 2.0)
+    cell, _ = locate(stress.mesh.points, stress.mesh.corners, points, 2.0)
     inside = cell >= 0
     direction = strongest_stress(stress.stress).direction[cell[inside]]
     cosine = np.abs(np.einsum("sd,sd->s", tangent[inside], direction))

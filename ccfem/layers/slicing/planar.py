@@ -11,6 +11,7 @@ from ccfem.elasticity.part_stress import PartStress
 from ccfem.errors import InputError
 from ccfem.layers.cutting import border_edges, chain, cut_at_zero, patch_edges
 from ccfem.layers.layer import Layer
+from ccfem.layers.pitch import check_pitch
 from ccfem.layers.plane import Plane, plane_frame
 from ccfem.layers.slicer import Vector
 from ccfem.machine.machine import Machine
@@ -67,11 +68,25 @@ class Planar:
             heights = tuple(sorted(float(height) for height in self.heights))
             if not heights or not np.isfinite(heights).all():
                 raise InputError("give at least one layer height, a finite number in mm")
+            if (np.diff(heights) == 0.0).any():
+                again = heights[int(np.flatnonzero(np.diff(heights) == 0.0)[0])]
+                raise InputError(
+                    f"each layer height must be given once; got {again:g} mm more than once: a "
+                    "layer there has room for its fibre once"
+                )
             object.__setattr__(self, "heights", heights)
 
     def __call__(self, stress: PartStress, build: Vector, machine: Machine) -> tuple[Layer, ...]:
-        """Cut a part into flat layers; the stress has no influence."""
-        return self.cut(stress.mesh, build)
+        """Cut a part into flat layers; the stress has no influence.
+
+        Raises
+        ------
+        InputError
+            As of `cut`, and when layers are nearer than a strand of the machine is high.
+        """
+        layers = self.cut(stress.mesh, build)
+        check_pitch(layers, machine)
+        return layers
 
     def cut(self, mesh: TetMesh, build: Vector = (0.0, 0.0, 1.0)) -> tuple[Layer, ...]:
         """Cut a mesh into flat layers.
