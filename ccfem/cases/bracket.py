@@ -71,12 +71,7 @@ def bracket_design(
 ) -> Design:
     """Densities of least compliance of both load cases together, 30 % of the domain filled.
 
-    Parameters
-    ----------
-    element_size : float, mm
-    max_iterations : int
-        It stops earlier when the compliance no longer changes.
-    progress : callable, optional
+    The iterations stop earlier when the compliance no longer changes.
     """
     problem = _problem(bracket_domain(element_size), FORCE)
     method = Simp(

@@ -70,13 +70,7 @@ def loop(element_size: float = ELEMENT_SIZE, order: int = 1, force: float = 1000
 
     The outer half of the bottom hole is fixed, the outer half of the top hole pulled along y.
 
-    Parameters
-    ----------
-    element_size : float, mm
-        Edge length of the cells aimed at.
-    order : {1, 2}
-        Linear or quadratic cells.
-    force : float, N
+    Parameters as in `ccfem.cases.bar`.
     """
     mesh = mesh_of_case("loop", element_size, order, loop_mesh)
     return Case(

@@ -35,13 +35,7 @@ def open_hole_mesh(element_size: float) -> TetMesh:
 def open_hole(element_size: float = ELEMENT_SIZE, order: int = 1, force: float = 1000.0) -> Case:
     """Plate 200 x 36 x 4 mm with a hole of radius 6 mm, held left and pulled right along x.
 
-    Parameters
-    ----------
-    element_size : float, mm
-        Edge length of the cells aimed at; shorter at the hole.
-    order : {1, 2}
-        Linear or quadratic cells.
-    force : float, N
+    Parameters as in `ccfem.cases.bar`; the cells are shorter at the hole.
     """
     mesh = mesh_of_case("open_hole", element_size, order, open_hole_mesh)
     return Case(

@@ -198,7 +198,7 @@ def read_part(path: str | os.PathLike[str]) -> Case:
     Returns
     -------
     Case
-        `Case.findings` says what was mended in the mesh.
+        `Case.findings` says what was repaired in the mesh.
 
     Raises
     ------

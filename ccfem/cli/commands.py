@@ -237,7 +237,7 @@ def calibrate(
     found.write(out)
     rho = "" if found.rho is None else f", rho {found.rho:.3g} mm^2"
     print(
-        f"{out}: modulus {found.modulus:.4g} MPa, matrix strength {found.matrix_strength:.3g} MPa"
+        f"{out}: modulus {found.modulus:.4g} MPa, matrix strength {found.tensile_strength:.3g} MPa"
         f"{rho}; use it with --calibration {out}"
     )
 

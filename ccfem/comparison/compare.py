@@ -221,7 +221,8 @@ def compare(
         runs = all_tested(runs, part, strand, backend, tell)
     lengths = [float(run.toolpaths.lengths.sum()) for run in runs if run.tested is not None]
     bound = None
-    if lengths:
+    # The bound is one for flat layers.
+    if lengths and all(layer.flat is not None for layer in stack):
         tell("bounding what any paths could reach")
         with timed(seconds, "bound"):
             bound = upper_bound(

@@ -86,7 +86,9 @@ def record(comparison: Comparison, command: str, seconds: Mapping[str, float]) -
                 "material": case.problem.material.name,
                 "build": case.build,
                 "layers": len(comparison.layers),
-                "heights": [layer.plane.height for layer in comparison.layers],
+                "heights": [
+                    None if layer.flat is None else layer.flat.height for layer in comparison.layers
+                ],
                 "nodes": len(mesh.points),
                 "cells": len(mesh.cells),
                 "order": mesh.order,

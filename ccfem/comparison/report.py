@@ -13,6 +13,7 @@ from ccfem.comparison.ranking import best_values, stiffness_ratios
 from ccfem.comparison.result import Comparison
 from ccfem.comparison.runs import Run
 from ccfem.evaluation import COLUMNS, Column
+from ccfem.layers.layer import Layer
 from ccfem.virtual_testing.stiffer import HONEST_PROMISE
 
 __all__ = ["report_html"]
@@ -187,25 +188,33 @@ def _against_each_other(comparison: Comparison) -> str:
 
 def _pictures(comparison: Comparison, pictures: Pictures) -> str:
     runs = [run for run in comparison.ranking if run.evaluation is not None]
-    heights = {layer.index: layer.plane.height for layer in comparison.layers}
-    rows = [_layer(index, height, runs, pictures) for index, height in heights.items()]
+    drawn = {index for _, index in pictures.paths}
+    places = {layer.index: _place(layer) for layer in comparison.layers if layer.index in drawn}
+    rows = [_layer(index, place, runs, pictures) for index, place in places.items()]
     every = ""
     if len(rows) > 1:
         every = f"<details><summary>All {len(rows)} layers</summary>\n{''.join(rows)}</details>\n"
     tension = _figure(pictures.tension, "tension in the middle layer")
     return (
-        f"<h2>Paths</h2>\n{_layer(pictures.middle, heights[pictures.middle], runs, pictures)}"
+        f"<h2>Paths</h2>\n{_layer(pictures.middle, places[pictures.middle], runs, pictures)}"
         f"{every}{_forces(runs, pictures)}{_curves(pictures)}"
         f"<h2>Tension without fibres</h2>\n{_grid([tension, '', '', ''])}\n"
     )
 
 
-def _layer(index: int, height: float, runs: Sequence[Run], pictures: Pictures) -> str:
+def _place(layer: Layer) -> str:
+    """Where a layer is, in words."""
+    if layer.flat is None:
+        return "curved, laid flat"
+    return f"at {layer.flat.height:.2f} mm along the build direction"
+
+
+def _layer(index: int, place: str, runs: Sequence[Run], pictures: Pictures) -> str:
     """One layer of every run side by side."""
     figures = [
         _figure(pictures.paths[run.name, index], f"{run.name}, layer {index}") for run in runs
     ]
-    title = f"<h3>Layer {index}, at {height:.2f} mm along the build direction</h3>"
+    title = f"<h3>Layer {index}, {place}</h3>"
     return f"{title}{_grid(figures)}\n"
 
 

@@ -6,7 +6,7 @@ import numpy as np
 
 from ccfem.arrays import FloatArray, freeze
 from ccfem.elasticity.part_stress import PartStress
-from ccfem.elasticity.problem import Problem
+from ccfem.elasticity.problem import Problem, patches_in_use
 from ccfem.errors import InputError
 from ccfem.geometry.locate import locate
 from ccfem.mesh.tet_mesh import TetMesh
@@ -86,6 +86,11 @@ class StressField:
     def held_or_loaded(self) -> tuple[str, ...]:
         """Names of the patches that carry a support or a load."""
         return self.problem.held_or_loaded
+
+    @property
+    def loaded(self) -> tuple[str, ...]:
+        """Names of the patches that carry a load in its load case."""
+        return patches_in_use((), {self.case: self.problem.loads[self.case]})
 
     def at(self, points: FloatArray, tolerance: float = 1e-3) -> FloatArray:
         """Recovered stress at any points of the part.

@@ -69,7 +69,7 @@ class Infill(ABC):
     mode: Literal["polyline", "raster"]
 
     amount: ClassVar[Amount] = SPACING
-    flat_layers_only: ClassVar[bool] = True
+    in_plane: ClassVar[bool] = True
 
     def __post_init__(self) -> None:
         check_fill(self)

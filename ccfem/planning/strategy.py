@@ -42,8 +42,10 @@ class LayerPlanner(Protocol):
 class LayerStrategy(Protocol):
     """A frozen dataclass whose fields are the parameters, called for each layer with data.
 
-    A strategy that works in the plane of a layer has a class variable ``flat_layers_only = True``:
-    `plan` refuses curved layers before any work.
+    A strategy that works in the plane of a layer has a class variable ``in_plane = True``: `plan`
+    gives it curved layers laid flat. One that does not work so either, such as one that solves the
+    part again layer by layer, has ``flat_layers_only = True``: `plan` refuses curved layers before
+    any work.
 
     Attributes
     ----------

@@ -27,13 +27,7 @@ def tension_picture(
 ) -> "Figure":
     """Picture of the tension in a layer: its size as colour, its direction as strokes.
 
-    Parameters
-    ----------
-    stress : LayerStress
-        Its nodal values are drawn.
-    heading, caption : str
-    limit : float, MPa, optional
-        End of the colour scale; default `plot.paths.tension_limit`.
+    Parameters as in `plot.paths.layer_picture`; the nodal values of the stress are drawn.
     """
     layer = stress.layer
     figure, (axes,) = new_figure(extents_of(layer.plane.points))

@@ -15,8 +15,7 @@ import shapely
 from ccfem.arrays import FloatArray
 from ccfem.errors import InputError
 from ccfem.fields.streamlines import streamlines
-from ccfem.geometry.guide_fit import fitted_guides
-from ccfem.geometry.guides import spaced_guides
+from ccfem.geometry.guide_fit import fitted_guides, spaced_guides
 from ccfem.geometry.medial_axis import medial_axis
 from ccfem.geometry.parallel_strands import grow, lengthened
 from ccfem.geometry.polylines import along_line, points_along

@@ -31,8 +31,8 @@ class Design:
     density : (m,) array in [0, 1]
         Of each cell (filtered, with a density filter).
     variables : (m,) array in [0, 1]
-        What the optimiser moves: equal to `density` unless that is filtered. Start from them to go
-        on with a run.
+        What the optimiser changes: equal to `density` unless that is filtered. Start from them to
+        continue a run.
     factor : (m,) array in (0, 1]
         On the stiffness of each cell, from its density.
     compliance : (k,) array, N mm

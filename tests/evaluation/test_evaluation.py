@@ -148,6 +148,8 @@ def test_zero_stress(make_part, uniform):
         "stiffness_alignment",
         "stiffness_alignment_harmonic",
         *(f"matching_{name}_{k}" for name in ("path", "energy") for k in (10, 30)),
+        *("space_angle_mean", "space_angle_stress", "across_tension"),
+        *(f"space_aligned_{k}" for k in (10, 20, 30)),
     }
     assert total["no_tension"] == 1.0
     assert {c.name for c in COLUMNS if "NaN" in c.range} >= nothing

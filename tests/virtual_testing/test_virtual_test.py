@@ -235,8 +235,8 @@ def test_ratio_depends_on_rho_alone_and_grows_with_it():
 def test_the_solver_does_not_count():
     field = solve(clamped())["load"]
     lines = toolpaths(*random_lines())
-    direct = virtual_test(lines, field, backend="superlu", span=())
-    iterative = virtual_test(lines, field, backend="amg", span=())
+    direct = virtual_test(lines, Specimen.of(field, "superlu"), span=())
+    iterative = virtual_test(lines, Specimen.of(field, "amg"), span=())
     assert iterative.stiffness == pytest.approx(direct.stiffness, rel=1e-7)
     assert iterative.solution.record.backend == "amg"
     assert iterative.solution.record.residual <= 1e-8
