@@ -53,6 +53,13 @@ class Specimen:
                 f"load case '{unreinforced.case}' has forces and moving supports; a virtual test "
                 "needs one or the other: split it"
             )
+        if not system.held.value.any() and not np.any(
+            system.held.restrict(system.forces[unreinforced.case])
+        ):
+            raise InputError(
+                f"load case '{unreinforced.case}' acts on nodes only that the supports hold, so "
+                "nothing moves and no stiffness can be told: load another patch"
+            )
         return cls(unreinforced, system, system.assemble(), backend)
 
     @cached_property
