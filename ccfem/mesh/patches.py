@@ -9,7 +9,7 @@ from dataclasses import dataclass
 from typing import Protocol
 
 import numpy as np
-from numpy.typing import ArrayLike
+from numpy.typing import ArrayLike, NDArray
 
 from ccfem.arrays import BoolArray, FloatArray, IntArray
 from ccfem.errors import InputError
@@ -269,13 +269,17 @@ def match_boundary(mesh: TetMesh, facets: IntArray) -> IntArray:
     return mesh.boundary[np.isin(facet_keys(mesh.boundary), facet_keys(facets))]
 
 
-def facet_keys(facets: IntArray) -> IntArray:
-    """One integer (...,) for the nodes of each facet (..., 3), whatever their order.
+def facet_keys(facets: IntArray) -> NDArray[np.complex128]:
+    """One number (...,) for the nodes of each facet (..., 3), whatever their order.
 
-    Node numbers must stay below 2^21 (two million).
+    The keys of different facets differ, and sort as their nodes do, for node numbers up to 2^31
+    (two thousand million): the three of them fill the 106 bits of two floats.
     """
     a, b, c = np.moveaxis(np.sort(np.asarray(facets, dtype=np.int64), axis=-1), -1, 0)
-    return ((a << 21) + b << 21) + c
+    keys = np.empty(a.shape, dtype=np.complex128)
+    keys.real = (a << 16) + (b >> 16)
+    keys.imag = ((b & 0xFFFF) << 32) + c
+    return keys
 
 
 def unit_vector(value: str | ArrayLike, what: str) -> FloatArray:

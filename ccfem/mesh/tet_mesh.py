@@ -9,6 +9,8 @@ import numpy as np
 
 from ccfem.arrays import FloatArray, IntArray, read_only
 from ccfem.errors import InputError
+from ccfem.mesh.flaws import first_flaw
+from ccfem.mesh.pairing import FREE, pair_facets
 
 __all__ = ["TetMesh", "signed_volumes"]
 
@@ -86,35 +88,31 @@ class TetMesh:
             return read_only(longest * largest / (3.0 * np.abs(self.volumes)))
 
     @cached_property
-    def _facet_pairing(self) -> tuple[IntArray, IntArray, IntArray]:
-        """Facets sorted so that equal ones are adjacent: order, first of a pair, single ones."""
-        facets = np.sort(self.corners[:, _FACES].reshape(-1, 3), axis=1)
-        n = len(self.points)
-        key = (facets[:, 0] * n + facets[:, 1]) * n + facets[:, 2]
-        order = np.argsort(key, kind="stable")
-        same = key[order[1:]] == key[order[:-1]]
-        first = np.flatnonzero(same)
-        single = np.ones(len(key), dtype=bool)
-        single[first] = single[first + 1] = False
-        return order, first, np.sort(order[single])
+    def partners(self) -> IntArray:
+        """Facet on the other side of each facet, (4 m,): see `ccfem.mesh.pairing.pair_facets`."""
+        return read_only(pair_facets(self.corners, _FACES, len(self.points)), np.int64)
+
+    @cached_property
+    def flaw(self) -> str:
+        """What keeps the mesh from being solved on, with its cure; empty for a sound mesh."""
+        return first_flaw(self.points, self.cells, _EDGES, self.volumes, self.partners)
 
     @cached_property
     def boundary(self) -> IntArray:
         """Corner nodes of the boundary facets, (b, 3), outward."""
-        _, _, single = self._facet_pairing
-        return read_only(self.corners[:, _FACES].reshape(-1, 3)[single], np.int64)
+        facet = np.flatnonzero(self.partners == FREE)
+        return read_only(self.corners[facet[:, None] // 4, _FACES[facet % 4]], np.int64)
 
     @cached_property
     def boundary_cells(self) -> IntArray:
         """Cell of each boundary facet, (b,)."""
-        _, _, single = self._facet_pairing
-        return read_only(single // 4, np.int64)
+        return read_only(np.flatnonzero(self.partners == FREE) // 4, np.int64)
 
     @cached_property
     def neighbours(self) -> IntArray:
         """Pairs of cells that share a face, (f, 2)."""
-        order, first, _ = self._facet_pairing
-        return read_only(np.stack([order[first], order[first + 1]], axis=1) // 4, np.int64)
+        facet = np.flatnonzero(self.partners > np.arange(len(self.partners)))
+        return read_only(np.stack([facet, self.partners[facet]], axis=1) // 4, np.int64)
 
     @cached_property
     def bounds(self) -> FloatArray:

@@ -5,6 +5,7 @@ from typing import Any
 
 import numpy as np
 import shapely
+from numpy.typing import NDArray
 
 from ccfem.arrays import BoolArray, FloatArray, IntArray
 from ccfem.elasticity.problem import PointForce
@@ -127,6 +128,6 @@ def patch_ends(plate: PlaneMesh, polygon: Any, pixel: float) -> FloatArray:
     return shapely.get_coordinates(shapely.get_point(onto[near], -1))
 
 
-def _edge_keys(edges: IntArray) -> IntArray:
-    """One integer (k,) for the nodes of each edge (k, 2), whatever their order."""
+def _edge_keys(edges: IntArray) -> NDArray[np.complex128]:
+    """One number (k,) for the nodes of each edge (k, 2), whatever their order."""
     return facet_keys(np.pad(edges, ((0, 0), (0, 1)), mode="edge"))
