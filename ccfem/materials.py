@@ -32,6 +32,9 @@ class Material:
         Along axis 1.
     source : str
         Where the numbers come from, and which of them are assumed.
+    mass_density : float or None, g/cm^3
+    expansion : tuple of 3 floats or None, 1/K
+        Strain by heat along axes 1, 2 and 3.
     """
 
     name: str
@@ -39,6 +42,8 @@ class Material:
     tensile_strength: float | None = None
     compressive_strength: float | None = None
     source: str = ""
+    mass_density: float | None = None
+    expansion: tuple[float, float, float] | None = None
 
     def __post_init__(self) -> None:
         stiffness = read_only(self.stiffness)
@@ -53,6 +58,16 @@ class Material:
                 f"material '{self.name}': stiffness must be finite and positive definite; check "
                 "the moduli and Poisson's ratios"
             )
+        if self.mass_density is not None and not 0.0 < self.mass_density < np.inf:
+            raise InputError(
+                f"material '{self.name}': mass density must be above 0 g/cm^3; got "
+                f"{self.mass_density}: correct it"
+            )
+        if self.expansion is not None and not np.isfinite(self.expansion).all():
+            raise InputError(
+                f"material '{self.name}': expansion must be finite numbers, 1/K; got "
+                f"{self.expansion}: correct it"
+            )
 
 
 def isotropic(
@@ -62,8 +77,13 @@ def isotropic(
     tensile_strength: float | None = None,
     compressive_strength: float | None = None,
     source: str = "",
+    mass_density: float | None = None,
+    expansion: float | None = None,
 ) -> Material:
-    """Isotropic material from Young's modulus, MPa, and Poisson's ratio in (-1, 0.5)."""
+    """Isotropic material from Young's modulus, MPa, and Poisson's ratio in (-1, 0.5).
+
+    Mass density in g/cm^3, expansion by heat in 1/K.
+    """
     if not modulus > 0.0 or not -1.0 < poisson < 0.5:
         raise InputError(
             f"material '{name}': expected modulus > 0 MPa and -1 < poisson < 0.5; got "
@@ -73,7 +93,10 @@ def isotropic(
     shear = modulus / (2.0 * (1.0 + poisson))
     stiffness = np.diag([2.0 * shear] * 3 + [shear] * 3)
     stiffness[:3, :3] += lame
-    return Material(name, stiffness, tensile_strength, compressive_strength, source)
+    heat = None if expansion is None else (expansion, expansion, expansion)
+    return Material(
+        name, stiffness, tensile_strength, compressive_strength, source, mass_density, heat
+    )
 
 
 def transversely_isotropic(
@@ -86,6 +109,9 @@ def transversely_isotropic(
     tensile_strength: float | None = None,
     compressive_strength: float | None = None,
     source: str = "",
+    mass_density: float | None = None,
+    expansion_fibre: float | None = None,
+    expansion_transverse: float | None = None,
 ) -> Material:
     """Transversely isotropic material with the fibre along axis 1, moduli in MPa.
 
@@ -97,6 +123,9 @@ def transversely_isotropic(
         nu12 = nu13, with ``|nu12| < sqrt(E1 / E2)``.
     poisson_transverse : float, default 0.45
         nu23; unidirectional polymer composites have 0.35 to 0.5.
+    mass_density : float, g/cm^3, optional
+    expansion_fibre, expansion_transverse : float, 1/K, optional
+        Both or none.
     """
     e1, e2, nu, nu23 = modulus_fibre, modulus_transverse, poisson_fibre, poisson_transverse
     if not (min(e1, e2, shear_fibre) > 0.0 and -1.0 < nu23 < 1.0 - 2.0 * nu * nu * e2 / e1):
@@ -112,7 +141,14 @@ def transversely_isotropic(
     compliance[1, 2] = compliance[2, 1] = -nu23 / e2
     stiffness = np.linalg.inv(compliance)
     stiffness = 0.5 * (stiffness + stiffness.T)
-    return Material(name, stiffness, tensile_strength, compressive_strength, source)
+    if (expansion_fibre is None) != (expansion_transverse is None):
+        raise InputError(f"material '{name}': expansion along and across the fibre go together")
+    heat = None
+    if expansion_fibre is not None and expansion_transverse is not None:
+        heat = (expansion_fibre, expansion_transverse, expansion_transverse)
+    return Material(
+        name, stiffness, tensile_strength, compressive_strength, source, mass_density, heat
+    )
 
 
 def plane_stress(

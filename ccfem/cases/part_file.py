@@ -233,9 +233,6 @@ def _case(content: Mapping[str, Any], path: Path) -> Case:
     _check_strategies(part.strategies)
     mesh, findings = part.read(path.parent)
     mesh = patches_from_rules(mesh, rules)
-    for value in (*supports, *(load for case in loads.values() for load in case)):
-        if not isinstance(value, PointForce):
-            mesh.patch(value.patch)
     name = part.name or path.stem
     return Case(
         name=name,

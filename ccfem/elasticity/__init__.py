@@ -13,9 +13,10 @@ from ccfem.elasticity.problem import (
     Traction,
 )
 from ccfem.elasticity.recovery import cell_stress, nodal_stress
-from ccfem.elasticity.solve import System, prepare, solve
+from ccfem.elasticity.solve import solve
 from ccfem.elasticity.solvers import BACKENDS, Solver, factorise, preconditioned_cg
 from ccfem.elasticity.stress_field import SolveRecord, StressField
+from ccfem.elasticity.system import System, prepare
 
 __all__ = [
     "BACKENDS",

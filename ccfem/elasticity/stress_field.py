@@ -28,6 +28,11 @@ class SolveRecord:
     assembly_seconds, solve_seconds : float
     unknowns : int
         Free components of the displacement.
+    backward_error : float
+        ``|f - K u| / (|K| |u| + |f|)``: how far equations that u solves exactly are from these.
+    energy_error : float
+        Bound of the energy norm of the error that the solve leaves, over that of u; NaN where it
+        was not looked for.
     """
 
     backend: str
@@ -36,6 +41,8 @@ class SolveRecord:
     assembly_seconds: float
     solve_seconds: float
     unknowns: int
+    backward_error: float = np.nan
+    energy_error: float = np.nan
 
 
 @dataclass(frozen=True)

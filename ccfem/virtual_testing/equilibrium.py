@@ -103,7 +103,7 @@ def equilibrium(
             "expected an axial stiffness >= 0 N and 0 <= slack < 1; got "
             f"{axial_stiffness} and {slack}"
         )
-    held = specimen.system.held
+    held = specimen.held
     u = specimen.unreinforced.displacement if start is None else start
     x, total = held.restrict(u), 0
     operator = strain_operator(strands, specimen.system.problem.mesh)

@@ -14,10 +14,10 @@ import pytest
 
 from ccfem.elasticity import Bearing, Force, Pressure, Problem, Support, Traction, solve
 from ccfem.elasticity.assembly import pattern
+from ccfem.elasticity.held import Held
 from ccfem.elasticity.loads import nodal_forces
-from ccfem.elasticity.solve import System
 from ccfem.elasticity.stress_field import SolveRecord
-from ccfem.elasticity.supports import Held
+from ccfem.elasticity.system import System
 from ccfem.materials import isotropic
 from ccfem.mesh.box import box_mesh
 
