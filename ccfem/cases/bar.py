@@ -6,7 +6,7 @@ import shapely
 
 from ccfem.cases.case import Case
 from ccfem.cases.stored import mesh_of_case
-from ccfem.elasticity.problem import Force, Problem, Support
+from ccfem.elasticity.problem import Force, Order, Problem, Support
 from ccfem.layers.slicing.planar import Planar
 from ccfem.materials import printed_pla
 from ccfem.mesh.patches import Plane, patches_from_rules
@@ -55,15 +55,15 @@ def bar_mesh(element_size: float) -> TetMesh:
     return patches_from_rules(extrude(bar_outline(), THICKNESS, element_size), rules)
 
 
-def bar(element_size: float = ELEMENT_SIZE, order: int = 1, force: float = 1000.0) -> Case:
+def bar(element_size: float = ELEMENT_SIZE, order: Order = 1, force: float = 1000.0) -> Case:
     """Tensile bar, 125 x 25 x 5 mm, held at its left end and pulled at its right end along x.
 
     Parameters
     ----------
     element_size : float, mm
         Edge length of the cells aimed at.
-    order : {1, 2}
-        Linear or quadratic cells.
+    order : 1, 2 or "auto"
+        Linear or quadratic cells, or what their estimated error calls for.
     force : float, N
     """
     problem = Problem(
@@ -71,6 +71,7 @@ def bar(element_size: float = ELEMENT_SIZE, order: int = 1, force: float = 1000.
         printed_pla(),
         (Support("support"),),
         {"pull": (Force("load", (force, 0.0, 0.0)),)},
+        order=order,
     )
     return Case(
         name="bar",

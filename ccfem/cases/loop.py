@@ -8,7 +8,7 @@ import shapely
 from ccfem.arrays import FloatArray
 from ccfem.cases.case import Case
 from ccfem.cases.stored import mesh_of_case
-from ccfem.elasticity.problem import Force, Problem, Support
+from ccfem.elasticity.problem import Force, Order, Problem, Support
 from ccfem.materials import printed_pla
 from ccfem.mesh.patches import Cylinder, patches_from_rules
 from ccfem.mesh.tet_mesh import TetMesh
@@ -80,7 +80,7 @@ def loop_mesh(element_size: float) -> TetMesh:
     return patches_from_rules(extrude(loop_outline(), THICKNESS, element_size), rules)
 
 
-def loop(element_size: float = ELEMENT_SIZE, order: int = 1, force: float = 1000.0) -> Case:
+def loop(element_size: float = ELEMENT_SIZE, order: Order = 1, force: float = 1000.0) -> Case:
     """Ring with two lugs, 140 x 100 x 10 mm, pulled apart at the two holes.
 
     The outer half of the bottom hole is fixed, the outer half of the top hole pulled along y.
@@ -89,8 +89,8 @@ def loop(element_size: float = ELEMENT_SIZE, order: int = 1, force: float = 1000
     ----------
     element_size : float, mm
         Edge length of the cells aimed at.
-    order : {1, 2}
-        Linear or quadratic cells.
+    order : 1, 2 or "auto"
+        Linear or quadratic cells, or what their estimated error calls for.
     force : float, N
     """
     problem = Problem(
@@ -98,6 +98,7 @@ def loop(element_size: float = ELEMENT_SIZE, order: int = 1, force: float = 1000
         printed_pla(),
         (Support("support"),),
         {"pull": (Force("load", (0.0, force, 0.0)),)},
+        order=order,
     )
     return Case(
         name="loop",

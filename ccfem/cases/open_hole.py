@@ -6,7 +6,7 @@ import shapely
 
 from ccfem.cases.case import Case
 from ccfem.cases.stored import mesh_of_case
-from ccfem.elasticity.problem import Force, Problem, Support
+from ccfem.elasticity.problem import Force, Order, Problem, Support
 from ccfem.layers.slicing.planar import Planar
 from ccfem.materials import printed_pla
 from ccfem.mesh.patches import Cylinder, PatchRule, Plane, patches_from_rules
@@ -36,15 +36,15 @@ def open_hole_mesh(element_size: float) -> TetMesh:
     return patches_from_rules(extrude(open_hole_outline(), THICKNESS, element_size), rules)
 
 
-def open_hole(element_size: float = ELEMENT_SIZE, order: int = 1, force: float = 1000.0) -> Case:
+def open_hole(element_size: float = ELEMENT_SIZE, order: Order = 1, force: float = 1000.0) -> Case:
     """Plate 200 x 36 x 4 mm with a hole of radius 6 mm, held left and pulled right along x.
 
     Parameters
     ----------
     element_size : float, mm
         Edge length of the cells aimed at; shorter at the hole.
-    order : {1, 2}
-        Linear or quadratic cells.
+    order : 1, 2 or "auto"
+        Linear or quadratic cells, or what their estimated error calls for.
     force : float, N
     """
     problem = Problem(
@@ -52,6 +52,7 @@ def open_hole(element_size: float = ELEMENT_SIZE, order: int = 1, force: float =
         printed_pla(),
         (Support("support"),),
         {"pull": (Force("load", (force, 0.0, 0.0)),)},
+        order=order,
     )
     return Case(
         name="open_hole",

@@ -178,7 +178,7 @@ def load_case(problem: SupportedProblem, name: str) -> FloatArray:
     heat = any(isinstance(load, Temperature) for load in loads)
     if heat:
         assert isinstance(problem, Problem)
-        parts.append(heat_forces(problem, loads))
+        parts.append(heat_forces(problem, name))
     total: FloatArray = sum(parts, np.zeros(problem.body.points.shape))
     largest = max((float(np.abs(part).max()) for part in parts), default=0.0)
     moved: list[Any] = [load.vector for load in loads if isinstance(load, Displacement)]

@@ -12,6 +12,7 @@ import scipy.sparse as sp
 from ccfem.arrays import FloatArray
 from ccfem.elasticity.conditioning import about_conditioning
 from ccfem.elasticity.held import Held
+from ccfem.elasticity.order import LARGEST_ERROR, MOST_CELLS, linear_locks, on_quadratic
 from ccfem.elasticity.problem import Problem
 from ccfem.elasticity.solution import Solution
 from ccfem.elasticity.solvers import LARGEST_DIRECT, Solver, direct_backend
@@ -36,6 +37,10 @@ def solve(
     Parameters
     ----------
     problem : Problem
+        With ``order = "auto"`` a mesh of linear cells is solved on quadratic ones where linear
+        ones lock or leave too large an error: see `ccfem.elasticity.order`. The nodes of the mesh
+        stay the first ones, the cells stay in their order, and the problem of each field is the
+        one that was solved.
     backend : str, default "auto"
         One of `ccfem.elasticity.BACKENDS`; "auto" chooses by size and by what is installed, and
         where an iterative backend fails goes on with a direct one. The record names the one that
@@ -58,11 +63,41 @@ def solve(
     SolveError
         When a solution is not accepted; what makes the equations ill-conditioned is named.
     """
+    if problem.order != "auto" or problem.mesh.order == 2:
+        wanted = problem if problem.order != 2 else on_quadratic(problem)
+        return _solved_as_it_is(wanted, backend, tolerance, "")
+    if len(problem.mesh.cells) > MOST_CELLS:
+        why = f"linear: more than {MOST_CELLS:,} cells"
+        return _solved_as_it_is(replace(problem, order=1), backend, tolerance, why)
+    if linear_locks(problem):
+        why = "quadratic: the material hardly changes its volume, where linear cells lock"
+        return _solved_as_it_is(on_quadratic(problem), backend, tolerance, why)
+    why = f"linear: estimated error at most {LARGEST_ERROR:.0%}"
+    fields = _solved_as_it_is(replace(problem, order=1), backend, tolerance, why)
+    worst = max(field.record.error for field in fields.values())
+    if worst <= LARGEST_ERROR:
+        return fields
+    why = f"quadratic: linear cells leave an estimated error of {worst:.0%}"
+    return _solved_as_it_is(on_quadratic(problem), backend, tolerance, why)
+
+
+def _solved_as_it_is(
+    problem: Problem, backend: str, tolerance: float, why: str
+) -> dict[str, StressField]:
+    """Solve a problem on its own cells."""
     try:
         fields = solve_system(partial(prepare, problem), backend, tolerance)
     except SolveError as error:
         raise SolveError(f"{error}; {about_conditioning(problem)}") from error
-    return fields
+    return {case: _with_error(field, why) for case, field in fields.items()}
+
+
+def _with_error(field: StressField, why: str) -> StressField:
+    """Field with its estimated error in the record."""
+    record = replace(field.record, error=field.error.relative, order_because=why)
+    result = replace(field, record=record)
+    result.__dict__["error"] = field.error
+    return result
 
 
 class _Equations(Protocol[FieldT]):

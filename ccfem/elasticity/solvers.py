@@ -134,7 +134,7 @@ class Solver:
     @cached_property
     def size(self) -> float:
         """Largest diagonal entry of the matrix, which its norm does not fall below."""
-        return float(self.matrix.diagonal().max())
+        return float(self.matrix.diagonal().max(initial=0.0))
 
     def energy_error(self, rhs: FloatArray, solution: Solution) -> float:
         """Bound of the energy of a solution's error, ``|x - x*|_A / |x|_A``.

@@ -1,12 +1,16 @@
 """The result of a solve: displacement, stress, reactions, and the record of the solve."""
 
 from dataclasses import dataclass
+from functools import cached_property
 
 import numpy as np
 
 from ccfem.arrays import FloatArray, read_only
+from ccfem.elasticity.error_estimate import ErrorEstimate, estimate_error
+from ccfem.elasticity.order import about_error
 from ccfem.elasticity.part_stress import PartStress
 from ccfem.elasticity.problem import Problem
+from ccfem.elasticity.volume_loads import free_strain
 from ccfem.errors import InputError
 from ccfem.geometry.locate import locate_tets
 from ccfem.mesh.tet_mesh import TetMesh
@@ -33,6 +37,11 @@ class SolveRecord:
     energy_error : float
         Bound of the energy norm of the error that the solve leaves, over that of u; NaN where it
         was not looked for.
+    error : float
+        Estimated energy norm of the error that the cells leave, over that of the exact solution;
+        NaN where it was not looked for.
+    order_because : str
+        Which order of the displacement was chosen and why, where it was left open.
     """
 
     backend: str
@@ -43,6 +52,8 @@ class SolveRecord:
     unknowns: int
     backward_error: float = np.nan
     energy_error: float = np.nan
+    error: float = np.nan
+    order_because: str = ""
 
 
 @dataclass(frozen=True)
@@ -82,6 +93,22 @@ class StressField:
     def mesh(self) -> TetMesh:
         """Mesh of the problem."""
         return self.problem.mesh
+
+    @cached_property
+    def error(self) -> ErrorEstimate:
+        """Estimated error of the stress of each cell."""
+        problem = self.problem
+        stiffness = problem.cell_stiffness
+        if problem.density is not None:
+            stiffness = problem.density[:, None, None] * stiffness
+        free = free_strain(problem, self.case)
+        return estimate_error(self.mesh, self.displacement, stiffness, free)
+
+    @property
+    def findings(self) -> tuple[str, ...]:
+        """One line for each thing worth knowing about the solution."""
+        found = about_error(self.error.relative, self.problem)
+        return (found,) if found else ()
 
     @property
     def held_or_loaded(self) -> tuple[str, ...]:

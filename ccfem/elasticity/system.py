@@ -39,8 +39,6 @@ class System:
         Of the loads; of heat, what would hold the part in shape, turned round.
     moved : dict of load case name to (n, 3) array, mm
         Values of the held components, where they are not those of `held`.
-    free_strains : dict of load case name to (m, 6) array
-        Strain, Voigt, that heat would give each cell if nothing held it, where there is heat.
     """
 
     problem: Problem
@@ -48,7 +46,6 @@ class System:
     held: Held
     forces: dict[str, FloatArray]
     moved: Mapping[str, FloatArray] = field(default_factory=dict)
-    free_strains: Mapping[str, FloatArray] = field(default_factory=dict)
 
     @cached_property
     def stiffness(self) -> FloatArray:
@@ -75,12 +72,6 @@ class System:
             return self.forces[case]
         parts = (k * self.forces[name] for name, k in factors.items())
         return sum(parts, np.zeros_like(self.problem.mesh.points))
-
-    def free_strain_in(self, case: str) -> FloatArray | None:
-        """Strain (m, 6) without stress in one load case or combination; None without heat."""
-        factors = self.problem.factors(case)
-        parts = [k * self.free_strains[n] for n, k in factors.items() if n in self.free_strains]
-        return sum(parts[1:], parts[0]) if parts else None
 
     def assemble(
         self, stiffness: FloatArray | None = None, density: FloatArray | None = None
@@ -133,7 +124,7 @@ class System:
         if problem.density is not None:
             scaled = problem.density[:, None, None] * scaled
         internal = (matrix @ displacement.reshape(-1)).reshape(-1, 3)
-        forces, free = self.forces_in(case), self.free_strain_in(case)
+        forces, free = self.forces_in(case), free_strain(problem, case)
         mesh, soft = problem.mesh, soft_supports(problem)
         reactions = self.held_in(case).supported(internal - forces)
         if soft:
@@ -172,12 +163,9 @@ def prepare(problem: Problem) -> System:
     """
     forces = load_cases(problem)
     at_rest = held(problem)
-    moved, heat = {}, {}
-    for case, loads in problem.loads.items():
+    moved = {}
+    for case in problem.loads:
         here = held_in(problem, case, at_rest)
         if here is not at_rest:
             moved[case] = here.value
-        free = free_strain(problem, loads)
-        if free is not None:
-            heat[case] = free
-    return System(problem, pattern(problem.mesh), at_rest, forces, moved, heat)
+    return System(problem, pattern(problem.mesh), at_rest, forces, moved)

@@ -4,7 +4,7 @@ import numpy as np
 
 from ccfem.arrays import FloatArray
 from ccfem.elasticity.assembly import cell_gradients
-from ccfem.elasticity.load_kinds import BodyForce, Gravity, Load, Temperature
+from ccfem.elasticity.load_kinds import BodyForce, Gravity, Temperature
 from ccfem.elasticity.problem import Problem
 from ccfem.elasticity.recovery import times
 from ccfem.errors import InputError
@@ -56,21 +56,25 @@ def _mass_density(problem: Problem, load: Gravity) -> FloatArray:
     return factor * result
 
 
-def free_strain(problem: Problem, loads: tuple[Load, ...]) -> FloatArray | None:
+def free_strain(problem: Problem, case: str) -> FloatArray | None:
     """Strain (m, 6) that heat would give each cell if nothing held it; None without heat.
 
-    Voigt, with engineering shear, in the global frame.
+    Voigt, with engineering shear, in the global frame; of a load case or a combination.
 
     Raises
     ------
     InputError
         When a material has no expansion.
     """
-    change = sum(load.change for load in loads if isinstance(load, Temperature))
+    change = sum(
+        factor * load.change
+        for name, factor in problem.factors(case).items()
+        for load in problem.loads[name]
+        if isinstance(load, Temperature)
+    )
     if not change:
         return None
-    m = len(problem.mesh.cells)
-    result = np.empty((m, 6))
+    result = np.empty((len(problem.mesh.cells), 6))
     for material, cells in problem.materials:
         if material.expansion is None:
             raise InputError(
@@ -85,9 +89,9 @@ def free_strain(problem: Problem, loads: tuple[Load, ...]) -> FloatArray | None:
     return result
 
 
-def heat_forces(problem: Problem, loads: tuple[Load, ...]) -> FloatArray:
+def heat_forces(problem: Problem, case: str) -> FloatArray:
     """Find the forces at the nodes (n, 3), N, with which heat drives the part apart."""
-    free = free_strain(problem, loads)
+    free = free_strain(problem, case)
     if free is None:
         return np.zeros(problem.mesh.points.shape)
     stress = times(problem.cell_stiffness, free)

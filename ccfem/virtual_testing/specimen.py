@@ -8,6 +8,7 @@ import scipy.sparse as sp
 
 from ccfem.arrays import BoolArray, FloatArray
 from ccfem.elasticity.held import Held
+from ccfem.elasticity.load_kinds import Temperature
 from ccfem.elasticity.solvers import Solver
 from ccfem.elasticity.stress_field import StressField
 from ccfem.elasticity.system import System, prepare
@@ -53,7 +54,7 @@ class Specimen:
                 f"load case '{case}' has forces and moving supports; a virtual test needs one or "
                 "the other: split it"
             )
-        if system.free_strain_in(case) is not None:
+        if any(isinstance(load, Temperature) for load in system.problem.loads_of(case)):
             raise InputError(
                 f"load case '{case}' heats the part; a virtual test needs forces or moving "
                 "supports: leave the heat out"

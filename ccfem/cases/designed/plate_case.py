@@ -5,7 +5,7 @@ from collections.abc import Callable
 from ccfem.cases.case import Case
 from ccfem.cases.designed.plate import DesignPlate
 from ccfem.cases.stored.files import mesh_of_case
-from ccfem.elasticity.problem import Force, Problem, Support
+from ccfem.elasticity.problem import Force, Order, Problem, Support
 from ccfem.layers.slicing.planar import Planar
 from ccfem.machine.machine import Machine
 from ccfem.machine.speed_table import SpeedTable
@@ -50,7 +50,7 @@ def case_of(plate: Callable[..., DesignPlate], title: str) -> Callable[..., Case
     def case(
         optimised: bool = True,
         element_size: float = ELEMENT_SIZE,
-        order: int = 1,
+        order: Order = 1,
         force: float = 100.0,
         thickness: float = THICKNESS,
     ) -> Case:
@@ -67,8 +67,8 @@ def case_of(plate: Callable[..., DesignPlate], title: str) -> Callable[..., Case
         Whether to take the optimised part, or the full plate.
     element_size : float, mm
         Edge length of the cells aimed at.
-    order : {{1, 2}}
-        Linear or quadratic cells.
+    order : 1, 2 or "auto"
+        Linear or quadratic cells, or what their estimated error calls for.
     force : float, N
     thickness : float, mm
     """
@@ -79,7 +79,7 @@ def designed_case(
     plate: DesignPlate,
     optimised: bool = True,
     element_size: float = ELEMENT_SIZE,
-    order: int = 1,
+    order: Order = 1,
     thickness: float = THICKNESS,
 ) -> Case:
     """Make the case of one plate; parameters as those of the functions that `case_of` makes."""
@@ -97,6 +97,7 @@ def designed_case(
             Support("bottom", "z"),
         ),
         {"down": (Force("load", (0.0, -plate.force, 0.0)),)},
+        order=order,
     )
     what = "optimised" if optimised else "full plate"
     return Case(
