@@ -5,6 +5,85 @@ Units are mm, N and MPa everywhere, angles in degrees at the interface.
 The line of flow, each arrow one function or one small callable value::
 
     TetMesh -> Problem -> StressField -> Layers -> Strategy -> Toolpaths -> Evaluation
+
+Its functions are here, from ``ccfem.read`` to ``ccfem.compare``. What they take and give lives in
+packages by name: ``ccfem.strategies.Isocurve``, ``ccfem.elasticity.Force``.
+
+Examples
+--------
+>>> import ccfem
+>>> case = ccfem.read("bar", element_size=5.0)
+>>> stress = ccfem.solve(case.problem)["pull"]
+>>> layers = ccfem.slice(stress, 2, case.build)
+>>> paths = ccfem.plan(ccfem.strategies.Zigzag(spacing=4.0), layers, stress, case.machine)
+>>> evaluation = ccfem.evaluate(paths, layers, stress, case.machine)
 """
 
-__version__ = "0.1.0"
+import importlib
+from importlib.metadata import version
+from typing import TYPE_CHECKING, Any
+
+if TYPE_CHECKING:
+    from ccfem.cases.case import Case
+    from ccfem.cases.reading import read
+    from ccfem.comparison.compare import compare
+    from ccfem.comparison.result import Comparison
+    from ccfem.elasticity import Problem, solve
+    from ccfem.evaluation import evaluate
+    from ccfem.layers.slicing import slice
+    from ccfem.machine import Machine
+    from ccfem.planning import plan
+    from ccfem.virtual_testing import virtual_test
+
+__all__ = [
+    "Case",
+    "Comparison",
+    "Machine",
+    "Problem",
+    "compare",
+    "evaluate",
+    "plan",
+    "read",
+    "slice",
+    "solve",
+    "virtual_test",
+]
+
+__version__ = version("ccfem")
+
+_HOMES = {
+    "Case": "cases",
+    "Comparison": "comparison",
+    "Machine": "machine",
+    "Problem": "elasticity",
+    "compare": "comparison",
+    "evaluate": "evaluation",
+    "plan": "planning",
+    "read": "cases",
+    "slice": "layers.slicing",
+    "solve": "elasticity",
+    "virtual_test": "virtual_testing",
+}
+"""Package that each name comes from, imported when the name is first used."""
+
+_PACKAGES = frozenset(
+    {
+        *("cases", "comparison", "elasticity", "errors", "evaluation", "export", "fields"),
+        *("geometry", "io", "layers", "linking", "machine", "materials", "mesh", "meshing"),
+        *("planning", "plates", "plot", "progress", "raster", "strategies", "tensor"),
+        *("toolpaths", "topopt", "virtual_testing"),
+    }
+)
+"""Packages and modules that need no import of their own."""
+
+
+def __getattr__(name: str) -> Any:
+    if name in _HOMES:
+        return getattr(importlib.import_module(f"ccfem.{_HOMES[name]}"), name)
+    if name in _PACKAGES:
+        return importlib.import_module(f"ccfem.{name}")
+    raise AttributeError(f"module 'ccfem' has no attribute '{name}'")
+
+
+def __dir__() -> list[str]:
+    return sorted({*__all__, *_PACKAGES, "__version__"})

@@ -5,7 +5,8 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from ccfem.arrays import FloatArray, read_only
+from ccfem.arrays import FloatArray, freeze
+from ccfem.checks import check_known, check_number
 from ccfem.errors import InputError
 
 __all__ = [
@@ -45,9 +46,13 @@ class Material:
     mass_density: float | None = None
     expansion: tuple[float, float, float] | None = None
 
+    def __repr__(self) -> str:
+        modulus = 1.0 / np.linalg.inv(self.stiffness)[0, 0]
+        return f"Material {self.name}: {modulus:.4g} MPa along axis 1"
+
     def __post_init__(self) -> None:
-        stiffness = read_only(self.stiffness)
-        object.__setattr__(self, "stiffness", stiffness)
+        freeze(self, stiffness=float)
+        stiffness = self.stiffness
         if stiffness.shape != (6, 6) or not np.allclose(stiffness, stiffness.T, rtol=1e-9):
             raise InputError(
                 f"material '{self.name}': stiffness must be a symmetric (6, 6) matrix in MPa; "
@@ -84,11 +89,8 @@ def isotropic(
 
     Mass density in g/cm^3, expansion by heat in 1/K.
     """
-    if not modulus > 0.0 or not -1.0 < poisson < 0.5:
-        raise InputError(
-            f"material '{name}': expected modulus > 0 MPa and -1 < poisson < 0.5; got "
-            f"{modulus} and {poisson}"
-        )
+    check_number(f"modulus of material '{name}'", modulus, above=0.0, unit="MPa")
+    check_number(f"poisson of material '{name}'", poisson, above=-1.0, below=0.5)
     lame = modulus * poisson / ((1.0 + poisson) * (1.0 - 2.0 * poisson))
     shear = modulus / (2.0 * (1.0 + poisson))
     stiffness = np.diag([2.0 * shear] * 3 + [shear] * 3)
@@ -253,8 +255,7 @@ def named_material(name: str) -> Material:
     InputError
         For an unknown name; the known ones are listed.
     """
-    if name not in _TABLE:
-        raise InputError(f"no material named '{name}'; there are: {', '.join(material_names())}")
+    check_known("material", name, material_names())
     return _TABLE[name]()
 
 

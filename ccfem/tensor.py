@@ -6,7 +6,7 @@ tensor component).
 
 import numpy as np
 
-from ccfem.arrays import FloatArray
+from ccfem.arrays import BoolArray, FloatArray
 
 __all__ = [
     "bond_matrix",
@@ -17,6 +17,8 @@ __all__ = [
     "rotate_stiffness",
     "strain_from_voigt",
     "strain_to_voigt",
+    "strongest",
+    "strongest_in_plane",
     "to_voigt",
     "von_mises",
 ]
@@ -25,6 +27,10 @@ _ROWS = np.array([0, 1, 2, 1, 0, 0])
 _COLUMNS = np.array([0, 1, 2, 2, 2, 1])
 _SQUARE = np.array([[0, 5, 4], [5, 1, 3], [4, 3, 2]])
 _ENGINEERING = np.array([1.0, 1.0, 1.0, 2.0, 2.0, 2.0])
+
+_EQUAL = 0.02
+"""Principal values whose sizes differ by no more than this share of the larger size have no
+strongest direction: in pure shear two directions at right angles are as strong."""
 
 
 def to_voigt(stress: FloatArray) -> FloatArray:
@@ -146,3 +152,45 @@ def largest_in_plane(plane_stress: FloatArray) -> tuple[FloatArray, FloatArray, 
     mean, half = 0.5 * (s11 + s22), 0.5 * (s11 - s22)
     radius = np.hypot(half, s12)
     return mean + radius, mean - radius, 0.5 * np.arctan2(s12, half)
+
+
+def strongest(largest: FloatArray, smallest: FloatArray) -> tuple[BoolArray, BoolArray]:
+    """Tell which of two principal values in a plane is the larger in size.
+
+    Parameters
+    ----------
+    largest, smallest : (...,) arrays, MPa
+        As from `largest_in_plane`.
+
+    Returns
+    -------
+    across : (...,) bool array
+        True where ``|smallest| > |largest|``: the strongest direction is square to that of
+        `largest`.
+    defined : (...,) bool array
+        True where the sizes differ by more than 2 % of the larger one.
+    """
+    high, low = np.abs(largest), np.abs(smallest)
+    return low > high, np.abs(high - low) > _EQUAL * np.maximum(high, low)
+
+
+def strongest_in_plane(plane_stress: FloatArray) -> tuple[FloatArray, FloatArray, BoolArray]:
+    """Principal value of the largest size of plane stress, tension or compression.
+
+    Parameters
+    ----------
+    plane_stress : (..., 3) array, MPa
+        s11, s22, s12.
+
+    Returns
+    -------
+    value : (...,) array, MPa
+        Positive in tension; the tension where both values are of one size.
+    angle : (...,) array, radians
+        Of its direction to axis 1, in (-pi/2, pi].
+    defined : (...,) bool array
+        Where there is one such direction: see `strongest`.
+    """
+    largest, smallest, angle = largest_in_plane(plane_stress)
+    across, defined = strongest(largest, smallest)
+    return np.where(across, smallest, largest), angle + 0.5 * np.pi * across, defined

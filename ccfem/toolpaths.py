@@ -6,7 +6,7 @@ from typing import Any
 
 import numpy as np
 
-from ccfem.arrays import BoolArray, FloatArray, IntArray, read_only
+from ccfem.arrays import BoolArray, FloatArray, IntArray, freeze
 from ccfem.layers.layer import Layer
 
 __all__ = ["FIBRE", "KINDS", "MATRIX", "SUPPORT", "TRAVEL", "Toolpaths"]
@@ -49,19 +49,18 @@ class Toolpaths:
     closed: BoolArray
     link: BoolArray = None  # type: ignore[assignment]
 
+    def __repr__(self) -> str:
+        length = float(self.of_kind(FIBRE).lengths.sum())
+        return (
+            f"Toolpaths: {len(self)} paths on {len(np.unique(self.layer))} layers, "
+            f"{length:.0f} mm of fibre"
+        )
+
     def __post_init__(self) -> None:
         if self.link is None:
             object.__setattr__(self, "link", np.zeros(len(self.points), dtype=np.bool_))
-        for name, dtype in (
-            ("points", np.float64),
-            ("normals", np.float64),
-            ("offsets", np.int64),
-            ("layer", np.int64),
-            ("kind", np.int64),
-            ("closed", np.bool_),
-            ("link", np.bool_),
-        ):
-            object.__setattr__(self, name, read_only(getattr(self, name), dtype))
+        freeze(self, points=float, normals=float, offsets=int)
+        freeze(self, layer=int, kind=int, closed=bool, link=bool)
         count = len(self.layer)
         if self.points.shape != self.normals.shape or self.points.ndim != 2:
             raise ValueError(

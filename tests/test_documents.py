@@ -1,5 +1,6 @@
 """README and CONTRIBUTING are true: their examples run, their lists are complete."""
 
+import json
 import re
 import shutil
 import subprocess
@@ -12,6 +13,7 @@ import pytest
 
 from ccfem.cases.part_file import read_part
 from ccfem.errors import InputError
+from ccfem.io import read_mesh
 from ccfem.io.toml import from_table
 from ccfem.machine import Machine, SpeedTable
 from ccfem.strategies import named
@@ -32,13 +34,15 @@ def test_the_two_commands_are_there():
     assert '    pip install -e ".[test]" && pytest\n' in README
 
 
-def test_python_of_the_readme_runs(capsys):
+def test_python_of_the_readme_runs(capsys, monkeypatch, tmp_path):
+    monkeypatch.chdir(tmp_path)
     space = {}
     for block in blocks(README, "python"):
         exec(compile(block, "README.md", "exec"), space)
     said = capsys.readouterr().out
     assert "efficiency" in said
     assert "isocurve makes the stiffest part" in said
+    assert set(read_mesh(tmp_path / "cantilever.vtu").patches) == set(space["part"].mesh.patches)
 
 
 def test_part_file_of_the_readme_lacks_nothing_but_its_mesh(tmp_path):
@@ -61,23 +65,45 @@ def test_links_lead_somewhere():
             assert target.startswith("http") or (ROOT / target).exists(), target
 
 
-def test_adding_a_strategy_works_as_told(tmp_path):
-    """Do what CONTRIBUTING.md says, to the letter, in a copy of the project."""
+@pytest.fixture
+def copy(tmp_path):
+    """A copy of the project, and what runs a module in it."""
     for folder in ("ccfem", "data", "tests/laws", "tests/strategies"):
         # With what numba compiled, but not what other tests are writing there.
         ignored = shutil.ignore_patterns("*.pyc*", "*.tmp.*")
         shutil.copytree(ROOT / folder, tmp_path / folder, ignore=ignored)
     shutil.copy(ROOT / "pyproject.toml", tmp_path)
-    module, test = blocks(CONTRIBUTING, "python")
-    (tmp_path / "ccfem/strategies/mean_tension.py").write_text(module)
-    (tmp_path / "tests/strategies/test_mean_tension.py").write_text(test)
+
+    def run(command):
+        done = subprocess.run(
+            [sys.executable, "-m", *command.split()],
+            cwd=tmp_path,
+            capture_output=True,
+            text=True,
+            check=False,
+        )
+        assert done.returncode == 0, done.stdout + done.stderr
+        return done.stdout
+
+    return tmp_path, run
+
+
+def test_adding_a_strategy_works_as_told(copy):
+    """Do what CONTRIBUTING.md says, to the letter, in a copy of the project."""
+    folder, run = copy
+    module, test, _ = blocks(CONTRIBUTING, "python")
+    (folder / "ccfem/strategies/mean_tension.py").write_text(module)
+    (folder / "tests/strategies/test_mean_tension.py").write_text(test)
     (command,) = re.findall(r"^ +(pytest -n 0 .*mean_tension)$", CONTRIBUTING, flags=re.M)
-    done = subprocess.run(
-        [sys.executable, "-m", *command.split()],
-        cwd=tmp_path,
-        capture_output=True,
-        text=True,
-        check=False,
-    )
-    assert done.returncode == 0, done.stdout + done.stderr
-    assert re.search(r"\d+ passed", done.stdout)
+    assert re.search(r"\d+ passed", run(command))
+
+
+def test_adding_a_slicer_works_as_told(copy):
+    folder, run = copy
+    (folder / "ccfem/layers/slicing/graded.py").write_text(blocks(CONTRIBUTING, "python")[2])
+    listed, compared = re.findall(r"^ +(ccfem .*graded.*)$", CONTRIBUTING, flags=re.M)
+    assert "Number of layers, at least 1." in run(listed)
+    run(f"{compared} --natural --no-virtual-test --out results")
+    heights = json.loads((folder / "results/results.json").read_text())["case"]["heights"]
+    # A bar 5 mm high: the middles of three steps of the unit interval, squared.
+    assert heights == pytest.approx([5.0 * (k / 6.0) ** 2 for k in (1, 3, 5)])

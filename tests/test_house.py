@@ -12,7 +12,6 @@ PACKAGE = ROOT / "ccfem"
 TWICE = {
     "assembly": "of tetrahedra and of plates",
     "guides": "as curves and as pixels",
-    "body": "as the equations see it and as a part file describes it",
     "hatch": "of lines and of pixels",
     "problem": "in space and in the plane",
     "solve": "in space and in the plane",

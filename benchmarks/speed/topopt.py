@@ -6,7 +6,7 @@ machine disturbs less but which counts every thread. ``pip install pymoto`` brin
 takes PARDISO when that is installed. Its volume constraint is on the variables, ours on the
 filtered densities, so the compliances after some iterations are close, not equal.
 
-    python benchmarks/speed/topopt.py
+    python -m benchmarks.speed.topopt
 """
 
 from collections.abc import Callable

@@ -1,6 +1,7 @@
-"""Cases: ready problems, one file a case. The module's name is the case's name."""
+"""Cases: ready problems, one file a case, and parts from part files."""
 
 from ccfem.cases.case import Case
 from ccfem.cases.named import create_case, named_cases
+from ccfem.cases.reading import read
 
-__all__ = ["Case", "create_case", "named_cases"]
+__all__ = ["Case", "create_case", "named_cases", "read"]

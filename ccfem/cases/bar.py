@@ -1,7 +1,5 @@
 """A tensile bar: of the size of the bar of Chen et al. 2021."""
 
-from typing import Any
-
 import shapely
 
 from ccfem.cases.case import Case
@@ -25,7 +23,7 @@ def bar_outline(
     gauge_length: float = 40.0,
     gauge_width: float = 8.0,
     shoulder: float = 8.0,
-) -> Any:
+) -> shapely.Polygon:
     """Planform of the bar: 125 mm long, 25 mm wide, 8 mm wide in the gauge.
 
     Parameters

@@ -1,7 +1,6 @@
 """A bracket with four bolt holes, as topology optimisation in space shapes it."""
 
 from dataclasses import replace
-from typing import Any
 
 import numpy as np
 import shapely
@@ -41,7 +40,7 @@ SIDE, LEG, HEIGHT = 52.0, 21.0, 27.0
 VOLUME_FRACTION = 0.3
 
 
-def bracket_outline() -> Any:
+def bracket_outline() -> shapely.Polygon:
     """Planform of the design domain: an L of 52 x 52 mm with legs 21 mm wide and four holes."""
     corner = shapely.box(LEG, LEG, SIDE, SIDE)
     holes = [shapely.Point(x, y).buffer(HOLE_RADIUS, quad_segs=16) for x, y in HOLES.values()]

@@ -2,9 +2,9 @@
 
 from collections.abc import Mapping
 from dataclasses import dataclass, field
-from types import MappingProxyType
 from typing import Any
 
+from ccfem.arrays import freeze
 from ccfem.elasticity.problem import Problem
 from ccfem.layers.slicer import Slicer
 from ccfem.layers.slicing.planar import Planar
@@ -46,6 +46,8 @@ class Case:
     source: str = ""
     findings: tuple[str, ...] = ()
 
+    def __repr__(self) -> str:
+        return f"Case {self.name}: {self.title}"
+
     def __post_init__(self) -> None:
-        parameters = {name: MappingProxyType(dict(p)) for name, p in self.parameters.items()}
-        object.__setattr__(self, "parameters", MappingProxyType(parameters))
+        freeze(self, parameters=dict)

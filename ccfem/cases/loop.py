@@ -1,7 +1,5 @@
 """A ring with two lugs, pulled at the holes: of the size of the Loop of Chen et al. 2021."""
 
-from typing import Any
-
 import numpy as np
 import shapely
 
@@ -28,7 +26,7 @@ def loop_outline(
     ring_width: float = 20.0,
     lug_radius: float = 20.0,
     fillet: float = 10.0,
-) -> Any:
+) -> shapely.Polygon:
     """Planform of the loop: 100 mm wide and 140 mm long with the defaults.
 
     Parameters

@@ -8,6 +8,7 @@ from importlib.metadata import entry_points
 from typing import Any, get_type_hints
 
 from ccfem.cases.case import Case
+from ccfem.checks import check_known
 from ccfem.errors import InputError, known_names
 from ccfem.io.toml import from_table
 
@@ -42,11 +43,7 @@ def create_case(name: str, **parameters: Any) -> Case:
         For an unknown case or parameter, the known ones listed; for a value of a wrong type.
     """
     known = named_cases()
-    if name not in known:
-        raise InputError(
-            f"no case named '{name}'; there are: {known_names(name, sorted(known))} "
-            "(or name a part file, .toml)"
-        )
+    check_known("case", name, sorted(known), "or name a part file, .toml")
     fields = inspect.signature(known[name]).parameters
     for parameter in parameters:
         if parameter not in fields:

@@ -1,7 +1,5 @@
 """A plate with a round hole in tension: the open-hole test of laminates."""
 
-from typing import Any
-
 import shapely
 
 from ccfem.cases.case import Case
@@ -20,7 +18,9 @@ RADIUS = 6.0
 THICKNESS = 4.0
 
 
-def open_hole_outline(length: float = 200.0, width: float = 36.0, radius: float = RADIUS) -> Any:
+def open_hole_outline(
+    length: float = 200.0, width: float = 36.0, radius: float = RADIUS
+) -> shapely.Polygon:
     """Planform of the plate, mm, the hole in its middle: a shapely Polygon."""
     plate = shapely.box(-0.5 * length, -0.5 * width, 0.5 * length, 0.5 * width)
     return plate.difference(shapely.Point(0.0, 0.0).buffer(radius, quad_segs=32))

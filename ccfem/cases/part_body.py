@@ -5,6 +5,7 @@ from pathlib import Path
 from typing import Any
 
 import numpy as np
+import shapely
 
 from ccfem.elasticity.problem import Order
 from ccfem.errors import InputError
@@ -46,7 +47,7 @@ class Body:
         if self.mesh is not None:
             mesh = read_mesh(folder / self.mesh, self.scale, check=False)
             if self.order == 1 and mesh.order == 2:
-                mesh = _linear(mesh)
+                mesh = mesh.linear()
             mesh, report = check_mesh(mesh, merge=self.merge_nodes)
         else:
             mesh, report = check_mesh(_filled(self, folder))
@@ -89,23 +90,12 @@ class _Planform:
     holes: tuple[dict[str, Any], ...] = ()
 
 
-def _linear(mesh: TetMesh) -> TetMesh:
-    """Mesh of the corners of a quadratic mesh."""
-    corners, cells = np.unique(mesh.corners, return_inverse=True)
-    number = np.zeros(len(mesh.points), dtype=np.int64)
-    number[corners] = np.arange(len(corners))
-    patches = {name: number[facets] for name, facets in mesh.patches.items()}
-    return TetMesh(mesh.points[corners], cells.reshape(-1, 4), patches)
-
-
 def _filled(body: Body, folder: Path) -> TetMesh:
     """Mesh of a surface or a planform."""
     if body.surface is not None and body.edge_length is not None:
         from ccfem.meshing import tetrahedralise
 
         return tetrahedralise(read_surface(folder / body.surface, body.scale), body.edge_length)
-    import shapely
-
     from ccfem.meshing import extrude
 
     plan = from_table(_Planform, body.planform, "planform")
@@ -124,10 +114,8 @@ def _filled(body: Body, folder: Path) -> TetMesh:
     return extrude(outline.difference(holes), plan.height, plan.edge_length)
 
 
-def _polygon(outline: tuple[tuple[float, float], ...], where: str) -> Any:
+def _polygon(outline: tuple[tuple[float, float], ...], where: str) -> shapely.Polygon:
     """Make a polygon of an outline that does not cut itself."""
-    import shapely
-
     if len(outline) < 3:
         raise InputError(f"{where}.outline needs at least 3 points; got {len(outline)}: add some")
     polygon = shapely.Polygon(outline)

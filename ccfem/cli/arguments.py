@@ -2,11 +2,21 @@
 
 import tomllib
 from collections.abc import Sequence
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 from ccfem.errors import InputError
 
-__all__ = ["assignment", "names_of", "numbers_of", "parameters_of"]
+if TYPE_CHECKING:
+    from ccfem.layers.slicer import Slicer
+
+__all__ = [
+    "assignment",
+    "names_of",
+    "numbers_of",
+    "parameters_by_strategy",
+    "parameters_of",
+    "slicer_of",
+]
 
 
 def names_of(text: str) -> tuple[str, ...]:
@@ -33,6 +43,24 @@ def assignment(text: str) -> tuple[str, Any]:
         return name, value
 
 
+def parameters_by_strategy(texts: Sequence[str]) -> dict[str, dict[str, Any]]:
+    """Parameters of several strategies, each as ``strategy.name=value``.
+
+    Raises
+    ------
+    InputError
+        When a text names no strategy, or has no ``=``.
+    """
+    found: dict[str, dict[str, Any]] = {}
+    for text in texts:
+        path, value = assignment(text)
+        strategy, dot, name = path.partition(".")
+        if not dot:
+            raise InputError(f"--set expects STRATEGY.NAME=VALUE; got '{text}'")
+        found.setdefault(strategy, {})[name] = value
+    return found
+
+
 def parameters_of(strategy: str, texts: Sequence[str]) -> dict[str, Any]:
     """Parameters of one strategy, each as ``name=value`` or ``strategy.name=value``.
 
@@ -52,3 +80,17 @@ def parameters_of(strategy: str, texts: Sequence[str]) -> dict[str, Any]:
             )
         found[name] = value
     return found
+
+
+def slicer_of(text: str) -> "Slicer":
+    """Slicer with its parameters, written ``method:name=value,name=value``.
+
+    Raises
+    ------
+    InputError
+        For an unknown slicer, parameter or value.
+    """
+    from ccfem.layers.slicing import create
+
+    method, _, rest = text.partition(":")
+    return create(method.strip(), dict(assignment(one) for one in names_of(rest)))

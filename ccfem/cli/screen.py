@@ -5,6 +5,7 @@ import inspect
 import os
 import re
 import typing
+from collections.abc import Mapping, Sequence
 from pathlib import Path
 
 import numpy as np
@@ -13,18 +14,15 @@ from rich.console import Console
 from rich.markup import escape
 from rich.table import Table
 
+from ccfem.checks import check_known
 from ccfem.cli.docstring import about, attributes
 from ccfem.comparison.headline import HEADLINE, cell_text, headline_values
 from ccfem.comparison.ranking import best_values, ranking
 from ccfem.comparison.remarks import remarks, verdict
-from ccfem.comparison.result import Comparison
-from ccfem.errors import InputError, known_names
-from ccfem.virtual_testing.verdict import HONEST_PROMISE
+from ccfem.comparison.result import Comparison, Run
+from ccfem.virtual_testing.stiffer import HONEST_PROMISE
 
-if typing.TYPE_CHECKING:
-    from ccfem.planning.strategy import Strategy
-
-__all__ = ["print_cases", "print_comparison", "print_strategies", "print_strategy"]
+__all__ = ["print_cases", "print_comparison", "print_member", "print_members"]
 
 _TITLES, _NUMBERS = 30, 20
 """Characters that a table is given for its titles and for each strategy, where neither a terminal
@@ -43,64 +41,75 @@ def print_cases() -> None:
         console.print(f"    {given}", markup=False)
 
 
-def print_strategies() -> None:
-    """Print the strategies with their parameters, defaults and choices; the amount is marked."""
-    from ccfem.strategies import named
+def print_members(kind: str) -> None:
+    """Print strategies or slicers with their parameters, defaults and choices.
 
+    Parameters
+    ----------
+    kind : {"strategy", "slicer"}
+    """
     console = Console(highlight=False)
-    for name, strategy in sorted(named().items()):
-        console.print(f"[bold]{name}[/bold]  {_first_line(strategy)}")
+    for name, member in sorted(_members(kind).items()):
+        console.print(f"[bold]{name}[/bold]  {_first_line(member)}")
         table = Table(box=None, show_header=False, padding=(0, 2, 0, 4))
-        hints = typing.get_type_hints(strategy)
-        for field in dataclasses.fields(strategy):  # type: ignore[arg-type]
-            note = _amount(strategy, field.name) or _choices(hints[field.name])
+        hints = typing.get_type_hints(member)
+        for field in dataclasses.fields(member):
+            note = _amount(member, field.name) or _choices(hints[field.name])
             table.add_row(field.name, repr(field.default), note)
         console.print(table)
 
 
-def print_strategy(name: str) -> None:
-    """Print what one strategy does, and what each of its parameters means, in its own words.
+def print_member(kind: str, name: str) -> None:
+    """Print what one strategy or slicer does, and what each of its parameters means.
 
     Raises
     ------
     InputError
-        For an unknown strategy.
+        For an unknown name.
     """
-    from ccfem.strategies import named
-
-    known = named()
-    if name not in known:
-        there = known_names(name, sorted(known))
-        raise InputError(f"no strategy named '{name}'; there are: {there}")
-    strategy, by_class = known[name], {each.__name__: each for each in known.values()}
-
-    def meaning(of: type, parameter: str) -> str:
-        text = attributes(of)[parameter].meaning if parameter in attributes(of) else ""
-        same = re.match(r"As in `(\w+)`", text)
-        if same is None or same[1] not in by_class:
-            return text
-        return meaning(by_class[same[1]], parameter).rstrip(".") + text[same.end() :]
-
+    known = _members(kind)
+    check_known(kind, name, sorted(known))
+    member, by_class = known[name], {each.__name__: each for each in known.values()}
     console = Console(highlight=False)
     console.print(f"[bold]{name}[/bold]")
-    for paragraph in about(strategy):
+    for paragraph in about(member):
         console.print(paragraph, markup=False)
     table = Table(box=box.SIMPLE_HEAD, header_style="bold")
     for column in ("parameter", "default", "type, unit", "meaning"):
         table.add_column(column, overflow="fold")
-    said = attributes(strategy)
-    for field in dataclasses.fields(strategy):  # type: ignore[arg-type]
-        kind = said[field.name].kind if field.name in said else ""
-        note = _amount(strategy, field.name)
-        text = f"{meaning(strategy, field.name)} {note and f'It {note}.'}".strip()
-        table.add_row(*map(escape, (field.name, repr(field.default), kind, text)))
+    said = attributes(member)
+    for field in dataclasses.fields(member):
+        what = said[field.name].kind if field.name in said else ""
+        note = _amount(member, field.name)
+        meaning = _meaning(member, field.name, by_class)
+        text = f"{meaning} {note and f'It {note}.'}".strip()
+        table.add_row(*map(escape, (field.name, repr(field.default), what, text)))
     console.print(table)
 
 
-def _amount(strategy: "type[Strategy]", parameter: str) -> str:
-    """Say that a parameter sets the amount of fibre, where it does."""
-    amount = strategy.amount
-    if parameter != amount.parameter:
+def _members(kind: str) -> Mapping[str, typing.Any]:
+    if kind == "slicer":
+        from ccfem.layers import slicing
+
+        return slicing.named()
+    from ccfem import strategies
+
+    return strategies.named()
+
+
+def _meaning(of: type, parameter: str, by_class: Mapping[str, type]) -> str:
+    """Say what a parameter means: "As in `Zigzag`" in the words of that class."""
+    text = attributes(of)[parameter].meaning if parameter in attributes(of) else ""
+    same = re.match(r"As in `(\w+)`", text)
+    if same is None or same[1] not in by_class:
+        return text
+    return _meaning(by_class[same[1]], parameter, by_class).rstrip(".") + text[same.end() :]
+
+
+def _amount(member: typing.Any, parameter: str) -> str:
+    """Say that a parameter of a strategy sets the amount of fibre, where it does."""
+    amount = getattr(member, "amount", None)
+    if amount is None or parameter != amount.parameter:
         return ""
     return f"sets the amount of fibre: {amount.most:g} most, {amount.least:g} least"
 
@@ -119,27 +128,11 @@ def _first_line(what: object) -> str:
 def print_comparison(comparison: Comparison, where: Path, seconds: float) -> None:
     """Print the headline table, the best of each row in bold, and where the results are."""
     console = Console(highlight=False)
-    best = best_values(comparison)
     runs = [run for run in ranking(comparison) if run.evaluation is not None]
-    values = [headline_values(run) for run in runs]
     if not console.is_terminal and "COLUMNS" not in os.environ:
         console.width = max(console.width, _TITLES + _NUMBERS * len(runs))
     console.print(comparison.case.title, style="bold", markup=False)
-    table = Table(header_style="bold", box=box.SIMPLE_HEAD)
-    table.add_column("")
-    for run in runs:
-        table.add_column(run.name, justify="right", overflow="fold")
-    for head in HEADLINE:
-        if not any(head.column in found for found in values):
-            continue
-        cells = []
-        for run, found in zip(runs, values, strict=True):
-            text, extra = cell_text(run, head)
-            if found.get(head.column) == best.get(head.column, np.nan):
-                text = f"[bold green]{text}[/]"
-            cells.append(f"{text} [dim]({extra})[/]" if extra else text)
-        table.add_row(head.title, *cells)
-    console.print(table)
+    console.print(_headline_table(runs, best_values(comparison)))
     for line in comparison.case.findings:
         console.print(f"mesh: {line}", style="dim", markup=False)
     for line in remarks(comparison):
@@ -150,3 +143,23 @@ def print_comparison(comparison: Comparison, where: Path, seconds: float) -> Non
     if any(run.tested is not None for run in runs):
         console.print(HONEST_PROMISE, style="dim", markup=False)
     console.print(f"{where / 'report.html'}  ({seconds:.1f} s)", markup=False, soft_wrap=True)
+
+
+def _headline_table(runs: Sequence[Run], best: Mapping[str, float]) -> Table:
+    """One column a run, one row an index; indices that no run has are left out."""
+    table = Table(header_style="bold", box=box.SIMPLE_HEAD)
+    table.add_column("")
+    for run in runs:
+        table.add_column(run.name, justify="right", overflow="fold")
+    values = [headline_values(run) for run in runs]
+    for head in HEADLINE:
+        if not any(head.column in found for found in values):
+            continue
+        cells = []
+        for run, found in zip(runs, values, strict=True):
+            text, extra = cell_text(run, head)
+            if found.get(head.column) == best.get(head.column, np.nan):
+                text = f"[bold green]{text}[/]"
+            cells.append(f"{text} [dim]({extra})[/]" if extra else text)
+        table.add_row(head.title, *cells)
+    return table

@@ -1,26 +1,29 @@
 """All pictures of a comparison: every layer of every strategy, and the fibre forces."""
 
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
+from typing import TYPE_CHECKING
 
 import numpy as np
 
 from ccfem.arrays import FloatArray
 from ccfem.comparison.result import Comparison, Run
-from ccfem.evaluation.curvature import sample_curvature
-from ccfem.evaluation.matching import THRESHOLDS, matching_rate
-from ccfem.evaluation.plane_paths import plane_paths, pool
+from ccfem.evaluation.matching import THRESHOLDS, along_fibre, matching_curve
+from ccfem.evaluation.plane_paths import pool
 from ccfem.layers import Layer
-from ccfem.layers.layer_stress import stress_on
+from ccfem.layers.layer_stress import LayerStress, stress_on
 from ccfem.plot.canvas import png
 from ccfem.plot.colours import palette
 from ccfem.plot.curves import curvature_curves, matching_curves
 from ccfem.plot.fields import tension_picture
-from ccfem.plot.on_paths import force_on_paths
+from ccfem.plot.forces import force_on_paths
 from ccfem.plot.paths import Coloured, compare_layer, layer_picture, mark_failure, tension_limit
 from ccfem.progress import Progress, silent
 
-__all__ = ["Pictures", "draw_pictures"]
+if TYPE_CHECKING:
+    from matplotlib.figure import Figure
+
+__all__ = ["Pictures", "caption", "draw_pictures"]
 
 
 @dataclass(frozen=True)
@@ -53,18 +56,41 @@ class Pictures:
 
 def draw_pictures(comparison: Comparison, progress: Progress = silent) -> Pictures:
     """Draw every layer of every strategy that did not fail, all on one colour scale."""
-    layers, runs, stress = comparison.layers, comparison.succeeded, comparison.stress
-    machine = comparison.case.machine
-    width = machine.fibre_width
-    limit = max(tension_limit(stress_on(layer, stress)) for layer in layers)
+    runs, machine = comparison.succeeded, comparison.case.machine
+    stresses = [stress_on(layer, comparison.stress) for layer in comparison.layers]
+    limit = max(tension_limit(stress) for stress in stresses)
     colours = palette(run.name for run in comparison.runs)
-    paths = {}
-    for k, layer in enumerate(layers):
-        progress("drawing pictures", k / len(layers))
+    middle = stresses[len(stresses) // 2]
+    rates, bends = _curves(runs)
+    heading = f"tension in layer {middle.layer.index}, load case {comparison.stress.case}"
+    return Pictures(
+        _layers(runs, stresses, machine.fibre_width, limit, colours, progress),
+        _forces(runs, middle.layer, machine.fibre_width, colours),
+        png(tension_picture(middle, heading, "size and direction", limit)),
+        png(_overview(runs, middle, machine.fibre_width, limit)),
+        png(matching_curves(rates, THRESHOLDS, "fibre along the stress", colours)),
+        png(curvature_curves(bends, machine.minimum_radius, "curvature", colours)),
+        middle.layer.index,
+    )
+
+
+def _layers(
+    runs: Sequence[Run],
+    stresses: Sequence[LayerStress],
+    width: float,
+    limit: float,
+    colours: Mapping[str, str],
+    progress: Progress,
+) -> dict[tuple[str, int], bytes]:
+    """Pictures of every layer of every run."""
+    drawn = {}
+    for k, stress in enumerate(stresses):
+        layer = stress.layer
+        progress("drawing pictures", k / len(stresses))
         for run in runs:
             figure = layer_picture(
                 layer,
-                stress_on(layer, stress),
+                stress,
                 run.toolpaths,
                 width,
                 f"{run.name}, layer {layer.index}",
@@ -72,27 +98,15 @@ def draw_pictures(comparison: Comparison, progress: Progress = silent) -> Pictur
                 limit,
                 colour=colours[run.name],
             )
-            paths[run.name, layer.index] = png(figure)
-    middle = layers[len(layers) // 2]
-    overview = compare_layer(
-        middle,
-        stress_on(middle, stress),
-        {run.name: run.toolpaths for run in runs},
-        width,
-        {run.name: caption(run, middle) for run in runs},
-        limit,
-    )
-    rates, bends = _curves(comparison)
-    heading = f"tension in layer {middle.index}, load case {stress.case}"
-    return Pictures(
-        paths,
-        _forces(runs, middle, width, colours),
-        png(tension_picture(stress_on(middle, stress), heading, "size and direction", limit)),
-        png(overview),
-        png(matching_curves(rates, THRESHOLDS, "fibre along the stress", colours)),
-        png(curvature_curves(bends, machine.minimum_radius, "curvature", colours)),
-        middle.index,
-    )
+            drawn[run.name, layer.index] = png(figure)
+    return drawn
+
+
+def _overview(runs: Sequence[Run], stress: LayerStress, width: float, limit: float) -> "Figure":
+    """All runs side by side on one layer."""
+    paths = {run.name: run.toolpaths for run in runs}
+    captions = {run.name: caption(run, stress.layer) for run in runs}
+    return compare_layer(stress.layer, stress, paths, width, captions, limit)
 
 
 def caption(run: Run, layer: Layer) -> str:
@@ -108,23 +122,21 @@ def caption(run: Run, layer: Layer) -> str:
     return laid if np.isnan(efficiency) else f"{laid}, efficiency {efficiency:.2f}"
 
 
-def _curves(comparison: Comparison) -> tuple[dict[str, FloatArray], dict[str, FloatArray]]:
-    """Take matching rates, and samples of the curvature, 1/mm, of each run over all layers."""
-    step = comparison.case.machine.fibre_width
-    stresses = [stress_on(layer, comparison.stress) for layer in comparison.layers]
+def _curves(runs: Sequence[Run]) -> tuple[dict[str, FloatArray], dict[str, FloatArray]]:
+    """Join matching rates, and curvatures, 1/mm, of each run over all layers: all were sampled."""
     rates, bends = {}, {}
-    for run in comparison.succeeded:
-        lines = [plane_paths(run.toolpaths, layer) for layer in comparison.layers]
-        rates[run.name] = matching_rate(run.toolpaths, stresses, step=step)
-        bends[run.name] = pool([sample_curvature(each, step) for each in lines]).curvature
+    for run in runs:
+        samples = run.evaluation.samples if run.evaluation is not None else ()
+        rates[run.name] = matching_curve(along_fibre(pool([each.alignment for each in samples])))
+        bends[run.name] = np.concatenate([each.curvature.curvature for each in samples])
     return rates, bends
 
 
 def _forces(
-    runs: Sequence[Run], layer: Layer, width: float, colours: dict[str, str]
+    runs: Sequence[Run], layer: Layer, width: float, colours: Mapping[str, str]
 ) -> dict[str, bytes]:
     """Pictures of the axial force in the fibres of a layer, all on one scale."""
-    coloured: dict[str, Coloured] = {}
+    coloured = {}
     for run in runs:
         if run.tested is not None:
             test = run.tested.bracket.tension
@@ -132,28 +144,28 @@ def _forces(
             coloured[run.name] = force_on_paths(
                 s.middle, s.tangent, s.length, test.axial_force, layer
             )
-    if not coloured:
-        return {}
-    end = max(one.limits[1] for one in coloured.values())
-    drawn = {}
-    for run in runs:
-        if run.tested is None:
-            continue
-        failure = run.tested.failure
-        about = "" if failure is None else f"first failure at {failure.load:.0f} N: {failure.what}"
-        figure = layer_picture(
+    end = max((one.limits[1] for one in coloured.values()), default=0.0)
+    return {
+        run.name: _force(
+            run,
             layer,
-            None,
-            run.toolpaths,
             width,
-            f"{run.name}, force in the fibres",
-            about,
-            coloured=replace(coloured[run.name], limits=(0.0, end), signed=False),
-            colour=colours[run.name],
+            replace(coloured[run.name], limits=(0.0, end)),
+            colours[run.name],
         )
-        if failure is not None:
-            mark_failure(
-                figure.axes[0], layer.plane.project(np.asarray(failure.where)), failure.what
-            )
-        drawn[run.name] = png(figure)
-    return drawn
+        for run in runs
+        if run.name in coloured
+    }
+
+
+def _force(run: Run, layer: Layer, width: float, coloured: Coloured, colour: str) -> bytes:
+    """Picture of the axial force in the fibres of a layer, and of where the part first fails."""
+    failure = run.tested.failure if run.tested is not None else None
+    about = "" if failure is None else f"first failure at {failure.load:.0f} N: {failure.what}"
+    heading = f"{run.name}, force in the fibres"
+    figure = layer_picture(
+        layer, None, run.toolpaths, width, heading, about, coloured=coloured, colour=colour
+    )
+    if failure is not None:
+        mark_failure(figure.axes[0], layer.plane.project(np.asarray(failure.where)), failure.what)
+    return png(figure)

@@ -5,8 +5,7 @@ import numpy as np
 from ccfem.comparison.headline import HEADLINE, headline_values
 from ccfem.comparison.result import Comparison, Run
 from ccfem.planning.equal_fibre import TOLERANCE
-from ccfem.virtual_testing.verdict import UNDECIDED
-from ccfem.virtual_testing.verdict import verdict as verdict_of_pair
+from ccfem.virtual_testing.stiffer import UNDECIDED, stiffer
 
 __all__ = ["best_values", "ranking", "stiffness_ratio", "stiffness_ratios", "too_long", "undecided"]
 
@@ -67,4 +66,4 @@ def undecided(one: Run, other: Run) -> bool:
     """Whether tension-only and bonded fibres disagree on the order of two runs."""
     if one.tested is None or other.tested is None:
         return False
-    return verdict_of_pair(one.tested.bracket, other.tested.bracket) == UNDECIDED
+    return stiffer(one.tested.bracket, other.tested.bracket) == UNDECIDED

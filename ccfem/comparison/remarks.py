@@ -1,12 +1,12 @@
 """What is said of a comparison: remarks beside the table, and the verdict in one sentence."""
 
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 
 import numpy as np
 
 from ccfem.comparison.headline import headline_values
 from ccfem.comparison.ranking import ranking, stiffness_ratio, too_long, undecided
-from ccfem.comparison.result import Comparison
+from ccfem.comparison.result import Comparison, Run
 from ccfem.evaluation.evaluation import Evaluation
 
 __all__ = ["bound_remark", "remarks", "verdict"]
@@ -20,30 +20,43 @@ def remarks(comparison: Comparison) -> list[str]:
     """Say what has to stand next to the numbers, a line each."""
     lines: dict[str, list[str]] = {}
     for run in ranking(comparison):
-        about = [f"failed: {run.failure}"] if run.failure else []
-        if run.untested:
-            about.append(f"no virtual test: {run.untested}")
-        if run.tested is not None and run.tested.note:
-            about.append(f"no first-failure load: {run.tested.note}")
-        if run.evaluation is not None:
-            about += _about_links(run.evaluation.total)
-            if getattr(run.strategy, "crosses", False):
-                about += _about_crossings(run.evaluation, comparison.bound is not None)
-        if run.note:
-            placed = ", so it is placed last" if too_long(run, comparison) else ""
-            about.append(f"{run.note}{placed}")
-        for line in about:
+        for line in _about(run, comparison):
             lines.setdefault(line, []).append(run.name)
     found = [f"{', '.join(names)}: {line}" for line, names in lines.items()]
-    tested = [run for run in ranking(comparison) if run.tested is not None]
+    found += _about_orders([run for run in ranking(comparison) if run.tested is not None])
+    return [*found, bound_remark(comparison)] if comparison.bound is not None else found
+
+
+def _about(run: Run, comparison: Comparison) -> list[str]:
+    """Say what has to stand next to the numbers of one run."""
+    reasons = {
+        "failed": run.failure,
+        "no virtual test": run.untested,
+        "cannot be printed as planned": run.unprinted,
+        "no first-failure load": run.tested.note if run.tested is not None else "",
+    }
+    lines = [f"{what}: {reason}" for what, reason in reasons.items() if reason]
+    if run.evaluation is not None:
+        lines += _about_links(run.evaluation.total)
+        if getattr(run.strategy, "crosses", False):
+            lines += _about_crossings(run.evaluation, comparison.bound is not None)
+    if run.note:
+        placed = ", so it is placed last" if too_long(run, comparison) else ""
+        lines.append(f"{run.note}{placed}")
+    return lines
+
+
+def _about_orders(tested: Sequence[Run]) -> list[str]:
+    """Say which runs, best first, cannot be put in an order."""
+    lines = []
     for k, run in enumerate(tested):
         unclear = [other.name for other in tested[k + 1 :] if undecided(run, other)]
         if unclear:
-            found.append(
+            lines.append(
                 f"{run.name}: undecided against {', '.join(unclear)}, for tension-only and bonded "
                 "fibres do not agree on an order"
             )
-    return [*found, bound_remark(comparison)] if comparison.bound is not None else found
+    return lines
 
 
 def _about_links(total: Mapping[str, float]) -> list[str]:
@@ -105,13 +118,7 @@ def verdict(comparison: Comparison) -> str:
     if len(order) < 2:
         return ""
     first, second = order[0], order[1]
-    more = first.length_per_layer / second.length_per_layer - 1.0
-    if comparison.fibre_per_layer is None:
-        amount = "each with its own amount of fibre"
-    elif abs(more) <= _EQUAL:
-        amount = f"at {comparison.fibre_per_layer:.0f} mm of fibre per layer"
-    else:
-        amount = f"with {abs(more):.0%} {'more' if more > 0.0 else 'less'} fibre than {second.name}"
+    amount = _amounts(first, second, comparison.fibre_per_layer)
     if first.tested is None or second.tested is None:
         best, following = (headline_values(run)["efficiency"] for run in (first, second))
         return (
@@ -132,3 +139,13 @@ def verdict(comparison: Comparison) -> str:
         f"{second.name} (predicted, fibres carrying tension only; bonded fibres agree on the "
         "order)."
     )
+
+
+def _amounts(first: Run, second: Run, wanted: float | None) -> str:
+    """Say how much fibre two runs lay, mm per layer, where they were held to a length."""
+    more = first.length_per_layer / second.length_per_layer - 1.0
+    if wanted is None:
+        return "each with its own amount of fibre"
+    if abs(more) <= _EQUAL:
+        return f"at {wanted:.0f} mm of fibre per layer"
+    return f"with {abs(more):.0%} {'more' if more > 0.0 else 'less'} fibre than {second.name}"

@@ -11,9 +11,9 @@ from ccfem.comparison.headline import HEADLINE, TEST_COLUMNS, cell_text, headlin
 from ccfem.comparison.pictures import Pictures
 from ccfem.comparison.ranking import best_values, ranking, stiffness_ratios
 from ccfem.comparison.remarks import remarks, verdict
-from ccfem.comparison.result import Comparison
+from ccfem.comparison.result import Comparison, Run
 from ccfem.evaluation import COLUMNS, Column
-from ccfem.virtual_testing.verdict import HONEST_PROMISE
+from ccfem.virtual_testing.stiffer import HONEST_PROMISE
 
 __all__ = ["report_html"]
 
@@ -69,7 +69,7 @@ def report_html(
     ----------
     comparison : Comparison
     record : mapping
-        What `ccfem.comparison.files.record` returns.
+        What `ccfem.comparison.record.record` returns.
     pictures : Pictures
 
     Returns
@@ -184,44 +184,55 @@ def _against_each_other(comparison: Comparison) -> str:
 def _pictures(comparison: Comparison, pictures: Pictures) -> str:
     runs = [run for run in ranking(comparison) if run.evaluation is not None]
     heights = {layer.index: layer.plane.height for layer in comparison.layers}
+    rows = [_layer(index, height, runs, pictures) for index, height in heights.items()]
+    every = ""
+    if len(rows) > 1:
+        every = f"<details><summary>All {len(rows)} layers</summary>\n{''.join(rows)}</details>\n"
+    tension = _figure(pictures.tension, "tension in the middle layer")
+    return (
+        f"<h2>Paths</h2>\n{_layer(pictures.middle, heights[pictures.middle], runs, pictures)}"
+        f"{every}{_forces(runs, pictures)}{_curves(pictures)}"
+        f"<h2>Tension without fibres</h2>\n{_grid([tension, '', '', ''])}\n"
+    )
 
-    def row(index: int) -> str:
-        figures = [
-            _figure(pictures.paths[run.name, index], f"{run.name}, layer {index}") for run in runs
-        ]
-        title = f"<h3>Layer {index}, at {heights[index]:.2f} mm along the build direction</h3>"
-        return f"{title}{_grid(figures)}\n"
 
-    parts = ["<h2>Paths</h2>\n", row(pictures.middle)]
-    if len(heights) > 1:
-        rows = "".join(row(index) for index in heights)
-        parts.append(f"<details><summary>All {len(heights)} layers</summary>\n{rows}</details>\n")
-    if pictures.forces:
-        figures = [
-            _figure(pictures.forces[run.name], f"{run.name}, force in the fibres")
-            for run in runs
-            if run.name in pictures.forces
-        ]
-        parts.append(
-            "<h2>Force in the fibres</h2>\n"
-            '<p class="note">Predicted axial force, fibres carrying tension only, in layer '
-            f"{pictures.middle}; the mark is where the part first fails, on whatever layer.</p>\n"
-            f"{_grid(figures)}\n"
-        )
+def _layer(index: int, height: float, runs: Sequence[Run], pictures: Pictures) -> str:
+    """One layer of every run side by side."""
+    figures = [
+        _figure(pictures.paths[run.name, index], f"{run.name}, layer {index}") for run in runs
+    ]
+    title = f"<h3>Layer {index}, at {height:.2f} mm along the build direction</h3>"
+    return f"{title}{_grid(figures)}\n"
+
+
+def _forces(runs: Sequence[Run], pictures: Pictures) -> str:
+    if not pictures.forces:
+        return ""
+    figures = [
+        _figure(pictures.forces[run.name], f"{run.name}, force in the fibres")
+        for run in runs
+        if run.name in pictures.forces
+    ]
+    return (
+        "<h2>Force in the fibres</h2>\n"
+        '<p class="note">Predicted axial force, fibres carrying tension only, in layer '
+        f"{pictures.middle}; the mark is where the part first fails, on whatever layer.</p>\n"
+        f"{_grid(figures)}\n"
+    )
+
+
+def _curves(pictures: Pictures) -> str:
     curves = [
         _figure(pictures.matching, "share of the fibre within an angle of the stress"),
         _figure(pictures.curvature, "share of the fibre below a curvature"),
         "",
     ]
-    parts.append(
+    return (
         "<h2>Direction and curvature</h2>\n"
         '<p class="note">Share of the fibre\'s length within an angle of the in-plane principal '
         "stress of the larger size, and share of it that is straighter than a curvature; all "
         f"layers.</p>\n{_grid(curves)}\n"
     )
-    stress = _figure(pictures.tension, "tension in the middle layer")
-    parts.append(f"<h2>Tension without fibres</h2>\n{_grid([stress, '', '', ''])}\n")
-    return "".join(parts)
 
 
 def _grid(figures: Sequence[str]) -> str:

@@ -3,12 +3,13 @@
 import dataclasses
 from collections.abc import Mapping
 from dataclasses import dataclass, field
-from types import MappingProxyType
 from typing import Any
 
+from ccfem.arrays import freeze
 from ccfem.cases.case import Case
 from ccfem.elasticity.stress_field import StressField
 from ccfem.evaluation import Evaluation
+from ccfem.export.print_plan import PrintPlan
 from ccfem.fibre_aware.upper_bound import UpperBound
 from ccfem.layers import Layer
 from ccfem.planning.strategy import Strategy
@@ -52,6 +53,9 @@ class Run:
         None where the strategy failed.
     tested : Tested or None
         None where the strategy failed, and where no virtual test was asked for or possible.
+    print_plan : PrintPlan or None
+        The whole part, matrix and fibre; None where the strategy failed, and where no print was
+        asked for or possible.
     length_per_layer : float, mm
     note : str
         Why the length is not the wanted one, or that it sets it; else empty.
@@ -59,6 +63,8 @@ class Run:
         One line that says why there are no paths, or why they could not be evaluated; else empty.
     untested : str
         Why there is no virtual test though one was asked for; else empty.
+    unprinted : str
+        Why the part cannot be printed as planned though a print was asked for; else empty.
     seconds : mapping of stage to float
     """
 
@@ -67,14 +73,16 @@ class Run:
     toolpaths: Toolpaths
     evaluation: Evaluation | None
     tested: Tested | None = None
+    print_plan: PrintPlan | None = None
     length_per_layer: float = 0.0
     note: str = ""
     failure: str = ""
     untested: str = ""
+    unprinted: str = ""
     seconds: Mapping[str, float] = field(default_factory=dict)
 
     def __post_init__(self) -> None:
-        object.__setattr__(self, "seconds", MappingProxyType(dict(self.seconds)))
+        freeze(self, seconds=dict)
 
     @property
     def parameters(self) -> dict[str, Any]:
@@ -112,7 +120,7 @@ class Comparison:
     bound: UpperBound | None = None
 
     def __post_init__(self) -> None:
-        object.__setattr__(self, "seconds", MappingProxyType(dict(self.seconds)))
+        freeze(self, seconds=dict)
 
     @property
     def succeeded(self) -> tuple[Run, ...]:

@@ -12,8 +12,8 @@ import numpy as np
 import scipy.sparse as sp
 from numba import njit
 
-from ccfem.arrays import FloatArray, IntArray, read_only
-from ccfem.elasticity.body import Cells
+from ccfem.arrays import FloatArray, IntArray, freeze
+from ccfem.mesh.cell_mesh import CellMesh
 from ccfem.mesh.tet_mesh import TetMesh
 
 __all__ = ["Pattern", "add_blocks", "assemble", "cell_gradients", "pattern"]
@@ -42,11 +42,10 @@ class Pattern:
     touching: IntArray
 
     def __post_init__(self) -> None:
-        for name in ("indptr", "indices", "start", "touching"):
-            object.__setattr__(self, name, read_only(getattr(self, name), np.int32))
+        freeze(self, indptr=np.int32, indices=np.int32, start=np.int32, touching=np.int32)
 
 
-def pattern(mesh: Cells) -> Pattern:
+def pattern(mesh: CellMesh) -> Pattern:
     """Find the pattern of the stiffness matrix of a mesh."""
     (m, q), n = mesh.cells.shape, len(mesh.points)
     starts = np.arange(0, m * q + 1, q, dtype=np.int32)
@@ -110,13 +109,29 @@ def _times_gradient(c, g, factor, t):  # type: ignore[no-untyped-def]
 
 
 @njit(cache=True)
+def _against(t, p, x, y, z):  # type: ignore[no-untyped-def]
+    """Row p of ``t.T B``, B the strain of displacements with gradient (x, y, z)."""
+    return (
+        t[0, p] * x + t[4, p] * z + t[5, p] * y,
+        t[1, p] * y + t[3, p] * z + t[5, p] * x,
+        t[2, p] * z + t[3, p] * y + t[4, p] * x,
+    )
+
+
+@njit(cache=True)
+def _mark(indptr, indices, i, slot):  # type: ignore[no-untyped-def]
+    """Store in `slot` the entry of the pattern of each column of row i."""
+    for s in range(indptr[i], indptr[i + 1]):
+        slot[indices[s]] = s
+
+
+@njit(cache=True)
 def _gather_linear(indptr, indices, start, touching, cells, gradients, scale, stiffness, data):  # type: ignore[no-untyped-def]
     one = stiffness.shape[0] == 1
     slot = np.empty(indptr.size - 1, np.int32)
     t = np.empty((6, 3))
     for i in range(indptr.size - 1):
-        for s in range(indptr[i], indptr[i + 1]):
-            slot[indices[s]] = s
+        _mark(indptr, indices, i, slot)
         for e in range(start[i], start[i + 1]):
             cell, a = touching[e] // 4, touching[e] % 4
             c = stiffness[0 if one else cell]
@@ -125,9 +140,10 @@ def _gather_linear(indptr, indices, start, touching, cells, gradients, scale, st
                 x, y, z = gradients[cell, b, 0], gradients[cell, b, 1], gradients[cell, b, 2]
                 s = slot[cells[cell, b]]
                 for p in range(3):
-                    data[s, p, 0] += t[0, p] * x + t[4, p] * z + t[5, p] * y
-                    data[s, p, 1] += t[1, p] * y + t[3, p] * z + t[5, p] * x
-                    data[s, p, 2] += t[2, p] * z + t[3, p] * y + t[4, p] * x
+                    u, v, w = _against(t, p, x, y, z)
+                    data[s, p, 0] += u
+                    data[s, p, 1] += v
+                    data[s, p, 2] += w
 
 
 @njit(cache=True)
@@ -143,8 +159,7 @@ def _gather_quadratic(  # type: ignore[no-untyped-def]
     t = np.empty((6, 3))
     block = np.empty((2, 4, 3, 3))
     for i in range(indptr.size - 1):
-        for s in range(indptr[i], indptr[i + 1]):
-            slot[indices[s]] = s
+        _mark(indptr, indices, i, slot)
         for e in range(start[i], start[i + 1]):
             cell, a = touching[e] // 10, touching[e] % 10
             c = stiffness[0 if one else cell]
@@ -155,9 +170,7 @@ def _gather_quadratic(  # type: ignore[no-untyped-def]
                 for b in range(4):
                     x, y, z = gradients[cell, b, 0], gradients[cell, b, 1], gradients[cell, b, 2]
                     for p in range(3):
-                        block[k, b, p, 0] = t[0, p] * x + t[4, p] * z + t[5, p] * y
-                        block[k, b, p, 1] = t[1, p] * y + t[3, p] * z + t[5, p] * x
-                        block[k, b, p, 2] = t[2, p] * z + t[3, p] * y + t[4, p] * x
+                        block[k, b, p] = _against(t, p, x, y, z)
             for b in range(10):
                 s = slot[cells[cell, b]]
                 terms_b = 1 if b < 4 else 2

@@ -1,4 +1,4 @@
-"""What the equations ask of a mesh and of a problem, in space or in the plane."""
+"""What loads and supports ask of a body and of a problem, in space or in the plane."""
 
 from collections.abc import Mapping
 from typing import Protocol
@@ -6,12 +6,13 @@ from typing import Protocol
 from ccfem.arrays import FloatArray, IntArray
 from ccfem.elasticity.load_kinds import Load
 from ccfem.elasticity.support_kinds import AnySupport
+from ccfem.mesh.cell_mesh import CellMesh
 
-__all__ = ["Cells", "LoadedBody", "SupportedProblem"]
+__all__ = ["LoadedBody", "SupportedProblem"]
 
 
-class Patched(Protocol):
-    """A mesh of d-dimensional cells, d = 2 or 3, with named patches of facets."""
+class LoadedBody(Protocol):
+    """A mesh whose boundary facets have areas and outward normals, so that loads act on it."""
 
     @property
     def points(self) -> FloatArray:
@@ -24,30 +25,12 @@ class Patched(Protocol):
         ...
 
     def patch(self, name: str) -> IntArray:
-        """Facets of a named patch by their corners."""
+        """Facets of a named patch that can carry a load."""
         ...
 
     def facet_nodes(self, facets: IntArray) -> IntArray:
         """All nodes of facets: their corners, and the middles of their sides."""
         ...
-
-
-class Cells(Patched, Protocol):
-    """A mesh whose cells hang together through facets, so that supports hold it."""
-
-    @property
-    def corners(self) -> IntArray:
-        """Corner nodes of each cell."""
-        ...
-
-    @property
-    def neighbours(self) -> IntArray:
-        """Pairs of cells that share a facet, (f, 2)."""
-        ...
-
-
-class LoadedBody(Patched, Protocol):
-    """A mesh whose boundary facets have areas and outward normals, so that loads act on it."""
 
     @property
     def boundary(self) -> IntArray:
@@ -63,7 +46,7 @@ class SupportedProblem(Protocol):
     """A problem as supports and loads see it."""
 
     @property
-    def mesh(self) -> Cells:
+    def mesh(self) -> CellMesh:
         """The mesh that is held."""
         ...
 

@@ -16,6 +16,16 @@ __all__ = ["GaussSeidel"]
 
 
 @njit(cache=True)
+def _times(data, k, u, v, w):  # type: ignore[no-untyped-def]
+    """Product of the 3x3 block that starts at k with a vector."""
+    return (
+        data[k] * u + data[k + 1] * v + data[k + 2] * w,
+        data[k + 3] * u + data[k + 4] * v + data[k + 5] * w,
+        data[k + 6] * u + data[k + 7] * v + data[k + 8] * w,
+    )
+
+
+@njit(cache=True)
 def _forward(indptr, indices, data, inverse, rhs, x, residual):  # type: ignore[no-untyped-def]
     """Sweep from x = 0, and leave the residual ``-U x``, U the strict upper triangle.
 
@@ -25,15 +35,10 @@ def _forward(indptr, indices, data, inverse, rhs, x, residual):  # type: ignore[
     for i in range(indptr.size - 1):
         a, b, c = rhs[3 * i], rhs[3 * i + 1], rhs[3 * i + 2]
         for s in range(indptr[i], indptr[i + 1]):
-            j, k = 3 * indices[s], 9 * s
-            u, v, w = x[j], x[j + 1], x[j + 2]
-            a -= data[k] * u + data[k + 1] * v + data[k + 2] * w
-            b -= data[k + 3] * u + data[k + 4] * v + data[k + 5] * w
-            c -= data[k + 6] * u + data[k + 7] * v + data[k + 8] * w
-        k = 9 * i
-        u = inverse[k] * a + inverse[k + 1] * b + inverse[k + 2] * c
-        v = inverse[k + 3] * a + inverse[k + 4] * b + inverse[k + 5] * c
-        w = inverse[k + 6] * a + inverse[k + 7] * b + inverse[k + 8] * c
+            j = 3 * indices[s]
+            p, q, r = _times(data, 9 * s, x[j], x[j + 1], x[j + 2])
+            a, b, c = a - p, b - q, c - r
+        u, v, w = _times(inverse, 9 * i, a, b, c)
         x[3 * i], x[3 * i + 1], x[3 * i + 2] = u, v, w
         for s in range(indptr[i], indptr[i + 1]):
             if indices[s] >= i:
@@ -52,15 +57,10 @@ def _backward(indptr, indices, data, inverse, rhs, x):  # type: ignore[no-untype
         for s in range(indptr[i + 1] - 1, indptr[i] - 1, -1):
             if indices[s] == i:
                 continue
-            j, k = 3 * indices[s], 9 * s
-            u, v, w = x[j], x[j + 1], x[j + 2]
-            a -= data[k] * u + data[k + 1] * v + data[k + 2] * w
-            b -= data[k + 3] * u + data[k + 4] * v + data[k + 5] * w
-            c -= data[k + 6] * u + data[k + 7] * v + data[k + 8] * w
-        k = 9 * i
-        x[3 * i] = inverse[k] * a + inverse[k + 1] * b + inverse[k + 2] * c
-        x[3 * i + 1] = inverse[k + 3] * a + inverse[k + 4] * b + inverse[k + 5] * c
-        x[3 * i + 2] = inverse[k + 6] * a + inverse[k + 7] * b + inverse[k + 8] * c
+            j = 3 * indices[s]
+            p, q, r = _times(data, 9 * s, x[j], x[j + 1], x[j + 2])
+            a, b, c = a - p, b - q, c - r
+        x[3 * i], x[3 * i + 1], x[3 * i + 2] = _times(inverse, 9 * i, a, b, c)
 
 
 class GaussSeidel:

@@ -4,7 +4,6 @@ from collections.abc import Callable
 from typing import Any
 
 import numpy as np
-from numpy.typing import NDArray
 
 from ccfem.arrays import FloatArray, IntArray
 from ccfem.elasticity.body import LoadedBody, SupportedProblem
@@ -25,7 +24,7 @@ from ccfem.elasticity.nodes import nearest_node, patch_facets
 from ccfem.elasticity.problem import Problem
 from ccfem.elasticity.volume_loads import heat_forces, volume_forces
 from ccfem.errors import InputError
-from ccfem.mesh.patches import facet_keys
+from ccfem.mesh.facets import positions
 
 __all__ = ["check_load", "load_case", "load_cases", "nodal_forces"]
 
@@ -33,20 +32,13 @@ __all__ = ["check_load", "load_case", "load_cases", "nodal_forces"]
 def _outward(mesh: LoadedBody, name: str) -> tuple[IntArray, FloatArray, FloatArray]:
     """Facets of a patch with their areas and outward unit normals."""
     facets = patch_facets(mesh, name)
-    known, wanted = _keys(mesh.boundary), _keys(facets)
-    order = np.argsort(known)
-    at = order[np.minimum(np.searchsorted(known, wanted, sorter=order), len(order) - 1)]
-    if (known[at] != wanted).any():
+    at = positions(facets, mesh.boundary)
+    if (at < 0).any():
         raise InputError(
             f"patch '{name}' has facets inside the part: pressure and bearing need boundary facets"
         )
     facets = mesh.boundary[at]
     return facets, *mesh.facet_areas(facets)
-
-
-def _keys(facets: IntArray) -> NDArray[np.complex128]:
-    """One number (k,) for the nodes of each facet (k, 3), or edge (k, 2)."""
-    return facet_keys(facets if facets.shape[1] == 3 else facets[:, [0, 1, 1]])
 
 
 def _spread(mesh: LoadedBody, facets: IntArray, forces: FloatArray) -> FloatArray:

@@ -5,13 +5,14 @@ from collections.abc import Sequence
 import numpy as np
 
 from ccfem.arrays import FloatArray, IntArray
-from ccfem.elasticity.body import Cells, LoadedBody
+from ccfem.elasticity.body import LoadedBody
 from ccfem.errors import InputError
+from ccfem.mesh.cell_mesh import CellMesh
 
 __all__ = ["edge_nodes", "nearest_node", "patch_facets", "patch_nodes", "patch_normals"]
 
 
-def patch_facets(mesh: Cells | LoadedBody, name: str) -> IntArray:
+def patch_facets(mesh: CellMesh | LoadedBody, name: str) -> IntArray:
     """Facets of a patch that must not be empty."""
     facets = mesh.patch(name)
     if not len(facets):
@@ -19,12 +20,12 @@ def patch_facets(mesh: Cells | LoadedBody, name: str) -> IntArray:
     return facets
 
 
-def patch_nodes(mesh: Cells, name: str) -> IntArray:
+def patch_nodes(mesh: CellMesh, name: str) -> IntArray:
     """Nodes (k,) of a patch, ascending."""
     return np.unique(mesh.facet_nodes(patch_facets(mesh, name)))
 
 
-def edge_nodes(mesh: Cells, names: tuple[str, str]) -> IntArray:
+def edge_nodes(mesh: CellMesh, names: tuple[str, str]) -> IntArray:
     """Nodes (k,) that two patches have in common."""
     first, second = (patch_nodes(mesh, name) for name in names)
     common = np.intersect1d(first, second)
@@ -35,7 +36,7 @@ def edge_nodes(mesh: Cells, names: tuple[str, str]) -> IntArray:
     return common
 
 
-def nearest_node(mesh: Cells | LoadedBody, point: Sequence[float], what: str) -> int:
+def nearest_node(mesh: CellMesh | LoadedBody, point: Sequence[float], what: str) -> int:
     """Node of some cell that is nearest to a point of the part.
 
     Raises

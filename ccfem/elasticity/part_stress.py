@@ -3,7 +3,7 @@
 from dataclasses import dataclass
 from typing import Protocol
 
-from ccfem.arrays import FloatArray, read_only
+from ccfem.arrays import FloatArray, freeze
 from ccfem.errors import InputError
 from ccfem.mesh.tet_mesh import TetMesh
 
@@ -54,10 +54,13 @@ class GivenStress:
     nodal: FloatArray
     held_or_loaded: tuple[str, ...] = ()
 
+    def __repr__(self) -> str:
+        return f"GivenStress on {self.mesh!r}"
+
     def __post_init__(self) -> None:
+        freeze(self, stress=float, nodal=float)
         for name, count in (("stress", len(self.mesh.cells)), ("nodal", len(self.mesh.points))):
-            value = read_only(getattr(self, name))
-            object.__setattr__(self, name, value)
+            value = getattr(self, name)
             if value.shape != (count, 3, 3):
                 raise InputError(
                     f"{name} must have shape ({count}, 3, 3), one tensor for each "

@@ -2,12 +2,11 @@
 
 from collections.abc import Mapping
 from dataclasses import dataclass, field
-from types import MappingProxyType
 from typing import Literal
 
 import numpy as np
 
-from ccfem.arrays import FloatArray, IntArray, read_only
+from ccfem.arrays import FloatArray, IntArray, freeze
 from ccfem.elasticity.load_kinds import (
     Bearing,
     Force,
@@ -60,7 +59,7 @@ class Region:
     cells: IntArray
 
     def __post_init__(self) -> None:
-        object.__setattr__(self, "cells", read_only(self.cells, np.int64))
+        freeze(self, cells=int)
 
 
 @dataclass(frozen=True)
@@ -108,13 +107,15 @@ class Problem:
     combinations: Mapping[str, Mapping[str, float]] = field(default_factory=dict)
     order: Order = "auto"
 
+    def __repr__(self) -> str:
+        return (
+            f"Problem of {self.material.name} on {self.mesh!r}; {len(self.supports)} supports, "
+            f"load cases {', '.join(self.loads) or 'none'}"
+        )
+
     def __post_init__(self) -> None:
-        object.__setattr__(self, "supports", tuple(self.supports))
-        object.__setattr__(self, "regions", tuple(self.regions))
-        loads = {name: tuple(case) for name, case in self.loads.items()}
-        object.__setattr__(self, "loads", MappingProxyType(loads))
-        sums = {name: MappingProxyType(dict(sum_)) for name, sum_ in self.combinations.items()}
-        object.__setattr__(self, "combinations", MappingProxyType(sums))
+        freeze(self, supports=tuple, loads=tuple, regions=tuple, combinations=dict)
+        freeze(self, axes=float, density=float, stiffness=float)
         if self.mesh.flaw:
             raise InputError(self.mesh.flaw)
         self._check_arrays()
@@ -133,8 +134,6 @@ class Problem:
             value = getattr(self, name)
             if value is None:
                 continue
-            value = read_only(value)
-            object.__setattr__(self, name, value)
             if value.shape != shape:
                 raise InputError(
                     f"problem.{name} must have shape {shape}, one entry a cell; got {value.shape}"

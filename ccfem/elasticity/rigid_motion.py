@@ -13,9 +13,10 @@ from scipy.sparse.csgraph import connected_components
 from scipy.sparse.linalg import eigsh
 
 from ccfem.arrays import BoolArray, FloatArray, IntArray
-from ccfem.elasticity.body import Cells
 from ccfem.elasticity.held import rigid_modes
 from ccfem.errors import InputError
+from ccfem.mesh.cell_mesh import CellMesh
+from ccfem.mesh.measures import connected
 
 __all__ = ["Holds", "check_motion"]
 
@@ -60,7 +61,7 @@ class Holds:
     centre_of: IntArray = field(default_factory=lambda: np.zeros(0, dtype=np.int64))
 
 
-def check_motion(mesh: Cells, points: FloatArray, holds: Holds) -> None:
+def check_motion(mesh: CellMesh, points: FloatArray, holds: Holds) -> None:
     """Check that no piece of the part can move as a rigid body.
 
     Parameters
@@ -75,9 +76,8 @@ def check_motion(mesh: Cells, points: FloatArray, holds: Holds) -> None:
     InputError
         Names the free motion.
     """
-    pairs, m = mesh.neighbours, len(mesh.cells)
-    links = sp.coo_array((np.ones(len(pairs), dtype=bool), pairs.T), shape=(m, m))
-    count, body = connected_components(links, directed=False)
+    body = connected(mesh.neighbours, len(mesh.cells))
+    count = int(body.max()) + 1
     used = np.zeros(len(points), dtype=bool)
     used[mesh.corners] = True
     if count == 1 and not holds.bodies:
@@ -91,11 +91,8 @@ def check_motion(mesh: Cells, points: FloatArray, holds: Holds) -> None:
         members = _Members(node, np.concatenate([key % count, *added]))
         members, holds = _joined(points, members, holds, count)
         size = members.bodies
-        links = sp.coo_array(
-            (np.ones(len(members.node), dtype=bool), (members.owner, size + members.node)),
-            shape=2 * (size + len(points),),
-        )
-        piece = connected_components(links, directed=False)[1][:size]
+        joined = np.stack([members.owner, size + members.node], axis=1)
+        piece = connected(joined, size + len(points))[:size]
     named = np.unique(piece)
     for k in named:
         which = piece == k

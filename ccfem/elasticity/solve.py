@@ -59,7 +59,7 @@ def solve(
     Raises
     ------
     InputError
-        For supports, loads or a backend that nothing sensible can follow from.
+        For an invalid mesh, support, load or backend.
     SolveError
         When a solution is not accepted; what makes the equations ill-conditioned is named.
     """

@@ -9,6 +9,7 @@ import numpy as np
 import scipy.sparse as sp
 
 from ccfem.arrays import FloatArray, IntArray
+from ccfem.checks import check_known
 from ccfem.elasticity import direct, multigrid
 from ccfem.elasticity.conjugate_gradient import conjugate_gradient
 from ccfem.elasticity.skyline import skyline, skyline_operations
@@ -269,8 +270,7 @@ def factorise(
     """
     if backend == "auto":
         backend = choose(matrix.shape[0], 1 if parents is None else 2, solves)
-    if backend not in BACKENDS:
-        raise InputError(f"no backend named '{backend}'; there are: auto, {', '.join(BACKENDS)}")
+    check_known("backend", backend, ["auto", *BACKENDS])
     if backend in _MODULES and find_spec(_MODULES[backend]) is None:
         raise InputError(f"backend '{backend}' is not installed: {_CURES[backend]}")
     make = _maker(backend, matrix, points, parents)

@@ -5,9 +5,10 @@ import scipy.sparse as sp
 
 from ccfem.arrays import FloatArray, IntArray
 from ccfem.elasticity.assembly import add_blocks
-from ccfem.elasticity.body import Cells, LoadedBody, SupportedProblem
+from ccfem.elasticity.body import LoadedBody, SupportedProblem
 from ccfem.elasticity.nodes import nearest_node, patch_facets, patch_nodes
 from ccfem.elasticity.support_kinds import Foundation, PointSpring, Spring
+from ccfem.mesh.cell_mesh import CellMesh
 
 __all__ = ["Soft", "add_springs", "soft_holds", "soft_supports", "spring_forces"]
 
@@ -36,7 +37,7 @@ def soft_supports(problem: SupportedProblem) -> tuple[Soft, ...]:
 
 
 def soft_holds(
-    mesh: Cells, surface: LoadedBody, support: Soft
+    mesh: CellMesh, surface: LoadedBody, support: Soft
 ) -> list[tuple[IntArray, FloatArray]]:
     """Nodes (k,) and directions (k, 3) that a soft support holds against rigid motions."""
     if isinstance(support, Foundation):

@@ -5,7 +5,7 @@ from functools import cached_property
 
 import numpy as np
 
-from ccfem.arrays import FloatArray, read_only
+from ccfem.arrays import FloatArray, freeze
 from ccfem.elasticity.error_estimate import ErrorEstimate, estimate_error
 from ccfem.elasticity.order import about_error
 from ccfem.elasticity.part_stress import PartStress
@@ -86,8 +86,14 @@ class StressField:
     record: SolveRecord
 
     def __post_init__(self) -> None:
-        for name in ("displacement", "stress", "nodal", "reactions"):
-            object.__setattr__(self, name, read_only(getattr(self, name)))
+        freeze(self, displacement=float, stress=float, nodal=float, reactions=float)
+
+    def __repr__(self) -> str:
+        largest = float(np.linalg.norm(self.displacement, axis=1).max())
+        return (
+            f"StressField of load case {self.case}: {len(self.stress):,} cells, largest "
+            f"displacement {largest:.4g} mm, strain energy {self.strain_energy:.4g} N mm"
+        )
 
     @property
     def mesh(self) -> TetMesh:

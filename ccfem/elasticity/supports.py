@@ -6,7 +6,7 @@ from dataclasses import dataclass, field
 import numpy as np
 
 from ccfem.arrays import BoolArray, FloatArray, IntArray, read_only
-from ccfem.elasticity.body import Cells, LoadedBody, SupportedProblem
+from ccfem.elasticity.body import LoadedBody, SupportedProblem
 from ccfem.elasticity.held import Held
 from ccfem.elasticity.load_kinds import Displacement
 from ccfem.elasticity.nodes import (
@@ -32,6 +32,7 @@ from ccfem.elasticity.support_kinds import (
 )
 from ccfem.elasticity.ties import Body, Ties
 from ccfem.errors import InputError
+from ccfem.mesh.cell_mesh import CellMesh
 
 __all__ = ["check_support", "held", "held_in"]
 
@@ -88,7 +89,7 @@ def held_in(problem: SupportedProblem, case: str, at_rest: Held) -> Held:
     return at_rest.at(_collect(problem, moves).held().value)
 
 
-def check_support(mesh: Cells, fixed: BoolArray) -> None:
+def check_support(mesh: CellMesh, fixed: BoolArray) -> None:
     """Check that no piece of the part can move as a rigid body.
 
     Parameters
@@ -131,7 +132,7 @@ class _Rigid:
 class _Collected:
     """What the supports of a problem hold."""
 
-    mesh: Cells
+    mesh: CellMesh
     surface: LoadedBody
     free: BoolArray
     value: FloatArray

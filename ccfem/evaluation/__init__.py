@@ -1,6 +1,6 @@
 """The shared evaluator: every strategy is measured the same way."""
 
 from ccfem.evaluation.column import Column
-from ccfem.evaluation.evaluation import COLUMNS, Evaluation, evaluate
+from ccfem.evaluation.evaluation import COLUMNS, Evaluation, FibreSamples, evaluate
 
-__all__ = ["COLUMNS", "Column", "Evaluation", "evaluate"]
+__all__ = ["COLUMNS", "Column", "Evaluation", "FibreSamples", "evaluate"]

@@ -4,9 +4,10 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from ccfem.arrays import FloatArray
+from ccfem.arrays import FloatArray, read_only
 from ccfem.evaluation.column import Column
 from ccfem.evaluation.plane_paths import PlanePaths
+from ccfem.evaluation.sensitivity import acute
 from ccfem.geometry.locate import locate
 from ccfem.geometry.polylines import sample_midpoints
 from ccfem.layers.layer_stress import LayerStress
@@ -98,6 +99,10 @@ class AlignmentSamples:
     smallest: FloatArray
     along: FloatArray
 
+    def __post_init__(self) -> None:
+        for name, values in vars(self).items():
+            object.__setattr__(self, name, read_only(values))
+
 
 def sample_alignment(paths: PlanePaths, stress: LayerStress, step: float) -> AlignmentSamples:
     """Stress along the paths of a layer, links in the part included.
@@ -121,8 +126,7 @@ def sample_alignment(paths: PlanePaths, stress: LayerStress, step: float) -> Ali
     s = np.einsum("qk,qkc->qc", weights[inside], corners)
     t = tangents[inside]
     largest, smallest, direction = largest_in_plane(s)
-    turned = np.abs(np.arctan2(t[:, 1], t[:, 0]) - direction) % np.pi
-    angle = np.minimum(turned, np.pi - turned)
+    angle = acute(np.arctan2(t[:, 1], t[:, 0]) - direction)
     size = np.maximum(np.abs(largest), np.abs(smallest))
     angle[largest - smallest <= _ISOTROPIC * size] = np.nan
     along = s[:, 0] * t[:, 0] ** 2 + s[:, 1] * t[:, 1] ** 2 + 2.0 * s[:, 2] * t[:, 0] * t[:, 1]

@@ -1,7 +1,6 @@
 """Fibre outside the layer."""
 
 from dataclasses import dataclass
-from typing import Any
 
 import numpy as np
 import shapely
@@ -10,6 +9,7 @@ from ccfem.arrays import FloatArray
 from ccfem.evaluation.column import Column
 from ccfem.evaluation.plane_paths import PlanePaths
 from ccfem.geometry.places import TOLERANCE
+from ccfem.geometry.shapes import Region, Shapes
 
 __all__ = ["COLUMNS", "ContainmentSamples", "containment_indices", "sample_containment"]
 
@@ -57,7 +57,7 @@ def sample_containment(paths: PlanePaths) -> ContainmentSamples:
     return ContainmentSamples(np.array([length]), np.array([_depth(outside, section)]))
 
 
-def _depth(lines: Any, section: Any) -> float:
+def _depth(lines: Shapes, section: Region) -> float:
     """Largest distance of lines outside a polygon from it, by bisection.
 
     The distance from one edge of the polygon is convex along a line, so no point of a piece is
@@ -85,7 +85,7 @@ def _depth(lines: Any, section: Any) -> float:
     return best
 
 
-def _segments(lines: Any) -> tuple[FloatArray, FloatArray]:
+def _segments(lines: shapely.Geometry | Shapes) -> tuple[FloatArray, FloatArray]:
     """First and last points, (s, 2) each, of all segments of lines."""
     points, index = shapely.get_coordinates(shapely.get_parts(lines), return_index=True)
     same = index[1:] == index[:-1]

@@ -8,7 +8,7 @@ from numba import njit
 from ccfem.arrays import BoolArray, FloatArray, IntArray
 from ccfem.evaluation.column import Column
 from ccfem.evaluation.plane_paths import PlanePaths
-from ccfem.geometry.polylines import subdivide
+from ccfem.geometry.polylines import starts_segment, subdivide
 from ccfem.layers.layer_stress import LayerStress
 from ccfem.tensor import in_plane
 
@@ -111,9 +111,7 @@ def sample_coverage(paths: PlanePaths, stress: LayerStress, width: float) -> Cov
     )
     covered = np.zeros(tension.shape, dtype=np.bool_)
     pieces, offsets, _ = subdivide(paths.points, paths.offsets, width)
-    start = np.ones(len(pieces), dtype=bool)
-    start[offsets[1:] - 1] = False
-    first = np.flatnonzero(start)
+    first = np.flatnonzero(starts_segment(offsets))
     _paint_paths(covered, origin, step, pieces[first], pieces[first + 1], 0.5 * width)
     inside = tension >= 0.0
     return CoverageSamples(

@@ -5,10 +5,10 @@ from dataclasses import dataclass
 import numpy as np
 import shapely
 
-from ccfem.arrays import FloatArray
+from ccfem.arrays import FloatArray, read_only
 from ccfem.evaluation.column import Column
 from ccfem.evaluation.plane_paths import PlanePaths
-from ccfem.geometry.polylines import arc_lengths, resample, turning_angles
+from ccfem.geometry.polylines import arc_lengths, inner_points, resample, turning_angles
 from ccfem.machine.machine import Machine
 
 __all__ = ["COLUMNS", "CurvatureSamples", "curvature_indices", "sample_curvature"]
@@ -85,6 +85,10 @@ class CurvatureSamples:
     turns: FloatArray
     length: FloatArray
 
+    def __post_init__(self) -> None:
+        for name, values in vars(self).items():
+            object.__setattr__(self, name, read_only(values))
+
 
 def sample_curvature(paths: PlanePaths, step: float) -> CurvatureSamples:
     """Curvature of the paths of a layer.
@@ -105,9 +109,7 @@ def sample_curvature(paths: PlanePaths, step: float) -> CurvatureSamples:
     lines = paths.in_part
     points, offsets = resample(lines.points, lines.offsets, step)
     angle = turning_angles(points, offsets, lines.closed)
-    inner = np.ones(len(points), dtype=bool)
-    inner[offsets[:-1]] = lines.closed
-    inner[offsets[1:] - 1] = False
+    inner = inner_points(offsets, lines.closed)
     size = np.repeat(lines.lengths, np.diff(offsets)) / np.repeat(
         np.maximum(np.diff(offsets) - 1, 1), np.diff(offsets)
     )
@@ -138,8 +140,7 @@ def _native(paths: PlanePaths, longest: float) -> FloatArray:
     after = np.roll(before, -1)
     first, last = offsets[:-1], offsets[1:] - 1
     before[first] = before[last]
-    inner = np.ones(len(points), dtype=bool)
-    inner[first], inner[last] = paths.closed, False
+    inner = inner_points(offsets, paths.closed)
     step = 0.5 * (before + after)[inner]
     angle = turning_angles(points, offsets, paths.closed)[inner]
     return 2.0 * np.sin(0.5 * angle[step > 0.0]) / step[step > 0.0]

@@ -2,12 +2,11 @@
 
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
-from types import MappingProxyType
-from typing import TYPE_CHECKING, Any, ClassVar
+from typing import TYPE_CHECKING, NamedTuple
 
 import numpy as np
 
-from ccfem.arrays import FloatArray, IntArray, read_only
+from ccfem.arrays import FloatArray, IntArray, freeze
 from ccfem.elasticity.part_stress import PartStress
 from ccfem.errors import InputError
 from ccfem.evaluation import (
@@ -23,8 +22,17 @@ from ccfem.evaluation import (
     spacing,
     stiffness_alignment,
 )
+from ccfem.evaluation.alignment import AlignmentSamples
 from ccfem.evaluation.column import Column
-from ccfem.evaluation.plane_paths import PlanePaths, plane_paths, pool
+from ccfem.evaluation.containment import ContainmentSamples
+from ccfem.evaluation.coverage import CoverageSamples
+from ccfem.evaluation.crossings import CrossingSamples
+from ccfem.evaluation.curvature import CurvatureSamples
+from ccfem.evaluation.links import LinkSamples
+from ccfem.evaluation.manufacture import ManufactureSamples
+from ccfem.evaluation.plane_paths import plane_paths, pool
+from ccfem.evaluation.sinuosity import SinuositySamples
+from ccfem.evaluation.spacing import SpacingSamples
 from ccfem.layers.layer import Layer
 from ccfem.layers.layer_stress import stress_on
 from ccfem.machine.machine import Machine
@@ -33,7 +41,7 @@ from ccfem.toolpaths import Toolpaths
 if TYPE_CHECKING:
     import pandas as pd
 
-__all__ = ["COLUMNS", "Evaluation", "evaluate"]
+__all__ = ["COLUMNS", "Evaluation", "FibreSamples", "evaluate"]
 
 COLUMNS: tuple[Column, ...] = (
     *manufacture.COLUMNS,
@@ -55,6 +63,20 @@ _ROUNDING = 1e-3
 
 
 @dataclass(frozen=True)
+class FibreSamples:
+    """Samples along the fibre of one layer: what curves are drawn of.
+
+    Attributes
+    ----------
+    curvature : CurvatureSamples
+    alignment : AlignmentSamples
+    """
+
+    curvature: CurvatureSamples
+    alignment: AlignmentSamples
+
+
+@dataclass(frozen=True)
 class Evaluation:
     """Every index of a set of paths.
 
@@ -65,19 +87,24 @@ class Evaluation:
     layers : (L,) int array
         Index of each layer.
     values : mapping of column name to (L + 1,) array
-        One value a layer, then the total. NaN only where `Column.range` says so.
-    columns : tuple of Column
-        What each value is: unit, formula, range.
+        One value a layer, then the total. NaN only where `Column.range` says so; `COLUMNS` says
+        what each value is.
+    samples : tuple of L FibreSamples
+        Of each layer.
     """
 
     layers: IntArray
     values: Mapping[str, FloatArray]
-    columns: ClassVar[tuple[Column, ...]] = COLUMNS
+    samples: tuple[FibreSamples, ...]
+
+    def __repr__(self) -> str:
+        return f"Evaluation of {len(self.layers)} layers by {len(self.values)} indices"
+
+    def _repr_html_(self) -> str:
+        return str(self.to_frame().T.to_html(float_format="{:.4g}".format))
 
     def __post_init__(self) -> None:
-        object.__setattr__(self, "layers", read_only(self.layers, np.int64))
-        values = {name: read_only(column) for name, column in self.values.items()}
-        object.__setattr__(self, "values", MappingProxyType(values))
+        freeze(self, layers=int, values=float)
 
     @property
     def total(self) -> Mapping[str, float]:
@@ -143,10 +170,13 @@ def evaluate(
         raise InputError("expected at least one layer to evaluate; got none: slice the part")
     _check_layers(toolpaths, layers)
     samples = [_sample(toolpaths.on_layer(k.index), k, stress, machine) for k in layers]
-    rows = [_indices(parts, machine) for parts in samples]
-    rows.append(_indices([pool(group) for group in zip(*samples, strict=True)], machine))
-    values = {column.name: np.array([row[column.name] for row in rows]) for column in COLUMNS}
-    return Evaluation(np.array([layer.index for layer in layers]), values)
+    rows = [_indices(each, machine) for each in samples]
+    rows.append(_indices(_pooled(samples), machine))
+    return Evaluation(
+        np.array([layer.index for layer in layers]),
+        {column.name: np.array([row[column.name] for row in rows]) for column in COLUMNS},
+        tuple(FibreSamples(each.curvature, each.alignment) for each in samples),
+    )
 
 
 def _check_layers(toolpaths: Toolpaths, layers: Sequence[Layer]) -> None:
@@ -169,12 +199,26 @@ def _check_layers(toolpaths: Toolpaths, layers: Sequence[Layer]) -> None:
             )
 
 
-def _sample(toolpaths: Toolpaths, layer: Layer, stress: PartStress, machine: Machine) -> list[Any]:
-    """Take the samples of one layer, in the order that `_indices` reads them."""
+class _Samples(NamedTuple):
+    """Samples of one layer, or of all together: every index is computed of them."""
+
+    manufacture: ManufactureSamples
+    sinuosity: SinuositySamples
+    curvature: CurvatureSamples
+    alignment: AlignmentSamples
+    spacing: SpacingSamples
+    coverage: CoverageSamples
+    containment: ContainmentSamples
+    links: LinkSamples
+    crossings: CrossingSamples
+
+
+def _sample(toolpaths: Toolpaths, layer: Layer, stress: PartStress, machine: Machine) -> _Samples:
+    """Take the samples of one layer."""
     width = machine.fibre_width
-    paths: PlanePaths = plane_paths(toolpaths, layer)
+    paths = plane_paths(toolpaths, layer)
     on_layer = stress_on(layer, stress)
-    return [
+    return _Samples(
         manufacture.sample_manufacture(paths, toolpaths, machine),
         sinuosity.sample_sinuosity(paths, width),
         curvature.sample_curvature(paths, width),
@@ -184,21 +228,26 @@ def _sample(toolpaths: Toolpaths, layer: Layer, stress: PartStress, machine: Mac
         containment.sample_containment(paths),
         links.sample_links(paths),
         crossings.sample_crossings(paths),
-    ]
+    )
 
 
-def _indices(samples: Sequence[Any], machine: Machine) -> dict[str, float]:
-    make, wind, turn, align, space, cover, contain, link, cross = samples
+def _pooled(samples: Sequence[_Samples]) -> _Samples:
+    """Join the samples of all layers."""
+    return _Samples._make(pool(group) for group in zip(*samples, strict=True))
+
+
+def _indices(samples: _Samples, machine: Machine) -> dict[str, float]:
+    """Value of each of `COLUMNS`."""
     return {
-        **manufacture.manufacture_indices(make, machine),
-        **sinuosity.sinuosity_indices(wind),
-        **curvature.curvature_indices(turn, machine),
-        **alignment.alignment_indices(align),
-        **matching.matching_indices(align),
-        **stiffness_alignment.stiffness_alignment_indices(align),
-        **spacing.spacing_indices(space, machine),
-        **coverage.coverage_indices(cover),
-        **containment.containment_indices(contain),
-        **links.link_indices(link),
-        **crossings.crossing_indices(cross),
+        **manufacture.manufacture_indices(samples.manufacture, machine),
+        **sinuosity.sinuosity_indices(samples.sinuosity),
+        **curvature.curvature_indices(samples.curvature, machine),
+        **alignment.alignment_indices(samples.alignment),
+        **matching.matching_indices(samples.alignment),
+        **stiffness_alignment.stiffness_alignment_indices(samples.alignment),
+        **spacing.spacing_indices(samples.spacing, machine),
+        **coverage.coverage_indices(samples.coverage),
+        **containment.containment_indices(samples.containment),
+        **links.link_indices(samples.links),
+        **crossings.crossing_indices(samples.crossings),
     }

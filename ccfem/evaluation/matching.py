@@ -18,15 +18,16 @@ import numpy as np
 import shapely
 
 from ccfem.arrays import FloatArray, read_only
+from ccfem.checks import check_known
 from ccfem.errors import InputError
 from ccfem.evaluation.alignment import AlignmentSamples, sample_alignment
 from ccfem.evaluation.column import Column
 from ccfem.evaluation.plane_paths import PlanePaths, plane_paths, pool
-from ccfem.evaluation.stiffness_alignment import strongest
+from ccfem.evaluation.sensitivity import acute
 from ccfem.geometry.places import INSIDE, section_places
-from ccfem.geometry.polylines import subdivide
+from ccfem.geometry.polylines import starts_segment, subdivide
 from ccfem.layers.layer_stress import LayerStress
-from ccfem.tensor import in_plane, largest_in_plane
+from ccfem.tensor import in_plane, strongest, strongest_in_plane
 from ccfem.toolpaths import Toolpaths
 
 __all__ = [
@@ -35,6 +36,7 @@ __all__ = [
     "THRESHOLDS",
     "MatchingSamples",
     "Reading",
+    "along_fibre",
     "matching_curve",
     "matching_indices",
     "matching_rate",
@@ -164,11 +166,10 @@ def sample_matching(
     reach: float = 1.0,
 ) -> MatchingSamples:
     """Angles between the fibre and the stress of one layer; parameters as in `matching_rate`."""
-    if reading not in READINGS:
-        raise InputError(f"no reading '{reading}' of the rate; there are: {', '.join(READINGS)}")
+    check_known("reading of the rate", reading, READINGS)
     lines = paths.in_part if links else paths.strands
     if reading in ("path", "energy"):
-        return _along_fibre(sample_alignment(lines, stress, step))
+        return along_fibre(sample_alignment(lines, stress, step))
     points, direction, size, area = _stress_vectors(stress)
     starts, ends = _pieces(lines, max(step, reach))
     angle = np.full(len(points), np.inf)
@@ -181,12 +182,12 @@ def sample_matching(
             else tree.query(places, predicate="dwithin", distance=reach)
         )
         tangent = np.arctan2(*(ends - starts).T[::-1])
-        turned = np.abs(tangent[piece] - direction[vector]) % np.pi
-        np.minimum.at(angle, vector, np.degrees(np.minimum(turned, np.pi - turned)))
+        turned = acute(tangent[piece] - direction[vector])
+        np.minimum.at(angle, vector, np.degrees(turned))
     return MatchingSamples(angle, area, size)
 
 
-def _along_fibre(samples: AlignmentSamples) -> MatchingSamples:
+def along_fibre(samples: AlignmentSamples) -> MatchingSamples:
     """Angles at samples along the fibre, where the stress has a direction."""
     across, defined = strongest(samples.largest, samples.smallest)
     angle = np.degrees(np.where(across, 0.5 * np.pi - samples.angle, samples.angle))
@@ -201,20 +202,15 @@ def _stress_vectors(stress: LayerStress) -> tuple[FloatArray, FloatArray, FloatA
     """
     layer = stress.layer
     plane = in_plane(stress.nodal, layer.plane.frame)[layer.triangles].mean(axis=1)
-    largest, smallest, angle = largest_in_plane(plane)
-    across, defined = strongest(largest, smallest)
-    direction = angle + 0.5 * np.pi * across
-    size = np.maximum(np.abs(largest), np.abs(smallest))
+    value, direction, defined = strongest_in_plane(plane)
     centres = layer.plane.points[layer.triangles].mean(axis=1)
-    return centres[defined], direction[defined], size[defined], layer.areas[defined]
+    return centres[defined], direction[defined], np.abs(value[defined]), layer.areas[defined]
 
 
 def _pieces(paths: PlanePaths, longest: float) -> tuple[FloatArray, FloatArray]:
     """Both ends (s, 2) of the straight pieces of the fibre that lie in the section."""
     points, offsets, _ = subdivide(paths.points, paths.offsets, longest)
-    follows = np.ones(len(points), dtype=bool)
-    follows[offsets[1:] - 1] = False
-    first = np.flatnonzero(follows)
+    first = np.flatnonzero(starts_segment(offsets))
     starts, ends = points[first], points[first + 1]
     inside = section_places(0.5 * (starts + ends), paths.layer.plane.polygon) == INSIDE
     return starts[inside], ends[inside]
@@ -239,7 +235,7 @@ def matching_curve(
 
 def matching_indices(samples: AlignmentSamples) -> dict[str, float]:
     """Values of `COLUMNS`."""
-    found = _along_fibre(samples)
+    found = along_fibre(samples)
     limits = np.array(_ANGLES, dtype=np.float64)
     return {
         f"matching_{reading}_{angle}": float(value)

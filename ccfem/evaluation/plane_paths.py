@@ -9,7 +9,7 @@ import numpy as np
 
 from ccfem.arrays import BoolArray, FloatArray, IntArray
 from ccfem.geometry.places import INSIDE, cut_at_section
-from ccfem.geometry.polylines import lengths, merge_repeated
+from ccfem.geometry.polylines import lengths, merge_repeated, starts_segment
 from ccfem.layers.layer import Layer
 from ccfem.toolpaths import FIBRE, Toolpaths
 
@@ -116,8 +116,8 @@ def _without(paths: PlanePaths, dropped: BoolArray) -> PlanePaths:
     if not dropped.any():
         return paths
     order = _from_gaps(paths, dropped)
-    points, link, step = paths.points[order], paths.link[order], ~dropped[order]
-    step[paths.offsets[1:] - 1] = False
+    points, link = paths.points[order], paths.link[order]
+    step = starts_segment(paths.offsets) & ~dropped[order]
     kept = step | np.concatenate([[False], step[:-1]])
     last = ~step[kept]
     path = np.repeat(np.arange(len(paths)), np.diff(paths.offsets))

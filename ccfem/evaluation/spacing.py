@@ -9,7 +9,7 @@ from ccfem.arrays import FloatArray, IntArray
 from ccfem.evaluation.column import Column
 from ccfem.evaluation.plane_paths import PlanePaths
 from ccfem.geometry.buckets import bucket
-from ccfem.geometry.polylines import arc_lengths, sample_midpoints, subdivide
+from ccfem.geometry.polylines import arc_lengths, sample_midpoints, starts_segment, subdivide
 from ccfem.machine.machine import Machine
 
 __all__ = ["COLUMNS", "SpacingSamples", "sample_spacing", "spacing_indices"]
@@ -67,9 +67,7 @@ def sample_spacing(paths: PlanePaths, width: float) -> SpacingSamples:
     first = np.searchsorted(line, line, side="left")
     position = (np.arange(len(line)) - first + 0.5) * length
     pieces, offsets, _ = subdivide(paths.points, paths.offsets, width)
-    start = np.ones(len(pieces), dtype=bool)
-    start[offsets[1:] - 1] = False
-    start = np.flatnonzero(start)
+    start = np.flatnonzero(starts_segment(offsets))
     ends = np.stack([pieces[start], pieces[start + 1]], axis=1)
     along = arc_lengths(pieces, offsets)
     owner = np.repeat(np.arange(len(paths)), np.diff(offsets))[start]

@@ -4,12 +4,13 @@ from typing import Literal
 
 import numpy as np
 
-from ccfem.arrays import BoolArray, FloatArray
-from ccfem.errors import InputError
+from ccfem.arrays import FloatArray
+from ccfem.checks import check_known
 from ccfem.evaluation.alignment import AlignmentSamples
 from ccfem.evaluation.column import Column
-from ccfem.evaluation.sensitivity import Curve, OffAxis, acute, plane_compliance
-from ccfem.materials import Material, named_material
+from ccfem.evaluation.sensitivity import OffAxis, acute, plane_compliance
+from ccfem.materials import named_material
+from ccfem.tensor import strongest
 
 __all__ = [
     "COLUMNS",
@@ -17,7 +18,6 @@ __all__ = [
     "agreement",
     "performance_index",
     "stiffness_alignment_indices",
-    "strongest",
 ]
 
 Reading = Literal["weighted", "literal", "harmonic"]
@@ -60,30 +60,8 @@ COLUMNS = (
     ),
 )
 
-_UNDEFINED = 0.02
-"""Absolute principal values nearer than this share of the larger one have no strongest direction
-(our choice: Plocher et al. give no rule)."""
 _CAP = 0.995
 """Quantile of the energies that counts as the largest: point loads have no finite one."""
-
-
-def strongest(largest: FloatArray, smallest: FloatArray) -> tuple[BoolArray, BoolArray]:
-    """Whether the strongest stress is the smaller principal value, and where there is none.
-
-    Parameters
-    ----------
-    largest, smallest : (...,) arrays, MPa
-        In-plane principal values.
-
-    Returns
-    -------
-    across : (...,) bool array
-        True where ``|smallest| > |largest|``: the direction is square to that of `largest`.
-    defined : (...,) bool array
-        True where the absolute values differ by more than 2 % of the larger.
-    """
-    high, low = np.abs(largest), np.abs(smallest)
-    return low > high, np.abs(high - low) > _UNDEFINED * np.maximum(high, low)
 
 
 def agreement(angle: FloatArray) -> FloatArray:
@@ -117,8 +95,7 @@ def performance_index(
     float
         NaN without a sample that counts.
     """
-    if reading not in READINGS:
-        raise InputError(f"no reading '{reading}' of the index; there are: {', '.join(READINGS)}")
+    check_known("reading of the index", reading, READINGS)
     weight = np.ones(len(factor)) if weight is None else weight
     if not len(factor) or not weight.sum() > 0.0 or not energy.max() > 0.0:
         return float("nan")
@@ -131,21 +108,10 @@ def performance_index(
     return float(np.average(factor, weights=weight * (1.0 + relative**3)))
 
 
-def stiffness_alignment_indices(
-    samples: AlignmentSamples, material: Material | None = None, curve: Curve | None = None
-) -> dict[str, float]:
-    """Values of `COLUMNS`.
-
-    Parameters
-    ----------
-    samples : AlignmentSamples
-    material : Material, optional
-        Default c_fram.
-    curve : callable, optional
-        f of angles (s,), radians; default that of uniform tension of the material.
-    """
-    material = named_material("c_fram") if material is None else material
-    curve = OffAxis(material) if curve is None else curve
+def stiffness_alignment_indices(samples: AlignmentSamples) -> dict[str, float]:
+    """Values of `COLUMNS`."""
+    material = named_material("c_fram")
+    curve = OffAxis(material)
     across, defined = strongest(samples.largest, samples.smallest)
     if not defined.any():
         return {column.name: float("nan") for column in COLUMNS}

@@ -8,15 +8,15 @@ comes that length before the end of the path; the rest is dragged out and laid b
 all, a path is fed exactly its own length.
 """
 
+from importlib.metadata import version
 from itertools import pairwise
 from pathlib import Path
 
 import numpy as np
 
-from ccfem import __version__
 from ccfem.arrays import FloatArray
 from ccfem.export.print_plan import COORDINATE_DIGITS, PrintPlan
-from ccfem.geometry.polylines import arc_lengths, point_at, subdivide
+from ccfem.geometry.polylines import arc_lengths, line_length, point_at, subdivide
 from ccfem.io.whole import whole_file
 from ccfem.linking.print_speed import step_speeds
 from ccfem.machine.machine import Machine
@@ -70,7 +70,7 @@ def gcode(plan: PrintPlan, machine: Machine) -> str:
     program.lines += machine.gcode.fill(machine.gcode.end, program.values)
     fibre = paths.of_kind(FIBRE)
     head = [
-        f"; ccfem {__version__}",
+        f"; ccfem {version('ccfem')}",
         "; mm, mm/min; X Y Z absolute, E relative; T0 matrix, T1 fibre (E in mm of fibre)",
         f"; {len(plan.top)} layers, {plan.top.max():g} mm high",
         f"; {fibre.lengths.sum():.1f} mm of fibre in {len(fibre)} paths, each cut "
@@ -129,10 +129,10 @@ class _Program:
 
     def lay_fibre(self, line: FloatArray, speeds: FloatArray) -> None:
         """Feed, lay, cut and lay to its end a path (n, 2) of fibre."""
-        total = _length(line)
+        total = line_length(line)
         line, speeds, cut = _with_point_at(line, speeds, total - self.machine.tail)
         self._travel(line[0])
-        self._extrude(_length(line[cut:]), self.profile.feed_speed)
+        self._extrude(line_length(line[cut:]), self.profile.feed_speed)
         self._lay(line[: cut + 1], speeds[:cut], 1.0)
         self.lines += self.profile.fill(self.profile.cut, self.values)
         self._feed = ""
@@ -184,10 +184,6 @@ class _Program:
         feed = f" F{60.0 * speed:.6g}"
         said, self._feed = self._feed, feed
         return "" if feed == said else feed
-
-
-def _length(line: FloatArray) -> float:
-    return float(np.linalg.norm(np.diff(line, axis=0), axis=1).sum())
 
 
 def _with_point_at(

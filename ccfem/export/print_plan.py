@@ -6,11 +6,11 @@ from itertools import pairwise
 
 import numpy as np
 
-from ccfem.arrays import FloatArray, read_only
+from ccfem.arrays import FloatArray, freeze, in_brief
 from ccfem.errors import InputError
 from ccfem.geometry.hatch import zigzag
 from ccfem.geometry.offsets import offset_rings
-from ccfem.geometry.polylines import merge_repeated, pack
+from ccfem.geometry.polylines import is_closed, merge_repeated, pack
 from ccfem.layers import Layer
 from ccfem.layers.slicing.planar import Planar
 from ccfem.linking.print_order import nearest_end_order
@@ -52,9 +52,10 @@ class PrintPlan:
     top: FloatArray
     thickness: FloatArray
 
+    __repr__ = in_brief
+
     def __post_init__(self) -> None:
-        for name in ("top", "thickness"):
-            object.__setattr__(self, name, read_only(getattr(self, name)))
+        freeze(self, top=float, thickness=float)
 
 
 @dataclass(frozen=True)
@@ -235,7 +236,7 @@ def _printed(lines: list[FloatArray], height: float, number: int, kind: int) -> 
         offsets=offsets,
         layer=np.full(len(lines), number),
         kind=np.full(len(lines), kind),
-        closed=np.array([np.array_equal(line[0], line[-1]) for line in lines]),
+        closed=np.array([is_closed(line) for line in lines]),
     )
 
 

@@ -25,7 +25,6 @@ _TYPES = {"f8": "Float64", "i8": "Int64", "u1": "UInt8"}
 def write_paths(
     toolpaths: Toolpaths,
     path: str | Path,
-    point_data: Mapping[str, FloatArray] | None = None,
     path_data: Mapping[str, FloatArray] | None = None,
 ) -> None:
     """Write toolpaths to a ``.vtp`` file, whole or not at all.
@@ -38,8 +37,6 @@ def write_paths(
     ----------
     toolpaths : Toolpaths
     path : str or Path
-    point_data : mapping of name to (P,) or (P, 3) array, optional
-        More values at the points.
     path_data : mapping of name to (K,) array, optional
         More values of the paths.
 
@@ -51,7 +48,6 @@ def write_paths(
     points: dict[str, NDArray[Any]] = {
         "normals": toolpaths.normals,
         "link": toolpaths.link.astype(np.uint8),
-        **(point_data or {}),
     }
     paths: dict[str, NDArray[Any]] = {
         "layer": toolpaths.layer,
@@ -60,15 +56,11 @@ def write_paths(
         "length": toolpaths.lengths,
         **(path_data or {}),
     }
-    for arrays, size, what in (
-        (points, len(toolpaths.points), "point"),
-        (paths, len(toolpaths), "path"),
-    ):
-        for name, values in arrays.items():
-            if len(values) != size:
-                raise InputError(
-                    f"'{name}' must have one value a {what}, {size} in all; got {len(values)}"
-                )
+    for name, values in paths.items():
+        if len(values) != len(toolpaths):
+            raise InputError(
+                f"'{name}' must have one value a path, {len(toolpaths)} in all; got {len(values)}"
+            )
     with whole_file(path) as temporary, open(temporary, "w", encoding="ascii") as file:
         file.writelines(_lines(toolpaths, points, paths))
 

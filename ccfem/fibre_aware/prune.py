@@ -6,14 +6,15 @@ left is tested again, for it takes over the load.
 """
 
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 from numba import njit
 
-from ccfem.arrays import BoolArray, FloatArray
+from ccfem.arrays import BoolArray, FloatArray, IntArray
+from ccfem.checks import check_number
 from ccfem.elasticity.stress_field import StressField
-from ccfem.errors import InputError
+from ccfem.geometry.polylines import along_line, points_along, runs
 from ccfem.machine.machine import Machine
 from ccfem.toolpaths import FIBRE, Toolpaths
 from ccfem.virtual_testing.equilibrium import equilibrium
@@ -26,10 +27,20 @@ __all__ = ["Profile", "least_price", "profiles", "prune", "shorten"]
 _STATION = 1.0
 """Length of path, mm, that is kept or taken off as a whole."""
 
+_SAME = 1e-9
+"""Distance along a path, mm, within which the middles of two pieces are one."""
+
 _WINDOW = 10
 """Stations over which the least valuable place of a closed path is looked for."""
 
 _BISECTIONS = 50
+
+_TILT = 1e-6
+"""Share by which the first piece of the first path is worth more than its strain says, others in
+proportion: of equally good pieces the last go first, whatever rounding makes of their values."""
+
+_EQUAL = 1e-12
+"""Share of the largest gain of a piece by which one choice has to be better than another."""
 
 _LOWER_PRICES = (0.999, 0.99, 0.97, 0.93, 0.85)
 """Shares of the price at which room that is left is used: a path may be worth all or nothing."""
@@ -42,8 +53,6 @@ def prune(
     machine: Machine,
     strand: Strand | None = None,
     rounds: int = 2,
-    cut_cost: float = 20.0,
-    backend: str = "auto",
 ) -> Toolpaths:
     """Take the least valuable fibre off until no more than a wanted length is left.
 
@@ -65,10 +74,6 @@ def prune(
         Stiffness of a strand; default rho = EA/E = 4 mm^2.
     rounds : int, default 2
         Virtual tests, at least 1.
-    cut_cost : float, mm, default 20
-        A path is parted only where that saves more than so much of the least valuable fibre.
-    backend : str, default "auto"
-        Solver, where `part` is a StressField.
 
     Returns
     -------
@@ -80,15 +85,12 @@ def prune(
     InputError
         When the length is not positive, `rounds` is below 1, or there is no fibre.
     """
-    if not 0.0 < length < np.inf or rounds < 1 or not 0.0 <= cut_cost < np.inf:
-        raise InputError(
-            "prune expects a length above 0 mm, at least 1 round and a cut cost >= 0 mm; got "
-            f"{length}, {rounds} and {cut_cost}"
-        )
+    check_number("length of fibre", length, above=0.0, unit="mm")
+    check_number("rounds", rounds, at_least=1)
     laid = _fibre_length(toolpaths)
     if laid <= length:
         return toolpaths
-    specimen = Specimen.of(part, backend) if isinstance(part, StressField) else part
+    specimen = Specimen.of(part) if isinstance(part, StressField) else part
     axial = (Strand() if strand is None else strand).stiffness(specimen.modulus)
     displacement = None
     for k in range(rounds):
@@ -98,7 +100,7 @@ def prune(
         value = np.where(found.carries, found.strain, 0.0) ** 2
         wanted = length if k == rounds - 1 else length + 0.5 * (laid - length)
         along = profiles(toolpaths, strands, value)
-        toolpaths = shorten(toolpaths, along, wanted, machine.minimum_length, cut_cost)
+        toolpaths = shorten(toolpaths, along, wanted, machine.minimum_length)
         laid = _fibre_length(toolpaths)
         if laid <= length:
             break
@@ -151,6 +153,7 @@ def _best_stretches(gain, least, cost, keep):  # type: ignore[no-untyped-def]  #
     kept. Stretches are at least `least` pieces long; each but the first costs `cost`.
     """
     n = len(gain)
+    equal = _EQUAL * np.abs(gain).max()
     total = np.zeros(n + 1)
     for i in range(n):
         total[i + 1] = total[i] + gain[i]
@@ -163,9 +166,9 @@ def _best_stretches(gain, least, cost, keep):  # type: ignore[no-untyped-def]  #
         start[i], alone[i] = start[i - 1], alone[i - 1]
         before = max(free[i - least] - cost, 0.0)
         opened = total[i] - total[i - least] + before
-        if opened >= held[i]:
+        if opened >= held[i] - equal:
             held[i], start[i], alone[i] = opened, i - least, before == 0.0
-        free[i] = max(free[i - 1], held[i])
+        free[i] = held[i] if held[i] > free[i - 1] + equal else free[i - 1]
     keep[:] = False
     i = n
     while i > 0 and free[i] > 0.0:
@@ -188,20 +191,47 @@ def profiles(toolpaths: Toolpaths, strands: Strands, value: FloatArray) -> list[
     value : (s,) array
         Of each piece of strand, per length.
     """
-    order = np.argsort(strands.path, kind="stable")
-    arc, work = strands.arc[order], (value * strands.length)[order]
-    bounds = np.searchsorted(strands.path[order], np.arange(len(toolpaths) + 1))
+    path, begin, end, work = _pieces(strands, value)
+    bounds = np.searchsorted(path, np.arange(len(toolpaths) + 1))
     total = toolpaths.lengths
     result = []
     for k in np.flatnonzero((toolpaths.kind == FIBRE) & (total > 0.0)).tolist():
         count = max(int(np.ceil(total[k] / _STATION)), 1)
         step = float(total[k]) / count
         own = slice(bounds[k], bounds[k + 1])
-        piece = np.clip((arc[own] / step).astype(np.int64), 0, count - 1)
-        mean = np.bincount(piece, work[own], minlength=count) / step
+        done = np.cumsum(work[own])
+        along = np.concatenate([[0.0], np.stack([begin[own], end[own]], axis=1).ravel()])
+        below = np.concatenate([[0.0], np.stack([done - work[own], done], axis=1).ravel()])
+        mean = np.diff(np.interp(step * np.arange(count + 1), along, below)) / step
         turn = _least_valuable(mean) if toolpaths.closed[k] else 0
         result.append(Profile(k, np.roll(mean, -turn), step, turn * step))
-    return result
+    return _tilted(result)
+
+
+def _tilted(along: list[Profile]) -> list[Profile]:
+    """Profiles whose values shrink, all together, by a trifle from the first piece to the last."""
+    ends = np.cumsum([0, *(len(one.value) for one in along)])
+    shares = np.split(1.0 + _TILT * (1.0 - np.arange(ends[-1]) / max(ends[-1], 1)), ends[1:-1])
+    return [replace(one, value=one.value * share) for one, share in zip(along, shares, strict=True)]
+
+
+def _pieces(
+    strands: Strands, value: FloatArray
+) -> tuple[IntArray, FloatArray, FloatArray, FloatArray]:
+    """Path, arc lengths of both ends, mm, and work of every piece, along the paths.
+
+    A piece on a face of the mesh comes once a cell in `Strands`, and once here.
+    """
+    order = np.lexsort((strands.arc, strands.path))
+    path, arc = strands.path[order], strands.arc[order]
+    fresh = np.flatnonzero((np.diff(path) > 0) | (np.diff(arc) > _SAME))
+    first = np.concatenate([[0], fresh + 1])[: len(path)]
+    length, work = (
+        np.add.reduceat(part[order], first) if len(first) else np.zeros(0)
+        for part in (strands.length, value * strands.length)
+    )
+    path, arc = path[first], arc[first]
+    return path, arc - 0.5 * length, arc + 0.5 * length, work
 
 
 def _least_valuable(value: FloatArray) -> int:
@@ -209,7 +239,8 @@ def _least_valuable(value: FloatArray) -> int:
     window = min(_WINDOW, len(value))
     total = np.cumsum(np.concatenate([[0.0], value, value[:window]]))
     mean = total[window : window + len(value)] - total[: len(value)]
-    return int((np.argmin(mean) + window // 2) % len(value))
+    least = np.flatnonzero(mean <= mean.min() + _TILT * window * value.max())[0]
+    return int((least + window // 2) % len(value))
 
 
 def shorten(
@@ -236,19 +267,36 @@ def shorten(
     -------
     Toolpaths
         The price of fibre is the same for all paths, and the smallest that keeps to the length;
-        what room it leaves is used path by path at slightly lower prices.
+        what room it leaves is used path by path at slightly lower prices, by part of what these
+        would keep where all of it is too long.
     """
     price = least_price(along, length, minimum, cut_cost)
     chosen = {one.path: one.kept(price, minimum, cut_cost)[0] for one in along}
     room = length - sum(one.step * float(chosen[one.path].sum()) for one in along)
     for factor in _LOWER_PRICES if price > 0.0 else ():
         for one in along:
+            before = chosen[one.path]
             longer = one.kept(factor * price, minimum, cut_cost)[0]
-            more = one.step * float(longer.sum() - chosen[one.path].sum())
+            if one.step * (longer.sum() - before.sum()) > room:
+                longer = _grown(before, longer, int(room / one.step))
+            more = one.step * float(longer.sum() - before.sum())
             if 0.0 < more <= room:
                 chosen[one.path] = longer
                 room -= more
     return _cut(toolpaths, along, chosen)
+
+
+def _grown(kept: BoolArray, longer: BoolArray, count: int) -> BoolArray:
+    """Kept pieces (n,), and up to so many of a longer choice that follow on from them."""
+    grown = kept.copy()
+    while count > 0:
+        beside = np.concatenate([[False], grown[:-1]]) | np.concatenate([grown[1:], [False]])
+        fresh = np.flatnonzero(longer & ~grown & beside)[:count]
+        if not len(fresh):
+            break
+        grown[fresh] = True
+        count -= len(fresh)
+    return grown
 
 
 def least_price(
@@ -301,12 +349,11 @@ def _stretches(
     line: FloatArray, profile: Profile, keep: BoolArray, closed: bool
 ) -> list[FloatArray]:
     """Kept stretches of a line (n, 7); those on both sides of the seam of a ring are one."""
-    turns = np.flatnonzero(np.diff(np.concatenate([[False], keep, [False]]).astype(np.int8)))
-    runs = [(int(a), int(b)) for a, b in zip(turns[::2], turns[1::2], strict=True)]
-    if closed and len(runs) > 1 and keep[0] and keep[-1]:
-        runs = [*runs[1:-1], (runs[-1][0], len(keep) + runs[0][1])]
+    spans = runs(keep)
+    if closed and len(spans) > 1 and keep[0] and keep[-1]:
+        spans = np.concatenate([spans[1:-1], [[spans[-1, 0], len(keep) + spans[0, 1]]]])
     step, origin = profile.step, profile.origin
-    return [_between(line, origin + a * step, origin + b * step) for a, b in runs]
+    return [_between(line, origin + a * step, origin + b * step) for a, b in spans]
 
 
 def _between(line: FloatArray, start: float, end: float) -> FloatArray:
@@ -314,8 +361,7 @@ def _between(line: FloatArray, start: float, end: float) -> FloatArray:
 
     Columns are the point, its normal, and whether the step to the next point is a link.
     """
-    size = np.linalg.norm(np.diff(line[:, :3], axis=0), axis=1)
-    along = np.concatenate([[0.0], np.cumsum(size)])
+    along = along_line(line[:, :3])
     if end > along[-1] * (1.0 + 1e-12):  # on past the seam, at most once round
         line = np.concatenate([line[:-1], line[:-1], line])
         along = np.concatenate([along, along[-1] + along[1:], 2.0 * along[-1] + along[1:]])
@@ -323,4 +369,4 @@ def _between(line: FloatArray, start: float, end: float) -> FloatArray:
     wanted = np.concatenate([[start], inside, [end]])
     step = np.searchsorted(along, 0.5 * (wanted[1:] + wanted[:-1]), side="right") - 1
     link = np.append(line[step, 6], 0.0)
-    return np.column_stack([*(np.interp(wanted, along, x) for x in line[:, :6].T), link])
+    return np.column_stack([points_along(line[:, :6], along, wanted), link])

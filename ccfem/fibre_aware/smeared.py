@@ -13,7 +13,7 @@ from typing import Any
 import numpy as np
 from numba import njit
 
-from ccfem.arrays import FloatArray, IntArray, read_only
+from ccfem.arrays import FloatArray, IntArray, freeze, in_brief, read_only
 from ccfem.elasticity.assembly import cell_gradients
 from ccfem.elasticity.solve import solve
 from ccfem.elasticity.solvers import preconditioned_cg
@@ -62,8 +62,7 @@ class SmearedSolution:
     iterations: int
 
     def __post_init__(self) -> None:
-        object.__setattr__(self, "displacement", read_only(self.displacement))
-        object.__setattr__(self, "strain", read_only(self.strain))
+        freeze(self, displacement=float, strain=float)
 
 
 Fibre = Callable[[FloatArray], FloatArray]
@@ -84,6 +83,8 @@ class SmearedPart:
 
     specimen: Specimen
     frame: FloatArray
+
+    __repr__ = in_brief
 
     @classmethod
     def of(
@@ -246,38 +247,33 @@ def on_linear_cells(stress: StressField, backend: str = "auto") -> StressField:
     mesh = problem.mesh
     if mesh.order == 1:
         return stress
-    kept, corners = np.unique(mesh.corners, return_inverse=True)
-    place = np.full(len(mesh.points), -1)
-    place[kept] = np.arange(len(kept))
-    patches = {name: place[facets] for name, facets in mesh.patches.items()}
-    linear = TetMesh(mesh.points[kept], corners.reshape(-1, 4), patches)
     loads = {stress.case: problem.loads[stress.case]}
-    return solve(replace(problem, mesh=linear, loads=loads), backend)[stress.case]
+    return solve(replace(problem, mesh=mesh.linear(), loads=loads), backend)[stress.case]
+
+
+@njit(cache=True)
+def _strain(cell, slopes, plane):  # type: ignore[no-untyped-def]  # pragma: no cover
+    """Strain e11, e22 and twice e12 in the plane of one cell."""
+    e1, e2, e12 = 0.0, 0.0, 0.0
+    for a in range(4):
+        u, v = plane[cell[a], 0], plane[cell[a], 1]
+        x, y = slopes[a, 0], slopes[a, 1]
+        e1 += u * x
+        e2 += v * y
+        e12 += u * y + v * x
+    return e1, e2, e12
 
 
 @njit(cache=True)
 def _strains(cells, slopes, plane, result):  # type: ignore[no-untyped-def]  # pragma: no cover
     for c in range(len(cells)):
-        e1, e2, e12 = 0.0, 0.0, 0.0
-        for a in range(4):
-            u, v = plane[cells[c, a], 0], plane[cells[c, a], 1]
-            x, y = slopes[c, a, 0], slopes[c, a, 1]
-            e1 += u * x
-            e2 += v * y
-            e12 += u * y + v * x
-        result[c, 0], result[c, 1], result[c, 2] = e1, e2, e12
+        result[c, 0], result[c, 1], result[c, 2] = _strain(cells[c], slopes[c], plane)
 
 
 @njit(cache=True)
 def _forces(cells, slopes, packed, plane, result):  # type: ignore[no-untyped-def]  # pragma: no cover
     for c in range(len(cells)):
-        e1, e2, e12 = 0.0, 0.0, 0.0
-        for a in range(4):
-            u, v = plane[cells[c, a], 0], plane[cells[c, a], 1]
-            x, y = slopes[c, a, 0], slopes[c, a, 1]
-            e1 += u * x
-            e2 += v * y
-            e12 += u * y + v * x
+        e1, e2, e12 = _strain(cells[c], slopes[c], plane)
         s1 = packed[c, 0] * e1 + packed[c, 1] * e2 + packed[c, 2] * e12
         s2 = packed[c, 1] * e1 + packed[c, 3] * e2 + packed[c, 4] * e12
         s12 = packed[c, 2] * e1 + packed[c, 4] * e2 + packed[c, 5] * e12

@@ -7,7 +7,7 @@ from typing import Any
 import numpy as np
 import scipy.sparse as sp
 
-from ccfem.arrays import FloatArray, IntArray, read_only
+from ccfem.arrays import FloatArray, IntArray, freeze
 
 __all__ = ["SplineGrid"]
 
@@ -37,9 +37,7 @@ class SplineGrid:
     used: IntArray
 
     def __post_init__(self) -> None:
-        object.__setattr__(self, "centre", read_only(self.centre))
-        object.__setattr__(self, "axes", read_only(self.axes))
-        object.__setattr__(self, "used", read_only(self.used, np.int64))
+        freeze(self, centre=float, axes=float, used=int)
 
     @classmethod
     def over(

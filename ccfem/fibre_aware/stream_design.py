@@ -19,7 +19,10 @@ from ccfem.arrays import FloatArray, IntArray
 from ccfem.fibre_aware.smeared import SmearedPart, SmearedSolution
 from ccfem.fibre_aware.spline_grid import SplineGrid
 
-__all__ = ["Objective", "StreamDesign", "StreamProblem", "design"]
+__all__ = ["DENSEST", "Objective", "StreamDesign", "StreamProblem", "design"]
+
+DENSEST = 0.95
+"""Strands a width that should not be exceeded."""
 
 _OVER_BUDGET = 20.0
 _STEEP = 100.0
@@ -34,6 +37,12 @@ _SLACK = 1e-3
 
 _MEMORY = 20
 """Steps that L-BFGS remembers."""
+
+_REACH = 1.0
+"""Radius of the filter in squares of the grid."""
+
+_TOLERANCE = 1e-3
+"""Relative residual of the solves of a design. The error of the compliance is its square."""
 
 
 @dataclass(frozen=True)
@@ -63,7 +72,7 @@ class Objective:
 class StreamProblem:
     """What a stream function is designed for.
 
-    Minimised is ``-log(stiffness) + 20 max(length / budget - 1, 0)^2 + 100 mean(max(|g| - densest,
+    Minimised is ``-log(stiffness) + 20 max(length / budget - 1, 0)^2 + 100 mean(max(|g| - 0.95,
     0)^2) + 0.001 mean((Laplacian s)^2)``, g in strands a width, means over the part and over the
     coefficients.
 
@@ -84,8 +93,6 @@ class StreamProblem:
         EA of a strand.
     budget : float, mm
         Length of fibre in the whole part.
-    densest : float, default 0.95
-        Strands a width that should not be exceeded.
     """
 
     part: SmearedPart
@@ -96,7 +103,6 @@ class StreamProblem:
     width: float
     axial_stiffness: float
     budget: float
-    densest: float = 0.95
 
     @cached_property
     def groups(self) -> int:
@@ -158,7 +164,7 @@ class StreamProblem:
 
         length = float(self.room @ (size - _SMALLEST))
         over = max(length / self.budget - 1.0, 0.0)
-        excess = np.maximum(size - self.densest, 0.0)
+        excess = np.maximum(size - DENSEST, 0.0)
         mean = self.part.mesh.volumes / self.part.mesh.volumes.sum()
         bend = self.laplacian @ field
         value = -np.log(ratio) + _OVER_BUDGET * over**2 + _STEEP * float(mean @ excess**2)
@@ -209,17 +215,11 @@ class StreamDesign:
     ratios: tuple[float, ...]
 
 
-def design(
-    problem: StreamProblem,
-    start: FloatArray,
-    evaluations: int = 50,
-    reach: float = 1.0,
-    tolerance: float = 1e-3,
-) -> StreamDesign:
+def design(problem: StreamProblem, start: FloatArray, evaluations: int = 50) -> StreamDesign:
     """Improve fields by L-BFGS on filtered coefficients.
 
-    The unknowns x give the coefficients ``(1 + reach^2 Laplacian)^-1 x``: steps are smooth, and
-    what the cells do not feel stays as it is.
+    The unknowns x give the coefficients ``(1 + Laplacian)^-1 x``, the Laplacian in squares of the
+    grid: steps are smooth, and what the cells do not feel stays as it is.
 
     Parameters
     ----------
@@ -227,17 +227,13 @@ def design(
     start : (c,) array
     evaluations : int, default 50
         Most evaluations of the objective, one or a few solves each; at least 1.
-    reach : float, default 1
-        Radius of the filter in squares of the grid.
-    tolerance : float, default 1e-3
-        Relative residual of the solves. The error of the compliance is its square.
 
     Returns
     -------
     StreamDesign
         The best of all evaluations.
     """
-    smoother = (sp.eye_array(len(start)) + reach**2 * problem.laplacian).tocsc()
+    smoother = (sp.eye_array(len(start)) + _REACH**2 * problem.laplacian).tocsc()
     factor = splu(smoother)
     tried: list[tuple[FloatArray, Objective]] = []
     ratios: list[float] = []
@@ -246,7 +242,7 @@ def design(
         field = factor.solve(x)
         # The last solution is near to this one, the best one is to be returned.
         last = tried[-1][1].solution if tried else None
-        found = problem.evaluate(field, last, tolerance)
+        found = problem.evaluate(field, last, _TOLERANCE)
         ratios.append(found.ratio)
         if len(tried) == 2:
             tried.pop() if tried[0][1].value <= tried[1][1].value else tried.pop(0)

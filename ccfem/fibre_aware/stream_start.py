@@ -8,7 +8,7 @@ import scipy.sparse as sp
 from ccfem.arrays import FloatArray
 from ccfem.elasticity.stress_field import StressField
 from ccfem.fibre_aware.smeared import SmearedPart
-from ccfem.fibre_aware.stream_design import StreamProblem
+from ccfem.fibre_aware.stream_design import DENSEST, StreamProblem
 from ccfem.fields.fill import fill_screened
 from ccfem.fields.layer_elements import Surface, positive_definite
 from ccfem.fields.layer_tension import SampledTension, layer_tension
@@ -104,7 +104,7 @@ def _fit(problem: StreamProblem, layer: Layer, tension: SampledTension, top: flo
         surface, tension.direction, tension.stress, confidence, _FILL_LENGTH
     )
     direction = orient(direction, surface.neighbours, confidence)
-    density = problem.densest * np.clip(size / top, 0.0, 1.0)
+    density = DENSEST * np.clip(size / top, 0.0, 1.0)
     weight = np.maximum(confidence, _LEAST_WEIGHT) * surface.areas
     weight = weight / weight.sum()
     x, y = grid.slopes(surface.points[surface.triangles].mean(axis=1))
@@ -121,10 +121,10 @@ def _fit(problem: StreamProblem, layer: Layer, tension: SampledTension, top: flo
 def _to_budget(problem: StreamProblem, field: FloatArray) -> FloatArray:
     """Field times the factor that uses the budget where the density stays below its bound."""
     size = np.hypot(*(slope @ field for slope in problem.slopes))
-    most = _FULLEST * problem.densest * float(problem.room.sum())
+    most = _FULLEST * DENSEST * float(problem.room.sum())
     low, high = 1e-2, 1e2
     for _ in range(60):
         middle = float(np.sqrt(low * high))
-        length = problem.room @ np.minimum(middle * size, problem.densest)
+        length = problem.room @ np.minimum(middle * size, DENSEST)
         low, high = (middle, high) if length < min(problem.budget, most) else (low, middle)
     return low * field

@@ -17,9 +17,9 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from ccfem.arrays import FloatArray, read_only
+from ccfem.arrays import FloatArray, freeze, in_brief
+from ccfem.checks import check_known, check_number
 from ccfem.elasticity.stress_field import StressField
-from ccfem.errors import InputError
 from ccfem.fibre_aware.heights import fibre_capacity
 from ccfem.fibre_aware.smeared import SmearedPart, SmearedSolution
 from ccfem.layers.layer import Layer
@@ -63,9 +63,10 @@ class UpperBound:
     angles: FloatArray
     bounds: tuple[float, ...]
 
+    __repr__ = in_brief
+
     def __post_init__(self) -> None:
-        object.__setattr__(self, "density", read_only(self.density))
-        object.__setattr__(self, "angles", read_only(self.angles))
+        freeze(self, density=float, angles=float)
 
     def share(self, ratio: float) -> float:
         """Share of the possible gain that a design with this stiffness ratio reaches."""
@@ -110,13 +111,10 @@ def upper_bound(
     InputError
         When the length is not positive, there is no layer, or for an unknown mode.
     """
-    if not 0.0 < length < np.inf or not layers or iterations < 1:
-        raise InputError(
-            "the upper bound expects a length of fibre above 0 mm, at least one layer and one "
-            f"iteration; got {length}, {len(layers)} and {iterations}"
-        )
-    if mode not in MODES:
-        raise InputError(f"no mode named '{mode}'; there are: {', '.join(MODES)}")
+    check_number("length of fibre", length, above=0.0, unit="mm")
+    check_number("number of layers", len(layers), at_least=1)
+    check_number("iterations", iterations, at_least=1)
+    check_known("mode", mode, MODES)
     part = SmearedPart.of(stress, layers[0].plane.frame)
     axial = (Strand() if strand is None else strand).stiffness(part.modulus)
     most = fibre_capacity(part, layers, machine)

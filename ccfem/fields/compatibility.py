@@ -1,14 +1,17 @@
 """The incompatibility filter: where neighbouring vectors disagree [Chen et al. 2021, Eq. 2]."""
 
-from typing import Literal
+from typing import Literal, get_args
 
 import numpy as np
 from numba import njit
 
 from ccfem.arrays import BoolArray, FloatArray, IntArray
-from ccfem.errors import InputError
+from ccfem.checks import check_known
 
 __all__ = ["Incompatible", "incompatible"]
+
+_LIMIT = 0.5
+"""The paper's eta."""
 
 Incompatible = Literal["any", "majority", "all", "none"]
 
@@ -18,11 +21,11 @@ def incompatible(
     cells: IntArray,
     defined: BoolArray,
     rule: Incompatible = "any",
-    limit: float = 0.5,
 ) -> BoolArray:
     """Mark the cells whose vector disagrees with those of the cells round them.
 
-    Two cells are neighbours when they share a node; they disagree when ``v . v* <= limit``.
+    Two cells are neighbours when they share a node; they disagree when ``v . v* <= 0.5``, the
+    paper's eta.
 
     Parameters
     ----------
@@ -35,8 +38,6 @@ def incompatible(
     rule : {"any", "majority", "all", "none"}, default "any"
         Which share of the neighbours has to disagree. The paper prints "for all", which marks next
         to nothing; "any" gives its figures.
-    limit : float, default 0.5
-        The paper's eta.
 
     Returns
     -------
@@ -44,14 +45,11 @@ def incompatible(
     """
     if rule == "none":
         return np.zeros(len(cells), dtype=bool)
-    if rule not in ("any", "majority", "all"):
-        raise InputError(
-            f"incompatible must be one of any, majority, all, none; got {rule!r}: choose one"
-        )
+    check_known("rule on incompatible directions", rule, get_args(Incompatible))
     nodes = cells.ravel()
     order = np.argsort(nodes, kind="stable")
     start = np.searchsorted(nodes[order], np.arange(int(nodes.max()) + 2))
-    against, asked = _disagreeing(direction, cells, defined, order // 4, start, limit)
+    against, asked = _disagreeing(direction, cells, defined, order // 4, start, _LIMIT)
     if rule == "any":
         return defined & (against > 0)
     if rule == "majority":

@@ -4,16 +4,24 @@ B. Jobard, W. Lefer, Creating evenly-spaced streamlines of arbitrary density, Vi
 Scientific Computing '97, Springer (1997) 43.
 """
 
-from typing import Any, NamedTuple
+from typing import NamedTuple
 
 import numpy as np
 import shapely
 from numba import njit
 
 from ccfem.arrays import FloatArray, IntArray
+from ccfem.checks import check_number
 from ccfem.errors import InputError
-from ccfem.fields.streamlines import direction_at, streamline_step, triangle_neighbours
+from ccfem.fields.streamlines import (
+    direction_at,
+    mean_and_shear,
+    streamline_step,
+    triangle_neighbours,
+)
 from ccfem.geometry.section_grid import SectionGrid, contains, section_grid
+from ccfem.geometry.shapes import Region
+from ccfem.tensor import strongest_in_plane
 
 __all__ = ["evenly_spaced_streamlines"]
 
@@ -30,7 +38,7 @@ def evenly_spaced_streamlines(
     points: FloatArray,
     triangles: IntArray,
     plane_stress: FloatArray,
-    region: Any,
+    region: Region,
     separation: float,
     closest: float = 0.5,
 ) -> list[FloatArray]:
@@ -62,16 +70,11 @@ def evenly_spaced_streamlines(
         In the order in which they were found, in steps of a tenth of the separation; a line that
         comes back to its start is closed: its last point is its first.
     """
-    if not 0.0 < separation < np.inf or not 0.0 < closest < 1.0:
-        raise InputError(
-            "streamlines need a separation above 0 mm and closest between 0 and 1; got "
-            f"{separation} and {closest}"
-        )
+    check_number("separation of streamlines", separation, above=0.0, unit="mm")
+    check_number("closest", closest, above=0.0, below=1.0)
     if shapely.is_empty(region) or not len(triangles):
         return []
-    s11, s22, s12 = plane_stress.T
-    field = np.stack([0.5 * (s11 + s22), 0.5 * (s11 - s22), s12], axis=1)
-    sizes = np.abs(field[:, 0]) + np.hypot(field[:, 1], field[:, 2])
+    field, sizes = mean_and_shear(plane_stress), np.abs(strongest_in_plane(plane_stress)[0])
     middles = points[triangles].mean(axis=1)
     seeds = np.argsort(-sizes[triangles].mean(axis=1), kind="stable")
     seeds = seeds[shapely.contains_xy(region, middles[seeds])]
@@ -87,7 +90,7 @@ def evenly_spaced_streamlines(
         _Field(
             np.ascontiguousarray(points[triangles]),
             np.ascontiguousarray(field[triangles]),
-            triangle_neighbours(triangles, len(points)),
+            triangle_neighbours(triangles),
             _LEAST * float(sizes.max()),
         ),
         grid,
@@ -169,7 +172,8 @@ def _lay(field, grid, laid, seeds, homes, apart, test, step):  # type: ignore[no
             x, y = seeds[tried]
             home = homes[tried]
             tried += 1
-        if not contains(grid, x, y) or _occupied(laid, x, y, apart * (1.0 - _SLACK)):
+        taken = _crowded(laid, x, y, -1, 0.0, apart * (1.0 - _SLACK), False)
+        if taken or not contains(grid, x, y):
             continue
         turn, end, ring = _trace(field, grid, laid, count, lines, x, y, home, test, step)
         if end - count < apart / step:
@@ -247,25 +251,11 @@ def _take_back(laid, first, end):  # type: ignore[no-untyped-def]
 
 
 @njit(cache=True, nogil=True)
-def _occupied(laid, x, y, limit):  # type: ignore[no-untyped-def]
-    """Whether a point of any line is nearer than a limit."""
-    i, j = _cell(laid, x, y)
-    nx, ny = laid.head.shape
-    for a in range(max(i - 1, 0), min(i + 2, nx)):
-        for b in range(max(j - 1, 0), min(j + 2, ny)):
-            q = laid.head[a, b]
-            while q >= 0:
-                if (laid.spot[q, 0] - x) ** 2 + (laid.spot[q, 1] - y) ** 2 < limit * limit:
-                    return True
-                q = laid.following[q]
-    return False
-
-
-@njit(cache=True, nogil=True)
 def _crowded(laid, x, y, number, along, limit, homing):  # type: ignore[no-untyped-def]
     """Whether a point of another line, or of another stretch of this one, is nearer than a limit.
 
-    A line that comes home meets the stretch about its seed: that does not count.
+    A line that comes home meets the stretch about its seed: that does not count. Line -1 has no
+    points yet.
     """
     i, j = _cell(laid, x, y)
     nx, ny = laid.head.shape

@@ -8,15 +8,16 @@ from ccfem.fields.layer_elements import Surface, positive_definite
 
 __all__ = ["fill_laplacian", "fill_screened"]
 
+_AVERAGES = 50
+
 
 def fill_laplacian(
     surface: Surface,
     direction: FloatArray,
     stress: FloatArray,
     defined: BoolArray,
-    iterations: int = 50,
 ) -> tuple[FloatArray, FloatArray]:
-    """Fill by repeated averaging over neighbouring triangles [Chen et al. 2021, Eq. 3-4].
+    """Fill by averaging over neighbouring triangles, 50 times [Chen et al. 2021, Eq. 3-4].
 
     The face of the largest stress is held. The energy that this descends has a constant minimiser,
     so more iterations keep degrading the field: `fill_screened` does not.
@@ -28,7 +29,6 @@ def fill_laplacian(
         Oriented vectors; those of undefined triangles are ignored.
     stress : (t,) array, MPa
     defined : (t,) bool array
-    iterations : int, default 50
 
     Returns
     -------
@@ -44,7 +44,7 @@ def fill_laplacian(
     held = int(np.argmax(np.where(defined, stress, -np.inf)))
     values = np.column_stack([np.where(defined[:, None], direction, 0.0), stress])
     fixed = values[held].copy()
-    for _ in range(iterations):
+    for _ in range(_AVERAGES):
         values = adjacency @ values / degree
         values[held] = fixed
     length = np.linalg.norm(values[:, :2], axis=1)

@@ -11,6 +11,8 @@ from scipy.sparse.linalg import splu
 from ccfem.arrays import FloatArray, IntArray, read_only
 from ccfem.geometry.isocontours import triangle_edges
 from ccfem.layers.layer import Layer
+from ccfem.mesh.facets import paired
+from ccfem.mesh.measures import signed_areas
 
 __all__ = ["Surface", "positive_definite"]
 
@@ -46,9 +48,7 @@ class Surface:
     @cached_property
     def areas(self) -> FloatArray:
         """Area of each triangle, (t,), mm^2."""
-        a, b, c = np.moveaxis(self.points[self.triangles], 1, 0)
-        u, v = b - a, c - a
-        return read_only(0.5 * (u[:, 0] * v[:, 1] - u[:, 1] * v[:, 0]))
+        return read_only(signed_areas(self.points, self.triangles))
 
     @cached_property
     def gradients(self) -> FloatArray:
@@ -115,15 +115,10 @@ class Surface:
     @cached_property
     def edges(self) -> tuple[IntArray, IntArray]:
         """Unique edges (e, 2), and the edges (t, 3) opposite to the corners of each triangle."""
-        return triangle_edges(self.triangles, len(self.points))
+        return triangle_edges(self.triangles)
 
     @cached_property
     def neighbours(self) -> IntArray:
         """Pairs of triangles that share an edge, (f, 2)."""
-        edges, of_triangle = self.edges
-        triangle = np.repeat(np.arange(len(self.triangles)), 3)
-        shape = (len(edges), len(self.triangles))
-        ones = np.ones(len(triangle), dtype=np.int8)
-        table = sparse.csr_array((ones, (of_triangle.ravel(), triangle)), shape=shape)
-        shared = table.indptr[:-1][np.diff(table.indptr) == 2]
-        return read_only(np.stack([table.indices[shared], table.indices[shared + 1]], 1), np.int64)
+        sides = self.triangles[:, [[1, 2], [2, 0], [0, 1]]].reshape(-1, 2)
+        return read_only(paired(sides)[0] // 3, int)

@@ -9,10 +9,10 @@ from ccfem.arrays import BoolArray, FloatArray
 from ccfem.elasticity.part_stress import PartStress
 from ccfem.fields.compatibility import Incompatible, incompatible
 from ccfem.fields.orientation import orient
-from ccfem.fields.tensile import UNDEFINED, Tension, plane_tension, spatial_tension
+from ccfem.fields.tensile import Tension, plane_tension, spatial_tension
 from ccfem.layers.layer import Layer
 from ccfem.layers.layer_stress import LayerStress
-from ccfem.tensor import in_plane
+from ccfem.tensor import in_plane, strongest_in_plane
 
 __all__ = ["MeshTension", "SampledTension", "layer_tension", "mesh_tension"]
 
@@ -64,20 +64,16 @@ def layer_tension(
     plane = in_plane(tensors, layer.plane.frame)
     tension = plane_tension(plane, compression_limit)
     if sense == "absolute":
-        tension = _absolute(tension, plane)
+        tension = _absolute(plane)
     return SampledTension(tension.direction, tension.stress, tension.defined, oriented=False)
 
 
-def _absolute(tension: Tension, plane: FloatArray) -> Tension:
+def _absolute(plane: FloatArray) -> Tension:
     """Direction and size of the principal stress of the largest size, whatever its sign."""
-    pulled = plane_tension(plane, _ANY_COMPRESSION)
-    pushed = plane_tension(-plane, _ANY_COMPRESSION)
-    push = pushed.stress > pulled.stress
-    return Tension(
-        np.where(push[:, None], pushed.direction, pulled.direction),
-        np.where(push, pushed.stress, pulled.stress),
-        pulled.defined | pushed.defined,
-    )
+    value, angle, _ = strongest_in_plane(plane)
+    size = np.abs(value)
+    direction = np.stack([np.cos(angle), np.sin(angle)], axis=1)
+    return Tension(direction, size, size > 0.0)
 
 
 @dataclass(frozen=True)
@@ -123,7 +119,7 @@ def mesh_tension(
     tension = spatial_tension(tensors, compression_limit)
     if sense == "absolute":
         pushed = spatial_tension(-tensors, _ANY_COMPRESSION)
-        push = pushed.stress > np.where(tension.defined, tension.stress, UNDEFINED)
+        push = pushed.stress > tension.stress
         tension = Tension(
             np.where(push[:, None], pushed.direction, tension.direction),
             np.where(push, pushed.stress, tension.stress),

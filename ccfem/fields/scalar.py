@@ -12,6 +12,8 @@ from ccfem.fields.layer_elements import Surface, positive_definite
 __all__ = ["fit_cone", "fit_constrained", "fit_literal", "fit_weighted"]
 
 _REGULARISATION = 1e-10
+_ITERATIONS = 20
+"""Of the alternating direction method: see `fit_constrained`."""
 _PENALTY = 1.0
 """Penalty of the alternating direction method, in units of the spacing weight."""
 _RELAXATION = 1.7
@@ -77,7 +79,6 @@ def fit_constrained(
     weight: FloatArray,
     width: float,
     spacing_weight: float = 0.1,
-    iterations: int = 20,
 ) -> FloatArray:
     """As `fit_weighted`, subject to ``|grad s| <= 1 / width`` on every triangle.
 
@@ -96,7 +97,6 @@ def fit_constrained(
     density : (t,) array, 1/mm
         Wanted number of isocurves per mm; capped at ``1 / width``.
     width : float, mm
-    iterations : int, default 20
 
     Returns
     -------
@@ -112,7 +112,7 @@ def fit_constrained(
     bounded = np.zeros((len(target), 2))
     dual = np.zeros_like(bounded)
     values = np.zeros(len(source))
-    for _ in range(iterations):
+    for _ in range(_ITERATIONS):
         values = solver.solve(source + divergence @ (bounded - dual).ravel())
         steep = (gradient @ values).reshape(-1, 2)
         free = _RELAXATION * steep + (1.0 - _RELAXATION) * bounded + dual
@@ -152,7 +152,8 @@ def fit_cone(
     import cvxpy
 
     count = len(surface.points)
-    density = np.minimum(density, 1.0 / width)
+    # In widths, so that the bound is 1: the solver judges its accuracy by sizes near 1.
+    target = np.minimum(density * width, 1.0)
     normal = np.column_stack([-direction[:, 1], direction[:, 0]])
     rows = np.repeat(np.arange(len(surface.triangles)), 3)
     shape = (len(surface.triangles), count)
@@ -165,19 +166,19 @@ def fit_cone(
     field = cvxpy.Variable(count)
     ones = np.ones((len(root), 1))
     misaligned = cvxpy.multiply(root, along(direction) @ field)
-    uneven = cvxpy.multiply(np.sqrt(spacing_weight) * root, along(normal) @ field - density)
+    uneven = cvxpy.multiply(np.sqrt(spacing_weight) * root, along(normal) @ field - target)
     gradient = cvxpy.vstack(
         [along(ones * np.array([1.0, 0.0])) @ field, along(ones * np.array([0.0, 1.0])) @ field]
     )
     usable = np.flatnonzero(np.abs(surface.gradients).max(axis=(1, 2)) > 0.0)
     problem = cvxpy.Problem(
         cvxpy.Minimize(cvxpy.sum_squares(misaligned) + cvxpy.sum_squares(uneven)),
-        [cvxpy.norm(gradient[:, usable], axis=0) <= 1.0 / width, field[0] == 0.0],
+        [cvxpy.norm(gradient[:, usable], axis=0) <= 1.0, field[0] == 0.0],
     )
     problem.solve(solver=cvxpy.CLARABEL)
     if problem.status != cvxpy.OPTIMAL or field.value is None:
         raise SolveError(f"the constrained scalar field ended as '{problem.status}' (Clarabel)")
-    return np.asarray(field.value)
+    return np.asarray(field.value) / width
 
 
 def _weighted_form(

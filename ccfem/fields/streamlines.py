@@ -4,10 +4,21 @@ import numpy as np
 from numba import njit
 
 from ccfem.arrays import FloatArray, IntArray
-from ccfem.errors import InputError
+from ccfem.checks import check_number
 from ccfem.geometry.locate import locate
+from ccfem.mesh.facets import paired
+from ccfem.tensor import strongest_in_plane
 
-__all__ = ["direction_at", "streamline_step", "streamlines", "triangle_neighbours"]
+__all__ = [
+    "direction_at",
+    "mean_and_shear",
+    "streamline_step",
+    "streamlines",
+    "triangle_neighbours",
+]
+
+_LONGEST = 10.0
+"""Length at which a line stops in either sense, in diagonals of the points."""
 
 _SHARPEST = 0.5
 """Cosine of the largest turn of the direction within one step: beyond 60 degrees two families of
@@ -21,7 +32,6 @@ def streamlines(
     starts: FloatArray,
     step: float,
     least: float = 0.02,
-    longest: float | None = None,
 ) -> list[FloatArray]:
     """Lines that follow the direction of the principal stress of the largest size.
 
@@ -43,9 +53,6 @@ def streamlines(
     least : float in [0, 1), default 0.02
         A line stops where the difference of the two principal stresses, or the larger of their
         sizes, is below this share of the largest size on the layer.
-    longest : float, mm, optional
-        Length at which a line stops in either sense; by default ten times the diagonal of the
-        points.
 
     Returns
     -------
@@ -54,19 +61,15 @@ def streamlines(
         comes back to its start within one step is closed: its last point is its first. Lines end
         inside the triangles, less than a step from the border that they run out of.
     """
-    if not 0.0 < step < np.inf:
-        raise InputError(f"step of streamlines must be above 0 mm; got {step}")
+    check_number("step of streamlines", step, above=0.0, unit="mm")
     starts = np.asarray(starts, dtype=np.float64).reshape(-1, 2)
     if not len(starts) or not len(triangles):
         return [np.zeros((0, 2)) for _ in starts]
-    s11, s22, s12 = plane_stress.T
-    field = np.stack([0.5 * (s11 + s22), 0.5 * (s11 - s22), s12], axis=1)
-    size = float((np.abs(field[:, 0]) + np.hypot(field[:, 1], field[:, 2])).max())
+    field, size = mean_and_shear(plane_stress), np.abs(strongest_in_plane(plane_stress)[0]).max()
     corners = np.ascontiguousarray(points[triangles])
-    beside = triangle_neighbours(triangles, len(points))
-    if longest is None:
-        longest = 10.0 * float(np.linalg.norm(points.max(axis=0) - points.min(axis=0)))
-    steps = int(np.ceil(longest / step))
+    beside = triangle_neighbours(triangles)
+    diagonal = float(np.linalg.norm(points.max(axis=0) - points.min(axis=0)))
+    steps = int(np.ceil(_LONGEST * diagonal / step))
     home, _ = locate(points, triangles, starts, 1e-6)
     values = np.ascontiguousarray(field[triangles])
     lines = []
@@ -84,14 +87,17 @@ def streamlines(
     return lines
 
 
-def triangle_neighbours(triangles: IntArray, count: int) -> IntArray:
+def mean_and_shear(plane_stress: FloatArray) -> FloatArray:
+    """Mean, half the difference and shear of plane stress (n, 3), MPa: linear in the stress."""
+    s11, s22, s12 = plane_stress.T
+    return np.stack([0.5 * (s11 + s22), 0.5 * (s11 - s22), s12], axis=1)
+
+
+def triangle_neighbours(triangles: IntArray) -> IntArray:
     """Triangle beyond the side opposite to each corner, (t, 3), -1 at the border."""
-    sides = np.sort(triangles[:, [[1, 2], [2, 0], [0, 1]]].reshape(-1, 2), axis=1)
-    key = sides[:, 0] * count + sides[:, 1]
-    order = np.argsort(key, kind="stable")
-    same = np.flatnonzero(key[order[1:]] == key[order[:-1]])
-    one, other = order[same], order[same + 1]
-    beside = np.full(len(key), -1, dtype=np.int64)
+    sides = triangles[:, [[1, 2], [2, 0], [0, 1]]].reshape(-1, 2)
+    one, other = paired(sides)[0].T
+    beside = np.full(len(sides), -1, dtype=np.int64)
     beside[one], beside[other] = other // 3, one // 3
     return beside.reshape(-1, 3)
 

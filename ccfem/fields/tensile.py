@@ -5,12 +5,9 @@ from dataclasses import dataclass
 import numpy as np
 
 from ccfem.arrays import BoolArray, FloatArray
-from ccfem.tensor import largest_in_plane, principal
+from ccfem.tensor import largest_in_plane, principal, strongest
 
-__all__ = ["UNDEFINED", "Tension", "plane_tension", "spatial_tension"]
-
-UNDEFINED = 1e-5
-"""Stress, MPa, that the paper gives to places without a tensile direction."""
+__all__ = ["Tension", "plane_tension", "spatial_tension"]
 
 
 @dataclass(frozen=True)
@@ -22,7 +19,8 @@ class Tension:
     direction : (k, 2) or (k, 3) array
         Unit vectors; lines, so the sign means nothing.
     stress : (k,) array, MPa
-        Tensile stress along the direction, `UNDEFINED` where there is none.
+        Tensile stress along the direction, 0 where there is none: 1e-5 MPa in the paper, which
+        would weigh more, the smaller the load.
     defined : (k,) bool array
         Whether there is a tensile direction.
     """
@@ -59,7 +57,7 @@ def spatial_tension(stress: FloatArray, compression_limit: float = 3.0) -> Tensi
     taken = np.where(second, 1, 0)
     rows = np.arange(len(values))
     defined = first | second
-    size = np.where(defined, values[rows, taken], UNDEFINED)
+    size = np.where(defined, values[rows, taken], 0.0)
     return Tension(directions[rows, :, taken], size, defined)
 
 
@@ -86,6 +84,6 @@ def plane_tension(plane_stress: FloatArray, compression_limit: float = 3.0) -> T
     defined = (largest > 0.0) & (-smallest < compression_limit * largest)
     direction = np.stack([np.cos(angle), np.sin(angle)], axis=1)
     across = np.stack([-direction[:, 1], direction[:, 0]], axis=1)
-    compressed = ~defined & (np.abs(smallest) > np.abs(largest))
-    direction = np.where(compressed[:, None], across, direction)
-    return Tension(direction, np.where(defined, largest, UNDEFINED), defined)
+    compressed, _ = strongest(largest, smallest)
+    direction = np.where((compressed & ~defined)[:, None], across, direction)
+    return Tension(direction, np.where(defined, largest, 0.0), defined)

@@ -12,9 +12,8 @@ import numpy as np
 from numba import njit
 
 from ccfem.arrays import FloatArray, IntArray
-from ccfem.errors import InputError
 
-__all__ = ["WORDS", "advance", "curve_points", "dubins", "dubins_curve", "word_sizes"]
+__all__ = ["WORDS", "advance", "curve_points", "word_sizes"]
 
 WORDS: IntArray = np.array(
     [[1, 0, 1], [-1, 0, -1], [1, 0, -1], [-1, 0, 1], [1, -1, 1], [-1, 1, -1]], dtype=np.int64
@@ -27,49 +26,26 @@ _TOUCHING = 1e-10
 """Distance in radii below which circles coincide, or touch."""
 
 
-def dubins(starts: FloatArray, ends: FloatArray, radius: float) -> tuple[IntArray, FloatArray]:
-    """Shortest curve of bounded curvature from each start to its end.
-
-    Parameters
-    ----------
-    starts, ends : (n, 3) arrays
-        Poses: x, y in mm and the heading in radians.
-    radius : float, mm
-        Tightest turn, > 0.
-
-    Returns
-    -------
-    turns : (n, 3) int array
-        Of the three pieces: 1 an arc to the left, -1 to the right, 0 a straight line.
-    sizes : (n, 3) array, mm
-        Length of each piece; their sum is the length of the curve.
-
-    Raises
-    ------
-    InputError
-        For a radius that is not positive, or poses of another shape.
-    """
-    starts, ends = (np.ascontiguousarray(poses, dtype=np.float64) for poses in (starts, ends))
-    if not 0.0 < radius < np.inf:
-        raise InputError(f"radius of Dubins curves must be above 0 mm; got {radius}")
-    if starts.ndim != 2 or starts.shape[1] != 3 or starts.shape != ends.shape:
-        raise InputError(
-            f"poses must be two arrays of shape (n, 3); got {starts.shape} and {ends.shape}: give "
-            "x, y and heading of each"
-        )
-    word, sizes = _shortest(starts, ends, float(radius))
-    return WORDS[word] * np.where(sizes < 0.0, -1, 1), np.abs(sizes)
-
-
-def dubins_curve(start: FloatArray, end: FloatArray, radius: float, step: float) -> FloatArray:
-    """Points of the shortest curve of bounded curvature between two poses.
+def curve_points(
+    start: FloatArray,
+    end: FloatArray,
+    turns: IntArray,
+    sizes: FloatArray,
+    radius: float,
+    step: float,
+) -> FloatArray:
+    """Points of a curve from one pose to another.
 
     Parameters
     ----------
     start, end : (3,) arrays
         Poses: x, y in mm and the heading in radians.
+    turns : (3,) int array
+        Of the three pieces: 1 an arc to the left, -1 to the right, 0 a straight line.
+    sizes : (3,) array, mm
+        Length of each piece, >= 0.
     radius : float, mm
-        Tightest turn, > 0.
+        Of the arcs, > 0.
     step : float, mm
         Longest distance along the curve between neighbouring points, > 0.
 
@@ -79,21 +55,6 @@ def dubins_curve(start: FloatArray, end: FloatArray, radius: float, step: float)
         The first and the last point are those given, exactly; both ends of every piece are among
         the points. k = 1 where the poses are the same.
     """
-    if not 0.0 < step < np.inf:
-        raise InputError(f"step of Dubins curves must be above 0 mm; got {step}")
-    turns, sizes = dubins(np.reshape(start, (1, 3)), np.reshape(end, (1, 3)), radius)
-    return curve_points(np.asarray(start), np.asarray(end), turns[0], sizes[0], radius, step)
-
-
-def curve_points(
-    start: FloatArray,
-    end: FloatArray,
-    turns: IntArray,
-    sizes: FloatArray,
-    radius: float,
-    step: float,
-) -> FloatArray:
-    """Points (k, 2), mm, of a curve given by turns (3,) and sizes (3,), as `dubins_curve`."""
     # Pieces shorter than this would only be repeated points.
     parts = np.where(sizes > 1e-9, np.ceil(sizes / step - 1e-9), 0).astype(np.int64)
     line = _sample(np.asarray(start, dtype=np.float64), turns, sizes, parts, float(radius))
@@ -176,21 +137,3 @@ def word_sizes(start, end, radius, sizes):  # type: ignore[no-untyped-def]
             sizes[word, 1] = _round(middle * (other - one))
             sizes[word, 2] = _round(last * (end[2] - other))
         sizes[word] *= radius
-
-
-@njit(cache=True, nogil=True)
-def _shortest(starts, ends, radius):  # type: ignore[no-untyped-def]
-    count = len(starts)
-    words, best = np.zeros(count, np.int64), np.empty((count, 3))
-    sizes = np.empty((6, 3))
-    for k in range(count):
-        word_sizes(starts[k], ends[k], radius, sizes)
-        least = np.inf
-        for word in range(6):
-            length = np.abs(sizes[word]).sum()
-            # Words that agree to rounding: the first, so that the answer does not flicker.
-            if length < least - 1e-9 * radius:
-                least = length
-                words[k] = word
-        best[k] = sizes[words[k]]
-    return words, best

@@ -2,13 +2,14 @@
 
 from collections.abc import Sequence
 from dataclasses import dataclass
-from typing import Any
 
 import numpy as np
 import shapely
 
 from ccfem.arrays import FloatArray, IntArray
 from ccfem.geometry.offsets import rings
+from ccfem.geometry.polylines import is_closed, line_length, straight_pieces
+from ccfem.geometry.shapes import Region
 
 __all__ = ["lead_on", "strips"]
 
@@ -19,7 +20,7 @@ _LEAST = 0.3
 """Shortest way, in pitches, by which an end is led on."""
 
 
-def strips(lines: Sequence[FloatArray], pitch: float) -> Any:
+def strips(lines: Sequence[FloatArray], pitch: float) -> Region:
     """Area that strands take, a pitch wide each, ends cut square: a (Multi)Polygon, mm."""
     return shapely.buffer(
         shapely.multilinestrings([shapely.LineString(line) for line in lines]),
@@ -31,8 +32,8 @@ def strips(lines: Sequence[FloatArray], pitch: float) -> Any:
 
 
 def lead_on(
-    lines: Sequence[FloatArray], region: Any, pitch: float, closest: float, reach: float
-) -> tuple[list[FloatArray], Any]:
+    lines: Sequence[FloatArray], region: Region, pitch: float, closest: float, reach: float
+) -> tuple[list[FloatArray], Region]:
     """Lead the free ends of strands on, straight, to what lies ahead where that is near.
 
     The longer of two strands goes first where both would take the same place.
@@ -71,7 +72,7 @@ def lead_on(
     start = here + 1.01 * slack * along
     rays = shapely.linestrings(np.stack([start, here + reach * along], axis=1))
     ahead = _Obstacles.of(lines, region, pitch)
-    ways: list[Any] = []
+    ways: list[shapely.LineString] = []
     for k, space in rooms.round(start).items():
         free = open_parts.round(start[k : k + 1]).get(0, shapely.Polygon())
         rivals = [way for way in ways if way.distance(rays[k]) < (closest + 0.5) * pitch]
@@ -90,31 +91,30 @@ def lead_on(
         if ahead.angle(stop, along[k], number) >= np.radians(_STEEPEST):
             ways.append(shapely.LineString([here[k], stop]))
             led[number] = np.insert(led[number], 0 if end == 0 else len(led[number]), stop, axis=0)
-    ways = [shapely.get_coordinates(way) for way in ways]
-    return led, shapely.difference(rest, strips(ways, pitch)) if ways else rest
+    tails = [shapely.get_coordinates(way) for way in ways]
+    return led, shapely.difference(rest, strips(tails, pitch)) if tails else rest
 
 
 def _free_ends(lines: Sequence[FloatArray], pitch: float) -> list[tuple[int, int]]:
     """Line and index (0 or -1) of every end of the open lines, the longest line first."""
-    size = np.array([np.linalg.norm(np.diff(line, axis=0), axis=1).sum() for line in lines])
+    size = np.array([line_length(line) for line in lines])
     order = np.argsort(-np.round(size / pitch, 3), kind="stable")
-    is_open = [not bool((line[0] == line[-1]).all()) for line in lines]
-    return [(int(number), end) for number in order if is_open[number] for end in (0, -1)]
+    return [(int(k), end) for k in order if not is_closed(lines[k]) for end in (0, -1)]
 
 
 class _Parts:
     """Parts of an area, found by a point inside."""
 
-    def __init__(self, area: Any) -> None:
+    def __init__(self, area: Region) -> None:
         self._tree = shapely.STRtree(shapely.get_parts(area))
 
-    def round(self, points: FloatArray) -> dict[int, Any]:
+    def round(self, points: FloatArray) -> dict[int, shapely.Polygon]:
         """Part round each of several points (k, 2) that has one."""
         point, part = self._tree.query(shapely.points(points), predicate="within")
         return dict(zip(point.tolist(), self._tree.geometries[part], strict=True))
 
 
-def _first_exit(ray: Any, space: Any) -> FloatArray | None:
+def _first_exit(ray: shapely.LineString, space: Region) -> FloatArray | None:
     """Place where a straight ray first leaves a space, None where it starts outside."""
     start = shapely.get_point(ray, 0)
     for part in shapely.get_parts(shapely.intersection(ray, space)):
@@ -129,16 +129,16 @@ def _first_exit(ray: Any, space: Any) -> FloatArray | None:
 class _Obstacles:
     """Straight pieces of strands and of the border, with the strand of each, -1 for the border."""
 
-    tree: Any
+    tree: shapely.STRtree
     along: FloatArray
     owner: IntArray
     half: float
 
     @classmethod
-    def of(cls, lines: Sequence[FloatArray], region: Any, pitch: float) -> "_Obstacles":
+    def of(cls, lines: Sequence[FloatArray], region: Region, pitch: float) -> "_Obstacles":
         border = rings(region)
         curves = [*lines, *border]
-        pairs = np.concatenate([np.stack([c[:-1], c[1:]], axis=1) for c in curves])
+        pairs = straight_pieces(curves)
         owner = np.concatenate([np.arange(len(lines)), np.full(len(border), -1)])
         along = pairs[:, 1] - pairs[:, 0]
         along = along / np.maximum(np.linalg.norm(along, axis=1), 1e-300)[:, None]

@@ -6,14 +6,14 @@ its whole length; where the guide lies decides how much of it there is.
 """
 
 from collections.abc import Sequence
-from typing import Any
 
 import numpy as np
 import shapely
 
-from ccfem.arrays import FloatArray
+from ccfem.arrays import BoolArray, FloatArray
 from ccfem.geometry.offsets import rings
-from ccfem.geometry.polylines import pack, sample_midpoints
+from ccfem.geometry.polylines import pack, sample_midpoints, straight_pieces
+from ccfem.geometry.shapes import Region
 
 __all__ = ["fitted_guides"]
 
@@ -28,7 +28,7 @@ _ROUNDS = 3
 """A guide is fitted between its neighbours, and these move too: times that all are fitted."""
 
 
-def fitted_guides(guides: Sequence[FloatArray], region: Any, pitch: float) -> list[FloatArray]:
+def fitted_guides(guides: Sequence[FloatArray], region: Region, pitch: float) -> list[FloatArray]:
     """Guides moved aside by at most half a pitch, so that gaps and overlaps become least.
 
     Parameters
@@ -45,7 +45,7 @@ def fitted_guides(guides: Sequence[FloatArray], region: Any, pitch: float) -> li
         Instead of a guide that moves by half a pitch there are two, half a pitch to either side:
         the strands beside it are the same, and a symmetric part stays so.
     """
-    border = _pieces(rings(region))
+    border = straight_pieces(rings(region))
     shifts = np.zeros(len(guides))
     moved = list(guides)
     rays = [_rays(guide, pitch) for guide in guides]
@@ -53,7 +53,7 @@ def fitted_guides(guides: Sequence[FloatArray], region: Any, pitch: float) -> li
     for _ in range(_ROUNDS):
         before = shifts.copy()
         for k, (start, normal) in enumerate(rays):
-            others = _pieces([other for j, other in enumerate(moved) if j != k])
+            others = straight_pieces([other for j, other in enumerate(moved) if j != k])
             gap, parallel, to_guide = _nearer(fixed[k], _first_hits(start, normal, others, pitch))
             shifts[k] = _best_shift(gap / pitch - np.where(to_guide, 0.0, 0.5), parallel)
             moved[k] = _aside(guides[k], shifts[k] * pitch)
@@ -85,12 +85,6 @@ def _rays(guide: FloatArray, pitch: float) -> tuple[FloatArray, FloatArray]:
     points, offsets = pack([guide])
     start, along, _, _ = sample_midpoints(points, offsets, _STEP * pitch)
     return start, np.column_stack([-along[:, 1], along[:, 0]])
-
-
-def _pieces(curves: Sequence[FloatArray]) -> FloatArray:
-    """Straight pieces (m, 2, 2) of curves."""
-    pairs = [np.stack([curve[:-1], curve[1:]], axis=1) for curve in curves]
-    return np.concatenate([np.zeros((0, 2, 2)), *pairs])
 
 
 def _first_hits(
@@ -129,7 +123,7 @@ def _first_hits(
 
 def _nearer(
     border: tuple[FloatArray, FloatArray], guides: tuple[FloatArray, FloatArray]
-) -> tuple[FloatArray, FloatArray, Any]:
+) -> tuple[FloatArray, FloatArray, BoolArray]:
     """Nearer of two hits: distance, how parallel, and whether it is the second."""
     second = guides[0] < border[0]
     gap = np.where(second, guides[0], border[0])

@@ -1,13 +1,12 @@
 """Guides: curves through a region that parallel strands start from."""
 
 from collections.abc import Sequence
-from typing import Any
 
 import numpy as np
 import shapely
 
 from ccfem.arrays import FloatArray
-from ccfem.geometry.parallel_strands import open_lines
+from ccfem.geometry.shapes import Region, open_lines
 
 __all__ = ["spaced_guides"]
 
@@ -15,7 +14,7 @@ __all__ = ["spaced_guides"]
 def spaced_guides(
     curves: Sequence[FloatArray],
     seeds: FloatArray,
-    region: Any,
+    region: Region,
     distance: float,
     least_length: float,
 ) -> list[FloatArray]:

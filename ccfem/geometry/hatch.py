@@ -1,13 +1,13 @@
 """Parallel lines across a section, and their linking into few paths."""
 
 from dataclasses import dataclass
-from typing import Any
 
 import numpy as np
 import shapely
 
-from ccfem.arrays import FloatArray, IntArray
+from ccfem.arrays import FloatArray, IntArray, repeated
 from ccfem.geometry.offsets import inset, rings
+from ccfem.geometry.shapes import Region
 
 __all__ = ["Hatch", "hatch", "link_hatch", "zigzag"]
 
@@ -63,7 +63,7 @@ def _turn(angle: float) -> FloatArray:
     return np.array([[c, s], [-s, c]])
 
 
-def hatch(section: Any, angle: float, pitch: float) -> Hatch:
+def hatch(section: Region, angle: float, pitch: float) -> Hatch:
     """Clip parallel lines to a section.
 
     Parameters
@@ -93,8 +93,8 @@ def hatch(section: Any, angle: float, pitch: float) -> Hatch:
     level_a, level_b = np.ceil((a[:, 1] - lowest) / pitch), np.ceil((b[:, 1] - lowest) / pitch)
     first = np.minimum(level_a, level_b).astype(np.int64)
     count = np.abs(level_a - level_b).astype(np.int64)
-    edge = np.repeat(np.arange(len(a)), count)
-    row = np.arange(len(edge)) - np.repeat(np.cumsum(count) - count, count) + first[edge]
+    edge, row = repeated(count)
+    row = row + first[edge]
     y = lowest + pitch * row
     t = np.clip((y - a[edge, 1]) / (b[edge, 1] - a[edge, 1]), 0.0, 1.0)
     x = a[edge, 0] + t * (b[edge, 0] - a[edge, 0])
@@ -110,7 +110,7 @@ def hatch(section: Any, angle: float, pitch: float) -> Hatch:
     )
 
 
-def link_hatch(lines: Hatch, section: Any, width: float) -> list[FloatArray]:
+def link_hatch(lines: Hatch, section: Region, width: float) -> list[FloatArray]:
     """Link the ends of hatch lines into as few paths as a sweep finds.
 
     A link joins two ends that follow each other on a border ring, so that no link crosses a line
@@ -141,7 +141,7 @@ def link_hatch(lines: Hatch, section: Any, width: float) -> list[FloatArray]:
 
 
 def zigzag(
-    section: Any, distance: float, width: float, pitch: float, angle: float
+    section: Region, distance: float, width: float, pitch: float, angle: float
 ) -> list[FloatArray]:
     """Linked hatch lines at least `distance` inside a section.
 
@@ -172,7 +172,7 @@ _FLATTEST = 1.5
 """Longest run of a straight link along the lines over their pitch: 34 degrees to the lines."""
 
 
-def _links(lines: Hatch, section: Any, width: float) -> Links:
+def _links(lines: Hatch, section: Region, width: float) -> Links:
     """All links that keep the rules of `link_hatch`."""
     order = np.lexsort((lines.position, lines.ring))
     links: Links = [{} for _ in order]

@@ -5,7 +5,7 @@ from numba import njit
 
 from ccfem.arrays import BoolArray, FloatArray, IntArray
 from ccfem.geometry.buckets import bucket
-from ccfem.geometry.polylines import lengths, subdivide
+from ccfem.geometry.polylines import lengths, starts_segment, subdivide
 
 __all__ = ["find_crossings"]
 
@@ -40,9 +40,7 @@ def find_crossings(points: FloatArray, offsets: IntArray, closed: BoolArray) -> 
     extent = points.max(axis=0) - points.min(axis=0)
     longest = max(2.0 * float(extent[0] * extent[1]) / total, 2.0 * total / len(points))
     pieces, ends, segment = subdivide(points, offsets, longest)
-    start = np.ones(len(pieces), dtype=bool)
-    start[ends[1:] - 1] = False
-    first = np.flatnonzero(start)
+    first = np.flatnonzero(starts_segment(ends))
     a, b = pieces[first], pieces[first + 1]
     grid = bucket(np.minimum(a, b) - _TOUCH, np.maximum(a, b) + _TOUCH, longest)
     following = np.arange(len(points)) + 1

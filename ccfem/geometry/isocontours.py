@@ -5,7 +5,8 @@ from dataclasses import dataclass
 import numpy as np
 from numba import njit
 
-from ccfem.arrays import FloatArray, IntArray
+from ccfem.arrays import FloatArray, IntArray, repeated
+from ccfem.mesh.facets import unique_edges
 
 __all__ = ["Isocontours", "isocontours", "least_distance", "steepest_spacing", "triangle_edges"]
 
@@ -75,7 +76,7 @@ def isocontours(
     scaled = (values - first) / step
     # A level exactly through a node would cross none or all of its edges.
     scaled = np.where(scaled == np.round(scaled), scaled + 1e-9, scaled)
-    ends, of_triangle = triangle_edges(triangles, len(points)) if edges is None else edges
+    ends, of_triangle = triangle_edges(triangles) if edges is None else edges
     low = np.ceil(np.minimum(scaled[ends[:, 0]], scaled[ends[:, 1]])).astype(np.int64)
     high = np.floor(np.maximum(scaled[ends[:, 0]], scaled[ends[:, 1]])).astype(np.int64)
     start = np.concatenate([[0], np.cumsum(np.maximum(high - low + 1, 0))])
@@ -83,24 +84,18 @@ def isocontours(
     line, offsets = _chain(of_triangle, low, high, start)
     order = np.argsort(level[line[offsets[:-1]]], kind="stable")
     sizes = np.diff(offsets)[order]
-    taken = _gather(line, offsets, order, sizes)
+    nth, number = repeated(sizes)
+    taken = line[offsets[:-1][order][nth] + number]
     new_offsets = np.concatenate([[0], np.cumsum(sizes)]).astype(np.int64)
     on, w = ends[edge[taken]], weights[taken]
     curve = (1.0 - w)[:, None] * points[on[:, 0]] + w[:, None] * points[on[:, 1]]
     return Isocontours(curve, new_offsets, level[taken[new_offsets[:-1]]], on, w)
 
 
-def _gather(line: IntArray, offsets: IntArray, order: IntArray, sizes: IntArray) -> IntArray:
-    shift = np.repeat(offsets[:-1][order] - (np.cumsum(sizes) - sizes), sizes)
-    return line[np.arange(int(sizes.sum())) + shift]
-
-
-def triangle_edges(triangles: IntArray, n: int) -> tuple[IntArray, IntArray]:
+def triangle_edges(triangles: IntArray) -> tuple[IntArray, IntArray]:
     """Return unique edges (e, 2) and the edges (t, 3) opposite to the corners of each triangle."""
-    pairs = np.concatenate([triangles[:, [1, 2]], triangles[:, [2, 0]], triangles[:, [0, 1]]])
-    key = pairs.min(axis=1) * n + pairs.max(axis=1)
-    unique, inverse = np.unique(key, return_inverse=True)
-    return np.stack(np.divmod(unique, n), axis=1), inverse.reshape(3, -1).T
+    edges, edge = unique_edges(triangles[:, [[1, 2], [2, 0], [0, 1]]].reshape(-1, 2))
+    return edges, edge.reshape(-1, 3)
 
 
 @njit(cache=True, nogil=True)

@@ -8,17 +8,18 @@ against its chord.
 
 from dataclasses import dataclass
 from itertools import pairwise
-from typing import Any
 
 import numpy as np
 import shapely
-from scipy.sparse import coo_array
-from scipy.sparse.csgraph import connected_components
 from scipy.spatial import QhullError, Voronoi, cKDTree
 
-from ccfem.arrays import BoolArray, FloatArray, IntArray, read_only
-from ccfem.errors import InputError
+from ccfem.arrays import BoolArray, FloatArray, IntArray, freeze, repeated
+from ccfem.checks import check_number
 from ccfem.geometry.offsets import rings
+from ccfem.geometry.polylines import is_closed, line_length
+from ccfem.geometry.shapes import Region
+from ccfem.mesh.facets import facet_keys
+from ccfem.mesh.measures import connected
 
 __all__ = ["MedialAxis", "MedialSegment", "medial_axis"]
 
@@ -35,7 +36,7 @@ class MedialSegment:
     Attributes
     ----------
     points : (m, 2) array, mm
-        A closed one repeats its first point.
+        A closed one repeats its first point; one that meets no other starts where it is widest.
     radius : (m,) array, mm
         Distance of each point to the border.
     left, right : (m - 1, 2) arrays, mm
@@ -52,18 +53,17 @@ class MedialSegment:
     ends: tuple[int, int]
 
     def __post_init__(self) -> None:
-        for name in ("points", "radius", "left", "right"):
-            object.__setattr__(self, name, read_only(getattr(self, name)))
+        freeze(self, points=float, radius=float, left=float, right=float)
 
     @property
     def closed(self) -> bool:
         """Whether the curve is closed."""
-        return self.ends[0] == self.ends[1] and bool((self.points[0] == self.points[-1]).all())
+        return self.ends[0] == self.ends[1] and is_closed(self.points)
 
     @property
     def length(self) -> float:
         """Length, mm."""
-        return float(np.linalg.norm(np.diff(self.points, axis=0), axis=1).sum())
+        return line_length(self.points)
 
 
 @dataclass(frozen=True)
@@ -84,12 +84,11 @@ class MedialAxis:
     segments: tuple[MedialSegment, ...]
 
     def __post_init__(self) -> None:
-        object.__setattr__(self, "nodes", read_only(self.nodes))
-        object.__setattr__(self, "radius", read_only(self.radius))
+        freeze(self, nodes=float, radius=float)
 
 
 def medial_axis(
-    section: Any,
+    section: Region,
     step: float,
     object_angle: float | None = 105.0,
     arc_chord: float | None = None,
@@ -123,8 +122,7 @@ def medial_axis(
     InputError
         For a step that is not above 0.
     """
-    if not 0.0 < step < np.inf:
-        raise InputError(f"step of the medial axis must be above 0 mm; got {step}")
+    check_number("step of the medial axis", step, above=0.0, unit="mm")
     border = _Border.of(section, step)
     nothing = MedialAxis(np.zeros((0, 2)), np.zeros(0), ())
     if len(border.points) < 4:
@@ -154,7 +152,7 @@ class _Border:
     after: IntArray
 
     @classmethod
-    def of(cls, section: Any, step: float) -> "_Border":
+    def of(cls, section: Region, step: float) -> "_Border":
         points, ring, along, around, before, after = [], [], [], [], [], []
         start = 0
         for number, line in enumerate(rings(section)):
@@ -165,8 +163,8 @@ class _Border:
             n = int(count.sum())
             if n < 3:
                 continue
-            edge = np.repeat(np.arange(len(a)), count)
-            share = (np.arange(n) - np.repeat(np.cumsum(count) - count, count)) / count[edge]
+            edge, part = repeated(count)
+            share = part / count[edge]
             here = start + np.arange(n)
             points.append(a[edge] + share[:, None] * side[edge])
             ring.append(np.full(n, number))
@@ -212,7 +210,7 @@ class _Graph:
     chord: FloatArray
 
     @classmethod
-    def inside(cls, section: Any, border: _Border, step: float) -> "_Graph | None":
+    def inside(cls, section: Region, border: _Border, step: float) -> "_Graph | None":
         try:
             diagram = Voronoi(border.points)
         except QhullError:
@@ -237,12 +235,11 @@ class _Graph:
         # Samples on one circle give several vertices in one place.
         size = np.linalg.norm(points[edges[:, 0]] - points[edges[:, 1]], axis=1)
         tiny = edges[size < _SAME * step]
-        join = coo_array((np.ones(len(tiny)), tiny.T), shape=(len(points),) * 2)
-        _, place = connected_components(join, directed=False)
+        place = connected(tiny, len(points))
         _, first = np.unique(place, return_index=True)
         points, nearest = points[first], nearest[first]
         edges = np.sort(place[edges], axis=1)
-        _, rows = np.unique(edges[:, 0] * len(points) + edges[:, 1], return_index=True)
+        _, rows = np.unique(facet_keys(edges)[0], return_index=True)
         rows = rows[edges[rows, 0] != edges[rows, 1]]
         edges, sites = edges[rows], sites[rows]
         middle = points[edges].mean(axis=1)
@@ -317,8 +314,7 @@ def _pruned(graph: _Graph, chains: list[list[int]], prune: float, step: float) -
             free = [degree[end] == 1 for end in (chain[0], chain[-1])]
             if not any(free):
                 continue
-            place = graph.points[chain]
-            length = float(np.linalg.norm(np.diff(place, axis=0), axis=1).sum())
+            length = line_length(graph.points[chain])
             if all(free):
                 least = min(step, 0.1 * float(graph.radius[chain].max()))
             else:
@@ -333,7 +329,13 @@ def _pruned(graph: _Graph, chains: list[list[int]], prune: float, step: float) -
         chains = _chains(edges, np.ones(len(edges), dtype=bool), len(graph.points))
 
 
-def _as_axis(section: Any, graph: _Graph, chains: list[list[int]]) -> MedialAxis:
+def _from_widest(chain: list[int], radius: FloatArray) -> list[int]:
+    """Return a closed chain from its place of the largest radius on."""
+    widest = int(np.argmax(np.round(radius[chain[:-1]], 6)))
+    return [*chain[widest:-1], *chain[: widest + 1]]
+
+
+def _as_axis(section: Region, graph: _Graph, chains: list[list[int]]) -> MedialAxis:
     """Values of the chains, and a node for every part of the section that has none."""
     ends = {end for chain in chains if chain[0] != chain[-1] for end in (chain[0], chain[-1])}
     starts = shapely.points(graph.points[[chain[0] for chain in chains]])
@@ -349,6 +351,8 @@ def _as_axis(section: Any, graph: _Graph, chains: list[list[int]]) -> MedialAxis
     edge_of = dict(zip(zip(a.tolist(), b.tolist(), strict=True), range(len(a)), strict=True))
     segments = []
     for chain in chains:
+        if chain[0] == chain[-1] and chain[0] not in index:
+            chain = _from_widest(chain, graph.radius)
         places = graph.points[chain]
         rows = [edge_of[(min(p, q), max(p, q))] for p, q in pairwise(chain)]
         feet, along = graph.feet[rows], np.diff(places, axis=0)

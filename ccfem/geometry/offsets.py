@@ -1,13 +1,14 @@
 """Offsets of a section from its border, and rings joined into one path."""
 
 from collections.abc import Sequence
-from typing import Any
 
 import numpy as np
 import shapely
 from shapely.geometry.polygon import orient
 
 from ccfem.arrays import FloatArray
+from ccfem.geometry.polylines import along_line, line_length
+from ccfem.geometry.shapes import Region
 
 __all__ = ["inset", "join_rings", "offset_rings", "ring_from", "rings"]
 
@@ -22,7 +23,7 @@ _RAMPS = (2.0, 1.0, 0.0)
 27, 45 and 90 degrees."""
 
 
-def inset(section: Any, distance: float, width: float = 0.0) -> Any:
+def inset(section: Region, distance: float, width: float = 0.0) -> Region:
     """Part of a section that keeps a distance from its border.
 
     Parameters
@@ -47,7 +48,7 @@ def inset(section: Any, distance: float, width: float = 0.0) -> Any:
     return inner
 
 
-def rings(section: Any) -> list[FloatArray]:
+def rings(section: Region) -> list[FloatArray]:
     """Border rings of a (Multi)Polygon as closed (k, 2) polylines, material on the left, mm."""
     found = []
     for part in shapely.get_parts(section):
@@ -59,7 +60,7 @@ def rings(section: Any) -> list[FloatArray]:
 
 
 def offset_rings(
-    section: Any, first: float, spacing: float, width: float, count: int | None = None
+    section: Region, first: float, spacing: float, width: float, count: int | None = None
 ) -> list[list[FloatArray]]:
     """Rings parallel to the border of a section, every one measured from the border itself.
 
@@ -148,16 +149,20 @@ def join_rings(
     return [
         chain[0]
         if len(chain) == 1
-        else np.concatenate([*chain[:-1], _until(chain[-1], _length(chain[-1]) - gap)])
+        else np.concatenate([*chain[:-1], _until(chain[-1], line_length(chain[-1]) - gap)])
         for chain in chains
     ]
 
 
 def _ramp(
-    ring: FloatArray, inner: Sequence[FloatArray], spacing: float, gap: float, walls: Any
+    ring: FloatArray,
+    inner: Sequence[FloatArray],
+    spacing: float,
+    gap: float,
+    walls: shapely.MultiLineString,
 ) -> tuple[FloatArray, FloatArray, int] | None:
     """`ring` opened, the nearest ring of the next level from its start, and its position there."""
-    length, longest = _length(ring), gap + _RAMPS[0] * spacing
+    length, longest = line_length(ring), gap + _RAMPS[0] * spacing
     if not inner or length < 2.0 * longest:
         return None
     landing = _until(ring, length - gap)[-1]
@@ -165,7 +170,7 @@ def _ramp(
     distances = shapely.distance(curves, shapely.points(landing))
     nearest = int(np.argmin(distances))
     partner = ring_from(inner[nearest], landing)
-    if distances[nearest] > 1.5 * spacing or _length(partner) < 2.0 * longest:
+    if distances[nearest] > 1.5 * spacing or line_length(partner) < 2.0 * longest:
         return None
     for ramp in _RAMPS:
         opened = _until(ring, length - gap - ramp * spacing)
@@ -176,13 +181,9 @@ def _ramp(
     return None
 
 
-def _length(line: FloatArray) -> float:
-    return float(np.linalg.norm(np.diff(line, axis=0), axis=1).sum())
-
-
 def _until(line: FloatArray, distance: float) -> FloatArray:
     """Part of a polyline up to a distance along it."""
-    along = np.concatenate([[0.0], np.cumsum(np.linalg.norm(np.diff(line, axis=0), axis=1))])
+    along = along_line(line)
     k = int(np.searchsorted(along, distance))
     t = (distance - along[k - 1]) / (along[k] - along[k - 1])
     return np.concatenate([line[:k], [line[k - 1] + t * (line[k] - line[k - 1])]])

@@ -2,16 +2,17 @@
 
 from collections.abc import Sequence
 from itertools import pairwise
-from typing import Any
 
 import numpy as np
 import shapely
 
 from ccfem.arrays import FloatArray, IntArray
 from ccfem.geometry.free_ends import lead_on
+from ccfem.geometry.polylines import is_closed, line_length, straight_pieces
+from ccfem.geometry.shapes import Region, open_lines
 from ccfem.geometry.shells import concentric
 
-__all__ = ["fill_rest", "grow", "lengthened", "open_lines", "parallels"]
+__all__ = ["fill_rest", "grow", "lengthened", "parallels"]
 
 _ARC = 16
 """Segments of a quarter turn round an end or a corner of a curve."""
@@ -30,7 +31,7 @@ _TOLERANCE = 2e-3
 
 def grow(
     curves: Sequence[FloatArray],
-    region: Any,
+    region: Region,
     pitch: float,
     closest: float,
     count: int | None = None,
@@ -67,7 +68,7 @@ def grow(
                 shapely.LineString(lengthened(part, room, 1e-6 * pitch, 1.4 * slack)), region
             )
         )
-        if _length(line) >= pitch
+        if line_length(line) >= pitch
     ]
     lines, rest = lead_on(lines, region, pitch, closest, _REACH * pitch)
     return lines + fill_rest(rest, pitch, closest)
@@ -75,7 +76,7 @@ def grow(
 
 def parallels(
     curves: Sequence[FloatArray],
-    region: Any,
+    region: Region,
     pitch: float,
     closest: float,
     count: int | None = None,
@@ -110,9 +111,8 @@ def parallels(
     if not len(curves):
         return []
     strings = np.array([shapely.LineString(curve) for curve in curves])
-    pairs = [np.stack([curve[:-1], curve[1:]], axis=1) for curve in curves]
-    sides = shapely.STRtree(shapely.linestrings(np.concatenate(pairs)))
-    owners = np.repeat(np.arange(len(curves)), [len(pair) for pair in pairs])
+    sides = shapely.STRtree(shapely.linestrings(straight_pieces(curves)))
+    owners = np.repeat(np.arange(len(curves)), [len(curve) - 1 for curve in curves])
     if whole:
         strings = np.array([shapely.multilinestrings(strings)])
         owners = np.zeros_like(owners)
@@ -145,7 +145,7 @@ def parallels(
 
 
 def _own_pieces(
-    ring: FloatArray, sides: Any, owners: IntArray, distance: float, tolerance: float
+    ring: FloatArray, sides: shapely.STRtree, owners: IntArray, distance: float, tolerance: float
 ) -> list[FloatArray]:
     """Pieces of a ring that lie at a distance from their nearest curve, split where that changes.
 
@@ -173,7 +173,7 @@ def _without_hooks(line: FloatArray, least: float) -> FloatArray:
     return line[long[0] : long[-1] + 2] if len(long) else line
 
 
-def fill_rest(rest: Any, pitch: float, closest: float) -> list[FloatArray]:
+def fill_rest(rest: Region, pitch: float, closest: float) -> list[FloatArray]:
     """Concentric strands in what other strands leave open.
 
     Parameters
@@ -198,20 +198,7 @@ def fill_rest(rest: Any, pitch: float, closest: float) -> list[FloatArray]:
     return concentric(shapely.multipolygons(parts), pitch, closest, walls=False)
 
 
-def open_lines(shapes: Any) -> list[FloatArray]:
-    """Lines of geometries as (k, 2) arrays, pieces that touch end to end joined."""
-    found = []
-    for shape in np.atleast_1d(shapes):
-        merged = shape if shape.geom_type == "LineString" else shapely.line_merge(shape)
-        found += [
-            shapely.get_coordinates(part)
-            for part in shapely.get_parts(merged)
-            if part.geom_type == "LineString" and part.length > 0.0
-        ]
-    return found
-
-
-def lengthened(line: FloatArray, region: Any, near: float, length: float) -> FloatArray:
+def lengthened(line: FloatArray, region: Region, near: float, length: float) -> FloatArray:
     """Open line made longer, straight, at ends that lie near the border of a region.
 
     Parameters
@@ -224,7 +211,7 @@ def lengthened(line: FloatArray, region: Any, near: float, length: float) -> Flo
     length : float, mm
         By how much.
     """
-    if bool((line[0] == line[-1]).all()):
+    if is_closed(line):
         return line
     gap = shapely.distance(region.boundary, shapely.points(line[[0, -1]]))
     parts = [line]
@@ -239,7 +226,3 @@ def lengthened(line: FloatArray, region: Any, near: float, length: float) -> Flo
 
 def _smooth(line: FloatArray, tolerance: float) -> FloatArray:
     return shapely.get_coordinates(shapely.simplify(shapely.LineString(line), tolerance))
-
-
-def _length(line: FloatArray) -> float:
-    return float(np.linalg.norm(np.diff(line, axis=0), axis=1).sum())

@@ -1,11 +1,12 @@
 """Where points and steps lie about a section: in it, over a void of it, or outside."""
 
-from typing import Any, NamedTuple
+from typing import NamedTuple
 
 import numpy as np
 import shapely
 
 from ccfem.arrays import FloatArray, IntArray
+from ccfem.geometry.shapes import Region
 
 __all__ = ["INSIDE", "OUTSIDE", "TOLERANCE", "VOID", "Pieces", "cut_at_section", "section_places"]
 
@@ -35,26 +36,24 @@ class Pieces(NamedTuple):
     place: IntArray
 
 
-def section_places(points: FloatArray, section: Any, tolerance: float = TOLERANCE) -> IntArray:
-    """Place of points about a section.
+def section_places(points: FloatArray, section: Region) -> IntArray:
+    """Place of points about a section; those up to `TOLERANCE` from it are inside.
 
     Parameters
     ----------
     points : (n, 2) array, mm
     section : Polygon or MultiPolygon
         Such as `Layer.polygon`.
-    tolerance : float, mm
-        Points no further than this from the section are inside.
 
     Returns
     -------
     (n,) int array
         INSIDE, VOID or OUTSIDE.
     """
-    return _places(points, shapely.buffer(section, tolerance, quad_segs=2))
+    return _places(points, shapely.buffer(section, TOLERANCE, quad_segs=2))
 
 
-def _places(points: FloatArray, section: Any) -> IntArray:
+def _places(points: FloatArray, section: Region) -> IntArray:
     rings = shapely.get_exterior_ring(shapely.get_parts(section))
     filled = shapely.union_all(shapely.polygons(rings))
     shapely.prepare([section, filled])
@@ -64,7 +63,7 @@ def _places(points: FloatArray, section: Any) -> IntArray:
 
 
 def cut_at_section(
-    starts: FloatArray, ends: FloatArray, section: Any, tolerance: float = TOLERANCE
+    starts: FloatArray, ends: FloatArray, section: Region, tolerance: float = TOLERANCE
 ) -> Pieces:
     """Cut straight steps at the boundary of a section.
 

@@ -1,28 +1,34 @@
-"""Polylines as arrays: arc length, resampling, turning, splitting.
+"""Polylines as arrays: arc length, resampling, turning.
 
 Many polylines at once are held as in CSR: ``points`` (P, d) with ``offsets`` (K + 1,), polyline k
 being ``points[offsets[k]:offsets[k + 1]]``, in d = 2 or 3 dimensions. A closed polyline repeats its
 first point at its end.
 """
 
-from collections.abc import Iterable, Sequence
-from itertools import pairwise
+from collections.abc import Sequence
 
 import numpy as np
 
-from ccfem.arrays import BoolArray, FloatArray, IntArray
+from ccfem.arrays import BoolArray, FloatArray, IntArray, repeated
 
 __all__ = [
+    "along_line",
     "arc_lengths",
     "between",
+    "inner_points",
+    "is_closed",
     "lengths",
+    "line_length",
     "merge_repeated",
     "pack",
     "point_at",
+    "points_along",
     "resample",
+    "runs",
     "sample_at",
     "sample_midpoints",
-    "split",
+    "starts_segment",
+    "straight_pieces",
     "subdivide",
     "turning_angles",
 ]
@@ -34,6 +40,27 @@ def pack(lines: Sequence[FloatArray]) -> tuple[FloatArray, IntArray]:
     offsets = np.concatenate([[0], np.cumsum(sizes, dtype=np.int64)]).astype(np.int64)
     points = np.concatenate(lines) if len(lines) else np.zeros((0, 2))
     return np.asarray(points, dtype=np.float64), offsets
+
+
+def straight_pieces(lines: Sequence[FloatArray]) -> FloatArray:
+    """Both ends (s, 2, 2) of the straight pieces of (n_i, 2) polylines, one after the other."""
+    pairs = [np.stack([line[:-1], line[1:]], axis=1) for line in lines]
+    return np.concatenate([np.zeros((0, 2, 2)), *pairs])
+
+
+def starts_segment(offsets: IntArray) -> BoolArray:
+    """Mask (P,) of the points that start a segment: all but the last one of each polyline."""
+    mask = np.ones(int(offsets[-1]), dtype=bool)
+    mask[offsets[1:][np.diff(offsets) > 0] - 1] = False
+    return mask
+
+
+def inner_points(offsets: IntArray, closed: BoolArray) -> BoolArray:
+    """Mask (P,) of the points at which polylines go on: of closed ones also the first."""
+    mask = starts_segment(offsets)
+    held = np.diff(offsets) > 0
+    mask[offsets[:-1][held]] &= np.asarray(closed, dtype=bool)[held]
+    return mask
 
 
 def _steps(points: FloatArray, offsets: IntArray) -> FloatArray:
@@ -120,8 +147,7 @@ def resample(points: FloatArray, offsets: IntArray, step: float) -> tuple[FloatA
     total = lengths(points, offsets)
     parts = np.maximum(1, np.round(total / step).astype(np.int64))
     ends = np.concatenate([[0], np.cumsum(parts + 1)])
-    line = np.repeat(np.arange(len(total)), parts + 1)
-    number = np.arange(ends[-1]) - ends[line]
+    line, number = repeated(parts + 1)
     found, _ = sample_at(points, offsets, line, number * (total / parts)[line])
     if len(total):
         found[ends[:-1]], found[ends[1:] - 1] = points[offsets[:-1]], points[offsets[1:] - 1]
@@ -147,10 +173,10 @@ def sample_midpoints(
     """
     total = lengths(points, offsets)
     parts = np.where(total > 0.0, np.maximum(1, np.round(total / step)), 0).astype(np.int64)
-    line = np.repeat(np.arange(len(total)), parts)
+    line, number = repeated(parts)
     size = np.divide(total, parts, out=np.zeros(len(total)), where=parts > 0)[line]
-    number = np.arange(len(line)) - (np.cumsum(parts) - parts)[line]
-    found, segment = sample_at(points, offsets, line, (number + 0.5) * size)
+    middle = np.asarray((number + 0.5) * size, dtype=np.float64)
+    found, segment = sample_at(points, offsets, line, middle)
     tangent = points[np.minimum(segment + 1, len(points) - 1)] - points[segment]
     norm = np.linalg.norm(tangent, axis=1)
     return found, tangent / np.maximum(norm, 1e-300)[:, None], size, line
@@ -172,9 +198,9 @@ def subdivide(
     # Pieces of the segment that each point starts; the last point of a polyline starts none.
     pieces = np.ones(len(points), dtype=np.int64)
     pieces[:-1] = np.maximum(1, np.ceil(steps[1:] / longest - 1e-9))
-    segment = np.repeat(np.arange(len(points)), pieces)
+    segment, number = repeated(pieces)
     first = np.concatenate([[0], np.cumsum(pieces)])
-    share = ((np.arange(len(segment)) - first[segment]) / pieces[segment])[:, None]
+    share = (number / pieces[segment])[:, None]
     following = np.minimum(segment + 1, len(points) - 1)
     return (1.0 - share) * points[segment] + share * points[following], first[offsets], segment
 
@@ -231,6 +257,32 @@ def turning_angles(points: FloatArray, offsets: IntArray, closed: BoolArray) -> 
     return np.arctan2(across, along)
 
 
+def is_closed(line: FloatArray) -> bool:
+    """Whether one polyline (n, d) ends at its first point."""
+    return bool((line[0] == line[-1]).all())
+
+
+def line_length(line: FloatArray) -> float:
+    """Length of one polyline (n, d)."""
+    return float(np.linalg.norm(np.diff(line, axis=0), axis=1).sum())
+
+
+def along_line(line: FloatArray) -> FloatArray:
+    """Arc length (n,) from the start of one polyline (n, d) to each of its points."""
+    return np.concatenate([[0.0], np.cumsum(np.linalg.norm(np.diff(line, axis=0), axis=1))])
+
+
+def points_along(line: FloatArray, along: FloatArray, positions: FloatArray) -> FloatArray:
+    """Columns of one polyline (n, d) at positions (k,) of its arc length `along`: (k, d) array."""
+    return np.stack([np.interp(positions, along, column) for column in line.T], axis=1)
+
+
+def runs(mask: BoolArray) -> IntArray:
+    """Start and end (k, 2), the end not included, of each run of true values of a mask (n,)."""
+    edges = np.diff(np.concatenate([[False], mask, [False]]).astype(np.int8))
+    return np.flatnonzero(edges).reshape(-1, 2)
+
+
 def point_at(line: FloatArray, position: float) -> FloatArray:
     """Point (d,) of one polyline (n, d) at an arc length from its start."""
     offsets = np.array([0, len(line)])
@@ -243,10 +295,3 @@ def between(line: FloatArray, start: float, end: float) -> FloatArray:
     along = arc_lengths(line, np.array([0, len(line)]))
     inside = (along > start) & (along < end)
     return np.concatenate([[point_at(line, start)], line[inside], [point_at(line, end)]])
-
-
-def split(line: FloatArray, positions: Iterable[float]) -> list[FloatArray]:
-    """Cut one open polyline (n, d) at arc lengths strictly inside it; the pieces in order."""
-    total = float(lengths(line, np.array([0, len(line)]))[0])
-    cuts = [0.0, *sorted({float(p) for p in positions if 0.0 < p < total}), total]
-    return [between(line, a, b) for a, b in pairwise(cuts)]

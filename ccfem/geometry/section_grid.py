@@ -1,17 +1,20 @@
 """A section for compiled loops: where a point lies about it, and how much room it has there."""
 
-from typing import Any, NamedTuple
+from typing import NamedTuple
 
 import numpy as np
 import shapely
 from numba import njit
 from scipy.ndimage import distance_transform_edt
 
-from ccfem.arrays import BoolArray, FloatArray, IntArray
+from ccfem.arrays import BoolArray, FloatArray, IntArray, repeated
 from ccfem.geometry.places import INSIDE, OUTSIDE, VOID
+from ccfem.geometry.shapes import Region
 
 __all__ = ["SectionGrid", "contains", "place", "place_and_room", "section_grid"]
 
+_CELL = 0.5
+"""Least size of a cell, mm."""
 _MOST_CELLS = 1_000_000
 
 
@@ -43,7 +46,7 @@ class SectionGrid(NamedTuple):
     outer: BoolArray
 
 
-def section_grid(section: Any, margin: float, cell: float = 0.5) -> SectionGrid:
+def section_grid(section: Region, margin: float) -> SectionGrid:
     """Prepare a section for `place` and `place_and_room`.
 
     Parameters
@@ -51,9 +54,12 @@ def section_grid(section: Any, margin: float, cell: float = 0.5) -> SectionGrid:
     section : shapely (Multi)Polygon, mm
     margin : float, mm
         By how much the grid is larger than the section on every side.
-    cell : float, mm, default 0.5
-        Made larger where the grid would have more than a million cells. Room is known where the
-        section and its voids are wider than this.
+
+    Returns
+    -------
+    SectionGrid
+        Of cells of 0.5 mm, or larger ones where these would be more than a million. Room is known
+        where the section and its voids are wider than a cell.
     """
     parts = shapely.get_parts(section)
     rings = shapely.get_rings(shapely.normalize(parts))
@@ -64,12 +70,12 @@ def section_grid(section: Any, margin: float, cell: float = 0.5) -> SectionGrid:
     edges = np.concatenate([points[:-1], points[1:]], axis=1)[follows]
     outer = np.isin(ring[1:][follows], first)
     low, high = points.min(axis=0) - margin, points.max(axis=0) + margin
-    cell = max(cell, float(np.sqrt(np.prod(high - low) / _MOST_CELLS)))
+    cell = max(_CELL, float(np.sqrt(np.prod(high - low) / _MOST_CELLS)))
     nx, ny = (np.floor((high - low) / cell) + 1).astype(int)
     rows = np.sort(((edges[:, [1, 3]] - low[1]) / cell).astype(np.int64), axis=1)
     count = rows[:, 1] - rows[:, 0] + 1
-    edge = np.repeat(np.arange(len(edges)), count)
-    row = rows[edge, 0] + np.arange(len(edge)) - np.repeat(np.cumsum(count) - count, count)
+    edge, row = repeated(count)
+    row = row + rows[edge, 0]
     starts = np.concatenate([[0], np.cumsum(np.bincount(row, minlength=ny))])
     by_row = edge[np.argsort(row, kind="stable")]
     places, room = np.empty((nx, ny), dtype=np.int64), np.empty((nx, ny))

@@ -1,11 +1,10 @@
 """Sections as their corners alone, so that equal layers of a part are equal to the last bit."""
 
-from typing import Any
-
 import numpy as np
 import shapely
 
 from ccfem.arrays import FloatArray
+from ccfem.geometry.shapes import Region
 
 __all__ = ["corners_only"]
 
@@ -15,7 +14,7 @@ _DECIMALS = 11
 """Of coordinates, mm: above the errors of slicing, below what any rule of a pattern tells apart."""
 
 
-def corners_only(section: Any) -> Any:
+def corners_only(section: Region) -> Region:
     """Section without the points on its straight sides, which slicing leaves where edges cross.
 
     Layers of an extruded part come out equal: what depends on the section alone can be planned

@@ -1,20 +1,17 @@
 """Concentric strands: rings along the border, and lines along the middle of what they leave."""
 
-from functools import lru_cache
-from typing import Any
-
 import numpy as np
 import shapely
 
-from ccfem.arrays import BoolArray, FloatArray, read_only
+from ccfem.arrays import BoolArray, FloatArray
 from ccfem.geometry.medial_axis import MedialAxis, medial_axis
 from ccfem.geometry.offsets import inset, rings
+from ccfem.geometry.polylines import is_closed, line_length, runs, straight_pieces
 from ccfem.geometry.sections import corners_only
+from ccfem.geometry.shapes import Region
 
 __all__ = ["concentric", "middle_lines", "shells"]
 
-_SECTIONS = 32
-"""Sections whose shells are remembered."""
 _LEAST_GAP = 0.5
 """Narrowest strip, in pitches, that a strand is laid along, the rest of it on its neighbours: gap
 and overlap together are then least."""
@@ -25,11 +22,9 @@ _STRAIGHT = 0.03
 
 
 def shells(
-    section: Any, width: float, pitch: float, count: int, closest: float
-) -> tuple[list[FloatArray], Any]:
+    section: Region, width: float, pitch: float, count: int, closest: float
+) -> tuple[list[FloatArray], Region]:
     """Rings along every border of a section, and what they leave inside.
-
-    Remembered for equal sections, as the layers of a part often are.
 
     Parameters
     ----------
@@ -46,38 +41,26 @@ def shells(
     Returns
     -------
     lines : list of (k, 2) arrays, mm
-        Closed rings, and open lines along the middle of parts that the rings leave no room in;
-        read-only.
+        Closed rings, and open lines along the middle of parts that the rings leave no room in.
     interior : shapely (Multi)Polygon, mm
         The rest of the section, half a pitch inside the innermost rings.
     """
-    lines, interior = _shells(corners_only(section), width, pitch, count, closest)
-    # A copy for each: layers are planned in threads, and a prepared geometry bears only one.
-    return list(lines), shapely.from_wkb(interior)
-
-
-@lru_cache(maxsize=_SECTIONS)
-def _shells(
-    section: Any, width: float, pitch: float, count: int, closest: float
-) -> tuple[tuple[FloatArray, ...], bytes]:
-    """Shells of a section, and the interior as WKB."""
+    section = corners_only(section)
     if count == 0:
-        return (), shapely.to_wkb(section)
+        return [], section
     interior = inset(section, 0.5 * width + (count - 0.5) * pitch)
     parts = shapely.get_parts(interior)  # without those of no width but for rounding
     wide = ~shapely.is_empty(shapely.buffer(parts, -1e-3 * pitch, join_style="mitre"))
     interior = interior if wide.all() else shapely.multipolygons(parts[wide])
-    lines = concentric(section, pitch, closest, 0.5 * width, count)
-    return tuple(read_only(line) for line in lines), shapely.to_wkb(interior)
+    return concentric(section, pitch, closest, 0.5 * width, count), interior
 
 
 def concentric(
-    section: Any,
+    section: Region,
     pitch: float,
     closest: float,
     first: float | None = None,
     count: int | None = None,
-    middle: bool = True,
     walls: bool = True,
 ) -> list[FloatArray]:
     """Fill a section with rings parallel to its border.
@@ -94,8 +77,6 @@ def concentric(
         Distance of the first ring to the border; default half a pitch.
     count : int, optional
         Number of rings; by default as many as fit.
-    middle : bool, default True
-        Whether to lay `middle_lines` in what the rings leave.
     walls : bool, default True
         Whether the border is that of the part, which no strand oversteps. The border of other
         strands may be overlapped where the section is narrower than a pitch.
@@ -103,7 +84,7 @@ def concentric(
     Returns
     -------
     list of (k, 2) arrays, mm
-        Closed rings from the border inward, then open lines.
+        Closed rings from the border inward, then `middle_lines` in what they leave.
     """
     first = 0.5 * pitch if first is None else first
     section = corners_only(section)
@@ -117,13 +98,13 @@ def concentric(
             break
         lines += found
         level += 1
-    if not middle or (count is not None and not _narrow(section, first, pitch, closest, count)):
+    if count is not None and not _narrow(section, first, pitch, closest, count):
         return lines
     axis = medial_axis(section, 0.5 * min(pitch, 2.0 * first))
     return lines + middle_lines(axis, lines, pitch, closest, first, count, walls)
 
 
-def _opened(section: Any, distance: float, width: float) -> Any:
+def _opened(section: Region, distance: float, width: float) -> Region:
     """Part of a section inside a distance, without channels narrower than a width.
 
     As `inset`, but corners stay sharp: strands fill them at the price of lying closer there.
@@ -139,7 +120,7 @@ def _opened(section: Any, distance: float, width: float) -> Any:
     return shapely.remove_repeated_points(shapely.multipolygons(parts), _SAME * width)
 
 
-def _narrow(section: Any, first: float, pitch: float, closest: float, count: int) -> bool:
+def _narrow(section: Region, first: float, pitch: float, closest: float, count: int) -> bool:
     """Whether some part of the section is too narrow for `count` rings, corners left aside."""
     depth = first + (count - 1 + 0.5 * closest) * pitch
     core = shapely.buffer(section, -depth, join_style="mitre")
@@ -189,9 +170,7 @@ def middle_lines(
         pieces += _runs(points, wanted)
     if not pieces:
         return []
-    pairs = [np.stack([ring[:-1], ring[1:]], axis=1) for ring in laid]
-    sides = np.concatenate([np.zeros((0, 2, 2)), *pairs])
-    tree = shapely.STRtree(shapely.linestrings(sides))
+    tree = shapely.STRtree(shapely.linestrings(straight_pieces(laid)))
     lines = []
     for piece in pieces:
         near, _ = tree.query(
@@ -202,7 +181,7 @@ def middle_lines(
         lines += _runs(piece, clear)
     tolerance = _STRAIGHT * pitch
     lines = [shapely.get_coordinates(shapely.LineString(x).simplify(tolerance)) for x in lines]
-    return [line for line in lines if _length(line) >= pitch]
+    return [line for line in lines if line_length(line) >= pitch]
 
 
 def _to_the_end(
@@ -233,14 +212,9 @@ def _runs(line: FloatArray, wanted: BoolArray) -> list[FloatArray]:
     """Pieces of a polyline between neighbouring wanted points; one that goes all round stays so."""
     if wanted.all():
         return [line]
-    closed = len(line) > 2 and bool((line[0] == line[-1]).all())
+    closed = len(line) > 2 and is_closed(line)
     if closed and wanted[0]:
         start = int(np.argmin(wanted))
         line = np.concatenate([line[start:-1], line[: start + 1]])
         wanted = np.concatenate([wanted[start:-1], wanted[: start + 1]])
-    edge = np.flatnonzero(np.diff(np.concatenate([[False], wanted, [False]]).astype(np.int8)))
-    return [line[a:b] for a, b in edge.reshape(-1, 2) if b - a > 1]
-
-
-def _length(line: FloatArray) -> float:
-    return float(np.linalg.norm(np.diff(line, axis=0), axis=1).sum())
+    return [line[a:b] for a, b in runs(wanted) if b - a > 1]

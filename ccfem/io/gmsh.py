@@ -9,7 +9,7 @@ import numpy as np
 from ccfem.arrays import IntArray
 from ccfem.errors import InputError
 from ccfem.io.cells import tetrahedra
-from ccfem.mesh.patches import match_boundary
+from ccfem.mesh.patches import with_groups
 from ccfem.mesh.tet_mesh import TetMesh
 
 __all__ = ["read_msh"]
@@ -49,10 +49,7 @@ def read_msh(path: Path) -> TetMesh:
         ) from None
     cells = tetrahedra([(block.type, block.data) for block in found.cells], path)
     mesh = TetMesh(np.asarray(found.points, dtype=np.float64)[:, :3], cells)
-    patches = {
-        name: match_boundary(mesh, facets) for name, facets in _triangle_groups(found).items()
-    }
-    return mesh.with_patches({name: facets for name, facets in patches.items() if len(facets)})
+    return with_groups(mesh, _triangle_groups(found))
 
 
 def _triangle_groups(found: Any) -> dict[str, IntArray]:

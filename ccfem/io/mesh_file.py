@@ -7,6 +7,7 @@ from pathlib import Path
 
 import numpy as np
 
+from ccfem.checks import check_number
 from ccfem.errors import InputError
 from ccfem.io.abaqus import read_inp
 from ccfem.io.gmsh import read_msh
@@ -70,8 +71,7 @@ def read_mesh(path: str | os.PathLike[str], scale: float = 1.0, check: bool = Tr
             f"cannot tell the format of mesh file {path}: its name must end in "
             f"{', '.join(sorted(_READERS))}"
         )
-    if not 0.0 < scale < float("inf"):
-        raise InputError(f"mesh scale must be a finite number above 0; got {scale}: correct it")
+    check_number("mesh scale", scale, above=0.0)
     try:
         mesh = _READERS[suffix](path)
         if scale != 1.0:

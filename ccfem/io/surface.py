@@ -5,7 +5,8 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from ccfem.arrays import FloatArray, IntArray, read_only
+from ccfem.arrays import FloatArray, IntArray, freeze, read_only
+from ccfem.checks import check_number
 from ccfem.errors import InputError
 from ccfem.io.quiet import read_quietly
 from ccfem.io.whole import existing_file
@@ -34,8 +35,7 @@ class Surface:
     triangles: IntArray
 
     def __post_init__(self) -> None:
-        object.__setattr__(self, "points", read_only(self.points))
-        object.__setattr__(self, "triangles", read_only(self.triangles, np.int64))
+        freeze(self, points=float, triangles=int)
         if self.points.ndim != 2 or self.points.shape[1] != 3 or not len(self.triangles):
             raise InputError(
                 f"a surface needs points (n, 3) and triangles (t, 3); got {self.points.shape} "
@@ -80,8 +80,7 @@ def read_surface(path: str | os.PathLike[str], scale: float = 1.0) -> Surface:
             f"cannot tell the format of surface file {path}: its name must end in "
             f"{', '.join(_SUFFIXES)}"
         )
-    if not 0.0 < scale < float("inf"):
-        raise InputError(f"surface scale must be a finite number above 0; got {scale}: correct it")
+    check_number("surface scale", scale, above=0.0)
     found = read_quietly(path)
     faces = getattr(found, "triangulate", lambda: None)()
     if faces is None or not getattr(faces, "n_cells", 0) or not hasattr(faces, "regular_faces"):

@@ -9,7 +9,7 @@ from ccfem.arrays import IntArray
 from ccfem.errors import InputError
 from ccfem.io.cells import tetrahedra
 from ccfem.io.quiet import read_quietly
-from ccfem.mesh.patches import match_boundary
+from ccfem.mesh.patches import with_groups
 from ccfem.mesh.tet_mesh import TetMesh
 
 __all__ = ["read_vtu", "write_vtu"]
@@ -62,8 +62,7 @@ def read_vtu(path: Path) -> TetMesh:
         if name.startswith(_PATCH)
     }
     groups = {**_tagged_triangles(grid, blocks), **groups}
-    patches = {name: match_boundary(mesh, facets) for name, facets in groups.items()}
-    return mesh.with_patches({name: facets for name, facets in patches.items() if len(facets)})
+    return with_groups(mesh, groups)
 
 
 def _tagged_triangles(grid: Any, blocks: dict[str, tuple[int, IntArray]]) -> dict[str, IntArray]:

@@ -1,8 +1,9 @@
 """Layers, flat or curved, the stress on them, and slicers that make them."""
 
+from ccfem.layers import slicing
 from ccfem.layers.layer import Layer
 from ccfem.layers.layer_stress import LayerStress, stress_on
 from ccfem.layers.plane import Plane, plane_frame
 from ccfem.layers.slicer import Slicer
 
-__all__ = ["Layer", "LayerStress", "Plane", "Slicer", "plane_frame", "stress_on"]
+__all__ = ["Layer", "LayerStress", "Plane", "Slicer", "plane_frame", "slicing", "stress_on"]

@@ -3,14 +3,13 @@
 from collections.abc import Mapping
 from dataclasses import dataclass, field
 from functools import cached_property
-from types import MappingProxyType
-from typing import Any
 
 import numpy as np
 import shapely
 
-from ccfem.arrays import FloatArray, IntArray, read_only
+from ccfem.arrays import FloatArray, IntArray, freeze, read_only
 from ccfem.errors import InputError
+from ccfem.geometry.shapes import Region
 from ccfem.layers.plane import Plane
 
 __all__ = ["FlatLayer", "Layer"]
@@ -57,17 +56,8 @@ class Layer:
     flat: Plane | None = None
 
     def __post_init__(self) -> None:
-        for name, dtype in (
-            ("points", np.float64),
-            ("triangles", np.int64),
-            ("cell", np.int64),
-            ("nodes", np.int64),
-            ("weights", np.float64),
-        ):
-            object.__setattr__(self, name, read_only(getattr(self, name), dtype))
+        freeze(self, points=float, triangles=int, cell=int, nodes=int, weights=float, patches=int)
         object.__setattr__(self, "loops", tuple(read_only(x, np.int64) for x in self.loops))
-        patches = {name: read_only(edges, np.int64) for name, edges in self.patches.items()}
-        object.__setattr__(self, "patches", MappingProxyType(patches))
 
     def __repr__(self) -> str:
         shape = "curved" if self.flat is None else f"flat at {self.flat.height:.6g} mm"
@@ -132,10 +122,10 @@ class FlatLayer(Plane):
 
     def __post_init__(self) -> None:
         super().__post_init__()
-        object.__setattr__(self, "points", read_only(self.points))
+        freeze(self, points=float)
 
     @cached_property
-    def polygon(self) -> Any:
+    def polygon(self) -> Region:
         """Section: a valid (Multi)Polygon with holes, mm."""
         rings = [shapely.Polygon(self.points[loop]) for loop in self.loops if len(loop) > 2]
         outer = [ring for ring in rings if ring.exterior.is_ccw]

@@ -2,7 +2,7 @@
 
 from dataclasses import dataclass
 
-from ccfem.arrays import FloatArray, read_only
+from ccfem.arrays import FloatArray, freeze
 from ccfem.elasticity.part_stress import PartStress
 from ccfem.layers.layer import Layer
 
@@ -29,9 +29,11 @@ class LayerStress:
     nodal: FloatArray
     held_or_loaded: tuple[str, ...] = ()
 
+    def __repr__(self) -> str:
+        return f"LayerStress on {self.layer!r}"
+
     def __post_init__(self) -> None:
-        object.__setattr__(self, "cell", read_only(self.cell))
-        object.__setattr__(self, "nodal", read_only(self.nodal))
+        freeze(self, cell=float, nodal=float)
 
 
 def stress_on(layer: Layer, stress: PartStress) -> LayerStress:

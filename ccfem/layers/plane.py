@@ -5,7 +5,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from ccfem.arrays import FloatArray, read_only
+from ccfem.arrays import FloatArray, freeze
 from ccfem.errors import InputError
 
 __all__ = ["Plane", "plane_frame"]
@@ -27,7 +27,7 @@ class Plane:
     height: float
 
     def __post_init__(self) -> None:
-        object.__setattr__(self, "frame", read_only(self.frame))
+        freeze(self, frame=float)
 
     def project(self, points: FloatArray) -> FloatArray:
         """Plane coordinates (..., 2) of points (..., 3), mm."""

@@ -6,6 +6,7 @@ import numpy as np
 from numba import njit
 
 from ccfem.arrays import FloatArray
+from ccfem.geometry.polylines import is_closed, line_length, pack, runs
 
 __all__ = ["trim_to_clearance"]
 
@@ -35,11 +36,10 @@ def trim_to_clearance(
     """
     if not lines:
         return []
-    length = [float(np.linalg.norm(np.diff(line, axis=0), axis=1).sum()) for line in lines]
-    order = np.lexsort((-np.array(length), np.arange(len(lines)) >= first))
+    length = np.array([line_length(line) for line in lines])
+    order = np.lexsort((-length, np.arange(len(lines)) >= first))
     ordered = [lines[k] for k in order]
-    points = np.concatenate(ordered)
-    offsets = np.concatenate([[0], np.cumsum([len(line) for line in ordered])])
+    points, offsets = pack(ordered)
     keep = _lay(points, offsets, clearance, least_length)
     kept: list[FloatArray] = []
     for k in range(len(ordered)):
@@ -48,14 +48,11 @@ def trim_to_clearance(
         if mask.all():
             kept.append(line)
             continue
-        runs = np.flatnonzero(np.diff(np.concatenate([[False], mask, [False]]).astype(np.int8)))
-        pieces = [line[a:b] for a, b in zip(runs[::2], runs[1::2], strict=True) if b - a > 1]
-        closed = np.array_equal(line[0], line[-1])
-        if closed and len(pieces) > 1 and mask[0] and mask[-1]:
+        pieces = [line[a:b] for a, b in runs(mask) if b - a > 1]
+        if is_closed(line) and len(pieces) > 1 and mask[0] and mask[-1]:
             pieces = [np.concatenate([pieces[-1], pieces[0][1:]]), *pieces[1:-1]]
         kept += pieces
-    sizes = [float(np.linalg.norm(np.diff(line, axis=0), axis=1).sum()) for line in kept]
-    return [line for line, size in zip(kept, sizes, strict=True) if size >= least_length]
+    return [line for line in kept if line_length(line) >= least_length]
 
 
 @njit(cache=True, nogil=True)

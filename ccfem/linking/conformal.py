@@ -1,18 +1,19 @@
 """Curves that run along a chosen boundary, and isocurves led into them [Chen et al. 2021, 4.4]."""
 
 from collections.abc import Sequence
-from typing import Any
 
 import numpy as np
 import shapely
 
 from ccfem.arrays import FloatArray
+from ccfem.geometry.polylines import is_closed
+from ccfem.geometry.shapes import Region, open_lines
 from ccfem.linking.joining import Joint, join, ring_arc
 
 __all__ = ["lead_into", "parallel_curve"]
 
 
-def parallel_curve(boundary: Any, distance: float, section: Any) -> list[FloatArray]:
+def parallel_curve(boundary: shapely.Polygon, distance: float, section: Region) -> list[FloatArray]:
     """Curve at a distance from a closed boundary, inside the section.
 
     Parameters
@@ -30,11 +31,11 @@ def parallel_curve(boundary: Any, distance: float, section: Any) -> list[FloatAr
     ring = shapely.buffer(boundary, distance, quad_segs=32).exterior
     if shapely.covers(section, ring):
         return [shapely.get_coordinates(ring)]
-    return _polylines(shapely.line_merge(shapely.intersection(ring, section)))
+    return open_lines(shapely.intersection(ring, section))
 
 
 def lead_into(
-    lines: Sequence[FloatArray], boundary: Any, distance: float, section: Any
+    lines: Sequence[FloatArray], boundary: shapely.Polygon, distance: float, section: Region
 ) -> list[FloatArray]:
     """Cut lines back to a distance from a boundary and join the cut ends along it.
 
@@ -62,21 +63,19 @@ def lead_into(
         if not shapely.intersects(zone, string):
             pieces.append(line)
             continue
-        outside = shapely.difference(string, zone)
-        if outside.geom_type == "MultiLineString":
-            outside = shapely.line_merge(outside)
-        pieces += _polylines(outside)
+        pieces += open_lines(shapely.difference(string, zone))
     ends = [
         (float(shapely.line_locate_point(ring, shapely.points(point))), 2 * k + side)
         for k, piece in enumerate(pieces)
         for side, point in ((0, piece[0]), (1, piece[-1]))
-        if shapely.distance(ring, shapely.points(point)) < 1e-6
-        and not np.array_equal(piece[0], piece[-1])
+        if shapely.distance(ring, shapely.points(point)) < 1e-6 and not is_closed(piece)
     ]
     return join(pieces, _pairing(sorted(ends), ring, section))
 
 
-def _pairing(ends: list[tuple[float, int]], ring: Any, section: Any) -> list[Joint]:
+def _pairing(
+    ends: list[tuple[float, int]], ring: shapely.LinearRing, section: Region
+) -> list[Joint]:
     """Joints of consecutive ends along the ring, of the smallest total length."""
     count = len(ends)
     if count < 2:
@@ -93,9 +92,3 @@ def _pairing(ends: list[tuple[float, int]], ring: Any, section: Any) -> list[Joi
         if shapely.covers(section, shapely.linestrings(arc)):
             joints.append(Joint(ends[k][1], ends[(k + 1) % count][1], arc[1:-1]))
     return joints
-
-
-def _polylines(geometry: Any) -> list[FloatArray]:
-    parts = shapely.get_parts(geometry)
-    strings = parts[shapely.get_type_id(parts) == 1]
-    return [shapely.get_coordinates(part) for part in strings if part.length > 0.0]

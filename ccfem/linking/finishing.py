@@ -1,18 +1,19 @@
 """From curves to paths that can be printed: kept off the border, linked, short ones dropped."""
 
 from collections.abc import Sequence
-from typing import Any
 
 import numpy as np
 import shapely
 
 from ccfem.arrays import FloatArray
+from ccfem.geometry.polylines import along_line, is_closed, line_length, points_along
+from ccfem.geometry.shapes import Region, open_lines
 from ccfem.linking.joining import link_ends
 
 __all__ = ["close_short_ring", "keep_off_border", "linked_paths"]
 
 
-def keep_off_border(lines: Sequence[FloatArray], section: Any, inset: float) -> list[FloatArray]:
+def keep_off_border(lines: Sequence[FloatArray], section: Region, inset: float) -> list[FloatArray]:
     """Parts of lines that keep a distance from the border of a section.
 
     Parameters
@@ -37,18 +38,13 @@ def keep_off_border(lines: Sequence[FloatArray], section: Any, inset: float) -> 
         if shapely.covers(room, string):
             kept.append(line)
             continue
-        inside = shapely.intersection(string, room)
-        if inside.geom_type == "MultiLineString":
-            inside = shapely.line_merge(inside)
-        parts = shapely.get_parts(inside)
-        strings = parts[shapely.get_type_id(parts) == 1]
-        kept += [shapely.get_coordinates(part) for part in strings if part.length > 0.0]
+        kept += open_lines(shapely.intersection(string, room))
     return kept
 
 
 def linked_paths(
     lines: list[FloatArray],
-    section: Any,
+    section: Region,
     width: float,
     link_limit: float,
     least_length: float,
@@ -72,7 +68,7 @@ def linked_paths(
     """
     lines = link_ends(lines, section, link_limit, width, along_boundary=along_boundary)
     lines = [close_short_ring(line, least_length) for line in lines]
-    return [line for line in lines if _length(line) >= least_length]
+    return [line for line in lines if line_length(line) >= least_length]
 
 
 def close_short_ring(line: FloatArray, least_length: float, overlap: float = 0.1) -> FloatArray:
@@ -92,16 +88,11 @@ def close_short_ring(line: FloatArray, least_length: float, overlap: float = 0.1
     (n, 2) array
         The line, open and exactly `least_length` long where it was lengthened.
     """
-    length = float(np.linalg.norm(np.diff(line, axis=0), axis=1).sum())
+    length = line_length(line)
     missing = least_length - length
-    if not np.array_equal(line[0], line[-1]) or not 0.0 < missing <= overlap * length:
+    if not is_closed(line) or not 0.0 < missing <= overlap * length:
         return line
-    along = np.concatenate([[0.0], np.cumsum(np.linalg.norm(np.diff(line, axis=0), axis=1))])
+    along = along_line(line)
     again = along[(along > 0.0) & (along < missing)]
     again = np.concatenate([again, [missing * (1.0 + 1e-12)]])
-    twice = np.column_stack([np.interp(again, along, line[:, axis]) for axis in (0, 1)])
-    return np.concatenate([line, twice])
-
-
-def _length(line: FloatArray) -> float:
-    return float(np.linalg.norm(np.diff(line, axis=0), axis=1).sum())
+    return np.concatenate([line, points_along(line, along, again)])

@@ -8,7 +8,9 @@ import numpy as np
 import shapely
 from scipy.spatial import cKDTree
 
-from ccfem.arrays import FloatArray
+from ccfem.arrays import FloatArray, IntArray
+from ccfem.geometry.polylines import along_line, is_closed, points_along
+from ccfem.geometry.shapes import Region, Shapes, strings
 
 __all__ = ["Joint", "join", "link_ends", "ring_arc"]
 
@@ -80,7 +82,7 @@ _CLOSING_TURN = np.deg2rad(60.0)
 neighbouring strands that closes on itself can no longer join the next."""
 
 _ON_BORDER = 1e-6
-"""Links that leave the section by no more than this, mm, are inside."""
+"""Distance, mm, up to which rounding may carry what lies on a border off it."""
 
 
 @dataclass(frozen=True)
@@ -96,7 +98,7 @@ class _Link:
 
 def link_ends(
     lines: Sequence[FloatArray],
-    section: Any,
+    section: Region,
     limit: float,
     width: float,
     turn_cost: float = 1.0,
@@ -125,7 +127,7 @@ def link_ends(
     -------
     list of (n, 2) arrays
     """
-    opened = [k for k, line in enumerate(lines) if not np.array_equal(line[0], line[-1])]
+    opened = [k for k, line in enumerate(lines) if not is_closed(line)]
     if not opened or limit <= 0.0:
         return list(lines)
     ends = np.array([2 * k + side for k in opened for side in (0, 1)])
@@ -136,17 +138,18 @@ def link_ends(
         links += _boundary_links(
             lines, points, outward, ends, section, 0.5 * width, limit, turn_cost
         )
-    links.sort(key=lambda link: (link.cost, link.first, link.second))
+    # Rounding orders no equal costs: a straight link comes before the same one along the boundary.
+    links.sort(key=lambda link: (round(link.cost, 6), link.first, link.second))
     return _accept(list(lines), links, section, _CLEARANCE * width)
 
 
 def _accept(
-    lines: list[FloatArray], links: list[_Link], section: Any, clearance: float
+    lines: list[FloatArray], links: list[_Link], section: Region, clearance: float
 ) -> list[FloatArray]:
     """Take links greedily, cheapest first, as long as they keep off everything else."""
     if not links:
         return lines
-    paths = _strings([link.path for link in links])
+    paths = strings([link.path for link in links])
     owners = np.array([[link.first // 2, link.second // 2] for link in links])
     free = _free_links(lines, paths, owners, section, clearance)
     taken: set[int] = set()
@@ -166,7 +169,7 @@ def _accept(
         if min(len(line) for line in cut.values()) < 2:
             continue
         shortened = shapely.linestrings(_shorten(link.path))
-        if shapely.intersects(shortened, _strings(list(cut.values()))).any():
+        if shapely.intersects(shortened, strings(list(cut.values()))).any():
             continue
         for owner, line in cut.items():
             lines[owner] = line
@@ -178,25 +181,18 @@ def _accept(
 
 
 def _free_links(
-    lines: list[FloatArray], paths: Any, owners: Any, section: Any, clearance: float
+    lines: list[FloatArray], paths: Any, owners: Any, section: Region, clearance: float
 ) -> Any:
     """Mask (l,) of links inside the section and clear of all strands but their own."""
     # The link of two ends on one edge of the border lies on it: that must not be up to rounding.
     grown = shapely.buffer(section, _ON_BORDER)
     shapely.prepare(grown)
     free = shapely.covers(grown, paths)
-    tree = shapely.STRtree(_strings(lines))
+    tree = shapely.STRtree(strings(lines))
     link, strand = tree.query(paths[free], predicate="dwithin", distance=clearance)
     link = np.flatnonzero(free)[link]
     free[link[(owners[link] != strand[:, None]).all(axis=1)]] = False
     return free
-
-
-def _strings(lines: Sequence[FloatArray]) -> Any:
-    sizes = [len(line) for line in lines]
-    return shapely.linestrings(
-        np.concatenate(lines), indices=np.repeat(np.arange(len(lines)), sizes)
-    )
 
 
 def _cut_back(line: FloatArray, link: _Link, k: int) -> FloatArray:
@@ -249,7 +245,7 @@ def _boundary_links(
     points: FloatArray,
     outward: FloatArray,
     ends: Any,
-    section: Any,
+    section: Region,
     inset: float,
     limit: float,
     turn_cost: float,
@@ -257,20 +253,15 @@ def _boundary_links(
     """Links along the boundary, `inset` inside it, between neighbouring ends on it."""
     links: list[_Link] = []
     starts = shapely.points(points)
-    heads = _strings(
+    heads = strings(
         [_head(lines[e // 2] if e % 2 == 0 else lines[e // 2][::-1], limit) for e in ends]
     )
     for ring in shapely.get_rings(shapely.buffer(section, -inset)):
         near = np.flatnonzero(shapely.dwithin(ring, starts, 1.5 * inset))
-        crossing = shapely.intersection(heads[near], ring)
-        crossed, index = shapely.get_coordinates(crossing, return_index=True)
-        if not len(crossed):
+        meeting, met = _first_meetings(heads[near], starts[near], ring)
+        if not len(met):
             continue
-        # Where a head meets the ring more than once, the link leaves at the first meeting.
-        passed = shapely.line_locate_point(heads[near][index], shapely.points(crossed))
-        order = np.lexsort((passed, index))
-        _, first = np.unique(index[order], return_index=True)
-        meeting, end = crossed[order[first]], near[index[order[first]]]
+        end = near[met]
         position = shapely.line_locate_point(ring, shapely.points(meeting))
         around = np.lexsort((end, position))
         for k, after in zip(around, np.roll(around, -1), strict=True):
@@ -286,14 +277,34 @@ def _boundary_links(
     return links
 
 
-def ring_arc(ring: Any, start: float, length: float) -> FloatArray:
+def _first_meetings(
+    heads: Shapes, starts: Shapes, ring: shapely.LinearRing
+) -> tuple[FloatArray, IntArray]:
+    """Points (k, 2) where heads first meet a ring, and the numbers (k,) of the heads that do.
+
+    A head that starts on the ring meets it there: strands that are kept half a width off the border
+    end on it, and rounding puts one end just inside and the next just outside.
+    """
+    starts_on = shapely.dwithin(ring, starts, _ON_BORDER)
+    on, off = np.flatnonzero(starts_on), np.flatnonzero(~starts_on)
+    crossed, index = shapely.get_coordinates(
+        shapely.intersection(heads[off], ring), return_index=True
+    )
+    passed = shapely.line_locate_point(heads[off][index], shapely.points(crossed))
+    order = np.lexsort((passed, index))
+    _, first = np.unique(index[order], return_index=True)
+    meeting = np.concatenate([shapely.get_coordinates(starts[on]), crossed[order[first]]])
+    return meeting, np.concatenate([on, off[index[order[first]]]])
+
+
+def ring_arc(ring: shapely.LinearRing, start: float, length: float) -> FloatArray:
     """Points (n, 2) of a closed ring from the arc length `start` over `length`, both ends in."""
     corners = shapely.get_coordinates(ring)
-    along = np.concatenate([[0.0], np.cumsum(np.linalg.norm(np.diff(corners, axis=0), axis=1))])
+    along = along_line(corners)
     twice = np.concatenate([along[:-1], along + along[-1]])
     inner = twice[(twice > start + 1e-9) & (twice < start + length - 1e-9)]
     wanted = np.concatenate([[start], inner, [start + length]]) % along[-1]
-    return np.column_stack([np.interp(wanted, along, corners[:, axis]) for axis in (0, 1)])
+    return points_along(corners, along, wanted)
 
 
 def _head(line: FloatArray, reach: float) -> FloatArray:

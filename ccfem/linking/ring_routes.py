@@ -1,16 +1,16 @@
 """Links that lead round a part, along a ring outside it."""
 
 from dataclasses import dataclass
-from typing import Any
 
 import numpy as np
 import shapely
 from numba import njit
 
-from ccfem.arrays import FloatArray, IntArray, read_only
+from ccfem.arrays import FloatArray, IntArray, freeze
 from ccfem.geometry.dubins import WORDS, curve_points, word_sizes
 from ccfem.geometry.polylines import between, resample
 from ccfem.geometry.section_grid import SectionGrid
+from ccfem.geometry.shapes import Region, Shapes
 from ccfem.linking.link_curves import curve_cost
 
 __all__ = ["RingRoutes", "ring_cost", "ring_curve", "ring_routes"]
@@ -55,12 +55,11 @@ class RingRoutes:
     radius: float
 
     def __post_init__(self) -> None:
-        for name in ("ring", "starts", "goal", "position", "cost"):
-            object.__setattr__(self, name, read_only(getattr(self, name)))
+        freeze(self, ring=float, starts=float, goal=float, position=float, cost=float)
 
 
 def ring_routes(
-    starts: FloatArray, section: Any, radius: float, grid: SectionGrid, weights: FloatArray
+    starts: FloatArray, section: Region, radius: float, grid: SectionGrid, weights: FloatArray
 ) -> RingRoutes:
     """Ring round a part, and the cheapest leads to it.
 
@@ -94,7 +93,7 @@ def ring_routes(
     return RingRoutes(ring, length, starts, goal, position, cost, word, radius)
 
 
-def _ring(section: Any, distance: float) -> FloatArray:
+def _ring(section: Region, distance: float) -> FloatArray:
     """Lay a closed curve (n, 2) round a section at a distance; round the hull of several parts."""
     for filled in (shapely.union_all(_filled(section)), shapely.convex_hull(section)):
         grown = shapely.union_all(_filled(shapely.buffer(filled, 2.0 * distance)))
@@ -105,7 +104,7 @@ def _ring(section: Any, distance: float) -> FloatArray:
     return ring if shapely.is_ccw(shapely.linearrings(ring)) else ring[::-1]
 
 
-def _filled(section: Any) -> Any:
+def _filled(section: Region) -> Shapes:
     return shapely.polygons(shapely.get_exterior_ring(shapely.get_parts(section)))
 
 

@@ -10,17 +10,18 @@ the order of the tracks is the one whose links cost least (`ordering`).
 from collections.abc import Sequence
 from dataclasses import dataclass
 from itertools import pairwise
-from typing import Any
 
 import numpy as np
 import shapely
 
-from ccfem.arrays import BoolArray, FloatArray, IntArray, read_only
+from ccfem.arrays import BoolArray, FloatArray, IntArray, freeze
+from ccfem.checks import check_number
 from ccfem.errors import InputError
 from ccfem.geometry.offsets import ring_from
 from ccfem.geometry.places import INSIDE, VOID, cut_at_section
-from ccfem.geometry.polylines import between
+from ccfem.geometry.polylines import between, is_closed, line_length, runs
 from ccfem.geometry.section_grid import section_grid
+from ccfem.geometry.shapes import Region
 from ccfem.linking.exchanges import improved_order
 from ccfem.linking.link_curves import LinkCurves, link_curve, link_curves, stub_points
 from ccfem.linking.ordering import costs_between_ends, order_clusters, strand_visits
@@ -54,8 +55,7 @@ class LinkedPath:
     link: BoolArray
 
     def __post_init__(self) -> None:
-        object.__setattr__(self, "points", read_only(self.points))
-        object.__setattr__(self, "link", read_only(self.link, np.bool_))
+        freeze(self, points=float, link=bool)
 
     @property
     def links(self) -> list[FloatArray]:
@@ -63,7 +63,7 @@ class LinkedPath:
         return [self.points[a : b + 1] for a, b in self._stretches()]
 
     def without_long_links(
-        self, section: Any, inside: float, over_void: float = np.inf
+        self, section: Region, inside: float, over_void: float = np.inf
     ) -> "list[LinkedPath]":
         """Leave out links of which more than so many mm lies inside a section or over its voids.
 
@@ -89,13 +89,12 @@ class LinkedPath:
 
     def _stretches(self) -> IntArray:
         """Points (k, 2) at which each link begins and ends."""
-        edges = np.diff(np.concatenate([[False], self.link, [False]]).astype(int))
-        return np.flatnonzero(edges).reshape(-1, 2)
+        return runs(self.link)
 
 
 def link_tracks(
     groups: Sequence[Sequence[FloatArray]],
-    section: Any,
+    section: Region,
     radius: float,
     width: float,
     inside_weight: float = 8.0,
@@ -151,13 +150,12 @@ def link_tracks(
         return LinkedPath(np.zeros((0, 2)), np.zeros(0, dtype=bool))
     if shapely.is_empty(section):
         raise InputError("tracks can only be linked round a section; got an empty one")
-    if not 0.0 < width < np.inf:
-        raise InputError(f"width of tracks must be above 0 mm; got {width}")
+    check_number("width of tracks", width, above=0.0, unit="mm")
     if len(wanted) == len(wanted[0]) == 1:
         return LinkedPath(wanted[0][0], np.zeros(len(wanted[0][0]), dtype=bool))
     radius = max(radius, 0.05 * width)
     opened = _opened(wanted, radius, width)
-    closed = [_is_closed(track) for group in wanted for track in group]
+    closed = [is_closed(track) for group in wanted for track in group]
     tracks = [track for group in opened for track in group]
     weights = np.array([inside_weight, void_weight, 0.0])
     network = _Network.between(tracks, np.array(closed), section, radius, weights)
@@ -172,10 +170,6 @@ def _clean(track: FloatArray) -> FloatArray:
     if track.ndim != 2 or track.shape[1] != 2 or not np.isfinite(track).all():
         raise InputError(f"tracks must be finite (n, 2) arrays; got shape {track.shape}")
     return track[np.concatenate([[True], (np.diff(track, axis=0) != 0.0).any(axis=1)])]
-
-
-def _is_closed(track: FloatArray) -> bool:
-    return bool((track[0] == track[-1]).all())
 
 
 def _opened(
@@ -193,19 +187,19 @@ def _opened(
             track[[0, -1]]
             for other in (*groups[:k], *groups[k + 1 :], group)
             for track in other
-            if not (other is group and _is_closed(track))
+            if not (other is group and is_closed(track))
         ]
         seam: FloatArray | None = None
         tracks = []
         for track in group:
-            if not _is_closed(track):
+            if not is_closed(track):
                 tracks.append(track)
                 continue
             if seam is None:
                 seam = np.concatenate(others).mean(axis=0) if others else track[0]
             ring = ring_from(track, seam)
             seam = ring[0]
-            length = float(np.linalg.norm(np.diff(ring, axis=0), axis=1).sum())
+            length = line_length(ring)
             tracks.append(between(ring, 0.0, max(length - gap, 0.5 * length)))
         found.append(tracks)
     return found
@@ -242,7 +236,7 @@ class _Network:
         cls,
         tracks: Sequence[FloatArray],
         closed: BoolArray,
-        section: Any,
+        section: Region,
         radius: float,
         weights: FloatArray,
     ) -> "_Network":

@@ -1,12 +1,13 @@
 """Nested closed strands joined to one spiral, so that the fibre is cut once and not at each."""
 
 from collections.abc import Callable, Sequence
-from typing import Any
 
 import numpy as np
 import shapely
 
 from ccfem.arrays import FloatArray
+from ccfem.geometry.polylines import is_closed
+from ccfem.geometry.shapes import Region
 from ccfem.linking.joining import ring_arc
 
 __all__ = ["spiral"]
@@ -19,7 +20,7 @@ def spiral(
     lines: Sequence[FloatArray],
     limit: float,
     cost: Callable[[FloatArray], FloatArray],
-    section: Any,
+    section: Region,
 ) -> list[FloatArray]:
     """Join closed lines that lie in each other to spirals.
 
@@ -43,7 +44,7 @@ def spiral(
     list of (n, 2) arrays
         Open lines first in their order, then rings and spirals from the outside in.
     """
-    closed = [k for k, line in enumerate(lines) if np.array_equal(line[0], line[-1])]
+    closed = [k for k, line in enumerate(lines) if is_closed(line)]
     rings = [_counter_clockwise(lines[k]) for k in closed]
     kept = [line for k, line in enumerate(lines) if k not in set(closed)]
     obstacles = [shapely.linestrings(line) for line in kept]
@@ -111,7 +112,7 @@ def _wind(
     return np.concatenate(pieces)
 
 
-def _fits(line: FloatArray, obstacles: list[Any], section: Any) -> bool:
+def _fits(line: FloatArray, obstacles: list[shapely.LineString], section: Region) -> bool:
     string = shapely.linestrings(line)
     return bool(
         shapely.is_simple(string)

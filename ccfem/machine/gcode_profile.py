@@ -1,10 +1,10 @@
 """What a printer's firmware wants to be told: commands as lines to fill in, and its small moves."""
 
-import math
 import re
 from collections.abc import Mapping
 from dataclasses import dataclass
 
+from ccfem.checks import check_fields, check_number
 from ccfem.errors import InputError
 
 __all__ = ["GcodeProfile"]
@@ -85,26 +85,12 @@ class GcodeProfile:
         for name in ("start", "tool", "cut", "end"):
             for line in getattr(self, name):
                 self._check(name, line)
-        for name in ("lift", "retract"):
-            if not 0.0 <= getattr(self, name) < float("inf"):
-                raise InputError(
-                    f"{name} must be a finite number >= 0; got {getattr(self, name)}: correct it"
-                )
-        for name in ("lift_speed", "retract_speed", "feed_speed", "longest_feed"):
-            if not 0.0 < getattr(self, name) < float("inf"):
-                raise InputError(
-                    f"{name} must be a finite number > 0; got {getattr(self, name)}: correct it"
-                )
-        for name in ("matrix_angle", "matrix_turn"):
-            if not math.isfinite(getattr(self, name)):
-                raise InputError(
-                    f"{name} must be a finite number of degrees; got {getattr(self, name)}: "
-                    "correct it"
-                )
-        if not all(0.0 < size < float("inf") for size in self.bed):
-            raise InputError(
-                f"bed must be three sizes in mm above 0; got {list(self.bed)}: correct it"
-            )
+        check_fields(self, "lift", "retract", at_least=0.0, unit="mm")
+        check_fields(self, "lift_speed", "retract_speed", "feed_speed", above=0.0, unit="mm/s")
+        check_fields(self, "longest_feed", above=0.0, unit="mm")
+        check_fields(self, "matrix_angle", "matrix_turn", unit="degrees")
+        for size in self.bed:
+            check_number("each size of gcode_profile.bed", size, above=0.0, unit="mm")
 
     @staticmethod
     def _check(name: str, line: str) -> None:

@@ -1,8 +1,8 @@
 """The printer: what a path has to respect, and what it costs."""
 
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, fields
 
-from ccfem.errors import InputError
+from ccfem.checks import check_fields
 from ccfem.machine.gcode_profile import GcodeProfile
 from ccfem.machine.speed_table import SpeedTable
 
@@ -77,16 +77,9 @@ class Machine:
     gcode: GcodeProfile = field(default_factory=GcodeProfile)
 
     def __post_init__(self) -> None:
-        for name, value in vars(self).items():
-            if name in ("speeds", "gcode") or value is None:
-                continue
-            if not value >= 0.0 or value == float("inf"):
-                raise InputError(
-                    f"machine.{name} must be a finite number >= 0; got {value!r}: correct it"
-                )
-        for name in ("fibre_width", "matrix_width", "matrix_diameter"):
-            if getattr(self, name) == 0.0:
-                raise InputError(f"machine.{name} must be above 0; got 0: give the width in mm")
+        check_fields(self, "fibre_width", "matrix_width", "matrix_diameter", above=0.0, unit="mm")
+        numbers = [one.name for one in fields(self) if one.name not in ("speeds", "gcode")]
+        check_fields(self, *numbers, at_least=0.0)
 
     @property
     def tail(self) -> float:

@@ -3,7 +3,14 @@
 import numpy as np
 
 from ccfem.arrays import BoolArray, FloatArray, IntArray
-from ccfem.geometry.polylines import arc_lengths, lengths, sample_at, turning_angles
+from ccfem.geometry.polylines import (
+    arc_lengths,
+    inner_points,
+    lengths,
+    sample_at,
+    starts_segment,
+    turning_angles,
+)
 from ccfem.machine.speed_table import SpeedTable
 
 __all__ = ["table_speeds"]
@@ -61,9 +68,7 @@ def _speeds(
     turn = np.degrees(turning_angles(points, offsets, open_ended))
     angle = (180.0 - turn).round(_DIGITS)
     corner = angle < table.angle[1]
-    inner = np.ones(len(points), dtype=bool)
-    inner[offsets[1:] - 1] = False
-    start = np.flatnonzero(inner)
+    start = np.flatnonzero(starts_segment(offsets))
     speeds = np.full(len(points), table.speed[0])
     if not len(start):
         return speeds
@@ -91,9 +96,7 @@ def _step_curvatures(
     bounds = np.sort(np.concatenate([[0], ends[offsets[1:] - 1], ends[corner] - 1]))
     pieces = points[index]
     curvature = _curvatures(pieces, bounds, shortest)
-    inner = np.ones(len(index), dtype=bool)
-    inner[bounds[1:] - 1] = False
-    start = np.flatnonzero(inner)
+    start = np.flatnonzero(starts_segment(bounds))
     return np.maximum(curvature[start], curvature[start + 1])
 
 
@@ -102,9 +105,7 @@ def _curvatures(points: FloatArray, offsets: IntArray, shortest: float) -> Float
     line = np.repeat(np.arange(len(offsets) - 1), np.diff(offsets))
     along = arc_lengths(points, offsets)
     total = lengths(points, offsets)[line]
-    inner = np.ones(len(points), dtype=bool)
-    inner[offsets[:-1]] = inner[offsets[1:] - 1] = False
-    k = np.flatnonzero(inner)
+    k = np.flatnonzero(inner_points(offsets, np.zeros(len(offsets) - 1, dtype=bool)))
     before = np.minimum(along[k] - shortest, along[k - 1])
     after = np.maximum(along[k] + shortest, along[k + 1])
     into = points[k] - sample_at(points, offsets, line[k], np.maximum(before, 0.0))[0]

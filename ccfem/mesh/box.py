@@ -5,7 +5,7 @@ from itertools import permutations
 import numpy as np
 
 from ccfem.arrays import IntArray
-from ccfem.errors import InputError
+from ccfem.checks import check_number
 from ccfem.mesh.tet_mesh import TetMesh
 
 __all__ = ["box_mesh"]
@@ -57,11 +57,9 @@ def box_mesh(
     InputError
         When a size is not positive or there are no divisions along an axis.
     """
-    if min(size) <= 0.0 or min(divisions) < 1:
-        raise InputError(
-            f"a box needs positive sizes and at least one division an axis; got size {size} "
-            f"and divisions {divisions}"
-        )
+    for length, count in zip(size, divisions, strict=True):
+        check_number("size of a box", length, above=0.0, unit="mm")
+        check_number("divisions of a box", count, at_least=1)
     nx, ny, nz = divisions
     axes = [o + s * np.arange(d + 1) / d for o, s, d in zip(origin, size, divisions, strict=True)]
     z, y, x = np.meshgrid(*axes[::-1], indexing="ij")

@@ -4,15 +4,15 @@ from collections.abc import Mapping
 from dataclasses import dataclass
 
 import numpy as np
-from scipy.sparse import coo_array
-from scipy.sparse.csgraph import connected_components
 
 from ccfem.arrays import BoolArray, FloatArray, IntArray
 from ccfem.errors import InputError
+from ccfem.mesh.facets import are_among, facet_keys
 from ccfem.mesh.flaws import STRAIGHT
 from ccfem.mesh.hanging import hanging_nodes
+from ccfem.mesh.measures import connected, signed_volumes
 from ccfem.mesh.pairing import FREE
-from ccfem.mesh.patches import facet_keys, match_boundary
+from ccfem.mesh.patches import match_boundary
 from ccfem.mesh.tet_mesh import TetMesh
 
 __all__ = ["MeshReport", "about_slivers", "check_mesh"]
@@ -233,8 +233,7 @@ def _sort_out(points: FloatArray, cells: IntArray) -> tuple[BoolArray, int, int,
     corner = points[cells[:, :4]]
     edges = corner[:, TetMesh.edges[:, 1]] - corner[:, TetMesh.edges[:, 0]]
     longest = np.sqrt(np.einsum("ijk,ijk->ij", edges, edges).max(axis=1))
-    first, second, third = np.moveaxis(corner[:, 1:] - corner[:, :1], 1, 0)
-    volumes = np.einsum("ij,ij->i", np.cross(first, second), third) / 6.0
+    volumes = signed_volumes(points, cells[:, :4])
     flat = np.abs(volumes) <= _FLAT * longest**3
     if flat.all():
         raise InputError(
@@ -273,18 +272,17 @@ def _check_faces(mesh: TetMesh) -> None:
         return
     faces = mesh.corners[crowded[:, None] // 4, TetMesh.faces[crowded % 4]]
     at = ", ".join(f"{x:.4g}" for x in mesh.points[faces[0]].mean(axis=0))
+    count = len(np.unique(facet_keys(faces)[0]))
     raise InputError(
-        f"{len(np.unique(facet_keys(faces)))} faces of the mesh belong to more than two cells, or "
+        f"{count} faces of the mesh belong to more than two cells, or "
         f"to two on one side of them, the first at ({at}) mm: cells overlap, mesh the part again"
     )
 
 
 def _components(corners: IntArray, nodes: int) -> int:
     """Count the pieces that hang together through nodes."""
-    links = corners[:, [0, 0, 0]].ravel(), corners[:, 1:].ravel()
-    graph = coo_array((np.ones(len(links[0]), dtype=bool), links), shape=(nodes, nodes))
-    _, label = connected_components(graph, directed=False)
-    return len(np.unique(label[corners[:, 0]]))
+    piece = connected(corners[:, [[0, 1], [0, 2], [0, 3]]].reshape(-1, 2), nodes)
+    return len(np.unique(piece[corners[:, 0]]))
 
 
 def _patches(
@@ -299,9 +297,9 @@ def _patches(
         found = match_boundary(mended, facets)
         lost = len(facets) - len(found)
         if lost and len(removed):
-            faces = removed[:, TetMesh.faces]
-            carries = np.isin(facet_keys(faces), facet_keys(facets)).any(axis=1)
-            both = np.concatenate([facets, faces[carries].reshape(-1, 3)])
+            faces = removed[:, TetMesh.faces].reshape(-1, 3)
+            carries = are_among(faces, facets).reshape(-1, 4).any(axis=1)
+            both = np.concatenate([facets, faces[np.repeat(carries, 4)]])
             found = match_boundary(mended, both)
             lost = max(len(facets) - len(found), 0)
         patches[name] = found

@@ -23,6 +23,7 @@ def first_flaw(
     Parameters
     ----------
     points : (n, 3) array, mm
+        Finite.
     cells : (m, 4) or (m, 10) int array
     edges : (6, 2) int array
         Corners at the ends of the edge of each mid-side node.
@@ -30,8 +31,6 @@ def first_flaw(
     partners : (4 m,) int array
         From `ccfem.mesh.pairing.pair_facets`.
     """
-    if not np.isfinite(points).all():
-        return "the mesh has points that are NaN or infinite: correct its coordinates"
     if not volumes.min() > 0.0:
         return (
             f"cell {volumes.argmin()} of the mesh has volume {volumes.min():.3g} mm^3: repair flat "

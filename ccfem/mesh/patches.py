@@ -9,10 +9,12 @@ from dataclasses import dataclass
 from typing import Protocol
 
 import numpy as np
-from numpy.typing import ArrayLike, NDArray
+from numpy.typing import ArrayLike
 
 from ccfem.arrays import BoolArray, FloatArray, IntArray
+from ccfem.checks import check_fields
 from ccfem.errors import InputError
+from ccfem.mesh.facets import are_among
 from ccfem.mesh.tet_mesh import TetMesh
 
 __all__ = [
@@ -22,10 +24,10 @@ __all__ = [
     "Nearest",
     "PatchRule",
     "Plane",
-    "facet_keys",
     "match_boundary",
     "patches_from_rules",
     "unit_vector",
+    "with_groups",
 ]
 
 Vector = tuple[float, float, float]
@@ -66,7 +68,7 @@ class Plane:
 
     def __post_init__(self) -> None:
         unit_vector(self.normal, "plane normal")
-        _check_tolerance(self.tolerance)
+        check_fields(self, "tolerance", at_least=0.0, unit="mm")
         if isinstance(self.offset, str) and self.offset not in ("min", "max"):
             raise InputError(
                 f"plane offset must be a number, 'min' or 'max'; got '{self.offset}': correct it"
@@ -153,9 +155,8 @@ class Cylinder:
     def __post_init__(self) -> None:
         _vector(self.point, "cylinder point")
         axis = unit_vector(self.axis, "cylinder axis")
-        _check_tolerance(self.tolerance)
-        if not 0.0 < self.radius < np.inf:
-            raise InputError(f"cylinder radius must be above 0 mm; got {self.radius}: correct it")
+        check_fields(self, "tolerance", at_least=0.0, unit="mm")
+        check_fields(self, "radius", above=0.0, unit="mm")
         if self.half is not None and abs(unit_vector(self.half, "cylinder half") @ axis) > 0.999:
             raise InputError(
                 "cylinder half must be a direction across the axis; got one along it: turn it"
@@ -198,10 +199,8 @@ class Nearest:
         _vector(self.point, "nearest point")
         if self.count is not None and self.radius is not None:
             raise InputError("nearest takes count or radius; got both: drop one")
-        if self.count is not None and self.count < 1:
-            raise InputError(f"nearest count must be at least 1; got {self.count}: correct it")
-        if self.radius is not None and not self.radius > 0.0:
-            raise InputError(f"nearest radius must be above 0 mm; got {self.radius}: correct it")
+        check_fields(self, "count", at_least=1)
+        check_fields(self, "radius", above=0.0, unit="mm")
 
     def __call__(self, mesh: TetMesh) -> IntArray:
         """Boundary facets (k, 3) nearest to the point."""
@@ -266,20 +265,16 @@ def match_boundary(mesh: TetMesh, facets: IntArray) -> IntArray:
     """
     if not len(facets):
         return np.zeros((0, 3), dtype=np.int64)
-    return mesh.boundary[np.isin(facet_keys(mesh.boundary), facet_keys(facets))]
+    return mesh.boundary[are_among(mesh.boundary, facets)]
 
 
-def facet_keys(facets: IntArray) -> NDArray[np.complex128]:
-    """One number (...,) for the nodes of each facet (..., 3), whatever their order.
+def with_groups(mesh: TetMesh, groups: Mapping[str, IntArray]) -> TetMesh:
+    """Return the mesh with groups of facets (k, 3) as patches, as far as they are on the boundary.
 
-    The keys of different facets differ, and sort as their nodes do, for node numbers up to 2^31
-    (two thousand million): the three of them fill the 106 bits of two floats.
+    Groups without a boundary facet give no patch.
     """
-    a, b, c = np.moveaxis(np.sort(np.asarray(facets, dtype=np.int64), axis=-1), -1, 0)
-    keys = np.empty(a.shape, dtype=np.complex128)
-    keys.real = (a << 16) + (b >> 16)
-    keys.imag = ((b & 0xFFFF) << 32) + c
-    return keys
+    found = {name: match_boundary(mesh, facets) for name, facets in groups.items()}
+    return mesh.with_patches({name: facets for name, facets in found.items() if len(facets)})
 
 
 def unit_vector(value: str | ArrayLike, what: str) -> FloatArray:
@@ -313,11 +308,6 @@ def _vector(value: ArrayLike, what: str) -> FloatArray:
     if vector.shape != (3,) or np.isnan(vector).any():
         raise InputError(f"{what} must be 3 numbers; got {value!r}: correct it")
     return vector
-
-
-def _check_tolerance(tolerance: float | None) -> None:
-    if tolerance is not None and not 0.0 <= tolerance < np.inf:
-        raise InputError(f"tolerance must be at least 0 mm; got {tolerance}: correct it")
 
 
 def _diagonal(mesh: TetMesh) -> float:

@@ -8,14 +8,17 @@ triangulation in every round.
 
 from collections.abc import Callable
 from itertools import pairwise
-from typing import Any
 
 import numpy as np
 import shapely
 from scipy.spatial import Delaunay, QhullError, cKDTree
 
 from ccfem.arrays import FloatArray, IntArray
+from ccfem.checks import check_number
 from ccfem.errors import InputError
+from ccfem.geometry.shapes import Region
+from ccfem.mesh.facets import are_among
+from ccfem.mesh.measures import signed_areas
 
 __all__ = ["triangulate"]
 
@@ -38,7 +41,7 @@ Size = Callable[[FloatArray], FloatArray]
 
 
 def triangulate(
-    polygon: Any, edge_length: float, keep: FloatArray | None = None
+    polygon: shapely.Polygon, edge_length: float, keep: FloatArray | None = None
 ) -> tuple[FloatArray, IntArray]:
     """Triangulate a planform.
 
@@ -88,7 +91,7 @@ def triangulate(
     return points[used], number[triangles]
 
 
-def _check(polygon: Any, edge_length: float) -> None:
+def _check(polygon: shapely.Polygon, edge_length: float) -> None:
     """Raise on a planform or edge length that cannot be meshed."""
     if not isinstance(polygon, shapely.Polygon) or polygon.is_empty:
         raise InputError(
@@ -99,8 +102,7 @@ def _check(polygon: Any, edge_length: float) -> None:
         raise InputError(
             f"the planform is not a valid polygon: {shapely.is_valid_reason(polygon)}: correct it"
         )
-    if not 0.0 < edge_length < np.inf:
-        raise InputError(f"edge length must be above 0 mm; got {edge_length}: correct it")
+    check_number("edge length", edge_length, above=0.0, unit="mm")
     expected = polygon.area / (0.433 * edge_length**2)
     if expected > _MOST:
         raise InputError(
@@ -191,7 +193,9 @@ def _along(ring: FloatArray, corners: IntArray, size: Size) -> FloatArray:
     return np.concatenate(found)
 
 
-def _grid(polygon: Any, edge_length: float, size: Size, outline: FloatArray) -> FloatArray:
+def _grid(
+    polygon: shapely.Polygon, edge_length: float, size: Size, outline: FloatArray
+) -> FloatArray:
     """Inner points (k, 2): a hexagonal grid, and points of a finer one in the gaps it leaves."""
     coarse = _hexagons(polygon, edge_length)
     wanted = size(coarse)
@@ -204,7 +208,7 @@ def _grid(polygon: Any, edge_length: float, size: Size, outline: FloatArray) -> 
     return np.concatenate([coarse, _thinned(fine[order], wanted[order])])
 
 
-def _hexagons(polygon: Any, step: float) -> FloatArray:
+def _hexagons(polygon: shapely.Polygon, step: float) -> FloatArray:
     """Points (k, 2) of a hexagonal grid inside a polygon."""
     low, high = np.array(polygon.bounds[:2]), np.array(polygon.bounds[2:])
     count = np.ceil((high - low) / (step * np.array([1.0, np.sqrt(0.75)]))).astype(int) + 2
@@ -240,14 +244,11 @@ def _conforming(
     for _ in range(8):
         points = np.concatenate([*outline, inner])
         corners = _delaunay(points)
-        sides = np.sort(corners[:, [[0, 1], [1, 2], [2, 0]]].reshape(-1, 2), axis=1)
-        known = np.unique(sides[:, 0] * len(points) + sides[:, 1])
+        sides = corners[:, [[0, 1], [1, 2], [2, 0]]].reshape(-1, 2)
         start, closer = 0, []
         for ring in outline:
             here = start + np.arange(len(ring))
-            there = np.roll(here, -1)
-            key = np.minimum(here, there) * len(points) + np.maximum(here, there)
-            lost = np.flatnonzero(~np.isin(key, known))
+            lost = np.flatnonzero(~are_among(np.stack([here, np.roll(here, -1)], axis=1), sides))
             middle = 0.5 * (ring[lost] + np.roll(ring, -1, axis=0)[lost])
             closer.append(np.insert(ring, lost + 1, middle, axis=0))
             start += len(ring)
@@ -271,23 +272,16 @@ def _delaunay(points: FloatArray) -> IntArray:
         raise InputError(
             "the planform has no area that could be triangulated: check its coordinates"
         ) from None
-    clockwise = _areas(points, corners) < 0.0
+    clockwise = signed_areas(points, corners) < 0.0
     corners[clockwise] = corners[clockwise][:, ::-1]
     return corners
 
 
-def _areas(points: FloatArray, corners: IntArray) -> FloatArray:
-    """Signed area of each triangle, (t,), mm^2."""
-    a, b, c = np.moveaxis(points[corners], 1, 0)
-    u, v = b - a, c - a
-    return 0.5 * (u[:, 0] * v[:, 1] - u[:, 1] * v[:, 0])
-
-
-def _inside(points: FloatArray, domain: Any) -> IntArray:
+def _inside(points: FloatArray, domain: Region) -> IntArray:
     """Delaunay triangles with their centre in the domain; those without area are left out."""
     corners = _delaunay(points)
     centre = points[corners].mean(axis=1)
-    area = _areas(points, corners)
+    area = signed_areas(points, corners)
     sides = np.roll(points[corners], 1, axis=1) - points[corners]
     longest = np.linalg.norm(sides, axis=2).max(axis=1)
     shapely.prepare(domain)
@@ -297,7 +291,7 @@ def _inside(points: FloatArray, domain: Any) -> IntArray:
 def _smoothed(points: FloatArray, corners: IntArray, fixed: int, size: Size) -> FloatArray:
     """Points moved to the weighted mean of the centres of the triangles round them."""
     centre = points[corners].mean(axis=1)
-    weight = _areas(points, corners) / size(centre) ** 2
+    weight = signed_areas(points, corners) / size(centre) ** 2
     total = np.zeros(len(points))
     moment = np.zeros_like(points)
     for column in corners.T:

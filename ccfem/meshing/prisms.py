@@ -1,13 +1,12 @@
 """Prismatic parts: a triangulated planform, extruded and cut into tetrahedra."""
 
-from typing import Any
-
 import numpy as np
+import shapely
 from scipy.sparse import coo_array
 from scipy.sparse.csgraph import reverse_cuthill_mckee
 
 from ccfem.arrays import FloatArray, IntArray
-from ccfem.errors import InputError
+from ccfem.checks import check_number
 from ccfem.mesh.tet_mesh import TetMesh
 from ccfem.meshing.planform import triangulate
 
@@ -18,7 +17,7 @@ _SPLIT = np.array([[0, 1, 2, 5], [0, 1, 4, 5], [0, 3, 4, 5]])
 
 
 def extrude(
-    polygon: Any,
+    polygon: shapely.Polygon,
     height: float,
     edge_length: float,
     layers: int | None = None,
@@ -46,10 +45,9 @@ def extrude(
         sides follow a random order of the planform's points (of a fixed seed) that is turned
         round in every other layer, so that they favour no direction.
     """
-    if not 0.0 < height < np.inf:
-        raise InputError(f"height must be a finite number above 0 mm; got {height}: correct it")
-    if layers is not None and layers < 1:
-        raise InputError(f"layers of cells must be at least 1; got {layers}: correct it")
+    check_number("height", height, above=0.0, unit="mm")
+    if layers is not None:
+        check_number("layers of cells", layers, at_least=1)
     plane, triangles = triangulate(polygon, edge_length, keep)
     plane, triangles = _numbered_along(plane, triangles)
     count = layers or max(1, round(height / edge_length))

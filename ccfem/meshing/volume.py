@@ -5,6 +5,7 @@ from tempfile import TemporaryDirectory
 
 import numpy as np
 
+from ccfem.checks import check_number
 from ccfem.errors import InputError
 from ccfem.io.surface import Surface
 from ccfem.mesh.check import check_mesh
@@ -38,11 +39,7 @@ def tetrahedralise(surface: Surface, edge_length: float) -> TetMesh:
         When the edge length does not suit the part, or nothing is left inside the surface.
     """
     size = float(np.linalg.norm(np.ptp(surface.points, axis=0)))
-    if not 0.0 < edge_length < size:
-        raise InputError(
-            f"edge length must lie between 0 and the part's diagonal, {size:.3g} mm; got "
-            f"{edge_length}: correct it"
-        )
+    check_number("edge length", edge_length, above=0.0, below=size, unit="mm (the part's diagonal)")
     expected = surface.volume / (edge_length**3 / (6.0 * np.sqrt(2.0)))
     if expected > _MOST:
         raise InputError(

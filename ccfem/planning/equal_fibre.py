@@ -11,8 +11,9 @@ from typing import Any
 
 import numpy as np
 
+from ccfem.arrays import in_brief
+from ccfem.checks import check_number
 from ccfem.elasticity.part_stress import PartStress
-from ccfem.errors import InputError
 from ccfem.layers.layer import Layer
 from ccfem.machine.machine import Machine
 from ccfem.planning.plan import plan
@@ -60,6 +61,8 @@ class Planned:
     length_per_layer: float
     note: str = ""
 
+    __repr__ = in_brief
+
 
 def length_per_layer(toolpaths: Toolpaths, layers: Sequence[Layer]) -> float:
     """Fibre length divided by the number of layers, mm."""
@@ -68,8 +71,7 @@ def length_per_layer(toolpaths: Toolpaths, layers: Sequence[Layer]) -> float:
 
 def check_wanted(wanted: float) -> None:
     """Refuse a wanted length per layer, mm, that is not a positive number."""
-    if not (np.isfinite(wanted) and wanted > 0.0):
-        raise InputError(f"fibre per layer must be a length above 0 mm; got {wanted:g}: correct it")
+    check_number("fibre per layer", wanted, above=0.0, unit="mm")
 
 
 def plan_to_length(
@@ -78,7 +80,6 @@ def plan_to_length(
     stress: PartStress,
     machine: Machine,
     wanted: float,
-    tolerance: float = TOLERANCE,
     start: Planned | None = None,
 ) -> Planned:
     """Plan with the value of the amount parameter that lays at most the wanted fibre.
@@ -100,10 +101,8 @@ def plan_to_length(
     stress : PartStress
     machine : Machine
     wanted : float, mm
-        Fibre per layer: mean over the stack.
-    tolerance : float, default 0.01
-        The search stops within this share below `wanted`. A strategy may miss it: `Planned.note`
-        says so.
+        Fibre per layer: mean over the stack. The search stops within the share `TOLERANCE` below
+        it. A strategy may miss that: `Planned.note` says so.
     start : Planned, optional
         The strategy's plan with its own value, where there is one already.
 
@@ -117,7 +116,7 @@ def plan_to_length(
         When `wanted` is not a positive number, or whatever the strategy raises.
     """
     check_wanted(wanted)
-    trials = _Trials(strategy, layers, stress, machine, wanted, tolerance)
+    trials = _Trials(strategy, layers, stress, machine, wanted)
     own = getattr(strategy, strategy.amount.parameter)
     if start is not None and own is not None:
         trials.tried[float(own)] = start
@@ -136,7 +135,6 @@ class _Trials:
     stress: PartStress
     machine: Machine
     wanted: float
-    tolerance: float
     tried: dict[float, Planned] = field(default_factory=dict)
     sampled: dict[float, float] = field(default_factory=dict)
 
@@ -162,11 +160,11 @@ class _Trials:
         return self.sampled[value]
 
     def meets(self, length: float) -> bool:
-        return (1.0 - self.tolerance) * self.wanted <= length <= self.wanted
+        return (1.0 - TOLERANCE) * self.wanted <= length <= self.wanted
 
     def guess(self) -> Planned | None:
         """Plan from one known plan of the stack, a few times at most; None where that fails."""
-        target = self.wanted * (1.0 - 0.5 * self.tolerance)
+        target = self.wanted * (1.0 - 0.5 * TOLERANCE)
         for _ in range(_GUESSES):
             lengths = {value: one.length_per_layer for value, one in self.tried.items()}
             value = _by_power(lengths, self.strategy.amount, target)
@@ -186,20 +184,20 @@ class _Trials:
         ratio = self._ratio()
         for _ in range(1 if self.few is self.layers else _ROUNDS):
             target = wanted * (1.0 - margin) / ratio
-            value = _search(self.sample, self.sampled, value, amount, target, self.tolerance)
+            value = _search(self.sample, self.sampled, value, amount, target)
             if value in tried:
                 break
             tried[value] = self.planned(value, self.layers)
             length = tried[value].length_per_layer
             if self.meets(length) or not self.sampled[value] > 0.0:
                 break
-            ratio, margin = length / self.sampled[value], 0.3 * self.tolerance
+            ratio, margin = length / self.sampled[value], 0.3 * TOLERANCE
         best = _best(list(tried.values()), wanted)
         if best.length_per_layer > wanted * (1.0 + 1e-9):
             best = _mixed(replace(best, toolpaths=Toolpaths.empty()), best, self.layers, wanted)
-        elif best.length_per_layer < (1.0 - self.tolerance) * wanted:
+        elif best.length_per_layer < (1.0 - TOLERANCE) * wanted:
             best = self._raised(best, ratio)
-        return replace(best, note=_note(best, amount, wanted, self.tolerance))
+        return replace(best, note=_note(best, amount, wanted))
 
     def _ratio(self) -> float:
         """Length on the stack over that on the few layers, where a plan is known."""
@@ -269,9 +267,9 @@ def _best(tried: list[Planned], wanted: float) -> Planned:
     return min(tried, key=lambda one: one.length_per_layer)
 
 
-def _note(best: Planned, amount: Amount, wanted: float, tolerance: float) -> str:
+def _note(best: Planned, amount: Amount, wanted: float) -> str:
     length, value = best.length_per_layer, getattr(best.strategy, amount.parameter)
-    if (1.0 - tolerance) * wanted <= length <= wanted * (1.0 + 1e-9):
+    if (1.0 - TOLERANCE) * wanted <= length <= wanted * (1.0 + 1e-9):
         return best.note
     mixed = f"{best.note}; " if best.note else ""
     reached = f"{mixed}lays {length:.0f} of {wanted:.0f} mm per layer"
@@ -288,7 +286,6 @@ def _search(
     start: float,
     amount: Amount,
     target: float,
-    tolerance: float,
 ) -> float:
     """Value whose length is at most the target and within the tolerance, or the nearest found.
 
@@ -296,7 +293,7 @@ def _search(
     known length on either side; while one side is unknown, a guess by proportion.
     """
     ends = min(amount.least, amount.most), max(amount.least, amount.most)
-    enough = (1.0 - 0.5 * tolerance) * target
+    enough = (1.0 - 0.5 * TOLERANCE) * target
     value = float(np.clip(start, *ends))
     for step in range(_STEPS):
         if value not in known and enough <= length(value) <= target:
@@ -305,6 +302,8 @@ def _search(
         high = min((v for v in known if known[v] > target), key=known.__getitem__, default=None)
         if low is None or high is None:
             value = _by_proportion(known, amount, target, 0.05)
+            if step == _STEPS - 2:  # out of proportion: the end itself is the last to be tried
+                value = amount.most if high is None else amount.least
         elif known[low] >= enough or abs(high - low) <= _FINEST * (ends[1] - ends[0]):
             return low
         else:
@@ -314,7 +313,7 @@ def _search(
             value = low + share * (high - low)
         if value in known:
             break
-    return low if low is not None else value
+    return low if low is not None else min(known, key=known.__getitem__)
 
 
 def _by_power(lengths: Mapping[float, float], amount: Amount, target: float) -> float:

@@ -44,6 +44,22 @@ class LayerStrategy(Protocol):
 
     A strategy that works in the plane of a layer has a class variable ``flat_layers_only = True``:
     `plan` refuses curved layers before any work.
+
+    Attributes
+    ----------
+    amount : Amount
+        The parameter that sets how much fibre is laid.
+    variants : mapping of str to parameters, optional
+        Other parameters than the defaults, by a short name, that the laws of strategies also run:
+        ``{"literal": {"fit": "literal"}}``. One for each branch that the defaults never take. A
+        point in them is the origin, about which the laws turn their part.
+    direction : str, optional
+        The parameter, in degrees, that gives a strategy a direction of its own.
+    crosses : bool, default False
+        Whether strands cross each other by intention.
+    on_axes : bool, default False
+        Whether paths keep to the axes of the layer, as those of pixels do, and so do not turn with
+        the part.
     """
 
     amount: ClassVar[Amount]

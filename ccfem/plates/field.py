@@ -4,7 +4,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from ccfem.arrays import FloatArray, read_only
+from ccfem.arrays import FloatArray, in_brief, read_only
 from ccfem.elasticity.stress_field import SolveRecord
 from ccfem.plates.mesh import PlaneMesh
 from ccfem.plates.problem import PlaneProblem
@@ -42,6 +42,8 @@ class PlaneField:
     cell_energy: FloatArray
     reactions: FloatArray
     record: SolveRecord
+
+    __repr__ = in_brief
 
     def __post_init__(self) -> None:
         for name in ("displacement", "strain", "stress", "cell_energy", "reactions"):

@@ -3,11 +3,10 @@
 from collections.abc import Mapping
 from dataclasses import dataclass, field
 from functools import cached_property
-from types import MappingProxyType
 
 import numpy as np
 
-from ccfem.arrays import FloatArray, read_only
+from ccfem.arrays import FloatArray, freeze, in_brief, read_only
 from ccfem.elasticity.load_kinds import Pressure, SurfaceLoad, patches_in_use
 from ccfem.elasticity.support_kinds import Support
 from ccfem.errors import InputError
@@ -40,11 +39,11 @@ class PlaneProblem:
     supports: tuple[Support, ...]
     loads: Mapping[str, tuple[SurfaceLoad, ...]] = field(default_factory=dict)
 
+    __repr__ = in_brief
+
     def __post_init__(self) -> None:
         m = len(self.mesh.cells)
-        object.__setattr__(self, "supports", tuple(self.supports))
-        loads = {name: tuple(case) for name, case in self.loads.items()}
-        object.__setattr__(self, "loads", MappingProxyType(loads))
+        freeze(self, supports=tuple, loads=tuple)
         stiffness, thickness = np.asarray(self.stiffness), np.asarray(self.thickness)
         if stiffness.shape not in ((3, 3), (m, 3, 3)):
             raise InputError(

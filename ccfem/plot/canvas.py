@@ -29,6 +29,8 @@ __all__ = [
 
 _HEAD, _FOOT = 0.50, 0.34
 """Space for title and scale bar, inches."""
+_WIDTH = 4.0
+"""Width of one picture, inches."""
 _MARGIN = 0.03
 """Free space round the section over its larger extent."""
 _DPI = 150.0
@@ -37,9 +39,7 @@ _FORMATS = (".png", ".pdf", ".svg")
 _FONT: dict[str, Any] = {"family": ["DejaVu Sans"], "color": INK}
 
 
-def new_figure(
-    extents: Sequence[float], columns: int = 1, width: float = 4.0
-) -> tuple["Figure", list["Axes"]]:
+def new_figure(extents: Sequence[float], columns: int = 1) -> tuple["Figure", list["Axes"]]:
     """Figure with one picture of a section, or several side by side.
 
     Parameters
@@ -47,9 +47,8 @@ def new_figure(
     extents : 4 floats, mm
         x and y of the lower left, then of the upper right corner of what is drawn.
     columns : int, default 1
-    width : float, inches, default 4
-        Of each picture; its height follows the section's shape, up to one and a half times as
-        much.
+        Pictures; the height of each follows the section's shape, up to one and a half times its
+        width.
 
     Returns
     -------
@@ -62,9 +61,9 @@ def new_figure(
     left, bottom, right, top = extents
     margin = _MARGIN * max(right - left, top - bottom)
     wide, high = right - left + 2.0 * margin, top - bottom + 2.0 * margin
-    height = width * min(max(high / wide, 0.2), 1.5)
+    height = _WIDTH * min(max(high / wide, 0.2), 1.5)
     total = height + _HEAD + _FOOT
-    figure = Figure(figsize=(columns * width, total), dpi=_DPI, facecolor="white")
+    figure = Figure(figsize=(columns * _WIDTH, total), dpi=_DPI, facecolor="white")
     FigureCanvasAgg(figure)
     axes = []
     for k in range(columns):

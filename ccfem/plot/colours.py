@@ -1,7 +1,7 @@
 """Colours of pictures: one per strategy, told apart by colour-blind readers too, and scales.
 
 The strategies take the colours of M. Okabe and K. Ito, Color Universal Design (2008). Scales run
-in one hue from light to dark; a quantity with a sign runs from blue over grey to red.
+in one hue from light to dark.
 """
 
 from collections.abc import Iterable
@@ -30,7 +30,6 @@ _SCALES = {
     "stress": (SECTION, "#f9e9cc", "#fbd9a5", "#f5b36b", "#e58646"),
     "size": ("#a9bdd6", "#7ba1cf", "#4f83bd", "#265a94", "#0d2f5c"),
     "field": ("#eef3f0", "#b9dccb", "#7cc0a6", "#41937f", "#1c5f58"),
-    "sign": ("#1f4e9c", "#7ea6dc", "#c9ccd1", "#e58f7d", "#a51f2d"),
 }
 
 
@@ -58,9 +57,9 @@ def scale(name: str) -> Any:
 
     Parameters
     ----------
-    name : {"stress", "field", "size", "sign"}
+    name : {"stress", "field", "size"}
         For a map of tension, or of another field, that fibre is drawn on; for a quantity on the
-        fibre, from none to much; for one with a sign, zero in the middle.
+        fibre, from none to much.
     """
     from matplotlib.colors import LinearSegmentedColormap
 

@@ -1,4 +1,4 @@
-"""Curves of several strategies on one pair of axes, and maps of the curvature of their paths."""
+"""Curves of several strategies on one pair of axes."""
 
 from collections.abc import Mapping, Sequence
 from typing import TYPE_CHECKING, Any
@@ -6,18 +6,14 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from ccfem.arrays import FloatArray
+from ccfem.checks import check_number
 from ccfem.errors import InputError
-from ccfem.layers.layer import Layer
-from ccfem.plot.canvas import colour_bar, new_figure, scale_bar, title
 from ccfem.plot.colours import INK, OUTLINE, palette
-from ccfem.plot.on_paths import curvature_on_paths
-from ccfem.plot.paths import draw_section, draw_segments, picture_extents
-from ccfem.toolpaths import Toolpaths
 
 if TYPE_CHECKING:
     from matplotlib.figure import Figure
 
-__all__ = ["curvature_curves", "curvature_maps", "matching_curves"]
+__all__ = ["curvature_curves", "matching_curves"]
 
 _LEAST, _MOST = 0.01, 10.0
 """Ends, 1/mm, of the scale of curvature; what is straighter counts at its left end."""
@@ -34,7 +30,7 @@ def matching_curves(
     Parameters
     ----------
     rates : mapping of name to (k,) array
-        As from `evaluate.matching.matching_rate`; NaN is left out.
+        As from `evaluation.matching.matching_curve`; NaN is left out.
     thresholds : (k,) array, degrees
     heading : str
     colours : mapping of name to colour, optional
@@ -73,7 +69,7 @@ def curvature_curves(
     Parameters
     ----------
     curvatures : mapping of name to (s,) array, 1/mm
-        Samples that count equally, as `evaluate.curvature.sample_curvature` takes them.
+        Samples that count equally, as `evaluation.curvature.sample_curvature` takes them.
     radius : float, mm
         Tightest that the machine allows (`Machine.minimum_radius`): its curvature is marked, unless
         it is 0.
@@ -81,8 +77,7 @@ def curvature_curves(
     colours : mapping of name to colour, optional
         Default `palette`.
     """
-    if not 0.0 <= radius < np.inf:
-        raise InputError(f"the tightest radius must be a finite number >= 0 mm; got {radius:g}")
+    check_number("the tightest radius", radius, at_least=0.0, unit="mm")
     figure, axes = _axes(heading, "curvature, 1/mm", "share below it, %")
     if radius > 0.0:
         axes.axvline(1.0 / radius, color=OUTLINE, lw=0.8, ls=(0, (4, 3)), zorder=1.0)
@@ -106,39 +101,6 @@ def curvature_curves(
     axes.set_xlim(_LEAST, _MOST)
     axes.set_xticks([0.01, 0.1, 1.0, 10.0], ["≤ 0.01", "0.1", "1", "10"])
     _legend(axes, chosen, list(curvatures))
-    return figure
-
-
-def curvature_maps(
-    layer: Layer,
-    paths: Mapping[str, Toolpaths],
-    width: float,
-    most: float,
-    captions: Mapping[str, str] | None = None,
-) -> "Figure":
-    """Draw the paths of several strategies on one layer side by side, coloured by curvature.
-
-    Parameters
-    ----------
-    layer : Layer
-    paths : mapping of name to Toolpaths
-        Links are drawn too, also where they lie beyond the part.
-    width : float, mm
-        Of a strand (`Machine.fibre_width`); the curvature is taken in steps of it.
-    most : float, 1/mm
-        End of the colour scale, such as ``1 / Machine.minimum_radius``.
-    captions : mapping of name to str, optional
-        Lines with key numbers.
-    """
-    figure, columns = new_figure(picture_extents(layer, paths.values()), columns=len(paths))
-    colours = palette(paths)
-    for axes, (name, lines) in zip(columns, paths.items(), strict=True):
-        draw_section(axes, layer)
-        coloured = curvature_on_paths(lines, layer, most, width)
-        scale = draw_segments(axes, coloured, width)
-        colour_bar(axes, scale, coloured.limits, coloured.label)
-        scale_bar(axes)
-        title(axes, name, (captions or {}).get(name, ""), colours[name])
     return figure
 
 

@@ -1,6 +1,5 @@
-"""Pictures of the fields on a layer: the tension that paths follow, and scalar fields."""
+"""Picture of the tension in a layer, which paths follow."""
 
-from collections.abc import Sequence
 from typing import TYPE_CHECKING
 
 import numpy as np
@@ -9,7 +8,7 @@ from ccfem.arrays import BoolArray, FloatArray
 from ccfem.layers.layer import Layer
 from ccfem.layers.layer_stress import LayerStress
 from ccfem.plot.canvas import colour_bar, extents_of, new_figure, scale_bar, title
-from ccfem.plot.colours import INK, scale
+from ccfem.plot.colours import INK
 from ccfem.plot.paths import draw_section, draw_stress, tension_limit
 from ccfem.tensor import in_plane, largest_in_plane
 
@@ -17,7 +16,7 @@ if TYPE_CHECKING:
     from matplotlib.axes import Axes
     from matplotlib.figure import Figure
 
-__all__ = ["draw_directions", "scalar_picture", "tension_picture"]
+__all__ = ["draw_directions", "tension_picture"]
 
 _STROKES = 45
 """Strokes across the larger extent of a section."""
@@ -82,52 +81,3 @@ def draw_directions(
     axes.add_collection(
         LineCollection(list(strokes), colors=INK, linewidths=0.8, zorder=2.0), autolim=False
     )
-
-
-def scalar_picture(
-    layer: Layer,
-    values: FloatArray,
-    isocurves: Sequence[FloatArray] = (),
-    label: str = "",
-    heading: str = "",
-    caption: str = "",
-) -> "Figure":
-    """Picture of a scalar field on a layer, with curves on it.
-
-    Parameters
-    ----------
-    layer : Layer
-    values : (n,) array
-        At the layer's points, or (t,) on its triangles.
-    isocurves : sequence of (k, 2) arrays, mm
-        In plane coordinates.
-    label : str
-        Quantity and unit.
-    heading, caption : str
-    """
-    from matplotlib.collections import LineCollection
-
-    figure, (axes,) = new_figure(extents_of(layer.plane.points))
-    draw_section(axes, layer, filled=False)
-    colours = scale("field")
-    limits = (float(values.min()), float(values.max()))
-    per_point = len(values) == len(layer.points)
-    axes.tripcolor(
-        *layer.plane.points.T,
-        layer.triangles,
-        *([values] if per_point else []),
-        facecolors=None if per_point else values,
-        shading="gouraud" if per_point else "flat",
-        cmap=colours,
-        vmin=limits[0],
-        vmax=limits[1],
-        rasterized=True,
-        zorder=1.0,
-    )
-    axes.add_collection(
-        LineCollection(list(isocurves), colors=INK, linewidths=0.9, zorder=2.0), autolim=False
-    )
-    colour_bar(axes, colours, limits, label)
-    scale_bar(axes)
-    title(axes, heading, caption)
-    return figure

@@ -34,7 +34,6 @@ __all__ = [
 
 _LINE = 0.45
 """Width of a drawn strand over the fibre width, so that neighbours stay apart in the picture."""
-_NO_VALUE = "#b5bac1"
 
 
 @dataclass(frozen=True)
@@ -46,24 +45,20 @@ class Coloured:
     segments : (s, 2, 2) array, mm
         Both ends of each piece in the plane of the layer.
     values : (s,) array
-        NaN is drawn grey.
     label : str
         Unit, and quantity if wanted, for the colour bar.
     limits : tuple of 2 floats
         Values at the ends of the colour scale.
-    signed : bool, default False
-        Whether the scale has its middle at zero; `limits` should then be symmetric.
     """
 
     segments: FloatArray
     values: FloatArray
     label: str
     limits: tuple[float, float]
-    signed: bool = False
 
 
-def tension_limit(stress: LayerStress, share: float = 0.98) -> float:
-    """Tension, MPa, that this share of the layer's area stays below: the end of a colour scale.
+def tension_limit(stress: LayerStress) -> float:
+    """Tension, MPa, that 98 % of the layer's area stay below: the end of a colour scale.
 
     At least a tiny positive number, so that a layer without tension has a scale too.
     """
@@ -72,7 +67,7 @@ def tension_limit(stress: LayerStress, share: float = 0.98) -> float:
     below = np.cumsum(stress.layer.areas[order])
     if not len(order):
         return 1e-12
-    place = min(int(np.searchsorted(below, share * below[-1])), len(order) - 1)
+    place = min(int(np.searchsorted(below, 0.98 * below[-1])), len(order) - 1)
     return max(float(values[order[place]]), 1e-12)
 
 
@@ -126,9 +121,7 @@ def draw_stress(axes: "Axes", stress: LayerStress, limit: float) -> Any:
     return colours
 
 
-def draw_paths(
-    axes: "Axes", layer: Layer, paths: Toolpaths, width: float, colour: str = INK
-) -> None:
+def draw_paths(axes: "Axes", layer: Layer, paths: Toolpaths, width: float) -> None:
     """Draw the fibre paths of a layer in one colour, and their links in another.
 
     Parameters
@@ -139,13 +132,12 @@ def draw_paths(
         Of the whole part, or of this layer.
     width : float, mm
         Of a strand.
-    colour : str
     """
     from matplotlib.collections import LineCollection
 
     wanted = paths.select((paths.layer == layer.index) & (paths.kind == FIBRE))
     strands, links = _strands_and_links(wanted, layer)
-    for lines, shown, order in ((strands, colour, 2.0), (links, LINK, 1.9)):
+    for lines, shown, order in ((strands, INK, 2.0), (links, LINK, 1.9)):
         axes.add_collection(
             LineCollection(
                 lines,
@@ -177,7 +169,7 @@ def draw_segments(axes: "Axes", coloured: Coloured, width: float) -> Any:
     """Draw pieces of fibre coloured by their values; returns the colour map."""
     from matplotlib.collections import LineCollection
 
-    colours = scale("sign" if coloured.signed else "size").with_extremes(bad=_NO_VALUE)
+    colours = scale("size")
     pieces = LineCollection(
         list(coloured.segments),
         cmap=colours,
@@ -185,7 +177,7 @@ def draw_segments(axes: "Axes", coloured: Coloured, width: float) -> Any:
         capstyle="round",
         zorder=2.0,
     )
-    pieces.set_array(np.ma.masked_invalid(coloured.values))
+    pieces.set_array(coloured.values)
     pieces.set_clim(*coloured.limits)
     axes.add_collection(pieces, autolim=False)
     return colours
@@ -264,7 +256,6 @@ def compare_layer(
     width: float,
     captions: Mapping[str, str] | None = None,
     limit: float | None = None,
-    coloured: Mapping[str, Coloured] | None = None,
 ) -> "Figure":
     """Picture of one layer with the paths of several strategies side by side.
 
@@ -275,7 +266,6 @@ def compare_layer(
     paths : mapping of strategy name to Toolpaths
     captions : mapping of strategy name to str, optional
         Lines with key numbers.
-    coloured : mapping of strategy name to Coloured, optional
 
     Returns
     -------
@@ -284,8 +274,7 @@ def compare_layer(
     figure, columns = new_figure(picture_extents(layer, paths.values()), columns=len(paths))
     colours = palette(paths)
     for axes, (name, lines) in zip(columns, paths.items(), strict=True):
-        own = (coloured or {}).get(name)
-        _draw(axes, layer, stress, lines, width, limit, own)
+        _draw(axes, layer, stress, lines, width, limit)
         title(axes, name, (captions or {}).get(name, ""), colours[name])
     return figure
 
@@ -297,7 +286,7 @@ def _draw(
     paths: Toolpaths,
     width: float,
     limit: float | None,
-    coloured: Coloured | None,
+    coloured: Coloured | None = None,
 ) -> None:
     """One picture without its title."""
     draw_section(axes, layer, filled=stress is None or coloured is not None)

@@ -2,13 +2,14 @@
 
 from dataclasses import dataclass
 from functools import cached_property
-from typing import Any
 
 import numpy as np
 import shapely
 
-from ccfem.arrays import BoolArray, FloatArray, IntArray, read_only
+from ccfem.arrays import BoolArray, FloatArray, IntArray, freeze, read_only
+from ccfem.checks import check_number
 from ccfem.errors import InputError
+from ccfem.geometry.shapes import Region
 
 __all__ = ["NEIGHBOURS", "Bitmap", "bitmap"]
 
@@ -42,11 +43,10 @@ class Bitmap:
     mask: BoolArray
     pixel: float
     origin: FloatArray
-    section: Any
+    section: Region
 
     def __post_init__(self) -> None:
-        object.__setattr__(self, "mask", read_only(self.mask, np.bool_))
-        object.__setattr__(self, "origin", read_only(self.origin))
+        freeze(self, mask=bool, origin=float)
 
     def centres(self, pixels: IntArray) -> FloatArray:
         """Centres (k, 2), mm, of pixels (k, 2) by row and column."""
@@ -96,7 +96,7 @@ class Bitmap:
         return near | np.roll(near, 1, 1)
 
 
-def bitmap(section: Any, pixel: float) -> Bitmap:
+def bitmap(section: Region, pixel: float) -> Bitmap:
     """Bitmap of a section.
 
     A box of a whole number of pixels is divided into exactly those; otherwise the pixels are
@@ -113,8 +113,7 @@ def bitmap(section: Any, pixel: float) -> Bitmap:
     InputError
         For a pixel that is not above 0, or that is far too small for the section.
     """
-    if not 0.0 < pixel < np.inf:
-        raise InputError(f"the pixel of a bitmap must be above 0 mm; got {pixel}")
+    check_number("the pixel of a bitmap", pixel, above=0.0, unit="mm")
     section = shapely.force_2d(section)  # a copy of its own, to be prepared
     if shapely.is_empty(section):
         return Bitmap(np.zeros((2, 2), dtype=bool), pixel, np.zeros(2), section)

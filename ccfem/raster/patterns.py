@@ -9,7 +9,7 @@ from dataclasses import dataclass
 import numpy as np
 from scipy import ndimage
 
-from ccfem.arrays import BoolArray, IntArray, read_only
+from ccfem.arrays import BoolArray, IntArray, freeze
 from ccfem.raster.bands import Metric, bands
 from ccfem.raster.dilation import first_touch, ring_regions, rings_round
 from ccfem.raster.hatch import hatch_lines
@@ -49,8 +49,7 @@ class Regions:
     domain: IntArray
 
     def __post_init__(self) -> None:
-        object.__setattr__(self, "number", read_only(self.number, np.int64))
-        object.__setattr__(self, "domain", read_only(self.domain, np.int64))
+        freeze(self, number=int, domain=int)
 
 
 def inside_shells(mask: BoolArray, shells: int, metric: Metric = "euclid") -> BoolArray:

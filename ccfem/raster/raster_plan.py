@@ -1,14 +1,13 @@
 """A pattern of pixels as paths in the plane of a layer."""
 
 from dataclasses import dataclass
-from typing import Any
 
 import numpy as np
 import shapely
 
-from ccfem.arrays import FloatArray
+from ccfem.arrays import BoolArray, FloatArray
+from ccfem.geometry.polylines import pack
 from ccfem.layers.layer import Layer
-from ccfem.machine.machine import Machine
 from ccfem.raster.bitmap import Bitmap
 from ccfem.raster.patterns import Regions
 from ccfem.raster.simplify import corners
@@ -44,37 +43,31 @@ class RasterPlan:
             for chain, closed in zip(chains, self.paths.closed, strict=True)
         ]
 
-    def lines(self, stairs: bool = True) -> list[FloatArray]:
-        """Polylines (n_i, 2), mm: staircases made straight, straight runs by their ends.
+    def lines(self) -> list[FloatArray]:
+        """Polylines (n_i, 2), mm: straight runs by their ends, staircases made straight.
 
-        Parameters
-        ----------
-        stairs : bool, default True
-            Whether staircases are made straight, where the straight way is in the section.
+        A path with a straight way that leaves the section keeps all its staircases.
         """
         chains = self.chains
         if not chains:
             return []
-        offsets = np.concatenate([[0], np.cumsum([len(chain) for chain in chains])])
-        pixels = self.raster.pixels(np.concatenate(chains))
-        found = self._kept(chains, corners(pixels, offsets, stairs))
-        if stairs:
-            shapely.prepare(self.raster.section)
-            inside = shapely.covers(self.raster.section, [shapely.LineString(x) for x in found])
-            if not inside.all():
-                plain = self._kept(chains, corners(pixels, offsets, stairs=False))
-                found = [a if k else b for a, b, k in zip(found, plain, inside, strict=True)]
+        points, offsets = pack(chains)
+        pixels = self.raster.pixels(points)
+        found = self._kept(chains, corners(pixels, offsets))
+        shapely.prepare(self.raster.section)
+        inside = shapely.covers(self.raster.section, [shapely.LineString(x) for x in found])
+        if not inside.all():
+            plain = self._kept(chains, corners(pixels, offsets, stairs=False))
+            found = [a if k else b for a, b, k in zip(found, plain, inside, strict=True)]
         return found
 
-    def _kept(self, chains: list[FloatArray], keep: Any) -> list[FloatArray]:
+    def _kept(self, chains: list[FloatArray], keep: BoolArray) -> list[FloatArray]:
         ends = np.cumsum([len(chain) for chain in chains])[:-1]
         return [chain[k] for chain, k in zip(chains, np.split(keep, ends), strict=True)]
 
-    def toolpaths(self, layer: Layer, machine: Machine, minimum_length: float | None) -> Toolpaths:
-        """Paths on a layer without those below a length, mm; default: the least to be cut."""
-        paths = Toolpaths.from_plane(self.lines(), layer, self.paths.closed.tolist())
-        least = machine.minimum_length if minimum_length is None else minimum_length
-        return paths.select(paths.lengths >= least)
+    def toolpaths(self, layer: Layer) -> Toolpaths:
+        """Paths on a layer, however short."""
+        return Toolpaths.from_plane(self.lines(), layer, self.paths.closed.tolist())
 
 
 def raster_plan(raster: Bitmap, regions: Regions) -> RasterPlan:

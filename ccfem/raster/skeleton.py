@@ -5,7 +5,7 @@ from dataclasses import dataclass
 import numpy as np
 from scipy import ndimage
 
-from ccfem.arrays import BoolArray, FloatArray, IntArray, read_only
+from ccfem.arrays import BoolArray, FloatArray, IntArray, freeze
 from ccfem.raster.bands import depth
 from ccfem.raster.bitmap import NEIGHBOURS
 from ccfem.raster.thinning import thin
@@ -37,7 +37,7 @@ class Segment:
     closed: bool
 
     def __post_init__(self) -> None:
-        object.__setattr__(self, "pixels", read_only(self.pixels, np.int64))
+        freeze(self, pixels=int)
 
     @property
     def length(self) -> float:

@@ -4,7 +4,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from ccfem.arrays import BoolArray, IntArray, read_only
+from ccfem.arrays import BoolArray, IntArray, freeze
 from ccfem.raster.thinning import thin
 from ccfem.raster.walking import (
     absorb,
@@ -50,10 +50,7 @@ class PixelPaths:
     isolated: BoolArray
 
     def __post_init__(self) -> None:
-        for name in ("pixels", "offsets", "label"):
-            object.__setattr__(self, name, read_only(getattr(self, name), np.int64))
-        for name in ("closed", "isolated"):
-            object.__setattr__(self, name, read_only(getattr(self, name), np.bool_))
+        freeze(self, pixels=int, offsets=int, label=int, closed=bool, isolated=bool)
 
     def __len__(self) -> int:
         return len(self.closed)

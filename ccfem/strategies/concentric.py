@@ -1,21 +1,22 @@
 """Baseline: rings parallel to the border, from the outside in."""
 
+from collections.abc import Mapping
 from dataclasses import dataclass
-from typing import ClassVar, Literal
+from typing import Any, ClassVar, Literal
 
 import numpy as np
 
+from ccfem.arrays import FloatArray
+from ccfem.checks import check_fields
 from ccfem.errors import InputError
 from ccfem.geometry.offsets import join_rings, offset_rings
 from ccfem.geometry.shells import concentric
 from ccfem.layers.layer import Layer
 from ccfem.layers.layer_stress import LayerStress
 from ccfem.machine.machine import Machine
-from ccfem.planning.strategy import Amount
-from ccfem.raster.bitmap import bitmap
-from ccfem.raster.patterns import concentric_regions
-from ccfem.raster.raster_plan import RasterPlan, raster_plan
-from ccfem.toolpaths import Toolpaths
+from ccfem.planning.infill import Infill
+from ccfem.raster.bitmap import Bitmap
+from ccfem.raster.patterns import Regions, concentric_regions
 
 __all__ = ["Concentric"]
 
@@ -24,7 +25,7 @@ _CLOSEST = 0.6
 
 
 @dataclass(frozen=True)
-class Concentric:
+class Concentric(Infill):
     """Rings parallel to every border of the section, the stress unseen.
 
     The first ring lies half a fibre width inside the border; opposite sides of a ring stay a fibre
@@ -61,50 +62,34 @@ class Concentric:
     minimum_length: float | None = None
     mode: Literal["polyline", "raster"] = "polyline"
 
-    amount: ClassVar[Amount] = Amount("spacing", most=1.0, least=20.0)
-    flat_layers_only: ClassVar[bool] = True
+    variants: ClassVar[Mapping[str, Mapping[str, Any]]] = {
+        "single": {"joined": False, "rings": 3},
+        "start": {"start": (0.0, 0.0)},
+        "filled": {"joined": False, "filled": True},
+        "raster": {"joined": False, "mode": "raster"},
+    }
 
     def __post_init__(self) -> None:
-        if self.mode not in ("polyline", "raster"):
-            raise InputError(f"concentric.mode must be polyline or raster; got {self.mode!r}")
-        if not 1.0 <= self.spacing < float("inf"):
-            raise InputError(
-                f"concentric.spacing must be at least 1 fibre width; got {self.spacing}"
-            )
-        if self.mode == "raster" and self.joined:
-            raise InputError(
-                "concentric.mode raster lays single rings: set concentric.joined to false"
-            )
-        if self.rings is not None and self.rings < 1:
-            raise InputError(f"concentric.rings must be at least 1; got {self.rings}")
-        if self.filled and self.joined:
-            raise InputError("concentric.filled lays single rings: set concentric.joined to false")
-        if self.minimum_length is not None and not 0.0 <= self.minimum_length < float("inf"):
-            raise InputError(
-                f"concentric.minimum_length must be a finite number >= 0; got {self.minimum_length}"
-            )
+        super().__post_init__()
+        check_fields(self, "rings", at_least=1)
+        if self.joined and (self.mode == "raster" or self.filled):
+            name = "mode raster" if self.mode == "raster" else "filled"
+            raise InputError(f"concentric.{name} lays single rings: set concentric.joined to false")
 
-    def __call__(self, layer: Layer, stress: LayerStress, machine: Machine) -> Toolpaths:
-        """Plan the paths of one layer; none where the section is thinner than a fibre."""
-        if self.mode == "raster":
-            plan = self.raster(layer, stress, machine)
-            return plan.toolpaths(layer, machine, self.minimum_length)
-        width = machine.fibre_width
-        spacing = self.spacing * width
+    def strands(
+        self, layer: Layer, stress: LayerStress, machine: Machine, prepared: None
+    ) -> list[FloatArray]:
+        """Rings, or what joins them."""
+        width, spacing = machine.fibre_width, self.spacing * machine.fibre_width
         if self.filled:
-            lines = concentric(layer.plane.polygon, spacing, _CLOSEST, 0.5 * width, self.rings)
-        else:
-            levels = offset_rings(layer.plane.polygon, 0.5 * width, spacing, width, self.rings)
-            lines = [ring for level in levels for ring in level]
-            if self.joined and levels:
-                first = layer.plane.points[layer.loops[0][:2]].mean(axis=0)
-                start = first if self.start is None else np.asarray(self.start, dtype=np.float64)
-                lines = join_rings(levels, start, spacing, width)
-        paths = Toolpaths.from_plane(lines, layer)
-        least = machine.minimum_length if self.minimum_length is None else self.minimum_length
-        return paths.select(paths.lengths >= least)
+            return concentric(layer.plane.polygon, spacing, _CLOSEST, 0.5 * width, self.rings)
+        levels = offset_rings(layer.plane.polygon, 0.5 * width, spacing, width, self.rings)
+        if not self.joined or not levels:
+            return [ring for level in levels for ring in level]
+        first = layer.plane.points[layer.loops[0][:2]].mean(axis=0)
+        start = first if self.start is None else np.asarray(self.start, dtype=np.float64)
+        return join_rings(levels, start, spacing, width)
 
-    def raster(self, layer: Layer, stress: LayerStress, machine: Machine) -> RasterPlan:
-        """Plan one layer on a bitmap of pixels a spacing wide, whatever the mode."""
-        image = bitmap(layer.plane.polygon, self.spacing * machine.fibre_width)
-        return raster_plan(image, concentric_regions(image.mask, rings=self.rings))
+    def regions(self, image: Bitmap, layer: Layer, stress: LayerStress) -> Regions:
+        """Rings of pixels."""
+        return concentric_regions(image.mask, rings=self.rings)

@@ -1,15 +1,17 @@
 """Baseline: contours along the border, a zigzag inside."""
 
+from collections.abc import Mapping
 from dataclasses import dataclass
-from typing import ClassVar
+from typing import Any, ClassVar
 
 import numpy as np
 
-from ccfem.errors import InputError
+from ccfem.checks import check_fields
 from ccfem.geometry.hatch import zigzag
 from ccfem.layers.layer import Layer
 from ccfem.layers.layer_stress import LayerStress
 from ccfem.machine.machine import Machine
+from ccfem.planning.infill import SPACING, check_fill, long_enough
 from ccfem.planning.strategy import Amount
 from ccfem.strategies.concentric import Concentric
 from ccfem.toolpaths import Toolpaths
@@ -43,26 +45,15 @@ class ContourZigzag:
     turn: float = 90.0
     joined: bool = True
 
-    amount: ClassVar[Amount] = Amount("spacing", most=1.0, least=20.0)
+    amount: ClassVar[Amount] = SPACING
     flat_layers_only: ClassVar[bool] = True
     direction: ClassVar[str] = "angle"
+    variants: ClassVar[Mapping[str, Mapping[str, Any]]] = {"single": {"joined": False}}
 
     def __post_init__(self) -> None:
-        if not 1.0 <= self.spacing < float("inf"):
-            raise InputError(
-                f"contour_zigzag.spacing must be at least 1 fibre width; got {self.spacing}"
-            )
-        if self.contours < 1:
-            raise InputError(
-                f"contour_zigzag.contours must be at least 1; got {self.contours}: use "
-                "zigzag for none"
-            )
-
-        if not np.isfinite([self.angle, self.turn]).all():
-            raise InputError(
-                f"contour_zigzag.angle and contour_zigzag.turn must be finite degrees; got "
-                f"{self.angle} and {self.turn}"
-            )
+        check_fill(self)
+        check_fields(self, "contours", at_least=1)
+        check_fields(self, "angle", "turn", unit="degrees")
 
     def __call__(self, layer: Layer, stress: LayerStress, machine: Machine) -> Toolpaths:
         """Plan the paths of one layer; none where the section is thinner than a fibre."""
@@ -73,6 +64,5 @@ class ContourZigzag:
             np.radians(self.angle + self.turn * layer.index),
         )
         lines = zigzag(layer.plane.polygon, inside, width, self.spacing * width, angle)
-        inner = Toolpaths.from_plane(lines, layer)
-        inner = inner.select(inner.lengths >= machine.minimum_length)
+        inner = long_enough(Toolpaths.from_plane(lines, layer), None, machine)
         return Toolpaths.concatenate([contours, inner])

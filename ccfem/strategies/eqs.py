@@ -5,6 +5,7 @@ Papapetrou, C. Patel, A. Y. Tamijani, Stiffness-based optimization framework for
 fiber paths of continuous fiber composites, Composites Part B 183 (2020) 107681 (EQS).
 """
 
+from collections.abc import Mapping
 from dataclasses import dataclass
 from typing import Any, ClassVar
 
@@ -14,12 +15,13 @@ import shapely
 from ccfem.arrays import FloatArray
 from ccfem.errors import InputError
 from ccfem.fields.streamlines import streamlines
-from ccfem.geometry.parallel_strands import open_lines
+from ccfem.geometry.shapes import Region, open_lines
 from ccfem.layers.layer import Layer
 from ccfem.layers.layer_stress import LayerStress
 from ccfem.machine.machine import Machine
+from ccfem.planning.infill import SPACING, check_fill, long_enough
 from ccfem.planning.strategy import Amount
-from ccfem.tensor import in_plane
+from ccfem.tensor import in_plane, strongest_in_plane
 from ccfem.toolpaths import Toolpaths
 
 __all__ = ["Eqs"]
@@ -57,18 +59,14 @@ class Eqs:
     seed: tuple[float, float] | None = None
     minimum_length: float | None = None
 
-    amount: ClassVar[Amount] = Amount("spacing", most=1.0, least=20.0)
+    amount: ClassVar[Amount] = SPACING
     flat_layers_only: ClassVar[bool] = True
+    variants: ClassVar[Mapping[str, Mapping[str, Any]]] = {"seed": {"seed": (0.0, 0.0)}}
 
     def __post_init__(self) -> None:
-        if not 1.0 <= self.spacing < float("inf"):
-            raise InputError(f"eqs.spacing must be at least 1 fibre width; got {self.spacing}")
+        check_fill(self)
         if self.seed is not None and not np.isfinite(self.seed).all():
             raise InputError(f"eqs.seed must be a point in mm; got {self.seed}")
-        if self.minimum_length is not None and not 0.0 <= self.minimum_length < float("inf"):
-            raise InputError(
-                f"eqs.minimum_length must be a finite number >= 0; got {self.minimum_length}"
-            )
 
     def __call__(self, layer: Layer, stress: LayerStress, machine: Machine) -> Toolpaths:
         """Plan the paths of one layer; none where the section is thinner than a fibre."""
@@ -78,18 +76,17 @@ class Eqs:
         if len(seed) < 2:
             return Toolpaths.empty()
         lines = _iso_lines(seed, region, self.spacing * width, _OFF * width)
-        paths = Toolpaths.from_plane(lines, layer)
-        least = machine.minimum_length if self.minimum_length is None else self.minimum_length
-        return paths.select(paths.lengths >= least)
+        return long_enough(Toolpaths.from_plane(lines, layer), self.minimum_length, machine)
 
-    def _seed_line(self, layer: Layer, stress: LayerStress, region: Any, step: float) -> FloatArray:
+    def _seed_line(
+        self, layer: Layer, stress: LayerStress, region: Region, step: float
+    ) -> FloatArray:
         """Longest candidate (n, 2); empty where no candidate lies in the region."""
         plane = in_plane(stress.nodal, layer.plane.frame)
         if self.seed is None:
-            s11, s22, s12 = plane[layer.triangles].mean(axis=1).T
-            size = np.abs(0.5 * (s11 + s22)) + np.hypot(0.5 * (s11 - s22), s12)
+            value, _, _ = strongest_in_plane(plane[layer.triangles].mean(axis=1))
             middles = layer.plane.points[layer.triangles].mean(axis=1)
-            order = np.argsort(-size, kind="stable")
+            order = np.argsort(-np.abs(value), kind="stable")
             starts = middles[order[shapely.contains_xy(region, middles[order])]][:_CANDIDATES]
         else:
             starts = np.array([self.seed])
@@ -99,7 +96,7 @@ class Eqs:
         return lines[int(np.argmax([len(line) for line in lines]))]
 
 
-def _iso_lines(seed: FloatArray, region: Any, pitch: float, off: float) -> list[FloatArray]:
+def _iso_lines(seed: FloatArray, region: Region, pitch: float, off: float) -> list[FloatArray]:
     """Lines (k, 2), mm, at whole multiples of a pitch from a seed line, clipped to a region."""
     curve = shapely.simplify(shapely.LineString(seed), 0.5 * off)
     lines = open_lines(shapely.intersection(curve, region))

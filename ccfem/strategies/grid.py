@@ -5,28 +5,31 @@ guidelines and investigation into the influence of infill patterns, Rapid Protot
 (2022) 1241.
 """
 
+from collections.abc import Mapping
 from dataclasses import dataclass
-from typing import ClassVar, Literal
+from typing import Any, ClassVar, Literal
 
 import numpy as np
+import shapely
 
+from ccfem.arrays import FloatArray
+from ccfem.checks import check_fields
 from ccfem.errors import InputError
 from ccfem.geometry.hatch import hatch
+from ccfem.geometry.shapes import Region
 from ccfem.geometry.shells import shells
 from ccfem.layers.layer import Layer
 from ccfem.layers.layer_stress import LayerStress
 from ccfem.machine.machine import Machine
-from ccfem.planning.strategy import Amount
-from ccfem.raster.bitmap import bitmap
-from ccfem.raster.patterns import grid_regions
-from ccfem.raster.raster_plan import RasterPlan, raster_plan
-from ccfem.toolpaths import Toolpaths
+from ccfem.planning.infill import Infill, check_shells
+from ccfem.raster.bitmap import Bitmap
+from ccfem.raster.patterns import Regions, grid_regions
 
 __all__ = ["Grid"]
 
 
 @dataclass(frozen=True)
-class Grid:
+class Grid(Infill):
     """Shells along the border, and inside straight lines in two directions. The stress is unseen.
 
     Every line is a path of its own, as in the paper; `Zigzag` links them.
@@ -63,57 +66,59 @@ class Grid:
     minimum_length: float | None = None
     mode: Literal["polyline", "raster"] = "polyline"
 
-    amount: ClassVar[Amount] = Amount("spacing", most=1.0, least=20.0)
-    flat_layers_only: ClassVar[bool] = True
     direction: ClassVar[str] = "angle"
+    variants: ClassVar[Mapping[str, Mapping[str, Any]]] = {
+        "both": {"families": "both"},
+        "paper": {"lines": "paper"},
+        "raster": {"mode": "raster"},
+        "raster_paper": {"mode": "raster", "lines": "paper"},
+    }
 
     def __post_init__(self) -> None:
-        if self.mode not in ("polyline", "raster"):
-            raise InputError(f"grid.mode must be polyline or raster; got {self.mode!r}")
-        if not 1.0 <= self.spacing < float("inf"):
-            raise InputError(f"grid.spacing must be at least 1 fibre width; got {self.spacing}")
-        if self.shells < 0:
-            raise InputError(f"grid.shells must be at least 0; got {self.shells}")
-        if not np.isfinite([self.angle, self.turn]).all():
-            raise InputError(
-                f"grid.angle and grid.turn must be finite degrees; got {self.angle} and {self.turn}"
-            )
-        if self.families not in ("alternate", "both"):
-            raise InputError(f"grid.families must be alternate or both; got {self.families!r}")
+        super().__post_init__()
+        check_shells(self)
+        check_fields(self, "angle", "turn", unit="degrees")
         if self.mode == "raster" and self.families == "both":
             raise InputError("grid.mode raster lays one family a layer: set families to alternate")
-        if self.lines not in ("printable", "paper"):
-            raise InputError(f"grid.lines must be printable or paper; got {self.lines!r}")
-        if not 0.5 <= self.closest <= 1.0:
-            raise InputError(f"grid.closest must lie between 0.5 and 1; got {self.closest}")
-        if self.minimum_length is not None and not 0.0 <= self.minimum_length < float("inf"):
-            raise InputError(
-                f"grid.minimum_length must be a finite number >= 0; got {self.minimum_length}"
-            )
 
-    def __call__(self, layer: Layer, stress: LayerStress, machine: Machine) -> Toolpaths:
-        """Plan the paths of one layer; none where the section is thinner than a fibre."""
-        if self.mode == "raster":
-            plan = self.raster(layer, stress, machine)
-            return plan.toolpaths(layer, machine, self.minimum_length)
+    @property
+    def on_axes(self) -> bool:
+        """Whether paths keep to the axes of the layer, or their distance does."""
+        return self.mode == "raster" or self.lines == "paper"
+
+    @property
+    def crosses(self) -> bool:
+        """Whether strands cross each other by intention."""
+        return self.families == "both"
+
+    def prepare(self, section: Region, machine: Machine) -> tuple[list[FloatArray], Region]:
+        """Shells, and what they leave."""
         pitch = self.spacing * machine.fibre_width
-        lines, interior = shells(
-            layer.plane.polygon, machine.fibre_width, pitch, self.shells, self.closest
-        )
-        turns = (0, 1) if self.families == "both" else (layer.index,)
-        for number in turns:
-            angle = np.radians(self.angle + self.turn * number)
-            step = pitch
+        return shells(section, machine.fibre_width, pitch, self.shells, self.closest)
+
+    def strands(
+        self,
+        layer: Layer,
+        stress: LayerStress,
+        machine: Machine,
+        prepared: tuple[list[FloatArray], Region],
+    ) -> list[FloatArray]:
+        """Shells, then each family of lines."""
+        lines, interior = prepared
+        interior = shapely.force_2d(interior)  # a copy: threads must not share a geometry
+        for number in (0, 1) if self.families == "both" else (layer.index,):
+            angle = self._angle(number)
+            step = self.spacing * machine.fibre_width
             if self.lines == "paper":
                 step *= max(abs(np.cos(angle)), abs(np.sin(angle)))
-            lines += hatch(interior, angle, step).lines
-        paths = Toolpaths.from_plane(lines, layer)
-        least = machine.minimum_length if self.minimum_length is None else self.minimum_length
-        return paths.select(paths.lengths >= least)
+            lines = lines + hatch(interior, angle, step).lines
+        return lines
 
-    def raster(self, layer: Layer, stress: LayerStress, machine: Machine) -> RasterPlan:
-        """Plan one layer on a bitmap of pixels a spacing wide, whatever the mode."""
-        image = bitmap(layer.plane.polygon, self.spacing * machine.fibre_width)
-        angle = np.radians(self.angle + self.turn * layer.index)
-        every = self.lines == "paper"
-        return raster_plan(image, grid_regions(image.mask, angle, self.shells, every))
+    def regions(self, image: Bitmap, layer: Layer, stress: LayerStress) -> Regions:
+        """Shells and rows of pixels."""
+        angle, every = self._angle(layer.index), self.lines == "paper"
+        return grid_regions(image.mask, angle, self.shells, every)
+
+    def _angle(self, number: int) -> float:
+        """Direction of a family, radians."""
+        return float(np.radians(self.angle + self.turn * number))

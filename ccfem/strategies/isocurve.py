@@ -7,14 +7,15 @@ continuous fibre reinforced thermoplastic composites, Additive Manufacturing 49 
 """
 
 import itertools
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
-from typing import Any, ClassVar, Literal, get_args
+from typing import Any, ClassVar, Literal
 
 import numpy as np
 from scipy.spatial import cKDTree
 
 from ccfem.arrays import BoolArray, FloatArray
+from ccfem.checks import check_choices, check_fields
 from ccfem.elasticity.part_stress import PartStress
 from ccfem.errors import InputError
 from ccfem.fields.compatibility import Incompatible
@@ -26,6 +27,7 @@ from ccfem.fields.levels import extract_levels, unit_levels
 from ccfem.fields.orientation import orient
 from ccfem.fields.scalar import fit_cone, fit_constrained, fit_literal, fit_weighted
 from ccfem.geometry.isocontours import Isocontours
+from ccfem.geometry.polylines import is_closed, runs
 from ccfem.layers.holes import holes_on
 from ccfem.layers.layer import Layer
 from ccfem.layers.layer_stress import LayerStress, stress_on
@@ -55,6 +57,22 @@ _TRIM = 0.98
 each other at one width differ by their chords."""
 _SPIRAL_LIMIT = 4.0
 """Largest distance, in strand widths, of closed isocurves that are joined to a spiral."""
+
+_LITERAL: Mapping[str, Any] = {
+    "cap": 100.0,
+    "floor": 0.0,
+    "link_limit": 2.0,
+    "conformal": "loaded",
+    "stress": "cell",
+    "field": "mesh",
+    "incompatible": "any",
+    "fill": "laplacian",
+    "fit": "literal",
+    "spacing": "search",
+    "spiral": False,
+    "boundary_links": False,
+    "trim": False,
+}
 
 
 @dataclass(frozen=True)
@@ -113,7 +131,7 @@ class Isocurve:
         Cut branches that come nearer than a strand's width to a longer one.
     inset : float, default 0
         Least distance of strands from the boundary, in strand widths. At 0 they may run along the
-        boundary with half of their width outside; 0.45 keeps them in, and their ends still meet
+        boundary with half of their width outside; 0.5 keeps them in, and their ends still meet
         the links along the boundary.
     """
 
@@ -141,56 +159,35 @@ class Isocurve:
 
     amount: ClassVar[Amount] = Amount("density", most=4.0, least=0.05)
     flat_layers_only: ClassVar[bool] = True
+    variants: ClassVar[Mapping[str, Mapping[str, Any]]] = {
+        "literal": _LITERAL,
+        "inset": {"inset": 0.5},
+        "search": {"spacing": "search"},
+        "cone": {"spacing": "cone"},
+        "mesh": {
+            "field": "mesh",
+            "sense": "absolute",
+            "incompatible": "majority",
+            "conformal": "loaded",
+        },
+    }
 
     def __post_init__(self) -> None:
-        choices = {
-            "stress": Source,
-            "field": Field,
-            "sense": Sense,
-            "incompatible": Incompatible,
-            "fill": Fill,
-            "fit": Fit,
-            "spacing": Spacing,
-        }
-        for name, kind in choices.items():
-            if getattr(self, name) not in get_args(kind):
-                raise InputError(
-                    f"isocurve.{name} must be one of {', '.join(get_args(kind))}; got "
-                    f"{getattr(self, name)!r}"
-                )
+        check_choices(self)
         if isinstance(self.conformal, str) and self.conformal != "loaded":
             raise InputError(
                 "isocurve.conformal must be 'loaded' or a list of patch names; got "
                 f"{self.conformal!r}"
             )
-        if not 0.0 < self.cap <= 100.0:
-            raise InputError(f"isocurve.cap must be a percentile in (0, 100]; got {self.cap!r}")
-        if not 0.0 < self.density < np.inf:
-            raise InputError(f"isocurve.density must be a finite number > 0; got {self.density!r}")
-        for name in ("power", "spacing_weight", "fill_length", "link_limit", "inset"):
-            if not 0.0 <= getattr(self, name) < np.inf:
-                raise InputError(
-                    f"isocurve.{name} must be a finite number >= 0; got {getattr(self, name)!r}"
-                )
+        check_fields(self, "cap", above=0.0, at_most=100.0)
+        check_fields(self, "density", above=0.0)
+        weights = ("power", "spacing_weight", "fill_length", "link_limit", "inset")
+        check_fields(self, *weights, at_least=0.0)
 
     @classmethod
     def literal(cls) -> "Isocurve":
         """Return the algorithm as the paper prints it."""
-        return cls(
-            cap=100.0,
-            floor=0.0,
-            link_limit=2.0,
-            conformal="loaded",
-            stress="cell",
-            field="mesh",
-            incompatible="any",
-            fill="laplacian",
-            fit="literal",
-            spacing="search",
-            spiral=False,
-            boundary_links=False,
-            trim=False,
-        )
+        return cls(**_LITERAL)
 
     def for_part(
         self, stress: PartStress, layers: Sequence[Layer], machine: Machine
@@ -284,7 +281,7 @@ class _Planner:
         kept = []
         for a, b in itertools.pairwise(curves.offsets):
             line, worth = curves.points[a:b], enough[a:b]
-            if np.array_equal(line[0], line[-1]):
+            if is_closed(line):
                 # A closed curve that mostly is worth its fibre stays whole: opened, it would lose
                 # the hold of its return. Any other is opened amid its longest low stretch.
                 if worth.mean() >= 0.5:
@@ -336,9 +333,7 @@ def _nearest(layer: Layer, values: FloatArray) -> Callable[[FloatArray], FloatAr
 
 def _longest_run(mask: BoolArray) -> int:
     """Index of the middle of the longest run of true values on a ring of values."""
-    twice = np.concatenate([[False], mask, mask, [False]]).astype(np.int8)
-    edges = np.flatnonzero(np.diff(twice))
-    starts, ends = edges[::2], edges[1::2]
+    starts, ends = runs(np.concatenate([mask, mask])).T
     longest = int(np.argmax(ends - starts))
     return int(starts[longest] + ends[longest]) // 2 % len(mask)
 

@@ -5,26 +5,26 @@ guidelines and investigation into the influence of infill patterns, Rapid Protot
 (2022) 1241.
 """
 
+from collections.abc import Mapping
 from dataclasses import dataclass
-from typing import ClassVar, Literal
+from typing import Any, ClassVar, Literal
 
-from ccfem.errors import InputError
+from ccfem.arrays import FloatArray
 from ccfem.geometry.medial_fill import medial_fill
+from ccfem.geometry.shapes import Region
 from ccfem.geometry.shells import shells
 from ccfem.layers.layer import Layer
 from ccfem.layers.layer_stress import LayerStress
 from ccfem.machine.machine import Machine
-from ccfem.planning.strategy import Amount
-from ccfem.raster.bitmap import bitmap
-from ccfem.raster.patterns import medial_regions
-from ccfem.raster.raster_plan import RasterPlan, raster_plan
-from ccfem.toolpaths import Toolpaths
+from ccfem.planning.infill import Infill, check_shells
+from ccfem.raster.bitmap import Bitmap
+from ccfem.raster.patterns import Regions, medial_regions
 
 __all__ = ["Mat"]
 
 
 @dataclass(frozen=True)
-class Mat:
+class Mat(Infill):
     """Shells along the border, and strands along the medial axis of what they leave.
 
     Strands parallel to the medial axis follow, until the first of them would touch a shell;
@@ -51,38 +51,24 @@ class Mat:
     minimum_length: float | None = None
     mode: Literal["polyline", "raster"] = "polyline"
 
-    amount: ClassVar[Amount] = Amount("spacing", most=1.0, least=20.0)
-    flat_layers_only: ClassVar[bool] = True
+    variants: ClassVar[Mapping[str, Mapping[str, Any]]] = {"raster": {"mode": "raster"}}
 
     def __post_init__(self) -> None:
-        if self.mode not in ("polyline", "raster"):
-            raise InputError(f"mat.mode must be polyline or raster; got {self.mode!r}")
-        if not 1.0 <= self.spacing < float("inf"):
-            raise InputError(f"mat.spacing must be at least 1 fibre width; got {self.spacing}")
-        if self.shells < 0:
-            raise InputError(f"mat.shells must be at least 0; got {self.shells}")
-        if not 0.5 <= self.closest <= 1.0:
-            raise InputError(f"mat.closest must lie between 0.5 and 1; got {self.closest}")
-        if self.minimum_length is not None and not 0.0 <= self.minimum_length < float("inf"):
-            raise InputError(
-                f"mat.minimum_length must be a finite number >= 0; got {self.minimum_length}"
-            )
+        super().__post_init__()
+        check_shells(self)
 
-    def __call__(self, layer: Layer, stress: LayerStress, machine: Machine) -> Toolpaths:
-        """Plan the paths of one layer; none where the section is thinner than a fibre."""
-        if self.mode == "raster":
-            plan = self.raster(layer, stress, machine)
-            return plan.toolpaths(layer, machine, self.minimum_length)
+    def prepare(self, section: Region, machine: Machine) -> list[FloatArray]:
+        """All strands: they depend on the section alone."""
         pitch = self.spacing * machine.fibre_width
-        lines, interior = shells(
-            layer.plane.polygon, machine.fibre_width, pitch, self.shells, self.closest
-        )
-        lines += medial_fill(interior, pitch, self.closest)
-        paths = Toolpaths.from_plane(lines, layer)
-        least = machine.minimum_length if self.minimum_length is None else self.minimum_length
-        return paths.select(paths.lengths >= least)
+        rings, interior = shells(section, machine.fibre_width, pitch, self.shells, self.closest)
+        return rings + medial_fill(interior, pitch, self.closest)
 
-    def raster(self, layer: Layer, stress: LayerStress, machine: Machine) -> RasterPlan:
-        """Plan one layer on a bitmap of pixels a spacing wide, whatever the mode."""
-        image = bitmap(layer.plane.polygon, self.spacing * machine.fibre_width)
-        return raster_plan(image, medial_regions(image.mask, self.shells))
+    def strands(
+        self, layer: Layer, stress: LayerStress, machine: Machine, prepared: list[FloatArray]
+    ) -> list[FloatArray]:
+        """Strands of the layer's section."""
+        return prepared
+
+    def regions(self, image: Bitmap, layer: Layer, stress: LayerStress) -> Regions:
+        """Shells, rings of pixels round the medial axis, and concentric ones."""
+        return medial_regions(image.mask, self.shells)

@@ -5,31 +5,31 @@ guidelines and investigation into the influence of infill patterns, Rapid Protot
 (2022) 1241.
 """
 
+from collections.abc import Mapping
 from dataclasses import dataclass
-from functools import lru_cache
-from typing import Any, ClassVar, Literal
+from typing import Any, ClassVar, Literal, NamedTuple
 
 import numpy as np
 import shapely
 
-from ccfem.arrays import FloatArray, read_only
+from ccfem.arrays import FloatArray
 from ccfem.errors import InputError
 from ccfem.fields.streamlines import streamlines
 from ccfem.geometry.guide_fit import fitted_guides
 from ccfem.geometry.guides import spaced_guides
 from ccfem.geometry.medial_axis import medial_axis
 from ccfem.geometry.parallel_strands import grow, lengthened
+from ccfem.geometry.polylines import along_line, points_along
+from ccfem.geometry.shapes import Region
 from ccfem.geometry.shells import shells
 from ccfem.layers.layer import Layer
 from ccfem.layers.layer_stress import LayerStress
 from ccfem.machine.machine import Machine
-from ccfem.planning.strategy import Amount
-from ccfem.raster.bitmap import bitmap
+from ccfem.planning.infill import Infill, check_shells
+from ccfem.raster.bitmap import Bitmap
 from ccfem.raster.guides import stress_guides
-from ccfem.raster.patterns import inside_shells, stress_regions
-from ccfem.raster.raster_plan import RasterPlan, raster_plan
+from ccfem.raster.patterns import Regions, inside_shells, stress_regions
 from ccfem.tensor import in_plane
-from ccfem.toolpaths import Toolpaths
 
 __all__ = ["Mps"]
 
@@ -43,8 +43,16 @@ length, distance to the shells up to which an end is taken for one at the border
 is then made longer, so that the strands parallel to it reach a slanted border too."""
 
 
+class _Inside(NamedTuple):
+    """Shells of a section, what they leave, and the middles of the segments of its medial axis."""
+
+    rings: list[FloatArray]
+    interior: Region
+    middles: FloatArray
+
+
 @dataclass(frozen=True)
-class Mps:
+class Mps(Infill):
     """Shells along the border, and inside strands parallel to streamlines of the stress.
 
     The streamlines follow the principal stress of the largest size in the plane of the layer, and
@@ -78,60 +86,56 @@ class Mps:
     minimum_length: float | None = None
     mode: Literal["polyline", "raster"] = "polyline"
 
-    amount: ClassVar[Amount] = Amount("spacing", most=1.0, least=20.0)
-    flat_layers_only: ClassVar[bool] = True
+    variants: ClassVar[Mapping[str, Mapping[str, Any]]] = {
+        "ends": {"seeds": "ends"},
+        "raster": {"mode": "raster"},
+        "raster_ends": {"mode": "raster", "seeds": "ends"},
+    }
 
     def __post_init__(self) -> None:
-        if self.mode not in ("polyline", "raster"):
-            raise InputError(f"mps.mode must be polyline or raster; got {self.mode!r}")
-        if not 1.0 <= self.spacing < float("inf"):
-            raise InputError(f"mps.spacing must be at least 1 fibre width; got {self.spacing}")
-        if self.shells < 0:
-            raise InputError(f"mps.shells must be at least 0; got {self.shells}")
+        super().__post_init__()
+        check_shells(self)
         if isinstance(self.seeds, str) and self.seeds not in ("segments", "ends"):
             raise InputError(
                 f"mps.seeds must be 'segments', 'ends' or a list of points; got {self.seeds!r}"
             )
-        if not 0.5 <= self.closest <= 1.0:
-            raise InputError(f"mps.closest must lie between 0.5 and 1; got {self.closest}")
-        if self.minimum_length is not None and not 0.0 <= self.minimum_length < float("inf"):
-            raise InputError(
-                f"mps.minimum_length must be a finite number >= 0; got {self.minimum_length}"
-            )
 
-    def __call__(self, layer: Layer, stress: LayerStress, machine: Machine) -> Toolpaths:
-        """Plan the paths of one layer; none where the section is thinner than a fibre."""
-        if self.mode == "raster":
-            plan = self.raster(layer, stress, machine)
-            return plan.toolpaths(layer, machine, self.minimum_length)
+    def prepare(self, section: Region, machine: Machine) -> _Inside:
+        """Shells, what they leave, and the middles of its medial axis where these are seeds."""
         pitch = self.spacing * machine.fibre_width
-        rings, interior = shells(
-            layer.plane.polygon, machine.fibre_width, pitch, self.shells, self.closest
-        )
-        guides = self._guides(layer, stress, interior, pitch)
-        paths = Toolpaths.from_plane(rings + grow(guides, interior, pitch, self.closest), layer)
-        least = machine.minimum_length if self.minimum_length is None else self.minimum_length
-        return paths.select(paths.lengths >= least)
+        rings, interior = shells(section, machine.fibre_width, pitch, self.shells, self.closest)
+        wanted = self.seeds == "segments" and not shapely.is_empty(interior)
+        return _Inside(rings, interior, _middles(interior, pitch) if wanted else np.zeros((0, 2)))
 
-    def raster(self, layer: Layer, stress: LayerStress, machine: Machine) -> RasterPlan:
-        """Plan one layer on a bitmap of pixels a spacing wide, whatever the mode."""
-        image = bitmap(layer.plane.polygon, self.spacing * machine.fibre_width)
+    def strands(
+        self, layer: Layer, stress: LayerStress, machine: Machine, prepared: _Inside
+    ) -> list[FloatArray]:
+        """Shells, then guides and what is parallel to them."""
+        pitch = self.spacing * machine.fibre_width
+        interior = shapely.force_2d(prepared.interior)  # a copy: threads must not share a geometry
+        guides = self._guides(layer, stress, interior, prepared.middles, pitch)
+        return prepared.rings + grow(guides, interior, pitch, self.closest)
+
+    def regions(self, image: Bitmap, layer: Layer, stress: LayerStress) -> Regions:
+        """Shells of pixels, guides and rings round them."""
         inside = inside_shells(image.mask, self.shells)
-        points = None
-        if self.seeds == "ends":
-            points = _patch_middles(layer, stress.held_or_loaded)
-        elif self.seeds != "segments":
-            points = np.array(self.seeds, dtype=np.float64).reshape(-1, 2)
+        points = None if self.seeds == "segments" else self._points(layer, stress)
         guides = stress_guides(image, inside, layer, stress, points)
-        return raster_plan(image, stress_regions(image.mask, guides, self.shells))
+        return stress_regions(image.mask, guides, self.shells)
 
     def _guides(
-        self, layer: Layer, stress: LayerStress, interior: Any, pitch: float
+        self,
+        layer: Layer,
+        stress: LayerStress,
+        interior: Region,
+        seeds: FloatArray,
+        pitch: float,
     ) -> list[FloatArray]:
         """Streamlines inside the shells, moved aside so that whole strands fit beside them."""
         if shapely.is_empty(interior):
             return []
-        seeds = self._seeds(layer, stress, interior, pitch)
+        if self.seeds != "segments":
+            seeds = _moved_inside(self._points(layer, stress), interior, pitch)
         curves = streamlines(
             layer.plane.points,
             layer.triangles,
@@ -145,26 +149,21 @@ class Mps:
             lengthened(guide, interior, _AT_BORDER * pitch, _BEYOND * pitch) for guide in guides
         ]
 
-    def _seeds(self, layer: Layer, stress: LayerStress, interior: Any, pitch: float) -> FloatArray:
-        """Points (k, 2) inside the shells that streamlines start from, the first before others."""
-        if self.seeds == "segments":
-            return _middles(interior, pitch)
+    def _points(self, layer: Layer, stress: LayerStress) -> FloatArray:
+        """Points (k, 2) that are given as seeds, by patches or one by one."""
         if self.seeds == "ends":
-            points = _patch_middles(layer, stress.held_or_loaded)
-        else:
-            points = np.array(self.seeds, dtype=np.float64).reshape(-1, 2)
-        # Points outside go to the nearest place inside, a little off the border.
-        inner = shapely.buffer(interior, -0.1 * pitch, join_style="mitre")
-        return shapely.get_coordinates(
-            [
-                shapely.shortest_line(inner, point).interpolate(0.0)
-                for point in shapely.points(points)
-            ]
-        )
+            return _patch_middles(layer, stress.held_or_loaded)
+        return np.array(self.seeds, dtype=np.float64).reshape(-1, 2)
 
 
-@lru_cache(maxsize=32)
-def _middles(interior: Any, pitch: float) -> FloatArray:
+def _moved_inside(points: FloatArray, interior: Region, pitch: float) -> FloatArray:
+    """Points (k, 2), those outside moved to the nearest place inside, a little off the border."""
+    inner = shapely.buffer(interior, -0.1 * pitch, join_style="mitre")
+    nearest = [shapely.shortest_line(inner, point) for point in shapely.points(points)]
+    return shapely.get_coordinates([line.interpolate(0.0) for line in nearest])
+
+
+def _middles(interior: Region, pitch: float) -> FloatArray:
     """Middle of each segment or point of the medial axis, that of the largest clearance first.
 
     A closed one has four: its place of the largest clearance, and those a quarter of the way round
@@ -173,29 +172,32 @@ def _middles(interior: Any, pitch: float) -> FloatArray:
     axis = medial_axis(interior, 0.5 * pitch)
     found: list[tuple[float, FloatArray]] = []
     for segment in axis.segments:
-        steps = np.linalg.norm(np.diff(segment.points, axis=0), axis=1)
-        along = np.concatenate([[0.0], np.cumsum(steps)])
+        along = along_line(segment.points)
         places = np.array([0.5 * along[-1]])
         if segment.closed:
             widest = along[np.argmax(segment.radius)]
             places = (widest + np.array([0.0, 0.25, 0.5, 0.75]) * along[-1]) % along[-1]
-        points = np.stack([np.interp(places, along, x) for x in segment.points.T], axis=1)
+        points = points_along(segment.points, along, places)
         found += zip(np.interp(places, along, segment.radius), points, strict=True)
     ends = {end for segment in axis.segments for end in segment.ends}
     lone = [k for k in range(len(axis.nodes)) if k not in ends]  # discs and squares
     found += zip(axis.radius[lone], axis.nodes[lone], strict=True)
     # Equal ones of a symmetric part keep the order of the axis, which puts the longest first.
     found.sort(key=lambda item: -round(item[0] / (0.01 * pitch)))
-    return read_only(np.reshape([point for _, point in found], (-1, 2)))
+    return np.reshape([point for _, point in found], (-1, 2))
 
 
 def _patch_middles(layer: Layer, patches: tuple[str, ...]) -> FloatArray:
-    """Point of the layer nearest to the middle of each named patch, (k, 2)."""
-    found: list[tuple[float, FloatArray]] = []
+    """Node or middle of an edge nearest to the middle of each named patch, (k, 2).
+
+    Of several that are equally near, as on the border of a hole, the first.
+    """
+    found: list[FloatArray] = []
     for name in patches:
-        nodes = np.unique(layer.patches.get(name, np.zeros((0, 2), dtype=np.int64)))
-        if len(nodes):
-            places = layer.plane.points[nodes]
-            gap = np.linalg.norm(places - places.mean(axis=0), axis=1)
-            found.append(places[np.argmin(gap)])
+        edges = layer.patches.get(name, np.zeros((0, 2), dtype=np.int64))
+        if len(edges):
+            nodes = layer.plane.points[np.unique(edges)]
+            places = np.concatenate([nodes, layer.plane.points[edges].mean(axis=1)])
+            gap = np.linalg.norm(places - nodes.mean(axis=0), axis=1)
+            found.append(places[np.argmin(np.round(gap, 6))])
     return np.array(found, dtype=np.float64).reshape(-1, 2)

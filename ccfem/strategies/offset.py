@@ -6,16 +6,17 @@ fiber paths of continuous fiber composites, Composites Part B 183 (2020) 107681.
 """
 
 from dataclasses import dataclass
-from typing import Any, ClassVar
+from typing import ClassVar
 
 import shapely
 
 from ccfem.arrays import FloatArray
-from ccfem.errors import InputError
 from ccfem.geometry.offsets import rings
+from ccfem.geometry.shapes import Region
 from ccfem.layers.layer import Layer
 from ccfem.layers.layer_stress import LayerStress
 from ccfem.machine.machine import Machine
+from ccfem.planning.infill import SPACING, check_fill, long_enough
 from ccfem.planning.strategy import Amount
 from ccfem.toolpaths import Toolpaths
 
@@ -44,27 +45,20 @@ class Offset:
     spacing: float = 1.0
     minimum_length: float | None = None
 
-    amount: ClassVar[Amount] = Amount("spacing", most=1.0, least=20.0)
+    amount: ClassVar[Amount] = SPACING
     flat_layers_only: ClassVar[bool] = True
 
     def __post_init__(self) -> None:
-        if not 1.0 <= self.spacing < float("inf"):
-            raise InputError(f"offset.spacing must be at least 1 fibre width; got {self.spacing}")
-        if self.minimum_length is not None and not 0.0 <= self.minimum_length < float("inf"):
-            raise InputError(
-                f"offset.minimum_length must be a finite number >= 0; got {self.minimum_length}"
-            )
+        check_fill(self)
 
     def __call__(self, layer: Layer, stress: LayerStress, machine: Machine) -> Toolpaths:
         """Plan the paths of one layer; none where the section is thinner than a fibre."""
         width = machine.fibre_width
         lines = _level_sets(layer.plane.polygon, 0.5 * width, self.spacing * width)
-        paths = Toolpaths.from_plane(lines, layer)
-        least = machine.minimum_length if self.minimum_length is None else self.minimum_length
-        return paths.select(paths.lengths >= least)
+        return long_enough(Toolpaths.from_plane(lines, layer), self.minimum_length, machine)
 
 
-def _level_sets(section: Any, first: float, spacing: float) -> list[FloatArray]:
+def _level_sets(section: Region, first: float, spacing: float) -> list[FloatArray]:
     """Find the closed curves (k, 2), mm, at `first`, `first + spacing`, ... inside a section."""
     found: list[FloatArray] = []
     distance = first

@@ -4,12 +4,13 @@ Beyond the papers: the part is tested virtually with the fibre in it, and the st
 least work go, until the wanted length is left (`ccfem.fibre_aware.prune`).
 """
 
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
-from typing import ClassVar
+from typing import Any, ClassVar
 
 import numpy as np
 
+from ccfem.checks import check_fields
 from ccfem.elasticity.part_stress import PartStress
 from ccfem.elasticity.stress_field import solved
 from ccfem.errors import InputError
@@ -55,18 +56,14 @@ class Pruned:
 
     amount: ClassVar[Amount] = Amount("coverage", most=0.9, least=0.1)
     flat_layers_only: ClassVar[bool] = True
+    variants: ClassVar[Mapping[str, Mapping[str, Any]]] = {"concentric": {"of": "concentric"}}
 
     def __post_init__(self) -> None:
-        checks = {
-            "of": (self.of not in ("pruned", "stream_function"), "another strategy"),
-            "coverage": (0.0 < self.coverage <= 1.0, "a share in (0, 1]"),
-            "overfill": (1.0 <= self.overfill < np.inf, "a finite number >= 1"),
-            "rounds": (self.rounds >= 1, "at least 1"),
-            "rho": (0.0 < self.rho < np.inf, "a finite number > 0 mm^2"),
-        }
-        for name, (good, expected) in checks.items():
-            if not good:
-                raise InputError(f"pruned.{name} must be {expected}; got {getattr(self, name)!r}")
+        if self.of in ("pruned", "stream_function"):
+            raise InputError(f"pruned.of must be another strategy; got {self.of!r}: correct it")
+        check_fields(self, "coverage", above=0.0, at_most=1.0)
+        check_fields(self, "overfill", "rounds", at_least=1)
+        check_fields(self, "rho", above=0.0, unit="mm^2")
 
     def for_part(
         self, stress: PartStress, layers: Sequence[Layer], machine: Machine

@@ -5,13 +5,14 @@ field, as in `isocurve`, but the field is not fitted to the stress of the part w
 optimised for the compliance of the part with the fibre that its isocurves lay.
 """
 
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
-from typing import ClassVar
+from typing import Any, ClassVar
 
 import numpy as np
 
 from ccfem.arrays import FloatArray, IntArray
+from ccfem.checks import check_fields
 from ccfem.elasticity.part_stress import PartStress
 from ccfem.elasticity.stress_field import StressField, solved
 from ccfem.errors import InputError
@@ -27,7 +28,7 @@ from ccfem.fibre_aware.spline_grid import SplineGrid
 from ccfem.fibre_aware.stream_design import StreamDesign, StreamProblem, design
 from ccfem.fibre_aware.stream_start import plane_axes, start_field
 from ccfem.fields.layer_tension import layer_tension
-from ccfem.geometry.isocontours import isocontours
+from ccfem.geometry.isocontours import isocontours, triangle_edges
 from ccfem.layers.layer import Layer
 from ccfem.layers.layer_stress import LayerStress, stress_on
 from ccfem.linking.clearance import trim_to_clearance
@@ -90,7 +91,7 @@ class StreamFunction:
     inset : float, default 0
         Least distance of strands from the boundary, in strand widths. At 0, as in the other
         strategies of isocurves, strands may run along the boundary with half of their width
-        outside; 0.45 keeps them in, and their ends still meet the links along the boundary.
+        outside; 0.5 keeps them in, and their ends still meet the links along the boundary.
     """
 
     coverage: float = 0.45
@@ -106,25 +107,18 @@ class StreamFunction:
 
     amount: ClassVar[Amount] = Amount("coverage", most=0.85, least=0.1)
     flat_layers_only: ClassVar[bool] = True
+    variants: ClassVar[Mapping[str, Mapping[str, Any]]] = {
+        "inset": {"inset": 0.5, "evaluations": 5},
+        "groups": {"groups": 2, "evaluations": 5},
+    }
 
     def __post_init__(self) -> None:
-        checks = {
-            "coverage": (0.0 < self.coverage <= 1.0, "a share in (0, 1]"),
-            "overfill": (1.0 <= self.overfill < np.inf, "a finite number >= 1"),
-            "rho": (0.0 < self.rho < np.inf, "a finite number > 0 mm^2"),
-            "evaluations": (self.evaluations >= 1, "at least 1"),
-            "groups": (self.groups >= 0, "at least 1, or 0 to choose"),
-            "grid": (0.0 < self.grid < np.inf, "a finite number > 0"),
-            "cap": (0.0 < self.cap <= 100.0, "a percentile in (0, 100]"),
-            "phases": (self.phases >= 1, "at least 1"),
-            "link_limit": (0.0 <= self.link_limit < np.inf, "a finite number >= 0"),
-            "inset": (0.0 <= self.inset < np.inf, "a finite number >= 0"),
-        }
-        for name, (good, expected) in checks.items():
-            if not good:
-                raise InputError(
-                    f"stream_function.{name} must be {expected}; got {getattr(self, name)!r}"
-                )
+        check_fields(self, "coverage", above=0.0, at_most=1.0)
+        check_fields(self, "overfill", "evaluations", "phases", at_least=1)
+        check_fields(self, "rho", above=0.0, unit="mm^2")
+        check_fields(self, "grid", above=0.0, unit="fibre widths")
+        check_fields(self, "cap", above=0.0, at_most=100.0)
+        check_fields(self, "groups", "link_limit", "inset", at_least=0)
 
     def for_part(
         self, stress: PartStress, layers: Sequence[Layer], machine: Machine
@@ -267,11 +261,9 @@ class _Extraction:
 def _refined(layer: Layer) -> tuple[FloatArray, IntArray]:
     """Points (n, 2) and triangles (t, 3) of a layer, each triangle cut in four."""
     points, corners = layer.plane.points, layer.triangles
-    pairs = np.sort(corners[:, [[1, 2], [2, 0], [0, 1]]].reshape(-1, 2), axis=1)
-    key, number = np.unique(pairs[:, 0] * len(points) + pairs[:, 1], return_inverse=True)
-    first, second = np.divmod(key, len(points))
+    edges, opposite = triangle_edges(corners)
     a, b, c = corners.T
-    x, y, z = number.reshape(-1, 3).T + len(points)
+    x, y, z = opposite.T + len(points)
     four = [np.stack(three, axis=1) for three in ((a, z, y), (z, b, x), (y, x, c), (x, y, z))]
-    middle = 0.5 * (points[first] + points[second])
+    middle = 0.5 * (points[edges[:, 0]] + points[edges[:, 1]])
     return np.concatenate([points, middle]), np.concatenate(four)

@@ -12,11 +12,12 @@ from typing import ClassVar
 
 import shapely
 
-from ccfem.errors import InputError
+from ccfem.checks import check_fields
 from ccfem.fields.evenly_spaced import evenly_spaced_streamlines
 from ccfem.layers.layer import Layer
 from ccfem.layers.layer_stress import LayerStress
 from ccfem.machine.machine import Machine
+from ccfem.planning.infill import SPACING, check_fill, long_enough
 from ccfem.planning.strategy import Amount
 from ccfem.tensor import in_plane
 from ccfem.toolpaths import Toolpaths
@@ -48,22 +49,12 @@ class Streamline:
     closest: float = 0.5
     minimum_length: float | None = None
 
-    amount: ClassVar[Amount] = Amount("spacing", most=1.0, least=20.0)
+    amount: ClassVar[Amount] = SPACING
     flat_layers_only: ClassVar[bool] = True
 
     def __post_init__(self) -> None:
-        if not 1.0 <= self.spacing < float("inf"):
-            raise InputError(
-                f"streamline.spacing must be at least 1 fibre width; got {self.spacing}"
-            )
-        if not 0.1 <= self.closest <= 0.95:
-            raise InputError(
-                f"streamline.closest must lie between 0.1 and 0.95; got {self.closest}"
-            )
-        if self.minimum_length is not None and not 0.0 <= self.minimum_length < float("inf"):
-            raise InputError(
-                f"streamline.minimum_length must be a finite number >= 0; got {self.minimum_length}"
-            )
+        check_fill(self)
+        check_fields(self, "closest", at_least=0.1, at_most=0.95, unit="spacings")
 
     def __call__(self, layer: Layer, stress: LayerStress, machine: Machine) -> Toolpaths:
         """Plan the paths of one layer; none where the section is thinner than a fibre."""
@@ -78,5 +69,4 @@ class Streamline:
         )
         smooth = shapely.simplify([shapely.LineString(line) for line in lines], _TOLERANCE * width)
         paths = Toolpaths.from_plane([shapely.get_coordinates(line) for line in smooth], layer)
-        least = machine.minimum_length if self.minimum_length is None else self.minimum_length
-        return paths.select(paths.lengths >= least)
+        return long_enough(paths, self.minimum_length, machine)

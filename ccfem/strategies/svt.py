@@ -5,6 +5,7 @@ planning method for 3D printing of continuous fiber reinforced plastics, Composi
 (2021) 106181. The tracks and the links are reconstructed: the paper shows them and gives no rule.
 """
 
+from collections.abc import Mapping
 from dataclasses import dataclass
 from typing import Any, ClassVar, Literal
 
@@ -12,12 +13,14 @@ import numpy as np
 import shapely
 
 from ccfem.arrays import BoolArray, FloatArray
-from ccfem.errors import InputError
+from ccfem.checks import check_fields
 from ccfem.geometry.offsets import join_rings, offset_rings, rings
+from ccfem.geometry.shapes import Region
 from ccfem.layers.layer import Layer
 from ccfem.layers.layer_stress import LayerStress
 from ccfem.linking.single_path import link_tracks
 from ccfem.machine.machine import Machine
+from ccfem.planning.infill import SPACING, check_fill, long_enough
 from ccfem.planning.strategy import Amount
 from ccfem.stress_tracing.band import band
 from ccfem.stress_tracing.criterion import Criterion
@@ -90,25 +93,20 @@ class Svt:
     width_ratio: float = 2.0
     minimum_length: float | None = None
 
-    amount: ClassVar[Amount] = Amount("spacing", most=1.0, least=20.0)
+    amount: ClassVar[Amount] = SPACING
     flat_layers_only: ClassVar[bool] = True
     crosses: ClassVar[bool] = True
+    variants: ClassVar[Mapping[str, Mapping[str, Any]]] = {
+        "points": {"mode": "points"},
+        "plain": {"links": "none", "crossings": False, "aligned": False},
+        "cut": {"longest_inside": 0.0, "longest_over_void": 0.0},
+    }
 
     def __post_init__(self) -> None:
-        if self.mode not in ("graph", "points"):
-            raise InputError(f"svt.mode must be 'graph' or 'points'; got {self.mode!r}")
-        if not 1.0 <= self.spacing < float("inf"):
-            raise InputError(f"svt.spacing must be at least 1 fibre width; got {self.spacing}")
-        if self.links not in ("outside", "none"):
-            raise InputError(f"svt.links must be 'outside' or 'none'; got {self.links!r}")
-        for name in ("longest_inside", "longest_over_void", "minimum_length"):
-            value = getattr(self, name)
-            if value is not None and not 0.0 <= value < float("inf"):
-                raise InputError(f"svt.{name} must be a finite number >= 0; got {value}")
-        if not 0.0 < self.turn < 180.0:
-            raise InputError(f"svt.turn must lie between 0 and 180 degrees; got {self.turn}")
-        if not self.width_ratio >= 1.0:
-            raise InputError(f"svt.width_ratio must be at least 1; got {self.width_ratio}")
+        check_fill(self)
+        check_fields(self, "longest_inside", "longest_over_void", at_least=0.0, unit="mm")
+        check_fields(self, "turn", above=0.0, below=180.0, unit="degrees")
+        check_fields(self, "width_ratio", at_least=1.0)
 
     def __call__(self, layer: Layer, stress: LayerStress, machine: Machine) -> Toolpaths:
         """Plan the paths of one layer: for each piece of its section one, or as few as can be."""
@@ -119,10 +117,11 @@ class Svt:
                 lines.append(line)
                 link.append(mask)
         paths = Toolpaths.from_plane(lines, layer, link=link)
-        least = machine.minimum_length if self.minimum_length is None else self.minimum_length
-        return paths.select(paths.lengths >= least)
+        return long_enough(paths, self.minimum_length, machine)
 
-    def groups(self, piece: Any, stress: LayerStress, machine: Machine) -> list[list[FloatArray]]:
+    def groups(
+        self, piece: Region, stress: LayerStress, machine: Machine
+    ) -> list[list[FloatArray]]:
         """Strands (n_i, 2), mm, of each main path of one piece of the section, not yet joined."""
         members = frame(piece, _SAMPLING * machine.fibre_width)
         criterion = Criterion(turn=self.turn)
@@ -135,7 +134,7 @@ class Svt:
         return found
 
     def _piece(
-        self, piece: Any, stress: LayerStress, machine: Machine
+        self, piece: Region, stress: LayerStress, machine: Machine
     ) -> list[tuple[FloatArray, BoolArray]]:
         """Paths of one piece of the section, with the mask of their links."""
         if self.mode == "points":
@@ -151,7 +150,7 @@ class Svt:
         parts = path.without_long_links(piece, self.longest_inside, over_void)
         return [(part.points, part.link) for part in parts]
 
-    def _rings(self, piece: Any, machine: Machine) -> list[FloatArray]:
+    def _rings(self, piece: Region, machine: Machine) -> list[FloatArray]:
         """Concentric rings of a piece that has no members, joined by ramps."""
         width = machine.fibre_width
         levels = offset_rings(piece, 0.5 * width, self.spacing * width, width)

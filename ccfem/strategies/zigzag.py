@@ -5,11 +5,12 @@ from typing import ClassVar
 
 import numpy as np
 
-from ccfem.errors import InputError
+from ccfem.checks import check_fields
 from ccfem.geometry.hatch import zigzag
 from ccfem.layers.layer import Layer
 from ccfem.layers.layer_stress import LayerStress
 from ccfem.machine.machine import Machine
+from ccfem.planning.infill import SPACING, check_fill, long_enough
 from ccfem.planning.strategy import Amount
 from ccfem.toolpaths import Toolpaths
 
@@ -38,23 +39,17 @@ class Zigzag:
     angle: float = 45.0
     turn: float = 90.0
 
-    amount: ClassVar[Amount] = Amount("spacing", most=1.0, least=20.0)
+    amount: ClassVar[Amount] = SPACING
     flat_layers_only: ClassVar[bool] = True
     direction: ClassVar[str] = "angle"
 
     def __post_init__(self) -> None:
-        if not 1.0 <= self.spacing < float("inf"):
-            raise InputError(f"zigzag.spacing must be at least 1 fibre width; got {self.spacing}")
-        if not np.isfinite([self.angle, self.turn]).all():
-            raise InputError(
-                f"zigzag.angle and zigzag.turn must be finite degrees; got {self.angle} and "
-                f"{self.turn}"
-            )
+        check_fill(self)
+        check_fields(self, "angle", "turn", unit="degrees")
 
     def __call__(self, layer: Layer, stress: LayerStress, machine: Machine) -> Toolpaths:
         """Plan the paths of one layer; none where the section is thinner than a fibre."""
         width = machine.fibre_width
         angle = np.radians(self.angle + self.turn * layer.index)
         lines = zigzag(layer.plane.polygon, 0.5 * width, width, self.spacing * width, angle)
-        paths = Toolpaths.from_plane(lines, layer)
-        return paths.select(paths.lengths >= machine.minimum_length)
+        return long_enough(Toolpaths.from_plane(lines, layer), None, machine)

@@ -11,7 +11,8 @@ import numpy as np
 import shapely
 from scipy.ndimage import gaussian_filter1d
 
-from ccfem.arrays import BoolArray, FloatArray, read_only
+from ccfem.arrays import BoolArray, FloatArray, freeze
+from ccfem.geometry.polylines import along_line, points_along
 from ccfem.stress_tracing.frame import FREE, Frame, Member
 from ccfem.stress_tracing.main_paths import MainPath
 
@@ -66,8 +67,7 @@ class Band:
     closed: bool = False
 
     def __post_init__(self) -> None:
-        for name in ("middle", "half", "width", "free"):
-            object.__setattr__(self, name, read_only(getattr(self, name)))
+        freeze(self, middle=float, half=float, width=float, free=float)
 
 
 def band(path: MainPath, frame: Frame, crossing: bool = True) -> Band:
@@ -85,7 +85,7 @@ def band(path: MainPath, frame: Frame, crossing: bool = True) -> Band:
     right = np.concatenate([member.right for member in path.members])[own]
     strip = np.column_stack([0.5 * (left + right), 0.5 * (left - right), np.zeros(len(left))])
     gap = np.diff(np.flatnonzero(own)) > 1
-    if _arc_length(strip)[-1] < STEP:
+    if along_line(strip[:, :2])[-1] < STEP:
         strip, gap = _stub(strip), np.zeros(1, dtype=bool)
     if path.closed:
         strip, gap = _as_ring(strip, np.append(gap, not own[0] or not own[-1]))
@@ -167,14 +167,9 @@ def _as_ring(strip: FloatArray, gap: BoolArray) -> tuple[FloatArray, BoolArray]:
     return np.concatenate([strip, strip[:1]]), gap
 
 
-def _arc_length(strip: FloatArray) -> FloatArray:
-    steps = np.linalg.norm(np.diff(strip[:, :2], axis=0), axis=1)
-    return np.concatenate([[0.0], np.cumsum(steps)])
-
-
 def _bridged(strip: FloatArray, gap: BoolArray) -> FloatArray:
     """Fill gaps (n - 1,) by cubics that go on in the directions of the strip at both sides."""
-    along, middle = _arc_length(strip), strip[:, :2]
+    along, middle = along_line(strip[:, :2]), strip[:, :2]
     gaps = np.flatnonzero(gap & (np.diff(along) > STEP))
     parts, start = [], 0
     for k, here in enumerate(gaps):
@@ -222,13 +217,13 @@ def _cubic(
 
 def _even(strip: FloatArray, closed: bool) -> FloatArray:
     """Strip in equal steps along its middle; a closed one from its point nearest to its centre."""
-    along = _arc_length(strip)
+    along = along_line(strip[:, :2])
     at = np.linspace(0.0, along[-1], max(4, round(along[-1] / STEP)) + 1)
     if closed:
         centre = shapely.centroid(shapely.Polygon(strip[:, :2]))
         line = shapely.LineString(strip[:, :2])
         at = (at + shapely.line_locate_point(line, centre)) % along[-1]
-    return np.stack([np.interp(at, along, x) for x in strip.T], axis=1)
+    return points_along(strip, along, at)
 
 
 def _smoothed(strip: FloatArray, mode: str) -> FloatArray:

@@ -2,14 +2,13 @@
 
 from dataclasses import dataclass, replace
 from functools import cached_property
-from typing import Any
 
 import numpy as np
-from scipy.sparse import coo_array
-from scipy.sparse.csgraph import connected_components
 
-from ccfem.arrays import BoolArray, FloatArray, IntArray, read_only
+from ccfem.arrays import BoolArray, FloatArray, IntArray, freeze
 from ccfem.geometry.medial_axis import MedialAxis, MedialSegment, medial_axis
+from ccfem.geometry.shapes import Region
+from ccfem.mesh.measures import connected
 
 __all__ = ["FREE", "Frame", "Member", "frame"]
 
@@ -44,8 +43,7 @@ class Member:
     closed: bool = False
 
     def __post_init__(self) -> None:
-        for name in ("points", "left", "right"):
-            object.__setattr__(self, name, read_only(getattr(self, name)))
+        freeze(self, points=float, left=float, right=float)
 
     @cached_property
     def reversed(self) -> "Member":
@@ -79,8 +77,7 @@ class Frame:
     radius: FloatArray
 
     def __post_init__(self) -> None:
-        object.__setattr__(self, "joints", read_only(self.joints))
-        object.__setattr__(self, "radius", read_only(self.radius))
+        freeze(self, joints=float, radius=float)
 
     def ends_at(self, joint: int) -> list[tuple[int, int]]:
         """Find the ends in a joint: number of the member, and 0 for its start or 1 for its end."""
@@ -92,7 +89,7 @@ class Frame:
         ]
 
 
-def frame(section: Any, step: float, contraction: float = 1.25) -> Frame:
+def frame(section: Region, step: float, contraction: float = 1.25) -> Frame:
     """Members and joints of a section.
 
     Parameters
@@ -138,8 +135,7 @@ def _joints(
     inner = np.flatnonzero((ends >= 0).all(axis=1))
     inner = inner[junction[ends[inner]].all(axis=1)]
     short[inner] = length[inner] < contraction * axis.radius[ends[inner]].max(axis=1)
-    link = coo_array((np.ones(short.sum()), ends[short].T), shape=(len(axis.nodes),) * 2)
-    _, group = connected_components(link, directed=False)
+    group = connected(ends[short], len(axis.nodes))
     joint = np.full(len(axis.nodes), FREE)
     _, joint[junction] = np.unique(group[junction], return_inverse=True)
     return joint, short

@@ -7,12 +7,9 @@ import numpy as np
 from ccfem.arrays import BoolArray, FloatArray
 from ccfem.geometry.locate import locate
 from ccfem.layers.layer_stress import LayerStress
-from ccfem.tensor import in_plane, largest_in_plane
+from ccfem.tensor import in_plane, strongest_in_plane
 
 __all__ = ["StressLines", "misalignment", "plane_stress_at", "stress_lines"]
-
-_EQUAL = 0.02
-"""Share by which the two principal values differ at least where there is a direction."""
 
 
 @dataclass(frozen=True)
@@ -26,7 +23,7 @@ class StressLines:
     value : (k,) array, MPa
         Positive in tension.
     defined : (k,) bool array
-        Whether there is a direction: not where both principal stresses are equal, or none.
+        Whether there is one: not where both principal stresses are of one size (`tensor`).
     """
 
     direction: FloatArray
@@ -47,12 +44,7 @@ def plane_stress_at(stress: LayerStress, points: FloatArray, reach: float) -> Fl
 
 def stress_lines(plane_stress: FloatArray) -> StressLines:
     """Principal stress of the largest size of plane stress (k, 3), MPa."""
-    largest, smallest, angle = largest_in_plane(plane_stress)
-    push = -smallest > largest
-    angle = np.where(push, angle + 0.5 * np.pi, angle)
-    value = np.where(push, smallest, largest)
-    size = np.abs(np.stack([largest, smallest]))
-    defined = largest - smallest > _EQUAL * size.max(axis=0)
+    value, angle, defined = strongest_in_plane(plane_stress)
     return StressLines(np.stack([np.cos(angle), np.sin(angle)], axis=-1), value, defined)
 
 

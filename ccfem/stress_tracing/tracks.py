@@ -3,15 +3,14 @@
 The paper shows tracks whose distance follows the width of the member, and gives no formula.
 """
 
-from typing import Any
-
 import numpy as np
 import shapely
 from scipy.ndimage import gaussian_filter1d, maximum_filter1d
 
 from ccfem.arrays import BoolArray, FloatArray
 from ccfem.geometry.offsets import ring_from
-from ccfem.geometry.polylines import subdivide, turning_angles
+from ccfem.geometry.polylines import along_line, subdivide, turning_angles
+from ccfem.geometry.shapes import Region
 from ccfem.layers.layer_stress import LayerStress
 from ccfem.stress_tracing.band import STEP, Band
 from ccfem.stress_tracing.turning import relaxed
@@ -46,7 +45,7 @@ def track_count(band: Band, pitch: float) -> int:
 def tracks(
     band: Band,
     count: int,
-    section: Any,
+    section: Region,
     radius: float = 0.0,
     stress: LayerStress | None = None,
 ) -> list[FloatArray]:
@@ -110,7 +109,7 @@ def eased(line: FloatArray, radius: float, closed: bool = False) -> FloatArray:
     return line
 
 
-def clipped(line: FloatArray, section: Any, core: slice, within: slice) -> FloatArray:
+def clipped(line: FloatArray, section: Region, core: slice, within: slice) -> FloatArray:
     """Part of a line round the middle of its core up to where it leaves a section for good.
 
     Excursions shorter than 1.5 mm do not end it: they would cut a track that grazes the border
@@ -139,13 +138,13 @@ def clipped(line: FloatArray, section: Any, core: slice, within: slice) -> Float
 
 def _last_inside(line: FloatArray, inside: BoolArray) -> int:
     """Index of the last point inside before a line is outside for more than a while."""
-    along = np.concatenate([[0.0], np.cumsum(np.linalg.norm(np.diff(line, axis=0), axis=1))])
+    along = along_line(line)
     within = np.flatnonzero(inside)
     left = np.flatnonzero(np.diff(along[within]) > _OUTSIDE + STEP)
     return int(within[left[0]] if len(left) else within[-1])
 
 
-def _way_out(inner: FloatArray, outer: FloatArray, section: Any) -> FloatArray:
+def _way_out(inner: FloatArray, outer: FloatArray, section: Region) -> FloatArray:
     """Point (1, 2) where a step out of a section first crosses its border; none at its start."""
     step = shapely.LineString([inner, outer])
     border = shapely.get_coordinates(shapely.intersection(step, section.boundary))
@@ -154,7 +153,7 @@ def _way_out(inner: FloatArray, outer: FloatArray, section: Any) -> FloatArray:
     return border[[np.argmin(away[away > 1e-6])]] if len(border) else border
 
 
-def _held(line: FloatArray, section: Any, inner: Any, closed: bool) -> FloatArray:
+def _held(line: FloatArray, section: Region, inner: Region, closed: bool) -> FloatArray:
     """Push a line back where it leaves a section between its ends, and what is beside that less."""
     step = 0.2 * STEP
     fine, _, _ = subdivide(line, np.array([0, len(line)]), step)

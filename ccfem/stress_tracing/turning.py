@@ -19,6 +19,7 @@ from scipy.sparse import coo_array
 from scipy.sparse.linalg import spsolve
 
 from ccfem.arrays import FloatArray
+from ccfem.geometry.shapes import Region
 from ccfem.layers.layer_stress import LayerStress
 from ccfem.stress_tracing.band import STEP, Band
 from ccfem.stress_tracing.stress_lines import plane_stress_at, stress_lines
@@ -34,7 +35,7 @@ _CLOSEST = 0.6
 _ROUNDS = 2
 
 
-def relaxed(lines: FloatArray, band: Band, stress: LayerStress, section: Any) -> FloatArray:
+def relaxed(lines: FloatArray, band: Band, stress: LayerStress, section: Region) -> FloatArray:
     """Turn the tracks of a band to the stress.
 
     Parameters
@@ -74,7 +75,7 @@ def _differences(values: FloatArray, closed: bool) -> FloatArray:
 
 
 def _wanted(
-    lines: FloatArray, closed: bool, stress: LayerStress, section: Any
+    lines: FloatArray, closed: bool, stress: LayerStress, section: Region
 ) -> tuple[FloatArray, FloatArray]:
     """Weight and wanted slope (k, n or n - 1) of every step of lines."""
     steps = _differences(lines, closed)

@@ -4,15 +4,14 @@ For comparison with the paper. The walk skips joints and leaves stray points, by
 are broken up; `main_paths` evaluates the same criterion at the joints instead.
 """
 
-from typing import Any
-
 import numpy as np
 import shapely
 from scipy.spatial import cKDTree
 
 from ccfem.arrays import BoolArray, FloatArray, IntArray
 from ccfem.geometry.medial_axis import medial_axis
-from ccfem.geometry.polylines import pack, resample
+from ccfem.geometry.polylines import inner_points, pack, resample
+from ccfem.geometry.shapes import Region
 from ccfem.layers.layer_stress import LayerStress
 from ccfem.stress_tracing.criterion import Criterion
 from ccfem.stress_tracing.stress_lines import misalignment, plane_stress_at, stress_lines
@@ -24,7 +23,7 @@ _ARC_CHORD = 1.6
 
 
 def walk(
-    section: Any,
+    section: Region,
     stress: LayerStress,
     sampling: float,
     step: float = 1.0,
@@ -73,16 +72,15 @@ def walk(
     return paths
 
 
-def _points(section: Any, sampling: float, step: float) -> tuple[FloatArray, IntArray, BoolArray]:
+def _points(
+    section: Region, sampling: float, step: float
+) -> tuple[FloatArray, IntArray, BoolArray]:
     """Points (n, 2) of the axis, how often each may be passed, and which are ends."""
     axis = medial_axis(section, sampling, object_angle=None, arc_chord=_ARC_CHORD)
     if not axis.segments:
         return np.zeros((0, 2)), np.zeros(0, dtype=np.int64), np.zeros(0, dtype=bool)
     lines, offsets = resample(*pack([segment.points for segment in axis.segments]), step)
-    inner = np.ones(len(lines), dtype=bool)
-    inner[offsets[1:] - 1] = False
-    open_ones = np.array([segment.ends[0] >= 0 for segment in axis.segments])
-    inner[offsets[:-1][open_ones]] = False
+    inner = inner_points(offsets, np.array([segment.ends[0] < 0 for segment in axis.segments]))
     ends = [end for segment in axis.segments for end in segment.ends if end >= 0]
     degree = np.bincount(ends, minlength=len(axis.nodes)) if ends else np.zeros(0, dtype=np.int64)
     nodes = np.flatnonzero(degree)
@@ -98,7 +96,12 @@ class _Walker:
     """The walk: points with how often each may still be passed."""
 
     def __init__(
-        self, section: Any, points: FloatArray, uses: IntArray, stress: FloatArray, rule: Criterion
+        self,
+        section: Region,
+        points: FloatArray,
+        uses: IntArray,
+        stress: FloatArray,
+        rule: Criterion,
     ) -> None:
         self.section, self.points, self.stress, self.rule = section, points, stress, rule
         self.uses = uses.copy()

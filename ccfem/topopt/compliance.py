@@ -1,28 +1,51 @@
-"""Compliance of a part with a factor on the stiffness of each cell, solved again and again."""
+"""Compliance of a part with a factor on the stiffness of its cells, solved again and again."""
 
 from collections.abc import Mapping
+from typing import NamedTuple
 
 import numpy as np
 import scipy.sparse as sp
 
-from ccfem.arrays import FloatArray
+from ccfem.arrays import FloatArray, IntArray
 from ccfem.elasticity.problem import Problem
 from ccfem.elasticity.solvers import Solver
 from ccfem.errors import InputError
 from ccfem.plates.problem import PlaneProblem
 from ccfem.topopt.equations import PlateEquations, TetEquations
-from ccfem.topopt.model import Response
+from ccfem.topopt.groups import CellGroups
 
-__all__ = ["Compliance"]
+__all__ = ["Compliance", "Response"]
 
 _TOLERANCE = 1e-6
 """Relative residual of a solve; contrasts of 1e9 leave no less in double precision."""
 
 
-class Compliance:
-    """Compliance of a plate or of a part of linear tetrahedra: an `OrientableModel`.
+class Response(NamedTuple):
+    """Response of a part to its load cases.
 
-    It keeps the last factorisation and displacement: iterative backends start at the latter.
+    Attributes
+    ----------
+    cases : dict of load case name to float, N mm
+        Compliance under each: the work of its loads, ``f . u``.
+    compliance : float, N mm
+        Their weighted sum.
+    energy : (g,) array, N mm
+        Weighted ``u^T k u`` of each group of cells at full density.
+    displacement : dict of load case name to (n, d) array, mm
+    """
+
+    cases: dict[str, float]
+    compliance: float
+    energy: FloatArray
+    displacement: dict[str, FloatArray]
+
+
+class Compliance:
+    """Compliance of a plate or of a part of linear tetrahedra.
+
+    It keeps the last factorisation and displacement: iterative backends start at the latter. A
+    stiffness is that of full density in the global axes, one of each group: a (g, k, k) array, MPa,
+    with k 3 for plates and 6 for tetrahedra.
 
     Parameters
     ----------
@@ -31,12 +54,20 @@ class Compliance:
     weights : mapping of load case name to float, optional
         One non-negative weight a load case; default 1 each.
     backend : str, default "auto"
+    groups : (m,) int array, optional
+        Cells with the same number share their factor; default each has its own (g = m).
+
+    Attributes
+    ----------
+    cells : CellGroups
+    centres : (g, d) array, mm
+    volumes : (g,) array, mm^3
 
     Raises
     ------
     InputError
-        For weights that do not fit the load cases, supports that move, quadratic tetrahedra, and a
-        problem that has a density already.
+        For weights or groups that do not fit the problem, supports that move, quadratic
+        tetrahedra, and a problem that has a density already.
     """
 
     def __init__(
@@ -44,6 +75,7 @@ class Compliance:
         problem: PlaneProblem | Problem,
         weights: Mapping[str, float] | None = None,
         backend: str = "auto",
+        groups: IntArray | None = None,
     ) -> None:
         self.weights = _checked_weights(problem, weights)
         self._equations: PlateEquations | TetEquations = (
@@ -55,32 +87,29 @@ class Compliance:
         self._backend = self._equations.backend() if backend == "auto" else backend
         self._solver: Solver | None = None
         self._displacement: dict[str, FloatArray] = {}
-        self.centres, self.volumes = self._equations.centres, self._equations.volumes
+        volumes = self._equations.volumes
+        self.cells = CellGroups.of_cells(groups, len(volumes))
+        self.volumes = self.cells.sum(volumes)
+        self.centres = self.cells.mean(self._equations.centres, volumes)
 
     def __call__(self, factor: FloatArray, stiffness: FloatArray | None = None) -> Response:
-        """Response with factors on the stiffness of the cells.
-
-        Parameters
-        ----------
-        factor : (m,) array in (0, 1]
-        stiffness : (m, k, k) array, MPa, optional
-            Of full density, where it is not the problem's: k is 3 for plates, 6 for tetrahedra.
+        """Response with factors (g,) in (0, 1], and where given with another stiffness.
 
         Raises
         ------
         SolveError
             When a solve misses its tolerance.
         """
-        equations = self._equations
-        elements = equations.elements(stiffness)
-        self._solve(equations.assemble(factor, elements))
-        cases, energy = {}, np.zeros(len(factor))
+        equations, member = self._equations, self.cells.member
+        elements = equations.elements(None if stiffness is None else stiffness[member])
+        self._solve(equations.assemble(factor[member], elements))
+        cases, energy = {}, np.zeros(len(member))
         for case, displacement in self._displacement.items():
             forces = equations.system.forces[case]
             cases[case] = float(np.einsum("ij,ij->", forces, displacement))
             energy += self.weights[case] * equations.energy(displacement, elements)
         compliance = sum(self.weights[case] * work for case, work in cases.items())
-        return Response(cases, compliance, energy, dict(self._displacement))
+        return Response(cases, compliance, self.cells.sum(energy), dict(self._displacement))
 
     def _solve(self, matrix: sp.bsr_array) -> None:
         """Find the displacement of every load case."""
@@ -97,12 +126,14 @@ class Compliance:
             self._displacement[case] = held.expand(solution.values)
 
     def energy(self, displacement: FloatArray, stiffness: FloatArray) -> FloatArray:
-        """Energy ``u^T k u`` (m,), N mm, of a displacement (n, d) and a stiffness (m, k, k)."""
-        return self._equations.energy(displacement, self._equations.elements(stiffness))
+        """Energy ``u^T k u`` of each group, (g,), N mm, at a displacement (n, d)."""
+        elements = self._equations.elements(stiffness[self.cells.member])
+        return self.cells.sum(self._equations.energy(displacement, elements))
 
     def stress(self, displacement: FloatArray, stiffness: FloatArray) -> FloatArray:
-        """Stress (m, 3), MPa, [s11, s22, s12] at the centre of each cell in the x-y plane."""
-        return self._equations.stress(displacement, stiffness)
+        """Mean stress [s11, s22, s12] of each group in the x-y plane, (g, 3), MPa."""
+        stress = self._equations.stress(displacement, stiffness[self.cells.member])
+        return self.cells.mean(stress, self._equations.volumes)
 
 
 def _checked_weights(

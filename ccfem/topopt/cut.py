@@ -5,8 +5,9 @@ from typing import NamedTuple
 import numpy as np
 
 from ccfem.arrays import BoolArray, FloatArray, IntArray
-from ccfem.mesh.patches import facet_keys
-from ccfem.mesh.tet_mesh import TetMesh, signed_volumes
+from ccfem.mesh.facets import are_among, positions
+from ccfem.mesh.measures import signed_volumes
+from ccfem.mesh.tet_mesh import TetMesh
 
 __all__ = ["CutMesh", "cut_mesh", "volume_above"]
 
@@ -115,7 +116,7 @@ def cut_mesh(mesh: TetMesh, values: FloatArray, level: float) -> CutMesh:
     facet = _facets(mesh, np.concatenate([own, ends])[used][found.boundary])
     patches = {}
     for name, facets in mesh.patches.items():
-        chosen = np.isin(facet_keys(mesh.boundary), facet_keys(facets))
+        chosen = are_among(mesh.boundary, facets)
         patches[name] = found.boundary[chosen[facet] & (facet >= 0)]
     return CutMesh(found.with_patches(patches), facet)
 
@@ -154,10 +155,6 @@ def _facets(mesh: TetMesh, nodes: IntArray) -> IntArray:
     nodes = np.sort(nodes.reshape(-1, 6), axis=1)
     fresh = np.concatenate([np.ones((len(nodes), 1), dtype=bool), np.diff(nodes) > 0], axis=1)
     flat = fresh.sum(axis=1) == 3
-    known = facet_keys(mesh.boundary)
-    order = np.argsort(known)
-    wanted = facet_keys(nodes[flat][fresh[flat]].reshape(-1, 3))
-    at = order[np.minimum(np.searchsorted(known, wanted, sorter=order), len(order) - 1)]
     result = np.full(len(nodes), -1)
-    result[flat] = np.where(known[at] == wanted, at, -1)
+    result[flat] = positions(nodes[flat][fresh[flat]].reshape(-1, 3), mesh.boundary)
     return result

@@ -4,8 +4,9 @@ import numpy as np
 import scipy.sparse as sp
 
 from ccfem.arrays import BoolArray, FloatArray, IntArray
-from ccfem.mesh.patches import facet_keys
-from ccfem.mesh.tet_mesh import TetMesh, signed_volumes
+from ccfem.mesh.facets import are_among
+from ccfem.mesh.measures import signed_volumes
+from ccfem.mesh.tet_mesh import TetMesh
 from ccfem.topopt.cut import CutMesh
 
 __all__ = ["relaxed"]
@@ -95,9 +96,8 @@ def _free_directions(cut: CutMesh) -> FloatArray:
 def _patch_ends(mesh: TetMesh, border: IntArray) -> BoolArray:
     """Nodes (n,) where facets (b, 3) inside and outside a patch meet."""
     ends = np.zeros(len(mesh.points), dtype=bool)
-    keys = facet_keys(border)
     for facets in mesh.patches.values():
-        own = np.isin(keys, facet_keys(facets))
+        own = are_among(border, facets)
         inside, outside = np.zeros((2, len(mesh.points)), dtype=bool)
         inside[border[own]], outside[border[~own]] = True, True
         ends |= inside & outside

@@ -5,7 +5,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 from scipy.spatial import cKDTree
 
-from ccfem.arrays import BoolArray, FloatArray, read_only
+from ccfem.arrays import BoolArray, FloatArray, freeze, in_brief
 from ccfem.elasticity.problem import Problem
 from ccfem.errors import InputError
 from ccfem.plates.problem import PlaneProblem
@@ -54,11 +54,11 @@ class Design:
     converged: str
     angle: FloatArray | None = None
 
+    __repr__ = in_brief
+
     def __post_init__(self) -> None:
-        for name in ("density", "variables", "factor", "compliance", "change"):
-            object.__setattr__(self, name, read_only(getattr(self, name)))
-        if self.angle is not None:
-            object.__setattr__(self, "angle", read_only(self.angle))
+        freeze(self, density=float, variables=float, factor=float, angle=float)
+        freeze(self, compliance=float, change=float)
 
     @property
     def iterations(self) -> int:

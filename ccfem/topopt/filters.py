@@ -35,16 +35,14 @@ class ConeFilter:
         ----------
         centres, volumes : arrays
         radius : float, mm
-            Below the distance of the centres, nothing is averaged.
+            Above 0; below the distance of the centres, nothing is averaged.
 
         Raises
         ------
         InputError
-            For a radius that is not positive, or so large that every cell sees most others.
+            For a radius so large that every cell sees most others.
         """
         m = len(centres)
-        if not 0.0 < radius < np.inf:
-            raise InputError(f"filter radius must be positive; got {radius} mm")
         tree = cKDTree(centres)
         sample = centres[:: max(1, m // 100)]
         around = np.mean([len(found) for found in tree.query_ball_point(sample, radius)])

@@ -9,8 +9,8 @@ from ccfem.arrays import FloatArray
 from ccfem.elasticity.problem import Problem
 from ccfem.plates.problem import PlaneProblem
 from ccfem.progress import Progress
+from ccfem.topopt.compliance import Response
 from ccfem.topopt.design import Design
-from ccfem.topopt.model import ComplianceModel, Response
 from ccfem.topopt.optimality_criteria import optimality_criteria
 from ccfem.topopt.parameters import Parameters
 from ccfem.topopt.parametrisation import Parametrisation
@@ -20,7 +20,8 @@ __all__ = ["iterate"]
 _WINDOW = 10
 """Iterations over which the objective must stand still."""
 
-ModelT = TypeVar("ModelT", bound=ComplianceModel)
+ModelT = TypeVar("ModelT", bound=Callable[[FloatArray], Response])
+"""Response of a part to factors (g,) on the stiffness of its groups of cells."""
 
 
 def iterate(
@@ -37,22 +38,22 @@ def iterate(
     ----------
     problem : PlaneProblem or Problem
         At full density, for the design.
-    model : ComplianceModel
-        Of m cells or groups.
+    model : callable
+        Response to factors (g,) on the stiffness of the groups.
     space : Parametrisation
+        Of m cells in g groups.
     start : (m,) array in [0, 1], optional
     progress : callable
     turn : callable, optional
-        Model of the next iteration, from that of this one, its response and the factors (m,).
+        Model of the next iteration, from that of this one, its response and the factors (g,).
 
     Returns
     -------
     design : Design
-        Of the cells or groups of the model.
-    model : ComplianceModel
+    model : callable
         That of the last iteration.
     """
-    parameters, volumes, free = space.parameters, model.volumes, space.free
+    parameters, volumes, free = space.parameters, space.cone.volumes, space.free
     variables, per_volume = space.start(start), space.volume_gradient()[free]
     fixed = float(space.density(np.where(free, 0.0, variables)) @ volumes)
     target = parameters.volume_fraction * float(volumes.sum()) - fixed
@@ -81,11 +82,12 @@ def iterate(
             f"change {changes[-1]:.3f}",
             len(changes) / parameters.max_iterations,
         )
+    member = space.cells.member
     design = Design(
         full=problem,
-        density=density,
-        variables=variables,
-        factor=factor,
+        density=density[member],
+        variables=variables[member],
+        factor=factor[member],
         compliance=np.array(compliance),
         change=np.array(changes),
         converged=converged,

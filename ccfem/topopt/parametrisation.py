@@ -7,8 +7,9 @@ import numpy as np
 
 from ccfem.arrays import BoolArray, FloatArray
 from ccfem.errors import InputError
+from ccfem.topopt.compliance import Compliance
 from ccfem.topopt.filters import ConeFilter
-from ccfem.topopt.model import ComplianceModel
+from ccfem.topopt.groups import CellGroups
 from ccfem.topopt.parameters import Parameters
 
 __all__ = ["Parametrisation"]
@@ -21,25 +22,34 @@ class Parametrisation:
     Attributes
     ----------
     parameters : Parameters
+    cells : CellGroups
+        g groups of m cells; all that follows is by groups.
     cone : ConeFilter
-    solid, void : (m,) bool arrays
+    solid, void : (g,) bool arrays
         Passive cells, whose density stays 1 or 0.
     """
 
     parameters: Parameters
+    cells: CellGroups
     cone: ConeFilter
     solid: BoolArray
     void: BoolArray
 
     @classmethod
-    def of_model(
+    def of_part(
         cls,
         parameters: Parameters,
-        model: ComplianceModel,
+        part: Compliance,
         solid: BoolArray | None,
         void: BoolArray | None,
     ) -> "Parametrisation":
-        """Make the filter of a part, and check its passive cells, (m,) each or None.
+        """Make the filter of a part, and check its passive cells.
+
+        Parameters
+        ----------
+        parameters : Parameters
+        part : Compliance
+        solid, void : (m,) bool arrays or None
 
         Raises
         ------
@@ -47,35 +57,30 @@ class Parametrisation:
             For cells that are both solid and void, a volume fraction that the passive cells make
             impossible, and a radius so large that every cell sees most others.
         """
-        m = len(model.volumes)
-        solid = np.zeros(m, dtype=bool) if solid is None else solid
-        void = np.zeros(m, dtype=bool) if void is None else void
-        if solid.dtype != np.bool_ or void.dtype != np.bool_:
-            raise InputError(
-                f"solid and void must be bool arrays; got {solid.dtype} and {void.dtype}"
-            )
+        cells = part.cells
+        solid, void = _mask(cells, "solid", solid), _mask(cells, "void", void)
         if (solid & void).any():
             raise InputError("a cell cannot be both solid and void: correct the masks")
-        filled, empty = (float(model.volumes[mask].sum()) for mask in (solid, void))
-        total, share = float(model.volumes.sum()), parameters.volume_fraction
-        if not filled < share * total < total - empty:
+        total, share = float(part.volumes.sum()), parameters.volume_fraction
+        filled, empty = (float(part.volumes[mask].sum()) / total for mask in (solid, void))
+        if not filled < share < 1.0 - empty:
             raise InputError(
-                f"volume fraction {share} cannot be met: solid cells fill {filled / total:.3g} and "
-                f"void cells {empty / total:.3g} of the volume"
+                f"volume fraction {share} cannot be met: solid cells fill {filled:.3g} and void "
+                f"cells {empty:.3g} of the volume"
             )
-        cone = ConeFilter.of_cells(model.centres, model.volumes, parameters.radius)
-        return cls(parameters, cone, solid, void)
+        cone = ConeFilter.of_cells(part.centres, part.volumes, parameters.radius)
+        return cls(parameters, cells, cone, solid, void)
 
     @cached_property
     def free(self) -> BoolArray:
-        """Cells whose density is to be found, (m,)."""
+        """Groups whose density is to be found, (g,)."""
         return ~(self.solid | self.void)
 
     def start(self, given: FloatArray | None) -> FloatArray:
-        """Variables (m,) to begin with: given, or uniform where they are free."""
+        """Variables (g,) to begin with: given (m,), or uniform where they are free."""
         volumes = self.cone.volumes
         if given is not None:
-            variables = np.array(given, dtype=np.float64)
+            variables = np.array(self.cells.reduced("start", given), dtype=np.float64)
             if not ((variables >= 0.0) & (variables <= 1.0)).all():
                 raise InputError(
                     f"start must be densities in [0, 1]; got {variables.min()} to {variables.max()}"
@@ -87,14 +92,14 @@ class Parametrisation:
         return variables
 
     def density(self, variables: FloatArray) -> FloatArray:
-        """Densities (m,) of the variables (m,)."""
+        """Densities (g,) of the variables (g,)."""
         filtered = self.parameters.filter == "density"
         density = self.cone.average(variables) if filtered else variables.copy()
         density[self.solid], density[self.void] = 1.0, 0.0
         return density
 
     def factor(self, density: FloatArray) -> FloatArray:
-        """Factor (m,) on the stiffness of each cell, by modified SIMP.
+        """Factor (g,) on the stiffness of each group, by modified SIMP.
 
         ``least + density**penalty * (1 - least)`` with the minimum stiffness (Sigmund, Struct.
         Multidisc. Optim. 33 (2007) 401).
@@ -103,32 +108,40 @@ class Parametrisation:
         return least + density**self.parameters.penalty * (1.0 - least)
 
     def gradient(self, density: FloatArray, energy: FloatArray) -> FloatArray:
-        """Differentiate the compliance by the variables, exactly: (m,) array.
+        """Differentiate the compliance by the variables, exactly: (g,) array.
 
         Parameters
         ----------
-        density : (m,) array
-        energy : (m,) array, N mm
-            ``u^T k u`` of each cell at full density.
+        density : (g,) array
+        energy : (g,) array, N mm
+            ``u^T k u`` of each group at full density.
         """
         penalty, least = self.parameters.penalty, self.parameters.minimum_stiffness
         slope = penalty * density ** (penalty - 1.0) * (1.0 - least)
         return self._by_variables(-slope * energy)
 
     def volume_gradient(self) -> FloatArray:
-        """Differentiate the volume by the variables: (m,) array, mm^3."""
+        """Differentiate the volume by the variables: (g,) array, mm^3."""
         return self._by_variables(self.cone.volumes)
 
     def _by_variables(self, by_density: FloatArray) -> FloatArray:
-        """Gradient (m,) by the variables from that by the densities: the chain rule."""
+        """Gradient (g,) by the variables from that by the densities: the chain rule."""
         own = np.where(self.free, by_density, 0.0)
         return self.cone.transposed(own) if self.parameters.filter == "density" else own
 
     def sensitivities(
         self, variables: FloatArray, density: FloatArray, energy: FloatArray
     ) -> FloatArray:
-        """Gradient (m,) that the update takes: with the sensitivity filter, smoothed."""
+        """Gradient (g,) that the update takes: with the sensitivity filter, smoothed."""
         gradient = self.gradient(density, energy)
         if self.parameters.filter == "sensitivity":
             return self.cone.sensitivities(variables, gradient)
         return gradient
+
+
+def _mask(cells: CellGroups, name: str, given: BoolArray | None) -> BoolArray:
+    """Mask (g,) of the groups from one (m,) of the cells, or empty."""
+    mask = np.zeros(len(cells.member), dtype=bool) if given is None else np.asarray(given)
+    if mask.dtype != np.bool_:
+        raise InputError(f"{name} must be a bool array; got {mask.dtype}: compare, as in x > 0")
+    return cells.reduced(name, mask)

@@ -9,7 +9,6 @@ from ccfem.plates.problem import PlaneProblem
 from ccfem.progress import Progress, silent
 from ccfem.topopt.compliance import Compliance
 from ccfem.topopt.design import Design
-from ccfem.topopt.groups import CellGroups
 from ccfem.topopt.iteration import iterate
 from ccfem.topopt.parameters import Parameters
 from ccfem.topopt.parametrisation import Parametrisation
@@ -91,9 +90,6 @@ class Simp(Parameters):
         SolveError
             When a solve misses its tolerance.
         """
-        cells = CellGroups.of_cells(groups, len(problem.mesh.cells))
-        model = cells.of(Compliance(problem, weights, self.backend))
-        solid, void = cells.reduced("solid", solid), cells.reduced("void", void)
-        space = Parametrisation.of_model(self, model, solid, void)
-        design, _ = iterate(problem, model, space, cells.reduced("start", start), progress)
-        return cells.expanded(design)
+        part = Compliance(problem, weights, self.backend, groups)
+        space = Parametrisation.of_part(self, part, solid, void)
+        return iterate(problem, part, space, start, progress)[0]

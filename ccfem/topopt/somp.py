@@ -14,10 +14,9 @@ from ccfem.progress import Progress, silent
 from ccfem.topopt.compliance import Compliance
 from ccfem.topopt.design import Design
 from ccfem.topopt.filters import ConeFilter
-from ccfem.topopt.groups import CellGroups
 from ccfem.topopt.iteration import iterate
 from ccfem.topopt.material_axes import harmonics, sheet
-from ccfem.topopt.orientation import (
+from ccfem.topopt.oriented_compliance import (
     OrientedCompliance,
     Turn,
     down_the_gradient,
@@ -120,21 +119,15 @@ class Somp(Parameters):
         m = len(problem.mesh.cells)
         first, stiffness = _first_angle(angle, m), _checked_stiffness(problem, stiffness)
         uniform = np.broadcast_to(stiffness, (m, *stiffness.shape))
-        cells = CellGroups.of_cells(groups, m)
-        part = cells.of(Compliance(replace(problem, stiffness=uniform), weights, self.backend))
-        solid, void = cells.reduced("solid", solid), cells.reduced("void", void)
-        space = Parametrisation.of_model(self, part, solid, void)
-        oriented = OrientedCompliance(part, harmonics(stiffness), cells.reduced("angle", first))
-        design, oriented = iterate(
-            problem,
-            oriented,
-            space,
-            cells.reduced("start", start),
-            progress,
-            self._turn(space.cone),
-        )
-        full = replace(problem, stiffness=oriented.stiffness()[cells.member])
-        return cells.expanded(replace(design, full=full, angle=oriented.angle))
+        part = Compliance(replace(problem, stiffness=uniform), weights, self.backend, groups)
+        space = Parametrisation.of_part(self, part, solid, void)
+        first = part.cells.reduced("angle", first)
+        oriented = OrientedCompliance(part, harmonics(stiffness), first)
+        turn = self._turn(space.cone)
+        design, oriented = iterate(problem, oriented, space, start, progress, turn)
+        member = part.cells.member
+        full = replace(problem, stiffness=oriented.stiffness()[member])
+        return replace(design, full=full, angle=oriented.angle[member])
 
     def _turn(self, cone: ConeFilter) -> Turn | None:
         """How the axes turn from one iteration to the next."""

@@ -3,14 +3,14 @@
 from typing import NamedTuple
 
 import numpy as np
-import scipy.sparse as sp
-from scipy.sparse.csgraph import connected_components
 from scipy.spatial import cKDTree
 
 from ccfem.arrays import BoolArray, FloatArray, IntArray
 from ccfem.elasticity.problem import PointForce, Problem
 from ccfem.errors import InputError
 from ccfem.materials import Material
+from ccfem.mesh.facets import unique_edges
+from ccfem.mesh.measures import connected
 from ccfem.mesh.tet_mesh import TetMesh
 from ccfem.topopt.cut import cut_mesh, volume_above
 from ccfem.topopt.cut_smoothing import relaxed
@@ -103,13 +103,11 @@ def _field(problem: Problem, density: FloatArray) -> _Field:
     for load in (load for case in problem.loads.values() for load in case):
         if isinstance(load, PointForce):
             anchors.append(np.array([cKDTree(mesh.points).query(load.point)[1]]))
-    ends = np.sort(mesh.cells[:, mesh.edges].reshape(-1, 2), axis=1)
-    keys = np.unique(ends[:, 0] * n + ends[:, 1])
     return _Field(
         mesh=mesh,
         values=total / np.maximum(weight, 1e-300),
         share=0.25 * weight / mesh.volumes.mean(),
-        pairs=np.stack(np.divmod(keys, n), axis=1),
+        pairs=unique_edges(mesh.cells[:, mesh.edges].reshape(-1, 2))[0],
         anchors=anchors,
     )
 
@@ -117,8 +115,7 @@ def _field(problem: Problem, density: FloatArray) -> _Field:
 def _pieces(field: _Field, chosen: BoolArray) -> IntArray:
     """Piece (n,) of each chosen node, by edges between chosen nodes; others by themselves."""
     pairs, n = field.pairs[chosen[field.pairs].all(axis=1)], len(chosen)
-    links = sp.coo_array((np.ones(len(pairs), dtype=bool), pairs.T), shape=(n, n))
-    return np.asarray(connected_components(links, directed=False)[1])
+    return connected(pairs, n)
 
 
 def _cleaned(field: _Field, level: float) -> FloatArray | None:

@@ -5,12 +5,11 @@ from typing import Any
 
 import numpy as np
 import shapely
-from numpy.typing import NDArray
 
 from ccfem.arrays import BoolArray, FloatArray, IntArray
 from ccfem.elasticity.problem import PointForce
 from ccfem.errors import InputError
-from ccfem.mesh.patches import facet_keys
+from ccfem.mesh.facets import are_among
 from ccfem.mesh.tet_mesh import TetMesh
 from ccfem.plates.mesh import PlaneMesh
 
@@ -89,7 +88,7 @@ class Walls:
     def _along(self, plate: PlaneMesh, edges: IntArray) -> BoolArray:
         """Walls (w,) that are nearest to edges (k, 2) of all edges of the plate, and face them."""
         boundary, reach = plate.boundary, _REACH * self.pixel
-        own = np.isin(_edge_keys(boundary), _edge_keys(edges))
+        own = are_among(boundary, edges)
         tree = shapely.STRtree(shapely.linestrings(plate.points[boundary]))
         middles = shapely.points(self.middle)
         (wall, edge), distance = tree.query_nearest(middles, return_distance=True)
@@ -126,8 +125,3 @@ def patch_ends(plate: PlaneMesh, polygon: Any, pixel: float) -> FloatArray:
     onto = shapely.shortest_line(points, polygon.boundary)
     near = shapely.length(onto) <= pixel
     return shapely.get_coordinates(shapely.get_point(onto[near], -1))
-
-
-def _edge_keys(edges: IntArray) -> NDArray[np.complex128]:
-    """One number (k,) for the nodes of each edge (k, 2), whatever their order."""
-    return facet_keys(np.pad(edges, ((0, 0), (0, 1)), mode="edge"))

@@ -13,6 +13,7 @@ from pathlib import Path
 import numpy as np
 from scipy.optimize import brentq
 
+from ccfem.checks import check_number
 from ccfem.elasticity.problem import Problem
 from ccfem.elasticity.solve import solve
 from ccfem.elasticity.stress_field import StressField
@@ -70,7 +71,7 @@ class Calibration:
     def strand(self, default: Strand | None = None) -> Strand:
         """Return the strand: `default` (rho = 4) with the calibrated rho, where there is one."""
         default = Strand() if default is None else default
-        return default if self.rho is None else replace(default, rho=self.rho, axial_stiffness=None)
+        return default if self.rho is None else replace(default, rho=self.rho)
 
     def write(self, path: str | Path) -> None:
         """Write a material file (TOML) that `read_calibration` reads."""
@@ -95,10 +96,8 @@ def calibrate(
     toolpaths: Toolpaths | None = None,
     case: str | None = None,
     name: str = "calibrated",
-    mode: str = TENSION,
-    backend: str = "auto",
 ) -> Calibration:
-    """Fit matrix and strand to tests of one part.
+    """Fit matrix and strand to tests of one part, the strand with fibres that carry tension only.
 
     Parameters
     ----------
@@ -114,10 +113,6 @@ def calibrate(
         Load case that stands for the test; needed where there are several.
     name : str
         Name of the material.
-    mode : str, default "tension"
-        Virtual test that rho is fitted with.
-    backend : str
-        Solver.
 
     Returns
     -------
@@ -132,8 +127,8 @@ def calibrate(
         raise InputError(
             "a reinforced test needs both its curve and its toolpaths; got only one of them"
         )
-    field = _field(problem, case, backend)
-    specimen = Specimen.of(field, backend)
+    field = _field(problem, case)
+    specimen = Specimen.of(field)
     poisson = _poisson(problem)
     computed = specimen.stiffness(field.displacement, field.strain_energy)
     slope = unreinforced.slope()
@@ -149,11 +144,11 @@ def calibrate(
     if reinforced is None or toolpaths is None:
         return result
     stiffer = reinforced.slope()
-    rho = _fit_rho(specimen, toolpaths, stiffer / slope, mode, reinforced.name)
+    rho = _fit_rho(specimen, toolpaths, stiffer / slope, reinforced.name)
     return replace(result, rho=rho, source=f"{source}; {reinforced.name}: {stiffer:.4g} N/mm")
 
 
-def _field(problem: Problem, case: str | None, backend: str) -> StressField:
+def _field(problem: Problem, case: str | None) -> StressField:
     """Solution of the load case that stands for the test."""
     if case is None and len(problem.loads) == 1:
         case = next(iter(problem.loads))
@@ -162,7 +157,7 @@ def _field(problem: Problem, case: str | None, backend: str) -> StressField:
             f"expected the load case of the test; got {case}: name one of "
             f"{', '.join(problem.loads)}"
         )
-    return solve(replace(problem, loads={case: problem.loads[case]}), backend)[case]
+    return solve(replace(problem, loads={case: problem.loads[case]}))[case]
 
 
 def _poisson(problem: Problem) -> float:
@@ -183,9 +178,7 @@ def _poisson(problem: Problem) -> float:
     return round(poisson, 12)
 
 
-def _fit_rho(
-    specimen: Specimen, toolpaths: Toolpaths, wanted: float, mode: str, name: str
-) -> float:
+def _fit_rho(specimen: Specimen, toolpaths: Toolpaths, wanted: float, name: str) -> float:
     """Value of rho, mm^2, at which the virtual test gives the wanted stiffness ratio."""
     if not wanted > 1.0:
         raise InputError(
@@ -196,7 +189,7 @@ def _fit_rho(
 
     def excess(logarithm: float) -> float:
         strand = Strand(rho=math.exp(logarithm))
-        return math.log(virtual_test(strands, specimen, strand, mode, span=()).ratio / wanted)
+        return math.log(virtual_test(strands, specimen, strand, TENSION, span=()).ratio / wanted)
 
     low, high = (math.log(rho) for rho in _RANGE)
     at = math.log(4.0)
@@ -234,13 +227,8 @@ def read_calibration(path: str | Path) -> Calibration:
         value = values.get(key)
         if value is None and key == "rho":
             continue
-        if (
-            isinstance(value, bool)
-            or not isinstance(value, int | float)
-            or not math.isfinite(value)
-        ):
-            raise InputError(f"{path}: expected a number for {key}; got {value!r}: correct it")
-        numbers[key] = float(value)
+        check_number(f"{path}: {key}", value)
+        numbers[key] = float(values[key])
     return Calibration(
         name=str(values.get("name", path.stem)),
         modulus=numbers["modulus"],

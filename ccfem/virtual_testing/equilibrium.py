@@ -5,9 +5,10 @@ from dataclasses import dataclass
 import numpy as np
 import scipy.sparse as sp
 
-from ccfem.arrays import BoolArray, FloatArray, read_only
+from ccfem.arrays import BoolArray, FloatArray, freeze
+from ccfem.checks import check_known, check_number
 from ccfem.elasticity.solvers import preconditioned_cg
-from ccfem.errors import InputError, SolveError
+from ccfem.errors import SolveError
 from ccfem.virtual_testing.bars import bar_matrix, strain_operator
 from ccfem.virtual_testing.specimen import Specimen
 from ccfem.virtual_testing.strands import Strands
@@ -53,9 +54,7 @@ class Equilibrium:
     residual: float
 
     def __post_init__(self) -> None:
-        object.__setattr__(self, "displacement", read_only(self.displacement))
-        object.__setattr__(self, "strain", read_only(self.strain))
-        object.__setattr__(self, "carries", read_only(self.carries, np.bool_))
+        freeze(self, displacement=float, strain=float, carries=bool)
 
 
 def equilibrium(
@@ -64,7 +63,6 @@ def equilibrium(
     axial_stiffness: float,
     mode: str = TENSION,
     start: FloatArray | None = None,
-    slack: float = 0.0,
     tolerance: float = 1e-8,
 ) -> Equilibrium:
     """Find the displacement of a part with fibres.
@@ -84,8 +82,6 @@ def equilibrium(
         "bonded" (all fibres carry) or "tension" (those that are stretched).
     start : (n, 3) array, mm, optional
         Where to start; default the part without fibres.
-    slack : float in [0, 1), default 0
-        Share of their stiffness that shortened fibres keep with "tension".
     tolerance : float
         Largest relative residual that is accepted.
 
@@ -96,19 +92,14 @@ def equilibrium(
     SolveError
         When the residual stays above the tolerance.
     """
-    if mode not in MODES:
-        raise InputError(f"no mode named '{mode}'; there are: {', '.join(MODES)}")
-    if not 0.0 <= axial_stiffness < np.inf or not 0.0 <= slack < 1.0:
-        raise InputError(
-            "expected an axial stiffness >= 0 N and 0 <= slack < 1; got "
-            f"{axial_stiffness} and {slack}"
-        )
+    check_known("mode", mode, MODES)
+    check_number("axial stiffness", axial_stiffness, at_least=0.0, unit="N")
     held = specimen.held
     u = specimen.unreinforced.displacement if start is None else start
     x, total = held.restrict(u), 0
     operator = strain_operator(strands, specimen.system.problem.mesh)
     strain, carries = _state(operator, u, mode)
-    matrix = _reinforced(specimen, strands, axial_stiffness, np.where(carries, 1.0, slack))
+    matrix = _reinforced(specimen, strands, axial_stiffness, carries)
     reduced, rhs = held.reduce(matrix), held.right_hand_side(matrix, specimen.forces)
     for update in range(_UPDATES):
         rest = rhs - reduced @ x
@@ -123,7 +114,7 @@ def equilibrium(
         before = carries
         strain, carries = _state(operator, u, mode)
         if (before != carries).any():
-            matrix = _reinforced(specimen, strands, axial_stiffness, np.where(carries, 1.0, slack))
+            matrix = _reinforced(specimen, strands, axial_stiffness, carries)
             reduced, rhs = held.reduce(matrix), held.right_hand_side(matrix, specimen.forces)
     raise SolveError(
         f"virtual test: relative residual {residual:.1e} after {_UPDATES} updates of the fibres "
@@ -140,10 +131,10 @@ def _state(
 
 
 def _reinforced(
-    specimen: Specimen, strands: Strands, axial_stiffness: float, share: FloatArray
+    specimen: Specimen, strands: Strands, axial_stiffness: float, carries: BoolArray
 ) -> sp.bsr_array:
-    """Stiffness matrix (3n, 3n), N/mm, of the part and its fibres."""
+    """Stiffness matrix (3n, 3n), N/mm, of the part and the pieces of fibre (s,) that carry."""
     system = specimen.system
-    bars = bar_matrix(strands, system.problem.mesh, system.where, share)
+    bars = bar_matrix(strands, system.problem.mesh, system.where, carries.astype(np.float64))
     data = specimen.matrix.data + axial_stiffness * bars.data
     return sp.bsr_array((data, bars.indices, bars.indptr), shape=bars.shape)

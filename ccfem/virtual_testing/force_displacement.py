@@ -6,11 +6,14 @@ from pathlib import Path
 
 import numpy as np
 
-from ccfem.arrays import FloatArray, read_only
+from ccfem.arrays import FloatArray, freeze
 from ccfem.errors import InputError
 from ccfem.io.whole import existing_file
 
 __all__ = ["Curve", "read_curve"]
+
+_LOW, _HIGH = 0.1, 0.4
+"""Shares of the peak force between which the stiffness is taken (ISO 6891)."""
 
 _UNITS = {
     "displacement": {"": 1.0, "mm": 1.0, "m": 1e3, "um": 1e-3},
@@ -35,8 +38,7 @@ class Curve:
     name: str = "curve"
 
     def __post_init__(self) -> None:
-        for name in ("displacement", "force"):
-            object.__setattr__(self, name, read_only(getattr(self, name)))
+        freeze(self, displacement=float, force=float)
         if self.displacement.shape != self.force.shape or self.force.ndim != 1:
             raise InputError(f"{self.name}: expected as many forces as displacements")
         if not (np.isfinite(self.force).all() and np.isfinite(self.displacement).all()):
@@ -51,10 +53,10 @@ class Curve:
         """Largest force, N."""
         return float(self.force.max())
 
-    def slope(self, low: float = 0.1, high: float = 0.4) -> float:
-        """Stiffness, N/mm: line through the rising points between two shares of the peak.
+    def slope(self) -> float:
+        """Stiffness, N/mm: line through the rising points between 10 and 40 % of the peak.
 
-        Shares of 0.1 and 0.4 as in ISO 6891 leave out the slack at the start and the yield.
+        These shares, as in ISO 6891, leave out the slack at the start and the yield.
 
         Raises
         ------
@@ -62,11 +64,11 @@ class Curve:
             For fewer than three points in that range, or a slope that is not positive.
         """
         rising = np.arange(len(self.force)) <= self.force.argmax()
-        used = rising & (self.force >= low * self.peak) & (self.force <= high * self.peak)
+        used = rising & (self.force >= _LOW * self.peak) & (self.force <= _HIGH * self.peak)
         if used.sum() < 3 or not np.ptp(self.displacement[used]) > 0.0:
             raise InputError(
-                f"{self.name}: expected at least 3 rising points between {100 * low:g} and "
-                f"{100 * high:g} % of the peak force; got {used.sum()}: record more points"
+                f"{self.name}: expected at least 3 rising points between {100 * _LOW:g} and "
+                f"{100 * _HIGH:g} % of the peak force; got {used.sum()}: record more points"
             )
         slope = float(np.polyfit(self.displacement[used], self.force[used], 1)[0])
         if not slope > 0.0:

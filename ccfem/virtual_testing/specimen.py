@@ -6,7 +6,7 @@ from functools import cached_property
 import numpy as np
 import scipy.sparse as sp
 
-from ccfem.arrays import BoolArray, FloatArray
+from ccfem.arrays import BoolArray, FloatArray, in_brief
 from ccfem.elasticity.held import Held
 from ccfem.elasticity.load_kinds import Temperature
 from ccfem.elasticity.solvers import Solver
@@ -38,6 +38,8 @@ class Specimen:
     matrix: sp.bsr_array
     backend: str = "auto"
 
+    __repr__ = in_brief
+
     @classmethod
     def of(cls, unreinforced: StressField, backend: str = "auto") -> "Specimen":
         """Make the specimen of a solved problem.
@@ -60,14 +62,6 @@ class Specimen:
                 "supports: leave the heat out"
             )
         return cls(unreinforced, system, system.assemble(), backend)
-
-    def under(self, unreinforced: StressField) -> "Specimen":
-        """Return the same part under another load case of its problem, factorisation shared."""
-        if unreinforced.problem is not self.unreinforced.problem:
-            raise InputError("expected a stress field of the same problem; got one of another")
-        other = Specimen(unreinforced, self.system, self.matrix, self.backend)
-        other.__dict__["solver"] = self.solver
-        return other
 
     @cached_property
     def solver(self) -> Solver:

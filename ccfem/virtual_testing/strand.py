@@ -2,11 +2,7 @@
 
 from dataclasses import dataclass
 
-import numpy as np
-
-from ccfem.errors import InputError
-from ccfem.machine.machine import Machine
-from ccfem.materials import Material
+from ccfem.checks import check_fields
 
 __all__ = ["RHO", "RHO_SPAN", "Strand"]
 
@@ -25,40 +21,18 @@ class Strand:
     ----------
     rho : float, mm^2, default 4
         EA/E with the modulus E of the matrix; stiffness ratios depend on it alone.
-    axial_stiffness : float, N, optional
-        EA; given, it goes before `rho`.
     strength : float, N, default 86
         Axial force that breaks the strand: 800 MPa times 0.1075 mm^2, a data sheet's value for
         carbon tow. None where it is not known.
     """
 
     rho: float = RHO
-    axial_stiffness: float | None = None
     strength: float | None = 86.0
 
     def __post_init__(self) -> None:
-        for name in ("rho", "axial_stiffness", "strength"):
-            value = getattr(self, name)
-            if value is not None and not 0.0 < value < np.inf:
-                raise InputError(f"strand.{name} must be a finite number > 0; got {value}")
-
-    @classmethod
-    def of(cls, material: Material, machine: Machine) -> "Strand":
-        """Strand of a fibre material with the cross-section of a machine's filament.
-
-        EA is the modulus along the fibre times `Machine.filament_area`; the strength is missing
-        where the material has no tensile strength.
-        """
-        area = machine.filament_area
-        if not area > 0.0:
-            raise InputError("machine.filament_area must be above 0 for a virtual test; got 0")
-        modulus = 1.0 / np.linalg.inv(material.stiffness)[0, 0]
-        tensile = material.tensile_strength
-        return cls(
-            axial_stiffness=float(modulus * area),
-            strength=None if tensile is None else tensile * area,
-        )
+        check_fields(self, "rho", above=0.0, unit="mm^2")
+        check_fields(self, "strength", above=0.0, unit="N")
 
     def stiffness(self, modulus: float) -> float:
         """EA, N, in a matrix with Young's modulus `modulus`, MPa."""
-        return self.rho * modulus if self.axial_stiffness is None else self.axial_stiffness
+        return self.rho * modulus

@@ -5,8 +5,10 @@ from dataclasses import dataclass
 import numpy as np
 from numba import njit
 
-from ccfem.arrays import FloatArray, IntArray, read_only
+from ccfem.arrays import FloatArray, IntArray, freeze, in_brief
 from ccfem.errors import InputError
+from ccfem.geometry.buckets import Buckets, bucket
+from ccfem.geometry.polylines import starts_segment
 from ccfem.mesh.tet_mesh import TetMesh
 from ccfem.toolpaths import FIBRE, Toolpaths
 
@@ -50,11 +52,10 @@ class Strands:
     middle: FloatArray
     outside: float
 
+    __repr__ = in_brief
+
     def __post_init__(self) -> None:
-        for name in ("cell", "path"):
-            object.__setattr__(self, name, read_only(getattr(self, name), np.int64))
-        for name in ("length", "tangent", "arc", "middle"):
-            object.__setattr__(self, name, read_only(getattr(self, name)))
+        freeze(self, cell=int, path=int, length=float, tangent=float, arc=float, middle=float)
 
     def __len__(self) -> int:
         return len(self.cell)
@@ -90,9 +91,8 @@ def cut_strands(toolpaths: Toolpaths, mesh: TetMesh, most_outside: float = 0.01)
         When there is no fibre, or none but links outside the mesh; or when more of it than allowed
         lies outside.
     """
-    follows = np.repeat(toolpaths.kind == FIBRE, np.diff(toolpaths.offsets))
-    follows[toolpaths.offsets[1:] - 1] = False
-    first_point = np.flatnonzero(follows)
+    fibre = np.repeat(toolpaths.kind == FIBRE, np.diff(toolpaths.offsets))
+    first_point = np.flatnonzero(fibre & starts_segment(toolpaths.offsets))
     path = np.searchsorted(toolpaths.offsets, first_point, side="right") - 1
     start = toolpaths.points[first_point]
     step = toolpaths.points[first_point + 1] - start
@@ -151,44 +151,15 @@ def _barycentric(mesh: TetMesh) -> tuple[FloatArray, FloatArray]:
     return corners[:, 0].copy(), cross / np.einsum("ij,ij->i", a, cross[:, 0])[:, None, None]
 
 
-def _grid(mesh: TetMesh) -> tuple[FloatArray, float, IntArray, IntArray, IntArray]:
-    """Boxes of a regular grid with the cells that may touch each: corner, spacing, shape, CSR."""
+def _grid(mesh: TetMesh) -> Buckets:
+    """Cells of the mesh by the boxes of a regular grid that each may touch."""
     corners = mesh.points[mesh.corners]
     low, high = corners.min(axis=1), corners.max(axis=1)
     extent = np.prod(mesh.bounds[1] - mesh.bounds[0])
     # The second keeps the number of boxes near that of the cells in parts that are mostly empty.
     spacing = max(float(np.mean(high - low)), float(np.cbrt(extent / (4 * len(low)))))
     margin = 1e-6 * spacing
-    first = mesh.bounds[0] - 2.0 * margin
-    shape = np.floor((mesh.bounds[1] + 2.0 * margin - first) / spacing).astype(np.int64) + 1
-    begin = np.floor((low - margin - first) / spacing).astype(np.int64)
-    end = np.minimum(np.floor((high + margin - first) / spacing).astype(np.int64) + 1, shape)
-    offsets = np.zeros(int(np.prod(shape)) + 1, dtype=np.int64)
-    offsets[-1] = np.prod(end - begin, axis=1).sum()
-    candidates = np.empty(offsets[-1], dtype=np.int64)
-    _fill_grid(begin, end, shape, offsets, candidates)
-    return first, spacing, shape, offsets, candidates
-
-
-@njit(cache=True)
-def _fill_grid(begin, end, shape, offsets, candidates):  # type: ignore[no-untyped-def]  # pragma: no cover
-    """Candidates of each box; the offsets come as zeros."""
-    boxes = len(offsets) - 1
-    for cell in range(2 * len(begin)):
-        counting = cell < len(begin)
-        if cell == len(begin):
-            for box in range(1, boxes):
-                offsets[box] += offsets[box - 1]
-        c = cell if counting else cell - len(begin)
-        for i in range(begin[c, 0], end[c, 0]):
-            for j in range(begin[c, 1], end[c, 1]):
-                for k in range(begin[c, 2], end[c, 2]):
-                    box = (i * shape[1] + j) * shape[2] + k
-                    if counting:
-                        offsets[box] += 1
-                    else:
-                        offsets[box] -= 1
-                        candidates[offsets[box]] = c
+    return bucket(low - 2.0 * margin, high + margin, spacing)
 
 
 @njit(cache=True)
@@ -275,7 +246,7 @@ def _complete(  # type: ignore[no-untyped-def]
         if at < 0 or at >= shape[i]:
             return number
         box = box * shape[i] + at
-    for c in range(offsets[box], offsets[box + 1]):
+    for c in range(offsets[box + 1] - 1, offsets[box] - 1, -1):
         if _least(point, origin, gradient, candidates[c]) >= -_TOUCH:
             found[number] = candidates[c]
             number += 1
@@ -300,7 +271,7 @@ def _touching(  # type: ignore[no-untyped-def]
         for j in range(low[1], high[1]):
             for k in range(low[2], high[2]):
                 box = (i * shape[1] + j) * shape[2] + k
-                for c in range(offsets[box], offsets[box + 1]):
+                for c in range(offsets[box + 1] - 1, offsets[box] - 1, -1):
                     cell = candidates[c]
                     u0, u1 = _inside(point, step, origin, gradient, cell)
                     known = u1 - u0 < _SLIVER

@@ -18,7 +18,7 @@ from ccfem.elasticity.nodes import edge_nodes
 from ccfem.elasticity.stress_field import StressField
 from ccfem.elasticity.support_kinds import AnySupport, EdgeSupport, Support
 from ccfem.errors import InputError
-from ccfem.mesh.patches import facet_keys
+from ccfem.mesh.facets import are_among
 from ccfem.mesh.tet_mesh import TetMesh
 from ccfem.tensor import von_mises
 from ccfem.virtual_testing.strand import Strand
@@ -197,7 +197,7 @@ def _slides(mesh: TetMesh, support: AnySupport) -> bool:
     patch = mesh.patch(support.patch)
     level = place[patch[0, 0]]
     flat = (np.abs(place[mesh.boundary] - level) <= 1e-9 * np.ptp(mesh.bounds)).all(axis=1)
-    return bool(np.isin(facet_keys(patch), facet_keys(mesh.boundary[flat])).all()) and (
+    return bool(are_among(patch, mesh.boundary[flat]).all()) and (
         len(patch) == np.count_nonzero(flat)
     )
 

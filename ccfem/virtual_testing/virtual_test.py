@@ -1,21 +1,20 @@
 """The virtual test: stiffness of the part with its fibres, and the force in every strand."""
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Sequence
 from dataclasses import dataclass
 from time import perf_counter
 
 import numpy as np
 
-from ccfem.arrays import FloatArray, read_only
+from ccfem.arrays import FloatArray, freeze, in_brief
 from ccfem.elasticity.stress_field import SolveRecord, StressField
-from ccfem.errors import InputError
 from ccfem.toolpaths import Toolpaths
 from ccfem.virtual_testing.equilibrium import BONDED, TENSION, equilibrium
 from ccfem.virtual_testing.specimen import Specimen
 from ccfem.virtual_testing.strand import RHO_SPAN, Strand
 from ccfem.virtual_testing.strands import Strands, cut_strands
 
-__all__ = ["Bracket", "VirtualTest", "virtual_bracket", "virtual_brackets", "virtual_test"]
+__all__ = ["Bracket", "VirtualTest", "virtual_bracket", "virtual_test"]
 
 _SPAN_TOLERANCE = 1e-3
 """Relative residual of the solves for the span; the ratio's error is of its square."""
@@ -65,8 +64,10 @@ class VirtualTest:
     span: tuple[tuple[float, float], ...]
     updates: int
 
+    __repr__ = in_brief
+
     def __post_init__(self) -> None:
-        object.__setattr__(self, "axial_force", read_only(self.axial_force))
+        freeze(self, axial_force=float)
 
     @property
     def ratio(self) -> float:
@@ -132,9 +133,8 @@ def virtual_test(
     SolveError
         When the solve misses its tolerance.
     """
-    specimen = Specimen.of(part, backend) if isinstance(part, StressField) else part
+    specimen, strands = _prepared(fibres, part, backend)
     before = specimen.unreinforced
-    strands = cut_strands(fibres, before.mesh) if isinstance(fibres, Toolpaths) else fibres
     axial = (Strand() if strand is None else strand).stiffness(specimen.modulus)
     started = perf_counter()
     found = equilibrium(specimen, strands, axial, mode)
@@ -179,43 +179,22 @@ def virtual_test(
     )
 
 
+def _prepared(
+    fibres: Toolpaths | Strands, part: StressField | Specimen, backend: str = "auto"
+) -> tuple[Specimen, Strands]:
+    specimen = Specimen.of(part, backend) if isinstance(part, StressField) else part
+    if isinstance(fibres, Toolpaths):
+        fibres = cut_strands(fibres, specimen.unreinforced.mesh)
+    return specimen, fibres
+
+
 def virtual_bracket(
     fibres: Toolpaths | Strands,
     part: StressField | Specimen,
     strand: Strand | None = None,
     span: Sequence[float] = RHO_SPAN,
-    backend: str = "auto",
 ) -> Bracket:
     """Both tests of `virtual_test`, with one factorisation; parameters as there."""
-    specimen = Specimen.of(part, backend) if isinstance(part, StressField) else part
-    mesh = specimen.unreinforced.mesh
-    strands = cut_strands(fibres, mesh) if isinstance(fibres, Toolpaths) else fibres
+    specimen, strands = _prepared(fibres, part)
     tension = virtual_test(strands, specimen, strand, TENSION, span)
     return Bracket(tension, virtual_test(strands, specimen, strand, BONDED, span))
-
-
-def virtual_brackets(
-    fibres: Toolpaths | Strands,
-    parts: Mapping[str, StressField],
-    strand: Strand | None = None,
-    span: Sequence[float] = RHO_SPAN,
-    backend: str = "auto",
-) -> dict[str, Bracket]:
-    """Both tests under every load case of a solved problem, with one factorisation.
-
-    Parameters
-    ----------
-    parts : mapping of load case name to StressField
-        As `ccfem.elasticity.solve.solve` gives it.
-    """
-    if not parts:
-        raise InputError("a virtual test needs at least one load case; got none")
-    first: Specimen | None = None
-    result = {}
-    for name, field in parts.items():
-        specimen = Specimen.of(field, backend) if first is None else first.under(field)
-        first = specimen
-        if isinstance(fibres, Toolpaths):
-            fibres = cut_strands(fibres, field.mesh)
-        result[name] = virtual_bracket(fibres, specimen, strand, span)
-    return result

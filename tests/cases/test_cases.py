@@ -11,7 +11,7 @@ from ccfem.cases.bar import bar_outline
 from ccfem.cases.loop import loop_outline
 from ccfem.cases.open_hole import open_hole_outline
 from ccfem.cases.stored.build import build
-from ccfem.cases.stored.files import data_folder, manifest, stored_mesh
+from ccfem.cases.stored.stored_files import data_folder, manifest, stored_mesh
 from ccfem.elasticity.solve import solve
 from ccfem.errors import InputError
 from ccfem.mesh.check import check_mesh
@@ -104,7 +104,7 @@ def test_the_command_makes_the_stored_mesh_again(tmp_path):
 
 def test_a_changed_file_is_refused(tmp_path, monkeypatch):
     build(tmp_path, ["bar"])
-    monkeypatch.setattr("ccfem.cases.stored.files.data_folder", lambda: tmp_path)
+    monkeypatch.setattr("ccfem.cases.stored.stored_files.data_folder", lambda: tmp_path)
     size = manifest()["bar"]["element_size"]
     assert stored_mesh("bar", size) is not None
     with (tmp_path / "bar.npz").open("ab") as file:

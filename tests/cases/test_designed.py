@@ -10,7 +10,7 @@ import shapely
 from ccfem.cases import create_case
 from ccfem.cases.designed import LAMINATE, DesignPlate, Stretch
 from ccfem.cases.stored.build import DESIGNED
-from ccfem.cases.stored.files import manifest
+from ccfem.cases.stored.stored_files import manifest
 from ccfem.elasticity import solve
 from ccfem.errors import InputError
 from ccfem.materials import plane_stress

@@ -238,6 +238,17 @@ def test_every_parameter_of_a_strategy_is_explained(ccfem, monkeypatch, name):
         assert not meaning.startswith("As in")
 
 
+def test_slicers_are_listed_and_explained(ccfem, monkeypatch, folder):
+    monkeypatch.setenv("COLUMNS", "1000")
+    code, out, _ = ccfem("slicers")
+    assert code == 0
+    assert "planar  Flat layers across the build direction" in out
+    code, out, _ = ccfem("slicers", "planar")
+    assert code == 0
+    assert "Height of a slab; the last one may stand out at the top." in out
+    refused(ccfem, folder, "no slicer named 'planr'; there are: .*'planar'", "slicers", "planr")
+
+
 def test_a_parameter_is_explained_in_the_words_of_its_class(ccfem, monkeypatch, folder):
     monkeypatch.setenv("COLUMNS", "1000")
     _, out, _ = ccfem("strategies", "contour_zigzag")
@@ -286,7 +297,7 @@ HOLE = '[patches.pin]\nrule = "cylinder"\npoint = [30, 12, 0]\naxis = "z"\nradiu
         (PART.replace(SUPPORT, ""), "support"),
         (PART.replace('patch = "x_min"', 'patch = "x_min"\ncomponents = "x"'), "free"),
         (PART + HOLE, "nearest"),
-        (PART.replace('"x_max"', '"end"'), "no patch named 'end'; the mesh has: x_max, x_min"),
+        (PART.replace('"x_max"', '"end"'), "no patch named 'end'; there are: x_max, x_min"),
         (PART.replace("body.npz", "nan.tet"), "NaN"),
         (PART.replace("[1000,", "[nan,"), "nan"),
         (PART.replace("[1000,", "[0,"), "zero"),
@@ -327,10 +338,13 @@ def test_bad_parts_end_in_one_line(ccfem, folder, text, message):
         (["part.toml", "--layers", "many"], "--layers"),
         (["part.toml", "--heights", "1,2,9"], "height 9 mm lies outside the part.* from 0 to 4 mm"),
         (["part.toml", "--heights", "1,x"], "expected numbers"),
-        (["part.toml", "--layers", "2", "--heights", "1"], "not both"),
+        (["part.toml", "--layers", "2", "--heights", "1"], "got --layers and --heights"),
+        (["part.toml", "--slicing", "planer"], "no slicer named 'planer'; there are: planar"),
+        (["part.toml", "--slicing", "planar:height=1"], "has no parameter 'height'; it has:"),
+        (["part.toml", "--slicing", "planar:count=0"], "number of layers must be at least 1"),
         (["part.toml", "--fibre-per-layer", "-3"], "above 0 mm; got -3"),
         (["part.toml", "--fibre-per-layer", "9", "--natural"], "not both"),
-        (["part.toml", "--load-case", "twist"], "no load case named 'twist'; the case has: pull"),
+        (["part.toml", "--load-case", "twist"], "no load case named 'twist'; there are: pull"),
         (["part.toml", "--backend", "magic"], "magic"),
         (["part.toml", "--out", "part.toml/results"], "cannot write results to part.toml/results"),
         (["part.toml", "--ouput", "x"], "No such option"),

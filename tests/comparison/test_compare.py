@@ -17,13 +17,13 @@ from ccfem.elasticity.problem import Force, Problem, Support
 from ccfem.errors import InputError
 from ccfem.evaluation import evaluate
 from ccfem.layers.slicing import Planar
-from ccfem.machine import Machine
+from ccfem.machine import GcodeProfile, Machine
 from ccfem.materials import isotropic
 from ccfem.mesh.box import box_mesh
 from ccfem.planning import plan
 from ccfem.planning.equal_fibre import length_per_layer
 from ccfem.strategies import create
-from ccfem.toolpaths import Toolpaths
+from ccfem.toolpaths import FIBRE, Toolpaths
 
 SIZE = (60.0, 24.0, 4.0)
 
@@ -209,6 +209,32 @@ def test_the_bound_says_that_it_is_not_one_of_bonded_fibres(compared):
     assert "tension only; bonded fibres are not bounded): " in remarks(more)[-1]
 
 
+def test_the_print_is_planned_where_it_is_asked_for(compared):
+    assert all(run.print_plan is None for run in compared.runs)
+    machine = replace(strip().machine, cutter_distance=20.0)
+    case = replace(strip(), machine=machine)
+    options = {"strand": None, "natural": True, "print_plans": True}
+    for run in compare(case, ["zigzag", "concentric"], **options).runs:
+        plan_of_fibre = run.print_plan.paths.of_kind(FIBRE)
+        assert plan_of_fibre.lengths.sum() == pytest.approx(run.toolpaths.lengths.sum(), rel=1e-4)
+        assert run.print_plan.top[-1] == pytest.approx(SIZE[2])
+        assert not run.unprinted
+
+
+def test_what_cannot_be_printed_as_planned_is_reported():
+    machine = replace(strip().machine, gcode=GcodeProfile(bed=(50.0, 50.0, 50.0)))
+    options = {"strategies": ["zigzag"], "strand": None, "natural": True, "print_plans": True}
+    result = compare(replace(strip(), machine=machine), **options)
+    (run,) = result.runs
+    assert run.print_plan is None
+    assert not run.failure
+    assert run.evaluation is not None
+    assert run.unprinted.startswith("the part needs 59.2 x 23.2 x 5 mm, but the pri")
+    assert f"zigzag: cannot be printed as planned: {run.unprinted}" in remarks(result)
+    with pytest.raises(InputError, match="fibre_speed must be above 0 to print"):
+        compare(replace(strip(), machine=Machine(fibre_speed=0.0)), **options)
+
+
 def test_thin_fibre_is_reported_not_dropped():
     strategies = {"zigzag": create("zigzag", {"spacing": 20.0})}
     case = replace(strip(), machine=Machine(minimum_length=5000.0))
@@ -225,7 +251,7 @@ def test_thin_fibre_is_reported_not_dropped():
         ({"layers": 0}, "at least 1; got 0"),
         ({"fibre_per_layer": -1.0}, "above 0 mm; got -1"),
         ({"fibre_per_layer": 10.0, "natural": True}, "not both"),
-        ({"load_case": "twist"}, "no load case named 'twist'; the case has: pull, push"),
+        ({"load_case": "twist"}, "no load case named 'twist'; there are: pull, push"),
     ],
 )
 def test_bad_input(arguments, message):

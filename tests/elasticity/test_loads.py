@@ -143,7 +143,7 @@ def test_total_of_a_force_is_its_vector(vector):
         (Pressure("x_max", 0.0), "must not be zero"),
         (Force("x_max", (NAN, 0.0, 0.0)), "must be finite"),
         (PointForce((NAN, 0.0, 0.0), (1.0, 0.0, 0.0)), "must be finite"),
-        (Force("nowhere", (1.0, 0.0, 0.0)), "no patch named 'nowhere'; the mesh has: .*x_max"),
+        (Force("nowhere", (1.0, 0.0, 0.0)), "no patch named 'nowhere'; there are: .*x_max"),
         (Traction("empty", (1.0, 0.0, 0.0)), "patch 'empty' is empty"),
         (Pressure("inside", 1.0), "facets inside the part"),
     ],

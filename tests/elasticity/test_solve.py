@@ -21,7 +21,7 @@ def problem(order=1, **more):
     mesh = more.pop("mesh", box_mesh((8.0, 3.0, 2.0), (6, 3, 2)))
     mesh = mesh if order == 1 else mesh.quadratic()
     parts = {"material": isotropic(100.0, 0.3), "supports": (Support("x_min"),), "loads": LOADS}
-    return Problem(mesh, **{**parts, **more})
+    return Problem(mesh, **{**parts, "order": order, **more})
 
 
 @pytest.mark.parametrize("order", [1, 2])

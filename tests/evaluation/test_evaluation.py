@@ -65,6 +65,25 @@ def test_every_column_is_described_once_and_computed(part):
     assert list(total) == NAMES
 
 
+def test_samples_of_each_layer_stay(make_part, uniform):
+    """A circle below, a strand at 30 degrees to the pull above."""
+    part = make_part(uniform(10.0), count=2)
+    t = np.linspace(0.0, 2.0 * np.pi, 400)
+    ring = np.stack([30.0 + 9.0 * np.cos(t), 20.0 + 9.0 * np.sin(t)], axis=1)
+    ring[-1] = ring[0]
+    step = 15.0 * np.array([np.cos(np.radians(30.0)), np.sin(np.radians(30.0))])
+    strand = [np.array([30.0, 20.0]) - step, np.array([30.0, 20.0]) + step]
+    paths = Toolpaths.concatenate([part.paths(ring), part.paths(strand, layer=1)])
+    below, above = evaluate(paths, part.layers, part.stress, MACHINE).samples
+    np.testing.assert_allclose(below.curvature.curvature, 1.0 / 9.0, rtol=2e-3)
+    assert below.alignment.length.sum() == pytest.approx(18.0 * np.pi, rel=2e-3)
+    np.testing.assert_allclose(above.curvature.curvature, 0.0, atol=1e-9)
+    np.testing.assert_allclose(np.degrees(above.alignment.angle), 30.0)
+    assert above.alignment.length.sum() == pytest.approx(30.0)
+    for samples in (below.curvature, below.alignment):
+        assert not any(values.flags.writeable for values in vars(samples).values())
+
+
 def test_table_has_a_row_a_layer_and_the_total(part):
     found = evaluate(paths_of(part), part.layers, part.stress, MACHINE)
     frame = found.to_frame()

@@ -193,7 +193,7 @@ def test_layers_count_by_their_fibre_or_by_their_area(make_part, reading):
 
 
 def test_bad_input_is_refused(pulled):
-    with pytest.raises(InputError, match="no reading 'paths' of the rate; there are: path"):
+    with pytest.raises(InputError, match="no reading of the rate named 'paths'; there are: path"):
         rate(pulled, pulled.paths(strand(0.0)), "paths")
     with pytest.raises(InputError, match="at least one layer"):
         matching_rate(pulled.paths(strand(0.0)), [])

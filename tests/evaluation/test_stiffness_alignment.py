@@ -5,13 +5,12 @@ import pytest
 
 from ccfem.errors import InputError
 from ccfem.evaluation import evaluate
-from ccfem.evaluation.sensitivity import ANGLES, OffAxis, Sensitivity, acute
+from ccfem.evaluation.sensitivity import OffAxis, acute
 from ccfem.evaluation.stiffness_alignment import (
     READINGS,
     agreement,
     performance_index,
     stiffness_alignment_indices,
-    strongest,
 )
 from ccfem.machine import Machine
 from ccfem.materials import isotropic, named_material
@@ -52,36 +51,10 @@ def test_curve_of_an_isotropic_sheet_is_one():
     np.testing.assert_allclose(OffAxis(isotropic(1000.0, 0.3))(angle), 1.0, rtol=1e-12)
 
 
-def test_fit_through_the_eleven_angles_stays_near_the_curve():
-    curve = OffAxis(named_material("c_fram"))
-    fit = Sensitivity(np.array(ANGLES), curve.compliance(np.radians(ANGLES)))
-    np.testing.assert_allclose(fit(np.radians(ANGLES)), fit.values, rtol=1e-12)
-    angle = np.radians(np.linspace(0.0, 90.0, 361))
-    assert np.abs(fit(angle) - curve(angle)).max() < 0.015
-    np.testing.assert_allclose(fit(-angle), fit(angle), atol=1e-12)
-    np.testing.assert_allclose(fit(np.pi - angle), fit(angle), atol=1e-12)
-    assert (np.diff(fit(angle)) <= 0.0).all()
-
-
-def test_curves_that_are_none_are_refused():
-    with pytest.raises(InputError, match="rising angles"):
-        Sensitivity(np.array([0.0, 0.0, 90.0]), np.ones(3))
-    with pytest.raises(InputError, match="from 0 to 90 degrees"):
-        Sensitivity(np.array([5.0, 90.0]), np.ones(2))
-    with pytest.raises(InputError, match="energies above 0"):
-        Sensitivity(np.array([0.0, 90.0]), np.array([1.0, 0.0]))
-
-
 def test_acute_angles_and_agreement():
     angle = np.radians([0.0, 45.0, 90.0, 135.0, 180.0, -30.0, 725.0])
     np.testing.assert_allclose(np.degrees(acute(angle)), [0, 45, 90, 45, 0, 30, 5], atol=1e-9)
     np.testing.assert_allclose(agreement(angle)[:4], [1.0, 0.5, 0.0, 0.5], atol=1e-12)
-
-
-def test_strongest_direction():
-    across, defined = strongest(np.array([3.0, 1.0, 1.0, 0.0]), np.array([1.0, -3.0, -1.0, 0.0]))
-    assert across.tolist() == [False, True, False, False]
-    assert defined.tolist() == [True, True, False, False]
 
 
 def test_index_in_its_three_readings_by_hand():

@@ -322,9 +322,9 @@ def test_the_printer_s_own_commands(plate):
         ({"cut": ["M280 P{pin}"]}, r"machine\.gcode: cut has no field '\{pin\}' to fill in"),
         ({"start": ["G28\nM112"]}, r"machine\.gcode: start must be a list of single lines"),
         ({"tool": "T0"}, r"machine\.gcode\.tool must be a list, each item a string; got 'T0'"),
-        ({"bed": [200, 0, 50]}, r"machine\.gcode: bed must be three sizes"),
-        ({"lift": -1}, r"machine\.gcode: lift must be a finite number >= 0; got .*: corr"),
-        ({"feed_speed": 0}, r"machine\.gcode: feed_speed must be a finite number > 0"),
+        ({"bed": [200, 0, 50]}, r"machine\.gcode: .*bed must be above 0 mm; got 0"),
+        ({"lift": -1}, r"machine\.gcode: .*lift must be at least 0 mm; got .*: corr"),
+        ({"feed_speed": 0}, r"machine\.gcode: .*feed_speed must be above 0 mm/s"),
         ({"nozzle": 1}, r"machine\.gcode has no key 'nozzle'"),
     ],
 )

@@ -23,13 +23,11 @@ def toolpaths():
 
 def test_pyvista_reads_the_paths_back(tmp_path):
     paths = toolpaths()
-    force = np.linspace(-1.0, 1.0, 7)
-    write_paths(paths, tmp_path / "paths.vtp", {"force": force}, {"cost": np.array([1, 2])})
+    write_paths(paths, tmp_path / "paths.vtp", {"cost": np.array([1, 2])})
     data = pyvista.read(tmp_path / "paths.vtp")
     np.testing.assert_array_equal(data.points, paths.points)
     np.testing.assert_array_equal(data.lines, [3, 0, 1, 2, 4, 3, 4, 5, 6])
     np.testing.assert_array_equal(data.point_data["normals"], paths.normals)
-    np.testing.assert_array_equal(data.point_data["force"], force)
     np.testing.assert_array_equal(data.point_data["link"], paths.link)
     np.testing.assert_array_equal(data.cell_data["layer"], [0, 5])
     np.testing.assert_array_equal(data.cell_data["kind"], [FIBRE, MATRIX])
@@ -62,14 +60,12 @@ def test_no_paths(tmp_path):
 
 
 def test_names_are_escaped(tmp_path):
-    write_paths(toolpaths(), tmp_path / "a.vtp", {'x < "y" & z': np.ones((7, 3))})
+    write_paths(toolpaths(), tmp_path / "a.vtp", {'x < "y" & z': np.array([3.0, 4.0])})
     data = pyvista.read(tmp_path / "a.vtp")
-    np.testing.assert_array_equal(data.point_data['x < "y" & z'], np.ones((7, 3)))
+    np.testing.assert_array_equal(data.cell_data['x < "y" & z'], [3.0, 4.0])
 
 
 def test_refused_data_leaves_no_file(tmp_path):
-    with pytest.raises(InputError, match="one value a point, 7 in all; got 3"):
-        write_paths(toolpaths(), tmp_path / "a.vtp", {"force": np.ones(3)})
     with pytest.raises(InputError, match="one value a path, 2 in all; got 7"):
         write_paths(toolpaths(), tmp_path / "a.vtp", path_data={"cost": np.ones(7)})
     with pytest.raises(InputError, match="no folder"):
@@ -82,6 +78,6 @@ def test_a_failure_half_way_leaves_the_old_file(tmp_path):
     write_paths(toolpaths(), target)
     before = target.read_bytes()
     with pytest.raises(TypeError):
-        write_paths(toolpaths(), target, {"force": np.array([object()] * 7)})
+        write_paths(toolpaths(), target, {"cost": np.array([object()] * 2)})
     assert target.read_bytes() == before
     assert [path.name for path in tmp_path.iterdir()] == ["a.vtp"]

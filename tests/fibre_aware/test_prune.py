@@ -149,6 +149,50 @@ def test_links_outside_the_part_stay_links(pulled_bar):
     virtual_test(left, stress, span=())
 
 
+def test_points_within_straight_steps_change_no_value(bent_beam):
+    """A path is worth the same wherever its points lie: its work is spread over its length."""
+    stress, layers = bent_beam
+    a, b, c = np.array([[1.0, 3.3], [59.0, 20.1], [40.0, 22.5]])
+    share = np.sort(np.random.default_rng(4).uniform(size=17))[:, None]
+    few, many = np.stack([a, b, c]), np.concatenate([[a], a + share * (b - a), [b, c]])
+    of_cell = np.random.default_rng(5).uniform(size=len(stress.mesh.cells))
+    found = []
+    for line in (few, many):
+        paths = Toolpaths.from_plane([line], layers[1])
+        strands = cut_strands(paths, stress.mesh)
+        found += profiles(paths, strands, of_cell[strands.cell])
+        work = (of_cell[strands.cell] * strands.length).sum()
+        assert found[-1].value.sum() * found[-1].step == pytest.approx(work, rel=1e-5)
+    np.testing.assert_allclose(found[1].value, found[0].value, rtol=1e-5)
+
+
+@pytest.mark.parametrize("noise", [0.0, 1e-13])
+@pytest.mark.parametrize("load", [1.0, 1e-4, 30.0])
+def test_of_equally_good_fibre_the_last_goes_whatever_the_load_and_rounding(
+    pulled_bar, noise, load
+):
+    stress, layers = pulled_bar
+    line = np.array([[1.0, 4.0], [59.0, 4.0]])
+    paths = Toolpaths.from_plane([line, line + np.array([0.0, 5.0])], layers[0])
+    strands = cut_strands(paths, stress.mesh)
+    rough = np.random.default_rng(1).normal(size=len(strands.path))
+    left = shorten(paths, profiles(paths, strands, load * (1.0 + noise * rough)), 80.0, 10.0)
+    np.testing.assert_allclose(left.lengths, [58.0, 22.0], atol=1e-9)
+    assert left.points[2:, 0].min() == pytest.approx(1.0)
+
+
+def test_room_that_no_whole_stretch_fits_is_used(pulled_bar):
+    """Two stretches worth the same: what is left of the length goes to a part of the second."""
+    stress, layers = pulled_bar
+    lines = [np.array([[1.0, y], [59.0, y]]) for y in (4.0, 9.0)]
+    paths = Toolpaths.from_plane(lines, layers[0])
+    strands = cut_strands(paths, stress.mesh)
+    # The second path is worth nothing in its middle: half of it, or all of it.
+    dull = (strands.path == 1) & (np.abs(strands.arc - 29.0) < 4.0)
+    left = shorten(paths, profiles(paths, strands, np.where(dull, 0.0, 1.0)), 100.0, 10.0)
+    assert 98.0 < left.lengths.sum() <= 100.0
+
+
 def test_cuts_that_save_little_are_not_made(pulled_bar):
     stress, layers = pulled_bar
     line = np.array([[0.0, 10.0], [60.0, 10.0]])
@@ -163,8 +207,14 @@ def test_cuts_that_save_little_are_not_made(pulled_bar):
     assert len(whole) == 2
 
 
-@pytest.mark.parametrize("options", [{"length": 0.0}, {"length": 10.0, "rounds": 0}])
-def test_impossible_requests_are_refused(pulled_bar, options):
+@pytest.mark.parametrize(
+    ("options", "message"),
+    [
+        ({"length": 0.0}, "length of fibre must be above 0 mm; got 0"),
+        ({"length": 10.0, "rounds": 0}, "rounds must be at least 1; got 0"),
+    ],
+)
+def test_impossible_requests_are_refused(pulled_bar, options, message):
     stress, layers = pulled_bar
-    with pytest.raises(InputError, match="prune expects"):
+    with pytest.raises(InputError, match=message):
         prune(crossing_strands(layers[0]), stress, machine=SHORT, **options)

@@ -100,7 +100,7 @@ def test_density_found_keeps_length_and_width(bent_beam):
 @pytest.mark.parametrize("length", [0.0, -1.0, np.nan])
 def test_length_must_be_positive(bent_beam, length):
     stress, layers = bent_beam
-    with pytest.raises(InputError, match="length of fibre above 0 mm"):
+    with pytest.raises(InputError, match=r"length of fibre must be .*above 0 mm; got"):
         upper_bound(stress, layers, length, MACHINE)
 
 

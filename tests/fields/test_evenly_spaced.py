@@ -142,11 +142,18 @@ def test_same_lines_again_and_none_without_room() -> None:
     assert evenly_spaced_streamlines(points, triangles, 0.0 * stress, region, 1.0) == []
 
 
-@pytest.mark.parametrize(("separation", "closest"), [(0.0, 0.5), (1.0, 1.0), (1e-4, 0.5)])
-def test_bad_input_is_refused(separation, closest) -> None:
+@pytest.mark.parametrize(
+    ("separation", "closest", "message"),
+    [
+        (0.0, 0.5, "separation of streamlines must be above 0 mm"),
+        (1.0, 1.0, "closest must be above 0 and below 1; got 1"),
+        (1e-4, 0.5, "separation"),
+    ],
+)
+def test_bad_input_is_refused(separation, closest, message) -> None:
     points, triangles = plate(12.0, 5.0)
     stress = np.tile([2.0, 0.0, 0.0], (len(points), 1))
-    with pytest.raises(InputError, match="separation"):
+    with pytest.raises(InputError, match=message):
         evenly_spaced_streamlines(
             points, triangles, stress, shapely.box(0, 0, 12, 5), separation, closest
         )

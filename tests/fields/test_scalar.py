@@ -7,7 +7,7 @@ from scipy.spatial import Delaunay
 from ccfem.fields.fill import fill_laplacian, fill_screened
 from ccfem.fields.layer_elements import Surface
 from ccfem.fields.orientation import orient
-from ccfem.fields.scalar import fit_constrained, fit_literal, fit_weighted
+from ccfem.fields.scalar import fit_cone, fit_constrained, fit_literal, fit_weighted
 
 
 def annulus(inner: float = 5.0, outer: float = 15.0, size: float = 0.7) -> Surface:
@@ -46,7 +46,7 @@ def test_literal_fit_of_a_uniform_field_is_linear() -> None:
     np.testing.assert_allclose(gradient, np.tile([-1.36, 1.02], (len(along), 1)), atol=1e-6)
 
 
-@pytest.mark.parametrize("fit", ["literal", "weighted", "constrained"])
+@pytest.mark.parametrize("fit", ["literal", "weighted", "constrained", "cone"])
 def test_hoop_tension_gives_circles(fit: str) -> None:
     surface = annulus(size=1.0)
     direction = hoop(surface)
@@ -55,6 +55,7 @@ def test_hoop_tension_gives_circles(fit: str) -> None:
         "literal": lambda: fit_literal(surface, direction),
         "weighted": lambda: fit_weighted(surface, direction, ones, ones),
         "constrained": lambda: fit_constrained(surface, direction, ones, ones, 1.0),
+        "cone": lambda: fit_cone(surface, direction, ones, ones, 1.0),
     }[fit]()
     radius = np.hypot(*surface.points.T)
     slope, offset = np.polyfit(radius, values, 1)
@@ -73,6 +74,18 @@ def test_constrained_field_keeps_the_width() -> None:
     assert steepest <= 1.0 / width * (1.0 + 1e-5)
     free = fit_weighted(surface, hoop(surface), density, ones)
     assert np.linalg.norm(surface.gradient(free), axis=1).max() > 1.0 / width
+
+
+def test_the_unit_of_length_changes_no_field() -> None:
+    """Millimetres or metres: the same levels, as they are numbers of strands."""
+    surface = annulus(size=1.5)
+    density = np.random.default_rng(2).uniform(0.2, 3.0, len(surface.triangles))
+    ones = np.ones(len(density))
+    small = Surface(1e-3 * surface.points, surface.triangles)
+    for fit in (fit_constrained, fit_cone):
+        one = fit(surface, hoop(surface), density, ones, 1.3)
+        other = fit(small, hoop(surface), 1e3 * density, ones, 1.3e-3)
+        np.testing.assert_allclose(other - other[0], one - one[0], atol=2e-3)
 
 
 @pytest.mark.parametrize("fill", ["screened", "laplacian"])

@@ -5,14 +5,14 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from ccfem.fields.tensile import UNDEFINED, plane_tension, spatial_tension
+from ccfem.fields.tensile import plane_tension, spatial_tension
 
 PRINCIPAL = [
     # principal values, index of the direction taken, stress
     ((5.0, 1.0, -2.0), 0, 5.0),
     ((-5.0, 2.0, 0.0), 1, 2.0),  # |s1/s2| = 2.5 < 3
-    ((-5.0, 1.0, 0.0), None, UNDEFINED),  # |s1/s2| = 5
-    ((-5.0, -1.0, 0.5), None, UNDEFINED),  # the second by size is compressive
+    ((-5.0, 1.0, 0.0), None, 0.0),  # |s1/s2| = 5
+    ((-5.0, -1.0, 0.5), None, 0.0),  # the second by size is compressive
     ((1.0, 0.0, 0.0), 0, 1.0),
 ]
 
@@ -51,3 +51,15 @@ def test_plane_rule_is_the_spatial_rule_for_plane_stress(
     assert flat.stress[0] == pytest.approx(spatial.stress[0])
     if flat.defined[0]:
         assert abs(flat.direction[0] @ spatial.direction[0, :2]) == pytest.approx(1.0)
+
+
+@pytest.mark.parametrize("factor", [1e-9, 1e6])
+def test_tension_of_a_larger_load_is_larger_by_as_much(factor: float) -> None:
+    stress = np.random.default_rng(8).normal(size=(40, 3, 3))
+    stress = stress + np.swapaxes(stress, 1, 2)
+    plane = stress[:, [0, 1, 0], [0, 1, 1]]
+    for rule, one in ((spatial_tension, stress), (plane_tension, plane)):
+        before, after = rule(one), rule(factor * one)
+        assert 0 < before.defined.sum() < len(before.defined)
+        np.testing.assert_array_equal(after.defined, before.defined)
+        np.testing.assert_allclose(after.stress, factor * before.stress, rtol=1e-12, atol=0.0)

@@ -45,6 +45,18 @@ def test_corner_spurs_stay_without_rules():
     np.testing.assert_allclose(spurs, 5.0 * np.sqrt(2.0), atol=0.15)
 
 
+@pytest.mark.parametrize("angle", [0.0, 33.0, 90.0, 200.0])
+def test_a_closed_axis_starts_where_it_is_widest(angle):
+    """Between a circle of 10 mm and one of 3 mm, 2 mm off its middle: 9 mm wide at the far side."""
+    ring = shapely.Point(0, 0).buffer(10.0, quad_segs=32)
+    ring = ring.difference(shapely.Point(2, 0).buffer(3.0, quad_segs=32))
+    (around,) = medial_axis(affinity.rotate(ring, angle, origin=(0, 0)), 0.4).segments
+    assert around.closed
+    far = -5.5 * np.array([np.cos(np.radians(angle)), np.sin(np.radians(angle))])
+    np.testing.assert_allclose(around.points[[0, -1]], [far, far], atol=0.25)
+    assert around.radius[0] == pytest.approx(4.5, abs=0.02)
+
+
 def test_arc_chord_rule_takes_off_the_corner_spurs_too():
     rule = {"object_angle": None, "arc_chord": 1.6}
     (spine,) = medial_axis(shapely.box(0, 0, 40, 10), 0.2, **rule).segments

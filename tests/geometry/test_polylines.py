@@ -1,4 +1,4 @@
-"""Arc length, resampling, turning and splitting against shapely and exact shapes."""
+"""Arc length, resampling, and turning against shapely and exact shapes."""
 
 from itertools import pairwise
 
@@ -10,16 +10,23 @@ from hypothesis import strategies as st
 from hypothesis.extra.numpy import arrays
 
 from ccfem.geometry.polylines import (
+    along_line,
     arc_lengths,
     between,
+    inner_points,
+    is_closed,
     lengths,
+    line_length,
     merge_repeated,
     pack,
     point_at,
+    points_along,
     resample,
+    runs,
     sample_at,
     sample_midpoints,
-    split,
+    starts_segment,
+    straight_pieces,
     subdivide,
     turning_angles,
 )
@@ -159,9 +166,10 @@ def test_point_at_an_arc_length_is_that_of_shapely(line: np.ndarray, share: floa
 
 
 @given(polylines, st.lists(st.floats(0.01, 0.99), max_size=4))
-def test_pieces_of_a_split_line_make_up_the_line(line: np.ndarray, shares: list[float]) -> None:
+def test_parts_between_arc_lengths_make_up_the_line(line: np.ndarray, shares: list[float]) -> None:
     total = shapely.LineString(line).length
-    pieces = split(line, [share * total for share in shares])
+    cuts = [0.0, *sorted({share * total for share in shares}), total]
+    pieces = [between(line, *ends) for ends in pairwise(cuts)]
     assert sum(shapely.LineString(p).length for p in pieces) == pytest.approx(total, abs=1e-9)
     assert np.array_equal(pieces[0][0], line[0])
     assert pieces[-1][-1] == pytest.approx(line[-1], abs=1e-9)
@@ -185,3 +193,46 @@ def test_resampling_moves_with_the_line(
     total = shapely.LineString(line).length
     if abs(total / step % 1.0 - 0.5) > 1e-6:
         assert there == pytest.approx(here @ turn.T + shift, abs=1e-6)
+
+
+def test_masks_of_segments_and_inner_points():
+    """Polylines of 3, 0, 1 and 4 points, the last one closed."""
+    offsets = np.array([0, 3, 3, 4, 8])
+    assert starts_segment(offsets).astype(int).tolist() == [1, 1, 0, 0, 1, 1, 1, 0]
+    closed = np.array([False, True, False, True])
+    assert inner_points(offsets, closed).astype(int).tolist() == [0, 1, 0, 0, 1, 1, 1, 0]
+    assert starts_segment(np.array([0])).shape == (0,)
+    assert starts_segment(np.array([0, 0])).shape == (0,)
+
+
+@given(polylines)
+def test_one_line_is_measured_as_many_are(line):
+    points, offsets = pack([line])
+    np.testing.assert_allclose(along_line(line), arc_lengths(points, offsets), atol=1e-9)
+    assert line_length(line) == pytest.approx(shapely.LineString(line).length, abs=1e-9)
+    assert is_closed(np.concatenate([line, line[:1]]))
+    assert not is_closed(np.concatenate([line, line[:1] + 1.0]))
+
+
+def test_points_along_a_line_are_those_of_shapely():
+    line = LINES[2]
+    along = along_line(line)
+    positions = RNG.uniform(0.0, along[-1], 40)
+    wanted = shapely.line_interpolate_point(shapely.LineString(line), positions)
+    found = points_along(line, along, positions)
+    np.testing.assert_allclose(found, shapely.get_coordinates(wanted), atol=1e-9)
+
+
+def test_straight_pieces_follow_the_lines():
+    pieces = straight_pieces(LINES)
+    wanted = [pair for line in LINES for pair in pairwise(line.tolist())]
+    np.testing.assert_array_equal(pieces, wanted)
+    assert straight_pieces([]).shape == (0, 2, 2)
+
+
+@pytest.mark.parametrize(
+    ("text", "wanted"),
+    [("", []), ("...", []), ("##.#", [[0, 2], [3, 4]]), (".###", [[1, 4]]), ("#", [[0, 1]])],
+)
+def test_runs_of_a_mask(text, wanted):
+    assert runs(np.array([letter == "#" for letter in text], dtype=bool)).tolist() == wanted

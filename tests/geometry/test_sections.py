@@ -6,7 +6,6 @@ from shapely import affinity
 
 from ccfem.cases.named import create_case
 from ccfem.geometry.sections import corners_only
-from ccfem.geometry.shells import shells
 from ccfem.layers.slicing.planar import Planar
 
 L_SHAPE = shapely.Polygon([(0, 0), (30, 0), (30, 10), (10, 10), (10, 30), (0, 30)])
@@ -40,13 +39,3 @@ def test_layers_of_an_extruded_part_are_equal():
     layers = Planar(count=4).cut(case.problem.mesh, case.build)
     assert not layers[0].plane.polygon.equals_exact(layers[1].plane.polygon, 0.0)
     assert len({corners_only(layer.plane.polygon) for layer in layers}) == 1
-
-
-def test_remembered_shells_are_equal_and_nobody_shares_them():
-    """Two threads that prepare one geometry crash: each caller has an interior of its own."""
-    (lines, interior), (again, other) = (shells(L_SHAPE, 1.0, 1.0, 2, 0.6) for _ in range(2))
-    assert interior == other
-    assert interior is not other
-    assert lines is not again
-    np.testing.assert_array_equal(np.concatenate(lines), np.concatenate(again))
-    assert not lines[0].flags.writeable

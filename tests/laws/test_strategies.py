@@ -1,4 +1,7 @@
-"""Laws that every strategy has to obey; a new module in ccfem/strategies is tested by itself."""
+"""Laws that every strategy has to obey; a new module in ccfem/strategies is tested by itself.
+
+Each runs with its defaults, and with the variants that it declares in a class variable `variants`.
+"""
 
 from dataclasses import FrozenInstanceError, fields, replace
 from functools import cache
@@ -20,10 +23,23 @@ from ccfem.strategies import create, named
 
 MACHINE = Machine()
 NAMES = sorted(named())
+VARIANTS = [
+    f"{name}-{variant}" for name in NAMES for variant in getattr(named()[name], "variants", {})
+]
+ALL = NAMES + VARIANTS
+
+
+def strategy_of(label):
+    """Strategy of a name, or of a name and one of its variants."""
+    name, _, variant = label.partition("-")
+    return create(name, named()[name].variants[variant] if variant else {})
 
 
 def plate_with_hole():
-    """An elliptic plate, 76 x 56 x 4 mm, with an eccentric round hole; no symmetry in its plane."""
+    """An elliptic plate, 76 x 56 x 4 mm, with an eccentric round hole; no symmetry in its plane.
+
+    The origin lies in it, to the left of the hole: what is turned about it turns onto itself.
+    """
     around, across = 60, 10
     box = box_mesh((1.0, 1.0, 4.0), (around, across, 2))
     share, depth, z = box.points.T
@@ -42,27 +58,49 @@ def plate_with_hole():
     cells[inverted] = cells[inverted][:, [0, 2, 1, 3]]
     rim_facets = number[box.patches["y_max"]]
     x = points[rim_facets, 0].mean(axis=1)
-    return TetMesh(points, cells, {"left": rim_facets[x < -30.0], "right": rim_facets[x > 30.0]})
+    patches = {
+        "left": rim_facets[x < -30.0],
+        "right": rim_facets[x > 30.0],
+        "hole": number[box.patches["y_min"]],
+    }
+    return TetMesh(points + np.array([20.0, -6.0, 0.0]), cells, patches)
 
 
 @cache
 def planned_on(load=1.0, degrees=0.0):
-    """Stress and layers of the plate under a pull, the whole turned about z."""
+    """Stress and layers of the plate, pulled at its edge and its hole, the whole turned about z."""
     c, s = np.cos(np.radians(degrees)), np.sin(np.radians(degrees))
     rotation = np.array([[c, -s, 0.0], [s, c, 0.0], [0.0, 0.0, 1.0]])
     mesh = plate_with_hole()
     mesh = replace(mesh, points=mesh.points @ rotation.T)
-    force = tuple(load * (rotation @ [500.0, 120.0, 0.0]))
-    problem = Problem(
-        mesh, isotropic(3500.0, 0.35), (Support("left"),), {"pull": (Force("right", force),)}
+    pull = (
+        Force("right", tuple(load * (rotation @ [500.0, 120.0, 0.0]))),
+        Force("hole", tuple(load * (rotation @ [200.0, -100.0, 0.0]))),
     )
+    problem = Problem(mesh, isotropic(3500.0, 0.35), (Support("left"),), {"pull": pull})
     return solve(problem, tolerance=1e-10)["pull"], Planar(count=2).cut(mesh)
 
 
 @cache
-def default_paths(name):
+def paths_of(label):
     stress, layers = planned_on()
-    return plan(create(name), layers, stress, MACHINE)
+    return plan(strategy_of(label), layers, stress, MACHINE)
+
+
+def turned_with(strategy, turn):
+    """Strategy with its own direction, where it has one, turned with the part."""
+    direction = getattr(strategy, "direction", None)
+    if direction is None:
+        return strategy
+    return replace(strategy, **{direction: getattr(strategy, direction) + turn})
+
+
+def assert_turned(turned, paths, turn):
+    """Turned paths are those of the part as it stood, turned."""
+    assert len(turned) == len(paths)
+    assert turned.lengths.sum() == pytest.approx(paths.lengths.sum(), rel=1e-3)
+    for k in (0, 1):
+        assert coincide(pieces(turned.on_layer(k)), pieces(paths.on_layer(k), turn), 0.02)
 
 
 def strands(paths):
@@ -104,9 +142,9 @@ def test_strategy_is_a_value_with_defaults(name):
         setattr(strategy, kind.amount.parameter, kind.amount.most)
 
 
-@pytest.mark.parametrize("name", NAMES)
-def test_lays_fibre_on_every_layer(name):
-    paths = default_paths(name)
+@pytest.mark.parametrize("label", ALL)
+def test_lays_fibre_on_every_layer(label):
+    paths = paths_of(label)
     assert np.isfinite(paths.points).all()
     assert set(paths.layer) == {0, 1}
     heights = [layer.plane.height for layer in planned_on()[1]]
@@ -115,12 +153,12 @@ def test_lays_fibre_on_every_layer(name):
     np.testing.assert_array_equal(np.unique(paths.normals, axis=0), [[0.0, 0.0, 1.0]])
 
 
-@pytest.mark.parametrize("name", NAMES)
-def test_same_input_gives_the_same_paths(name):
+@pytest.mark.parametrize("label", ALL)
+def test_same_input_gives_the_same_paths(label):
     stress, layers = planned_on()
-    again = plan(create(name), layers, stress, MACHINE)
-    np.testing.assert_array_equal(again.points, default_paths(name).points)
-    np.testing.assert_array_equal(again.offsets, default_paths(name).offsets)
+    again = plan(strategy_of(label), layers, stress, MACHINE)
+    np.testing.assert_array_equal(again.points, paths_of(label).points)
+    np.testing.assert_array_equal(again.offsets, paths_of(label).offsets)
 
 
 @pytest.mark.parametrize("factor", [1e3, 1e-3])
@@ -128,8 +166,8 @@ def test_same_input_gives_the_same_paths(name):
 def test_size_of_the_load_does_not_matter(name, factor):
     stress, layers = planned_on(load=factor)
     scaled = plan(create(name), layers, stress, MACHINE)
-    np.testing.assert_array_equal(scaled.offsets, default_paths(name).offsets)
-    np.testing.assert_allclose(scaled.points, default_paths(name).points, atol=1e-3)
+    np.testing.assert_array_equal(scaled.offsets, paths_of(name).offsets)
+    np.testing.assert_allclose(scaled.points, paths_of(name).points, atol=1e-3)
 
 
 @pytest.mark.parametrize("turn", [33.0, 90.0])
@@ -137,47 +175,56 @@ def test_size_of_the_load_does_not_matter(name, factor):
 def test_paths_turn_with_the_part(name, turn):
     """A strategy with a direction of its own names its parameter, in degrees, in `direction`."""
     stress, layers = planned_on(degrees=turn)
-    strategy = create(name)
-    direction = getattr(strategy, "direction", None)
-    if direction is not None:
-        strategy = replace(strategy, **{direction: getattr(strategy, direction) + turn})
-    turned = plan(strategy, layers, stress, MACHINE)
-    paths = default_paths(name)
-    assert len(turned) == len(paths)
-    assert turned.lengths.sum() == pytest.approx(paths.lengths.sum(), rel=1e-3)
-    for k in range(len(layers)):
-        expected = pieces(paths.on_layer(k), turn)
-        assert coincide(pieces(turned.on_layer(k)), expected, 0.02)
+    turned = plan(turned_with(create(name), turn), layers, stress, MACHINE)
+    assert_turned(turned, paths_of(name), turn)
 
 
-@pytest.mark.parametrize("name", NAMES)
-def test_paths_stay_inside_the_layer(name):
+@pytest.mark.parametrize("label", VARIANTS)
+def test_variants_turn_with_the_part_whatever_the_load(label):
+    """Paths that keep to the axes of the layer, `on_axes`, are only about as long when turned."""
+    strategy, paths = strategy_of(label), paths_of(label)
+    if not getattr(strategy, "on_axes", False):
+        stress, layers = planned_on(load=1e-3, degrees=33.0)
+        turned = plan(turned_with(strategy, 33.0), layers, stress, MACHINE)
+        assert_turned(turned, paths, 33.0)
+        return
+    stress, layers = planned_on(load=1e-3)
+    scaled = plan(strategy, layers, stress, MACHINE)
+    np.testing.assert_array_equal(scaled.offsets, paths.offsets)
+    np.testing.assert_allclose(scaled.points, paths.points, atol=1e-3)
+    stress, layers = planned_on(degrees=90.0)
+    turned = plan(turned_with(strategy, 90.0), layers, stress, MACHINE)
+    assert turned.lengths.sum() == pytest.approx(paths.lengths.sum(), rel=0.1)
+
+
+@pytest.mark.parametrize("label", ALL)
+def test_paths_stay_inside_the_layer(label):
     for layer in planned_on()[1]:
         allowed = shapely.buffer(layer.plane.polygon, 0.02)
         shapely.prepare(allowed)
-        assert shapely.covers(allowed, strands(default_paths(name).on_layer(layer.index))).all()
+        assert shapely.covers(allowed, strands(paths_of(label).on_layer(layer.index))).all()
 
 
-@pytest.mark.parametrize("name", NAMES)
-def test_no_path_is_too_short_for_the_cutter(name):
-    assert default_paths(name).lengths.min() >= MACHINE.minimum_length
+@pytest.mark.parametrize("label", ALL)
+def test_no_path_is_too_short_for_the_cutter(label):
+    assert paths_of(label).lengths.min() >= MACHINE.minimum_length
 
 
-@pytest.mark.parametrize("name", NAMES)
-def test_paths_cross_neither_each_other_nor_themselves(name):
+@pytest.mark.parametrize("label", ALL)
+def test_paths_cross_neither_each_other_nor_themselves(label):
     """A strategy whose strands cross by intention, in the joints of a frame, has `crosses`."""
-    if getattr(named()[name], "crosses", False):
+    if getattr(strategy_of(label), "crosses", False):
         return
     for k in (0, 1):
-        segments = strands(default_paths(name).on_layer(k))
+        segments = strands(paths_of(label).on_layer(k))
         crossing = shapely.STRtree(segments).query(segments, predicate="crosses")
         assert crossing.shape[1] == 0
 
 
-@pytest.mark.parametrize("name", NAMES)
-def test_evaluator_accepts_the_paths(name):
+@pytest.mark.parametrize("label", ALL)
+def test_evaluator_accepts_the_paths(label):
     stress, layers = planned_on()
-    paths = default_paths(name)
+    paths = paths_of(label)
     total = evaluate(paths, layers, stress, MACHINE).total
     assert total["fibre_length"] == pytest.approx(paths.lengths.sum())
     assert total["paths"] == len(paths)
@@ -192,5 +239,5 @@ def test_amount_sets_how_much_fibre_is_laid(name):
         for value in (amount.most, amount.least)
     )
     assert most > 1.2 * least
-    default = default_paths(name).lengths.sum()
+    default = paths_of(name).lengths.sum()
     assert least <= default <= most

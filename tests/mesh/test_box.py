@@ -50,7 +50,13 @@ def test_alternating_bricks_are_their_own_mirror_image(axis):
     assert known(other[plain.cells]) != known(plain.cells)
 
 
-@pytest.mark.parametrize(("size", "count"), [((1, 1, 0), (1, 1, 1)), ((1, 1, 1), (0, 1, 1))])
-def test_empty_boxes_are_refused(size, count):
-    with pytest.raises(InputError, match="positive sizes"):
+@pytest.mark.parametrize(
+    ("size", "count", "message"),
+    [
+        ((1, 1, 0), (1, 1, 1), "size of a box must be above 0 mm; got 0"),
+        ((1, 1, 1), (0, 1, 1), "divisions of a box must be at least 1; got 0"),
+    ],
+)
+def test_empty_boxes_are_refused(size, count, message):
+    with pytest.raises(InputError, match=message):
         box_mesh(size, count)

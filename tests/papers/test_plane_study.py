@@ -16,9 +16,10 @@ from benchmarks.papers.plocher_2022.plane_study import (
     reduced_stiffness,
     turned_energies,
 )
+from benchmarks.papers.plocher_2022.sensitivity import ANGLES
 from ccfem.elasticity.problem import Force, Support
 from ccfem.evaluation.plane_paths import PlanePaths
-from ccfem.evaluation.sensitivity import ANGLES, OffAxis
+from ccfem.evaluation.sensitivity import OffAxis
 from ccfem.geometry.polylines import pack
 from ccfem.linking.print_order import nearest_end_order
 from ccfem.materials import isotropic, named_material, plane_stress

@@ -119,6 +119,29 @@ def test_where_the_least_is_too_much_layers_stay_empty(plate):
 
 
 @dataclass(frozen=True)
+class Rimmed:
+    """Lines of 40 mm in all that no parameter thins, and one of 30 mm over the parameter."""
+
+    spacing: float = 1.0
+    amount: ClassVar[Amount] = Amount("spacing", most=1.0, least=200.0)
+
+    def __call__(self, layer, stress, machine):
+        x = 30.0 / self.spacing
+        return Toolpaths.from_plane(
+            [np.array([[0, 1], [40, 1]]), np.array([[0, 2], [x, 2]])], layer
+        )
+
+
+@pytest.mark.parametrize("wanted", [40.5, 41.0, 45.0])
+def test_a_length_out_of_proportion_to_the_parameter_is_met(plate, wanted):
+    """Guesses by proportion come nowhere near: the least amount itself has to be tried."""
+    stress, layers = plate
+    planned = plan_to_length(Rimmed(), layers, stress, MACHINE, wanted)
+    assert 0.98 * wanted <= planned.length_per_layer <= wanted
+    assert len(np.unique(planned.toolpaths.layer)) == len(layers)
+
+
+@dataclass(frozen=True)
 class Counted:
     """One line of a length in proportion to the parameter; counts how often it plans."""
 

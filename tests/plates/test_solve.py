@@ -283,7 +283,10 @@ CLAMP = (Support("x_min"),)
         ((MESH, STEEL, 1.0, CLAMP, {}), "no load case"),
         ((MESH, STEEL, 1.0, CLAMP, {"a": (Force("x_max", (0.0, 0.0, 1.0)),)}), "in its plane"),
         ((MESH, STEEL, 1.0, CLAMP, {"a": (Force("pin", (1.0, 0.0, 0.0)),)}), "PointForce"),
-        ((MESH, STEEL, 1.0, CLAMP, {"a": (Force("hole", (1.0, 0.0, 0.0)),)}), "the mesh has"),
+        (
+            (MESH, STEEL, 1.0, CLAMP, {"a": (Force("hole", (1.0, 0.0, 0.0)),)}),
+            "named 'hole'",
+        ),
     ],
 )
 def test_bad_problems_are_refused(arguments, message):

@@ -2,14 +2,9 @@ import numpy as np
 import pytest
 
 from ccfem.errors import InputError
-from ccfem.layers.slicing.planar import Planar
-from ccfem.mesh.box import box_mesh
 from ccfem.plot.canvas import png
 from ccfem.plot.colours import palette
-from ccfem.plot.curves import curvature_curves, curvature_maps, matching_curves
-from ccfem.toolpaths import Toolpaths
-
-LAYER = Planar(count=1).cut(box_mesh((60.0, 30.0, 4.0), (6, 3, 1)))[0]
+from ccfem.plot.curves import curvature_curves, matching_curves
 
 
 def curve(figure, name):
@@ -46,18 +41,5 @@ def test_the_curvature_curve_is_the_share_of_samples_below():
     assert png(figure).startswith(b"\x89PNG")
     assert list(figure.axes[0].lines[0].get_xdata()) == pytest.approx([1.0 / 3.85] * 2)
     assert len(curvature_curves({}, 0.0).axes[0].lines) == 0
-    with pytest.raises(InputError, match=">= 0 mm; got -1"):
+    with pytest.raises(InputError, match="at least 0 mm; got -1"):
         curvature_curves({}, -1.0)
-
-
-def test_maps_of_curvature_show_links_beyond_the_part():
-    line = np.array([[10.0, 15.0], [50.0, 15.0], [75.0, 15.0]])
-    paths = Toolpaths.from_plane([line], LAYER, link=[np.array([False, True, False])])
-    figure = curvature_maps(LAYER, {"isocurve": paths, "zigzag": Toolpaths.empty()}, 1.0, 0.26)
-    pictures = [axes for axes in figure.axes if len(axes.collections)]
-    assert len(pictures) == 2
-    for axes in pictures:
-        left, right = axes.get_xlim()
-        assert left < 0.0
-        assert right > 75.0
-    assert png(figure).startswith(b"\x89PNG")

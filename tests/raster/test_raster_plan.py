@@ -235,9 +235,9 @@ def test_shortest_paths_are_dropped():
 
 def test_bad_parameters():
     for kind in (Grid, Mat, Mps):
-        with pytest.raises(InputError, match="polyline or raster"):
+        with pytest.raises(InputError, match="'polyline', 'raster'"):
             kind(mode="bitmap")
-    with pytest.raises(InputError, match="polyline or raster"):
+    with pytest.raises(InputError, match="'polyline', 'raster'"):
         Concentric(joined=False, mode="bitmap")
     with pytest.raises(InputError, match=r"concentric\.joined"):
         Concentric(mode="raster")

@@ -106,9 +106,9 @@ def test_other_parameters_are_checked():
         Concentric(rings=0)
     with pytest.raises(InputError, match=r"contour_zigzag.contours must be at least 1; got 0"):
         ContourZigzag(contours=0)
-    with pytest.raises(InputError, match="finite degrees"):
+    with pytest.raises(InputError, match="finite number of degrees"):
         Zigzag(angle=float("nan"))
-    with pytest.raises(InputError, match="finite degrees"):
+    with pytest.raises(InputError, match="finite number of degrees"):
         ContourZigzag(turn=float("inf"))
 
 

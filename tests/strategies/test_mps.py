@@ -1,6 +1,5 @@
 from dataclasses import replace
 from functools import partial
-from types import SimpleNamespace
 
 import numpy as np
 import pytest
@@ -293,8 +292,7 @@ def test_seeds_by_points_and_at_loads():
     nodes = np.flatnonzero(layer.points[:, 0] < 1e-9)
     nodes = nodes[np.argsort(layer.points[nodes, 1])]
     layer = replace(layer, patches={"left": np.stack([nodes[:-1], nodes[1:]], axis=1)})
-    part = SimpleNamespace(problem=SimpleNamespace(held_or_loaded=("left",)))
-    stress = replace(stress_of(layer, along_x), part=part)
+    stress = replace(stress_of(layer, along_x), held_or_loaded=("left",))
     for seeds in ("ends", ((5.0, 10.0),), ((-3.0, 10.0),)):
         paths = Mps(seeds=seeds)(layer, stress, MACHINE)
         middle = [p for p in paths if abs(p[:, 1] - 10.0).max() < 0.5]

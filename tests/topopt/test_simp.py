@@ -76,7 +76,7 @@ def test_sensitivities_by_finite_differences(k, filter):
     rng = np.random.default_rng(k)
     solid, void = np.arange(m) == 3, np.arange(m) == 7
     parameters = Simp(0.5, 3.0, 2.3, filter, minimum_stiffness=1e-3)
-    space = Parametrisation.of_model(parameters, model, solid, void)
+    space = Parametrisation.of_part(parameters, model, solid, void)
     x = rng.uniform(0.2, 0.9, m)
 
     def compliance(x):
@@ -272,7 +272,7 @@ def test_bad_parameters_are_refused(more, message):
         ({"solid": np.ones(60, dtype=bool)}, "cannot be met"),
         ({"solid": np.arange(60) < 2, "void": np.arange(60) < 1}, "both solid and void"),
         ({"void": np.ones(5, dtype=bool)}, r"void must have shape \(60,\), one entry a cell"),
-        ({"void": np.zeros(60)}, "void must be bool arrays; got bool and float64"),
+        ({"void": np.zeros(60)}, "void must be a bool array; got float64"),
         ({"start": np.full(60, 2.0)}, r"densities in \[0, 1\]; got 2.0 to 2.0"),
         ({"groups": np.zeros(3, dtype=int)}, "groups must be 60 integers"),
         (

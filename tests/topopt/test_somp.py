@@ -9,7 +9,7 @@ from ccfem.materials import plane_stress
 from ccfem.plates import PlaneProblem, raster_mesh, rotate_plane, solve_plane
 from ccfem.topopt import Compliance, Simp, Somp
 from ccfem.topopt.material_axes import harmonics
-from ccfem.topopt.orientation import OrientedCompliance
+from ccfem.topopt.oriented_compliance import OrientedCompliance
 
 FIBRE = plane_stress(50000.0, 4000.0, 0.3, 2500.0)
 WANG = plane_stress(18300.0, 19800.0, 0.17, 5150.0)

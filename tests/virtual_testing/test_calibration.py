@@ -119,7 +119,7 @@ def test_missing_files_are_refused(tmp_path):
         read_calibration(tmp_path / "none.toml")
     path = tmp_path / "m.toml"
     path.write_text("modulus = 'a'\n")
-    with pytest.raises(InputError, match="expected a number for modulus; got 'a'"):
+    with pytest.raises(InputError, match="modulus must be a finite number; got 'a'"):
         read_calibration(path)
     path.write_text("modulus = \n")
     with pytest.raises(InputError, match=r"cannot be read.*write it by ccfem calibrate"):

@@ -30,9 +30,9 @@ from ccfem.strategies.isocurve import Isocurve
 from ccfem.strategies.stream_function import StreamFunction
 from ccfem.toolpaths import Toolpaths
 from ccfem.virtual_testing.specimen import Specimen
+from ccfem.virtual_testing.stiffer import HONEST_PROMISE
 from ccfem.virtual_testing.strands import cut_strands
 from ccfem.virtual_testing.strength import first_failure
-from ccfem.virtual_testing.verdict import HONEST_PROMISE
 from ccfem.virtual_testing.virtual_test import virtual_bracket, virtual_test
 
 __all__ = ["LAYER_COUNTS", "LENGTH", "Tested", "bound", "designs", "loop", "sliced", "tested"]
@@ -50,8 +50,7 @@ def loop() -> tuple[Case, dict[str, StressField], dict[str, Specimen]]:
     bearing = (Bearing("load", (0.0, 0.0, 1000.0)),)
     problem = replace(case.problem, loads={**case.problem.loads, "bearing": bearing})
     fields = solve(problem)
-    pull = Specimen.of(fields["pull"])
-    return case, fields, {"pull": pull, "bearing": pull.under(fields["bearing"])}
+    return case, fields, {name: Specimen.of(field) for name, field in fields.items()}
 
 
 @cache

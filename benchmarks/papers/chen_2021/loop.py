@@ -12,6 +12,7 @@ from ccfem.cases.case import Case
 from ccfem.elasticity.problem import Force, Problem, Support
 from ccfem.errors import InputError
 from ccfem.io import read_mesh
+from ccfem.layers.slicing import Planar
 from ccfem.materials import isotropic
 from ccfem.mesh.patches import Cylinder, patches_from_rules
 
@@ -73,6 +74,6 @@ def authors_loop(layers: int = LAYERS_TABLE_2) -> Case:
         title="Loop of Chen et al. 2021 on the authors' mesh, pulled at its holes with 1 kN",
         problem=problem,
         build=(0.0, 1.0, 0.0),
-        layers=layers,
+        slicing=Planar(count=layers),
         source="Chen, Fang, Liao, Wang, Additive Manufacturing 49 (2021) 102470",
     )

@@ -20,10 +20,10 @@ from ccfem.export.waypoints import read_waypoints
 from ccfem.materials import named_material
 from ccfem.toolpaths import Toolpaths
 from ccfem.virtual_testing.specimen import Specimen
+from ccfem.virtual_testing.stiffer import FIRST, HONEST_PROMISE, SECOND, stiffer
 from ccfem.virtual_testing.strand import Strand
 from ccfem.virtual_testing.strands import Strands, cut_strands
 from ccfem.virtual_testing.strength import first_failure, matrix_peak
-from ccfem.virtual_testing.verdict import HONEST_PROMISE, verdict
 from ccfem.virtual_testing.virtual_test import virtual_bracket, virtual_test
 
 __all__ = ["MATRIX_STRENGTH", "PHYSICAL", "authors_paths", "ratios"]
@@ -81,7 +81,7 @@ def main() -> None:
     carbon, area = named_material("c_fram"), case.machine.filament_area
     smeared = [oriented_ratio(strands[name], field, carbon, area)[0] for name in strands]
     text = "{:6.3f}     {:6.3f}       {:6.3f}".format(*smeared, smeared[1] / smeared[0])
-    rho = Strand.of(carbon, case.machine).stiffness(specimen.modulus) / specimen.modulus
+    rho = area / np.linalg.inv(carbon.stiffness)[0, 0] / specimen.modulus
     print(f"smeared  rho {rho:4.2f} mm^2          {text}")
 
     print(
@@ -94,9 +94,9 @@ def main() -> None:
         brackets[name] = virtual_bracket(strands[name], specimen, span=())
         failure = first_failure(brackets[name].tension, matrix_strength=MATRIX_STRENGTH)
         print(f"{name:7} {1e-3 * failure.load:5.2f} {_PEAKS[name]:5.2f}  in the {failure.what}")
-    stiffer = {"first": "ours", "second": "zigzag"}
-    found = verdict(brackets["ours"], brackets["zigzag"])
-    print(f"stiffer: {stiffer.get(found, found)}")
+    names = {FIRST: "ours", SECOND: "zigzag"}
+    found = stiffer(brackets["ours"], brackets["zigzag"])
+    print(f"stiffer: {names.get(found, found)}")
 
     bearing = replace(case.problem, loads={"bearing": (Bearing("load", (0.0, 0.0, 1000.0)),)})
     pressed = virtual_test(strands["ours"], solve(bearing)["bearing"], span=())

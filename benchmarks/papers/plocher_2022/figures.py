@@ -22,7 +22,7 @@ from ccfem.plot.canvas import save
 from ccfem.plot.colours import INK, OUTLINE, SECTION, scale
 from ccfem.raster.patterns import inside_shells
 from ccfem.raster.skeleton import skeleton
-from ccfem.tensor import largest_in_plane
+from ccfem.tensor import strongest_in_plane
 
 __all__ = ["COLOURS", "draw_all"]
 
@@ -198,8 +198,7 @@ def _strokes(axes: Any, case: CaseStudy, every: int = 3) -> None:
     centres, direction = case.plate.mesh.centres, case.benchmarks["C"].direction
     place = np.floor(centres / case.plate.bead).astype(int)
     chosen = (place % every == 1).all(axis=1)
-    largest, smallest, _ = largest_in_plane(case.plate.isotropic_field.stress)
-    tension = largest > -smallest
+    tension = strongest_in_plane(case.plate.isotropic_field.stress)[0] > 0.0
     half = 0.45 * every * case.plate.bead
     along = half * np.stack([np.cos(direction), np.sin(direction)], axis=1)
     for kind, colour in ((tension, "#a51f2d"), (~tension, "#1f4e9c")):

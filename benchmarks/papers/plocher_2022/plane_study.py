@@ -8,16 +8,17 @@ import numpy as np
 import shapely
 
 from benchmarks.papers.plocher_2022.fibre_map import FibreMap
+from benchmarks.papers.plocher_2022.sensitivity import ANGLES, Sensitivity
 from ccfem.arrays import BoolArray, FloatArray, read_only
 from ccfem.evaluation.plane_paths import PlanePaths
-from ccfem.evaluation.sensitivity import ANGLES, Sensitivity, plane_compliance
+from ccfem.evaluation.sensitivity import plane_compliance
 from ccfem.evaluation.sinuosity import LONG
-from ccfem.evaluation.stiffness_alignment import Reading, agreement, performance_index, strongest
+from ccfem.evaluation.stiffness_alignment import Reading, agreement, performance_index
 from ccfem.linking.print_order import nearest_end_order
 from ccfem.materials import Material
 from ccfem.plates import PlaneField, PlaneProblem, rotate_plane, solve_plane, stack_plane
 from ccfem.plates.solve import prepare
-from ccfem.tensor import largest_in_plane
+from ccfem.tensor import strongest_in_plane
 
 __all__ = [
     "PRINT_SPEED",
@@ -194,9 +195,7 @@ def benchmark(
     side, angles
         See `turned_energies`.
     """
-    largest, smallest, angle = largest_in_plane(isotropic.stress)
-    across, defined = strongest(largest, smallest)
-    direction = angle + np.where(across, 0.5 * np.pi, 0.0)
+    _, direction, defined = strongest_in_plane(isotropic.stress)
     laid = laid_plate(isotropic.problem, direction, stiffness)
     curve = turned_energies(isotropic.problem, direction, stiffness, side, angles)
     return Benchmark(direction, defined, laid, curve)

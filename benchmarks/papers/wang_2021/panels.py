@@ -15,7 +15,7 @@ from benchmarks.papers.wang_2021.study import PartStudy, PatternStudy
 from ccfem.arrays import BoolArray, FloatArray
 from ccfem.cases.designed import DesignPlate
 from ccfem.plot.colours import INK, OUTLINE, SECTION, scale
-from ccfem.tensor import in_plane, largest_in_plane
+from ccfem.tensor import in_plane, strongest_in_plane
 
 __all__ = [
     "COLOURS",
@@ -108,10 +108,8 @@ def strokes(axes: Any, part: PartStudy, count: int = 70) -> None:
     """Stress vectors: strokes along the principal stress of the larger size, as long as it is."""
     layer = part.layer
     plane = in_plane(part.stress.nodal, layer.plane.frame)[layer.triangles].mean(axis=1)
-    largest, smallest, angle = largest_in_plane(plane)
-    pulled = largest >= -smallest
-    angle = np.where(pulled, angle, angle + 0.5 * np.pi)
-    size = np.maximum(np.abs(largest), np.abs(smallest))
+    value, angle, _ = strongest_in_plane(plane)
+    pulled, size = value >= 0.0, np.abs(value)
     middle = layer.plane.points[layer.triangles].mean(axis=1)
     chosen = _spread(middle, float(np.ptp(layer.plane.points, axis=0).max()) / count)
     most = np.quantile(size, 0.97)

@@ -12,7 +12,7 @@ from scipy.spatial import cKDTree
 
 from ccfem.arrays import BoolArray, IntArray
 from ccfem.cases.designed.border import NEAR, Hole, Stretch
-from ccfem.cases.stored.files import stored_outline
+from ccfem.cases.stored.stored_files import stored_outline
 from ccfem.elasticity.problem import Force, Support
 from ccfem.errors import InputError
 from ccfem.materials import plane_stress

@@ -4,7 +4,7 @@ from collections.abc import Callable
 
 from ccfem.cases.case import Case
 from ccfem.cases.designed.plate import DesignPlate
-from ccfem.cases.stored.files import mesh_of_case
+from ccfem.cases.stored.stored_files import mesh_of_case
 from ccfem.elasticity.problem import Force, Order, Problem, Support
 from ccfem.layers.slicing.planar import Planar
 from ccfem.machine.machine import Machine

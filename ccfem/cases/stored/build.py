@@ -7,7 +7,7 @@ from collections.abc import Sequence
 from pathlib import Path
 
 from ccfem.cases.designed import ELEMENT_SIZE, THICKNESS
-from ccfem.cases.stored.files import COMMAND, data_folder, write_outline
+from ccfem.cases.stored.stored_files import COMMAND, data_folder, write_outline
 from ccfem.io import whole_file, write_mesh
 from ccfem.mesh.tet_mesh import TetMesh
 

@@ -1,10 +1,9 @@
-"""Which of two designs is the better one, and how far the virtual test may be believed."""
+"""Which of two designs is stiffer, and how far the virtual test may be believed."""
 
 from ccfem.errors import InputError
-from ccfem.virtual_testing.strength import FirstFailure
 from ccfem.virtual_testing.virtual_test import Bracket
 
-__all__ = ["FIRST", "HONEST_PROMISE", "SECOND", "UNDECIDED", "headline", "verdict"]
+__all__ = ["FIRST", "HONEST_PROMISE", "SECOND", "UNDECIDED", "stiffer"]
 
 FIRST, SECOND, UNDECIDED = "first", "second", "undecided"
 
@@ -22,7 +21,7 @@ _TIE = 1e-6
 """Relative difference of stiffness that means nothing."""
 
 
-def verdict(first: Bracket, second: Bracket) -> str:
+def stiffer(first: Bracket, second: Bracket) -> str:
     """Say which design is stiffer: "first", "second" or "undecided".
 
     Undecided where bonded and tension-only tests disagree on the order, or neither finds a
@@ -52,29 +51,3 @@ def verdict(first: Bracket, second: Bracket) -> str:
     if ahead == behind:
         return UNDECIDED
     return FIRST if ahead else SECOND
-
-
-def headline(bracket: Bracket, failure: FirstFailure | None = None) -> dict[str, float | str]:
-    """Columns of a comparison, in their order.
-
-    Parameters
-    ----------
-    bracket : Bracket
-    failure : FirstFailure, optional
-        Of the tension-only test.
-    """
-    tension, bonded = bracket.tension, bracket.bonded
-    result: dict[str, float | str] = {
-        "stiffness [N/mm]": tension.stiffness,
-        "stiffness ratio": tension.ratio,
-        "bonded ratio": bonded.ratio,
-    }
-    if tension.span:
-        result["ratio from"] = min(ratio for _, ratio in tension.span)
-        result["ratio to"] = max(ratio for _, ratio in tension.span)
-    result["gain per metre [1/m]"] = tension.gain_per_metre
-    result["strain energy [N mm]"] = tension.solution.strain_energy
-    if failure is not None:
-        result["first failure [N]"] = failure.load
-        result["fails in"] = failure.what
-    return result

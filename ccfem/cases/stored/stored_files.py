@@ -59,7 +59,7 @@ def stored_mesh(name: str, element_size: float) -> TetMesh | None:
     return None if path is None else read_mesh(path, check=False)
 
 
-def stored_outline(name: str, volume_fraction: float) -> Any:
+def stored_outline(name: str, volume_fraction: float) -> shapely.Polygon | None:
     """Read the stored outline of an optimised plate, mm: a shapely Polygon.
 
     None where there is none of this share of the plate's volume.
@@ -77,7 +77,7 @@ def stored_outline(name: str, volume_fraction: float) -> Any:
     return shapely.Polygon(border, holes)
 
 
-def write_outline(polygon: Any, path: Path) -> None:
+def write_outline(polygon: shapely.Polygon, path: Path) -> None:
     """Write a polygon to a compressed NumPy archive: its border, then its holes."""
     rings = [polygon.exterior, *polygon.interiors]
     arrays: dict[str, Any] = {f"ring_{k}": np.asarray(r.coords) for k, r in enumerate(rings)}

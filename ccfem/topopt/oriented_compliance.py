@@ -7,9 +7,9 @@ import numpy as np
 
 from ccfem.arrays import FloatArray
 from ccfem.plates.stiffness import turned_by
-from ccfem.tensor import largest_in_plane
+from ccfem.tensor import strongest_in_plane
+from ccfem.topopt.compliance import Compliance, Response
 from ccfem.topopt.filters import ConeFilter
-from ccfem.topopt.model import OrientableModel, Response
 
 __all__ = ["OrientedCompliance", "Turn", "down_the_gradient", "to_principal_stress"]
 
@@ -19,65 +19,52 @@ _LARGEST_TURN = np.radians(5.0)
 
 @dataclass(frozen=True)
 class OrientedCompliance:
-    """Compliance of a part whose material axis turns from cell to cell, about z.
+    """Compliance of a part whose material axis turns from group to group, about z.
 
     Attributes
     ----------
-    part : OrientableModel
-        Of m cells or groups.
+    part : Compliance
     harmonics : (5, k, k) array, MPa
         Of the material: see `ccfem.topopt.material_axes.harmonics`.
-    angle : (m,) array, radians
+    angle : (g,) array, radians
         From global axis x to the material axis.
     """
 
-    part: OrientableModel
+    part: Compliance
     harmonics: FloatArray
     angle: FloatArray
 
-    @property
-    def centres(self) -> FloatArray:
-        """Centre of each cell, (m, d), mm."""
-        return self.part.centres
-
-    @property
-    def volumes(self) -> FloatArray:
-        """Volume of each cell, (m,), mm^3."""
-        return self.part.volumes
-
     def stiffness(self, derivative: bool = False) -> FloatArray:
-        """Stiffness (m, k, k) in the global axes, MPa, or its derivative by the angle."""
+        """Stiffness (g, k, k) in the global axes, MPa, or its derivative by the angle."""
         return np.einsum("mk,kij->mij", turned_by(self.angle, derivative), self.harmonics)
 
     def __call__(self, factor: FloatArray) -> Response:
-        """Response with a factor (m,) on the stiffness of each cell."""
+        """Response with a factor (g,) on the stiffness of each group."""
         return self.part(factor, self.stiffness())
 
     def angle_gradient(self, response: Response, factor: FloatArray) -> FloatArray:
-        """Differentiate the compliance by the angle of each cell: (m,) array, N mm."""
+        """Differentiate the compliance by the angle of each group: (g,) array, N mm."""
         slope, energy = self.stiffness(derivative=True), np.zeros(len(factor))
         for case, displacement in response.displacement.items():
             energy += self.part.weights[case] * self.part.energy(displacement, slope)
         return -factor * energy
 
     def principal(self, response: Response, factor: FloatArray) -> FloatArray:
-        """Double-angle vectors (m, 2) of the principal stress of largest size, times that size.
+        """Double-angle vectors (g, 2) of the principal stress of largest size, times that size.
 
         The stress is that in the x-y plane.
         """
         stiffness, total = self.stiffness(), np.zeros((len(factor), 2))
         for case, displacement in response.displacement.items():
             stress = factor[:, None] * self.part.stress(displacement, stiffness)
-            largest, smallest, angle = largest_in_plane(stress)
-            # Across the larger principal stress where the smaller one is larger in size.
-            angle = np.where(largest >= -smallest, angle, angle + 0.5 * np.pi)
-            size = self.part.weights[case] * np.maximum(np.abs(largest), np.abs(smallest))
+            value, angle, _ = strongest_in_plane(stress)
+            size = self.part.weights[case] * np.abs(value)
             total += size[:, None] * _doubled(angle)
         return total
 
 
 Turn = Callable[[OrientedCompliance, Response, FloatArray], OrientedCompliance]
-"""Compliance of the next iteration, from that of this one, its response and factors (m,)."""
+"""Compliance of the next iteration, from that of this one, its response and factors (g,)."""
 
 
 def to_principal_stress(cone: ConeFilter, relaxation: float) -> Turn:
@@ -107,7 +94,7 @@ def down_the_gradient(cone: ConeFilter) -> Turn:
     def turn(
         model: OrientedCompliance, response: Response, factor: FloatArray
     ) -> OrientedCompliance:
-        gradient = cone.average(model.angle_gradient(response, factor) / model.volumes)
+        gradient = cone.average(model.angle_gradient(response, factor) / cone.volumes)
         scale = float(np.percentile(np.abs(gradient), 90.0))
         if not scale > 0.0:
             return model
@@ -118,5 +105,5 @@ def down_the_gradient(cone: ConeFilter) -> Turn:
 
 
 def _doubled(angle: FloatArray) -> FloatArray:
-    """Vectors (m, 2) of length 1 at twice the angles (m,): lines, whatever their sense."""
+    """Vectors (g, 2) of length 1 at twice the angles (g,): lines, whatever their sense."""
     return np.stack([np.cos(2 * angle), np.sin(2 * angle)], axis=1)

@@ -1,0 +1,91 @@
+"""Arguments and options that several commands share, with what their help says."""
+
+from pathlib import Path
+from typing import Annotated
+
+import typer
+
+__all__ = [
+    "Backend",
+    "Calibration",
+    "CasePath",
+    "Fibre",
+    "Heights",
+    "Layers",
+    "LoadCase",
+    "Out",
+    "SetCase",
+    "Slicing",
+    "VirtualTest",
+]
+
+CasePath = Annotated[
+    str, typer.Argument(metavar="CASE_OR_PART.toml", help="Name of a case, or a part file.")
+]
+Out = Annotated[Path | None, typer.Option("--out", metavar="DIR", help="Folder for the results.")]
+SetCase = Annotated[
+    list[str] | None,
+    typer.Option(
+        "--set-case",
+        metavar="NAME=VALUE",
+        help="Set a parameter of the case, as element_size=3; repeatable.",
+    ),
+]
+Layers = Annotated[
+    int | None,
+    typer.Option("--layers", metavar="N", help="Fibre layers instead of the part's own."),
+]
+Heights = Annotated[
+    str | None,
+    typer.Option(
+        "--heights",
+        metavar="MM,MM,..",
+        help="Heights of the layers along the build direction, instead of --layers.",
+    ),
+]
+Slicing = Annotated[
+    str | None,
+    typer.Option(
+        "--slicing",
+        metavar="METHOD[:NAME=VALUE,..]",
+        help="Slicer and its parameters instead of --layers, as planar:thickness=0.4; see ccfem "
+        "slicers.",
+    ),
+]
+Fibre = Annotated[
+    float | None,
+    typer.Option(
+        "--fibre-per-layer",
+        metavar="MM",
+        help="Fibre length that each strategy is held to, mean over the layers. By default compare "
+        "takes the smallest that any of them lays of its own accord, and one strategy alone lays "
+        "its own.",
+    ),
+]
+VirtualTest = Annotated[
+    bool,
+    typer.Option(
+        "--virtual-test/--no-virtual-test",
+        help="Re-solve the part with the fibres of each strategy in it.",
+    ),
+]
+LoadCase = Annotated[
+    str | None,
+    typer.Option("--load-case", metavar="NAME", help="Load case to plan for; default the first."),
+]
+Calibration = Annotated[
+    Path | None,
+    typer.Option(
+        "--calibration",
+        metavar="MATERIAL.toml",
+        help="Material of ccfem calibrate, instead of the part's own.",
+    ),
+]
+Backend = Annotated[
+    str,
+    typer.Option(
+        "--backend",
+        metavar="NAME",
+        help="Linear solver, such as superlu, amg or pypardiso; default by size.",
+    ),
+]

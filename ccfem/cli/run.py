@@ -1,0 +1,144 @@
+"""What ``ccfem compare`` and ``ccfem plan`` do: from the words of a command to a folder of results.
+
+Everything heavy is imported where it is needed, so that ``ccfem --help`` answers at once.
+"""
+
+import shlex
+import sys
+import time
+from collections.abc import Mapping, Sequence
+from dataclasses import replace
+from pathlib import Path
+from typing import TYPE_CHECKING, Any
+
+from ccfem.cli.arguments import assignment, numbers_of, slicer_of
+from ccfem.errors import InputError
+from ccfem.progress import Progress, progress_bar
+
+if TYPE_CHECKING:
+    from ccfem.cases.case import Case
+    from ccfem.comparison.result import Comparison
+
+__all__ = ["layers_of", "load", "options_of", "run"]
+
+_STARTED = time.perf_counter()
+
+_SOLVED = 0.75
+"""Share of the progress bar at which the comparison is made and the pictures begin."""
+
+
+def load(name: str, set_case: Sequence[str] | None) -> "Case":
+    """Read a part file, or make a case from its name and parameters."""
+    from ccfem.cases.reading import read
+
+    parameters = dict(assignment(text) for text in set_case or ())
+    if parameters and name.endswith(".toml"):
+        raise InputError(
+            f"--set-case is for cases by name; '{name}' is a part file: change the file"
+        )
+    return read(name, **parameters)
+
+
+def layers_of(layers: int | None, heights: str | None, slicing: str | None) -> Any:
+    """Read the layers from the one of three options that is given; None for the part's own."""
+    given = {"--layers": layers, "--heights": heights, "--slicing": slicing}
+    named = [name for name, value in given.items() if value is not None]
+    if len(named) > 1:
+        raise InputError(f"give --layers, --heights or --slicing; got {' and '.join(named)}")
+    if heights is not None:
+        return numbers_of(heights)
+    return layers if slicing is None else slicer_of(slicing)
+
+
+def options_of(
+    layers: Any,
+    fibre_per_layer: float | None,
+    virtual_test: bool,
+    load_case: str | None,
+    backend: str,
+) -> dict[str, Any]:
+    """Keyword arguments of `ccfem.comparison.compare.compare`."""
+    from ccfem.comparison.compare import DEFAULT_STRAND
+
+    return {
+        "layers": layers,
+        "fibre_per_layer": fibre_per_layer,
+        "strand": DEFAULT_STRAND if virtual_test else None,
+        "load_case": load_case,
+        "backend": backend,
+    }
+
+
+def run(
+    name: str,
+    set_case: Sequence[str] | None,
+    strategies: Sequence[str],
+    parameters: Mapping[str, Mapping[str, Any]],
+    options: Mapping[str, Any],
+    calibration: Path | None,
+    out: Path | None,
+    suffix: str = "",
+) -> None:
+    """Compare strategies, write the results and print the table; a failure leaves nothing behind.
+
+    Parameters
+    ----------
+    name : str
+        Of a case, or of a part file.
+    set_case : sequence of str, optional
+        Parameters of the case, as ``NAME=VALUE``.
+    strategies : sequence of str
+    parameters : mapping of strategy name to parameters
+    options : mapping
+        From `options_of`, and others that `compare` knows.
+    calibration : Path, optional
+        Material that goes before the part's own.
+    out : Path, optional
+        Folder; default ``results/`` and the name of the case with `suffix`.
+    suffix : str
+    """
+    from ccfem.cli.screen import print_comparison
+    from ccfem.comparison.compare import compare, create_all
+    from ccfem.comparison.files import staged, write_results
+
+    imported = time.perf_counter()
+    case = load(name, set_case)
+    seconds = {"start": imported - _STARTED, "mesh": time.perf_counter() - imported}
+    if calibration is not None:
+        case, options = _calibrated(case, options, calibration)
+    chosen = create_all(case, strategies, parameters)
+    where = out if out is not None else Path("results") / f"{case.name}{suffix}"
+    with staged(where) as folder, progress_bar() as progress:
+        comparison = compare(case, chosen, progress=_part(progress, 0.0, _SOLVED), **options)
+        _check(comparison)
+        command = shlex.join(["ccfem", *sys.argv[1:]])
+        write_results(comparison, folder, command, seconds, _part(progress, _SOLVED, 1.0))
+    print_comparison(comparison, where, time.perf_counter() - _STARTED)
+
+
+def _calibrated(
+    case: "Case", options: Mapping[str, Any], calibration: Path
+) -> tuple["Case", dict[str, Any]]:
+    """Case and options with the matrix and the strand of a calibration."""
+    from ccfem.virtual_testing.calibration import read_calibration
+
+    fitted, strand = read_calibration(calibration), options["strand"]
+    if strand is not None:
+        strand = fitted.strand(strand)
+    case = replace(case, problem=replace(case.problem, material=fitted.material))
+    return case, {**options, "strand": strand}
+
+
+def _check(comparison: "Comparison") -> None:
+    """Refuse a comparison in which nothing was planned, or what was cannot be printed as asked."""
+    if not comparison.succeeded:
+        reasons = "; ".join(f"{run.name}: {run.failure}" for run in comparison.runs)
+        raise InputError(f"no strategy could plan '{comparison.case.name}': {reasons}")
+    for each in comparison.runs:
+        if each.unprinted:
+            raise InputError(each.unprinted)
+
+
+def _part(progress: Progress, first: float, last: float) -> Progress:
+    """Progress of a piece of work that takes the bar from `first` to `last`."""
+    return lambda what, share: progress(what, first + (last - first) * share)

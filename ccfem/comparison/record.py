@@ -1,0 +1,147 @@
+"""The record of a comparison: all its numbers as a table, and what it takes to repeat it."""
+
+import dataclasses
+import platform
+from collections.abc import Mapping
+from datetime import UTC, datetime
+from importlib.metadata import PackageNotFoundError, version
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+
+from ccfem.comparison.headline import TEST_COLUMNS, headline_values
+from ccfem.comparison.result import Comparison, Run
+from ccfem.elasticity.stress_field import StressField
+
+if TYPE_CHECKING:
+    import pandas as pd
+
+__all__ = ["record", "results_frame"]
+
+_PACKAGES = ("numpy", "scipy", "numba", "pyamg", "shapely", "pypardiso")
+
+
+def results_frame(comparison: Comparison) -> "pd.DataFrame":
+    """Every index of every run: one row per layer, and one in total.
+
+    Returns
+    -------
+    DataFrame
+        Columns strategy, layer ("total" or its index), failure, the evaluator's columns, and those
+        of the virtual test, which are of the whole part and stand in the total rows only.
+        A failed strategy has its total row, with the reason and no numbers.
+    """
+    import pandas as pd
+
+    frames = []
+    for run in comparison.runs:
+        if run.evaluation is None:
+            frames.append(pd.DataFrame({"layer": ["total"], "failure": [run.failure]}))
+        else:
+            frame = run.evaluation.to_frame().reset_index().assign(failure="")
+            extra = headline_values(run)
+            for column in TEST_COLUMNS:
+                if column.name in extra:
+                    frame.loc[frame.index[-1], column.name] = extra[column.name]
+            frames.append(frame)
+        frames[-1].insert(0, "strategy", run.name)
+    frame = pd.concat(frames, ignore_index=True)
+    first = ["strategy", "layer", "failure"]
+    return frame[first + [name for name in frame.columns if name not in first]]
+
+
+def record(comparison: Comparison, command: str, seconds: Mapping[str, float]) -> dict[str, Any]:
+    """Everything that it takes to judge and repeat a comparison, ready for JSON.
+
+    Parameters
+    ----------
+    comparison : Comparison
+    command : str
+        What was typed, or how the comparison was made.
+    seconds : mapping of stage to float
+        Stages outside the comparison.
+
+    Returns
+    -------
+    dict
+        Versions, case, machine, mesh, solver record, stage times, and per strategy its parameters,
+        note, failure, times and total indices.
+    """
+    case, stress = comparison.case, comparison.stress
+    mesh = case.problem.mesh
+    return _plain(
+        {
+            "ccfem": version("ccfem"),
+            "command": command,
+            "made": datetime.now(UTC).isoformat(timespec="seconds"),
+            "versions": _versions(),
+            "case": {
+                "name": case.name,
+                "title": case.title,
+                "source": case.source,
+                "findings": case.findings,
+                "load_case": stress.case,
+                "load": _load(stress),
+                "material": case.problem.material.name,
+                "build": case.build,
+                "layers": len(comparison.layers),
+                "heights": [layer.plane.height for layer in comparison.layers],
+                "nodes": len(mesh.points),
+                "cells": len(mesh.cells),
+                "order": mesh.order,
+            },
+            "machine": dataclasses.asdict(case.machine),
+            "solver": vars(stress.record),
+            "strain_energy": stress.strain_energy,
+            "fibre_per_layer": comparison.fibre_per_layer,
+            "upper_bound": None if comparison.bound is None else comparison.bound.ratio,
+            "seconds": {**seconds, **comparison.seconds},
+            "strategies": [_run_record(run) for run in comparison.runs],
+        }
+    )
+
+
+def _load(stress: StressField) -> list[float] | None:
+    """Resultant that the supports hold, N; None where nothing is left over, as between grips."""
+    total = -stress.reactions.sum(axis=0)
+    size = float(np.linalg.norm(total))
+    if not size > 1e-6 * float(np.linalg.norm(stress.reactions, axis=1).sum()):
+        return None
+    return [float(size * share) for share in np.round(total / size, 6) + 0.0]
+
+
+def _run_record(run: Run) -> dict[str, Any]:
+    return {
+        "name": run.name,
+        "parameters": run.parameters,
+        "length_per_layer": run.length_per_layer,
+        "note": run.note,
+        "failure": run.failure,
+        "seconds": run.seconds,
+        "untested": run.untested,
+        "total": headline_values(run),
+        "first_failure": vars(run.tested.failure) if run.tested and run.tested.failure else None,
+    }
+
+
+def _versions() -> dict[str, str]:
+    found = {"python": platform.python_version(), "system": platform.platform()}
+    for package in _PACKAGES:
+        try:
+            found[package] = version(package)
+        except PackageNotFoundError:
+            found[package] = "not installed"
+    return found
+
+
+def _plain(value: Any) -> Any:
+    """Turn mappings, arrays and numbers into what JSON holds; NaN and infinity become null."""
+    if isinstance(value, Mapping):
+        return {str(key): _plain(entry) for key, entry in value.items()}
+    if isinstance(value, np.ndarray | np.generic):
+        return _plain(value.tolist())
+    if isinstance(value, list | tuple):
+        return [_plain(entry) for entry in value]
+    if isinstance(value, float) and not np.isfinite(value):
+        return None
+    return value if value is None or isinstance(value, bool | int | float | str) else str(value)

@@ -1,0 +1,172 @@
+"""Stages of a comparison: each makes of a `Run` one that holds more, or the reason why not."""
+
+import time
+from collections.abc import Callable, Iterator, Sequence
+from contextlib import contextmanager
+from dataclasses import dataclass, replace
+from typing import Any
+
+from ccfem.comparison.result import Run, Tested
+from ccfem.elasticity.stress_field import StressField
+from ccfem.errors import InputError, SolveError
+from ccfem.evaluation import evaluate
+from ccfem.export.print_plan import plan_print
+from ccfem.layers import Layer
+from ccfem.machine.machine import Machine
+from ccfem.planning.equal_fibre import Planned, length_per_layer, plan_to_length
+from ccfem.planning.plan import plan
+from ccfem.toolpaths import Toolpaths
+from ccfem.virtual_testing.equilibrium import BONDED, TENSION
+from ccfem.virtual_testing.specimen import Specimen
+from ccfem.virtual_testing.strand import Strand
+from ccfem.virtual_testing.strands import cut_strands
+from ccfem.virtual_testing.strength import first_failure
+from ccfem.virtual_testing.virtual_test import Bracket, virtual_test
+
+__all__ = ["Part", "Tell", "all_tested", "evaluated", "levelled", "planned", "timed", "with_print"]
+
+Tell = Callable[[str], None]
+"""Told what is done next."""
+
+
+@dataclass(frozen=True)
+class Part:
+    """What all runs share: the stress that counts, the layers and the machine."""
+
+    stress: StressField
+    layers: tuple[Layer, ...]
+    machine: Machine
+
+
+def planned(
+    run: Run, part: Part, wanted: float | None, tell: Tell, start: Planned | None = None
+) -> Run:
+    """Plan a strategy to a length per layer, mm, from a known plan, or to its natural amount."""
+    if run.failure:
+        return run
+    tell(f"planning {run.name}" + ("" if wanted is None else f" to {wanted:.0f} mm a layer"))
+
+    def work() -> Run:
+        layers, stress, machine = part.layers, part.stress, part.machine
+        if wanted is None:
+            paths = plan(run.strategy, layers, stress, machine)
+            found = Planned(run.strategy, paths, length_per_layer(paths, layers))
+        else:
+            found = plan_to_length(run.strategy, layers, stress, machine, wanted, start=start)
+        return replace(
+            run,
+            strategy=found.strategy,
+            toolpaths=found.toolpaths,
+            length_per_layer=found.length_per_layer,
+            note=found.note,
+        )
+
+    bare = replace(run, toolpaths=Toolpaths.empty(), length_per_layer=0.0)
+    return _stage(bare, "plan", work)
+
+
+def levelled(runs: Sequence[Run], part: Part, tell: Tell) -> tuple[list[Run], float | None]:
+    """Bring runs with their natural amounts to the smallest of them.
+
+    Returns
+    -------
+    list of Run
+    float, mm, or None
+        The length per layer; None where nobody lays fibre.
+    """
+    laid = [run for run in runs if len(run.toolpaths)]
+    if not laid:
+        return list(runs), None
+    setter = min(laid, key=lambda run: run.length_per_layer)
+
+    def level(run: Run) -> Run:
+        if run is setter:
+            return replace(run, note="lays the least of its own accord: sets the length")
+        own = Planned(run.strategy, run.toolpaths, run.length_per_layer)
+        return planned(run, part, setter.length_per_layer, tell, own)
+
+    return [level(run) for run in runs], setter.length_per_layer
+
+
+def evaluated(run: Run, part: Part, tell: Tell) -> Run:
+    """Evaluate what was planned, or say why there is nothing to evaluate."""
+    tell(f"evaluating {run.name}")
+    if run.failure:
+        return run
+    if not len(run.toolpaths):
+        return replace(
+            run,
+            failure="laid no fibre: the sections, or what of them is under tension, are too small "
+            "for the shortest strand (machine.minimum_length = "
+            f"{part.machine.minimum_length:g} mm): are all lengths in mm?",
+        )
+
+    def work() -> Run:
+        found = evaluate(run.toolpaths, part.layers, part.stress, part.machine)
+        return replace(run, evaluation=found)
+
+    return _stage(run, "evaluate", work)
+
+
+def with_print(run: Run, part: Part, tell: Tell) -> Run:
+    """Plan the print of the whole part, or say why it cannot be printed."""
+    tell(f"planning the print of {run.name}")
+    if run.evaluation is None:
+        return run
+    try:
+        found = plan_print(run.toolpaths, part.layers, part.stress.mesh, part.machine)
+    except InputError as error:
+        return replace(run, unprinted=str(error))
+    return replace(run, print_plan=found)
+
+
+def all_tested(
+    runs: Sequence[Run], stress: StressField, strand: Strand, backend: str, tell: Tell
+) -> list[Run]:
+    """Test every run that did not fail virtually, all on one factorisation."""
+    try:
+        specimen = Specimen.of(stress, backend)
+    except InputError as error:
+        return [replace(run, untested=str(error)) for run in runs]
+    return [_tested(run, specimen, strand, tell) for run in runs]
+
+
+def _tested(run: Run, specimen: Specimen, strand: Strand, tell: Tell) -> Run:
+    """Test a run virtually, or say why it cannot be tested."""
+    tell(f"testing {run.name}")
+    if run.evaluation is None:
+        return run
+
+    def work() -> Run:
+        strands = cut_strands(run.toolpaths, specimen.unreinforced.mesh)
+        tension = virtual_test(strands, specimen, strand, TENSION)
+        bracket = Bracket(tension, virtual_test(strands, specimen, strand, BONDED, span=()))
+        try:
+            test = Tested(bracket, first_failure(tension, strand))
+        except InputError as error:
+            test = Tested(bracket, None, str(error))
+        return replace(run, tested=test)
+
+    return _stage(run, "virtual test", work, reason="untested")
+
+
+def _stage(run: Run, stage: str, work: Callable[[], Run], reason: str = "failure") -> Run:
+    """Run that `work` makes of `run`; where it fails, `run` with the reason in that field."""
+    seconds = dict(run.seconds)
+    try:
+        with timed(seconds, stage):
+            done = work()
+    except (InputError, SolveError) as error:
+        said: Any = {reason: str(error)}
+        done = replace(run, **said)
+    return replace(done, seconds=seconds)
+
+
+@contextmanager
+def timed(seconds: dict[str, float], stage: str) -> Iterator[None]:
+    """Add what the block takes to the seconds of a stage."""
+    start = time.perf_counter()
+    try:
+        yield
+    finally:
+        seconds[stage] = seconds.get(stage, 0.0) + time.perf_counter() - start

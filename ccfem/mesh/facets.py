@@ -1,0 +1,75 @@
+"""Facets and edges by their nodes, whatever the order of these: pairs, places, unique edges."""
+
+import numpy as np
+
+from ccfem.arrays import BoolArray, IntArray
+
+__all__ = ["are_among", "facet_keys", "paired", "positions", "unique_edges"]
+
+
+def facet_keys(*tables: IntArray) -> list[IntArray]:
+    """Give facets one integer each, the same for the same nodes in any order.
+
+    Parameters
+    ----------
+    *tables : (k_i, c) int arrays
+        Nodes of facets, from 0.
+
+    Returns
+    -------
+    list of (k_i,) int arrays
+        Ascending as the sorted nodes do. They are comparable among the tables of one call only:
+        where node numbers are so large that a product of them would not fit, the keys of the first
+        columns are ranked in between.
+    """
+    nodes = np.sort(np.concatenate(tables).astype(np.int64), axis=1)
+    count = int(nodes.max(initial=0)) + 1
+    key = nodes[:, 0]
+    for column in nodes.T[1:]:
+        if int(key.max(initial=0)) >= np.iinfo(np.int64).max // count:
+            _, key = np.unique(key, return_inverse=True)
+        key = key * count + column
+    return np.split(key, np.cumsum([len(table) for table in tables])[:-1])
+
+
+def paired(facets: IntArray) -> tuple[IntArray, IntArray]:
+    """Find the facets (k, c) that coincide with another one, and those that stand alone.
+
+    Returns
+    -------
+    pairs : (f, 2) int array
+        Rows of `facets` with the same nodes, the smaller row first.
+    single : (s,) int array
+        The other rows, ascending.
+    """
+    (key,) = facet_keys(facets)
+    order = np.argsort(key, kind="stable")
+    first = np.flatnonzero(np.diff(key[order]) == 0)
+    single = np.ones(len(order), dtype=bool)
+    single[first] = single[first + 1] = False
+    return np.stack([order[first], order[first + 1]], axis=1), np.sort(order[single])
+
+
+def positions(facets: IntArray, among: IntArray) -> IntArray:
+    """Row (k,) of each facet (k, c) in another table (m, c), -1 where it is not there."""
+    wanted, known = facet_keys(facets, among)
+    known, row = np.unique(known, return_index=True)
+    at = np.searchsorted(known, wanted)
+    found = np.append(known, -1)[at] == wanted
+    return np.where(found, np.append(row, -1)[at], -1)
+
+
+def are_among(facets: IntArray, others: IntArray) -> BoolArray:
+    """Whether each facet (k, c) is in another table (m, c)."""
+    wanted, known = facet_keys(facets, others)
+    return np.isin(wanted, known)
+
+
+def unique_edges(ends: IntArray) -> tuple[IntArray, IntArray]:
+    """Edges (e, 2) that pairs of nodes (k, 2) stand for, and the edge (k,) of each pair.
+
+    The edges ascend, and so do the nodes of each.
+    """
+    (key,) = facet_keys(ends)
+    _, first, edge = np.unique(key, return_index=True, return_inverse=True)
+    return np.sort(ends[first], axis=1), edge

@@ -1,0 +1,134 @@
+"""What strategies have in common that fill a section with strands at a spacing."""
+
+import os
+from abc import ABC, abstractmethod
+from collections.abc import Sequence
+from concurrent.futures import ThreadPoolExecutor
+from dataclasses import dataclass
+from functools import partial
+from typing import Any, ClassVar, Literal
+
+from ccfem.arrays import FloatArray
+from ccfem.checks import check_choices, check_fields
+from ccfem.elasticity.part_stress import PartStress
+from ccfem.geometry.sections import corners_only
+from ccfem.geometry.shapes import Region
+from ccfem.layers.layer import Layer
+from ccfem.layers.layer_stress import LayerStress
+from ccfem.machine.machine import Machine
+from ccfem.planning.strategy import Amount, LayerPlanner
+from ccfem.raster.bitmap import Bitmap, bitmap
+from ccfem.raster.patterns import Regions
+from ccfem.raster.raster_plan import RasterPlan, raster_plan
+from ccfem.toolpaths import Toolpaths
+
+__all__ = ["SPACING", "Infill", "check_fill", "check_shells", "long_enough"]
+
+SPACING = Amount("spacing", most=1.0, least=20.0)
+"""Of a strategy whose parameter `spacing` is the distance of strands in fibre widths."""
+
+
+def check_fill(strategy: object) -> None:
+    """Check what all strategies with a `spacing` have: also choices and a `minimum_length`.
+
+    Raises
+    ------
+    InputError
+    """
+    check_choices(strategy)
+    check_fields(strategy, "spacing", at_least=1.0, unit="fibre width")
+    if hasattr(strategy, "minimum_length"):
+        check_fields(strategy, "minimum_length", at_least=0.0, unit="mm")
+
+
+def check_shells(strategy: object) -> None:
+    """Check the parameters `shells` and `closest` of a strategy.
+
+    Raises
+    ------
+    InputError
+    """
+    check_fields(strategy, "shells", at_least=0)
+    check_fields(strategy, "closest", at_least=0.5, at_most=1.0, unit="spacings")
+
+
+def long_enough(paths: Toolpaths, least: float | None, machine: Machine) -> Toolpaths:
+    """Paths no shorter than `least`, mm; None for the shortest that the machine can cut."""
+    return paths.select(paths.lengths >= (machine.minimum_length if least is None else least))
+
+
+class Infill(ABC):
+    """A strategy that lays polylines, or paths of pixels where its `mode` is "raster".
+
+    What depends on the section of a layer alone is made once for all layers of a part with equal
+    sections: see `prepare`.
+    """
+
+    spacing: float
+    minimum_length: float | None
+    mode: Literal["polyline", "raster"]
+
+    amount: ClassVar[Amount] = SPACING
+    flat_layers_only: ClassVar[bool] = True
+
+    def __post_init__(self) -> None:
+        check_fill(self)
+
+    @property
+    def on_axes(self) -> bool:
+        """Whether paths keep to the axes of the layer, as those of pixels do."""
+        return self.mode == "raster"
+
+    def prepare(self, section: Region, machine: Machine) -> Any:
+        """Make what layers of equal sections share; `strands` gets it, in several threads."""
+        return None
+
+    @abstractmethod
+    def strands(
+        self, layer: Layer, stress: LayerStress, machine: Machine, prepared: Any
+    ) -> list[FloatArray]:
+        """Strands (n_i, 2), mm, in the plane of a layer, however short."""
+
+    @abstractmethod
+    def regions(self, image: Bitmap, layer: Layer, stress: LayerStress) -> Regions:
+        """Pattern of pixels of a layer."""
+
+    def raster(self, layer: Layer, stress: LayerStress, machine: Machine) -> RasterPlan:
+        """Plan one layer on a bitmap of pixels a spacing wide, whatever the mode."""
+        image = bitmap(layer.plane.polygon, self.spacing * machine.fibre_width)
+        return raster_plan(image, self.regions(image, layer, stress))
+
+    def for_part(
+        self, stress: PartStress | None, layers: Sequence[Layer], machine: Machine
+    ) -> LayerPlanner:
+        """Prepare the sections of a part; `stress` does not matter for that."""
+        if self.mode == "raster":
+            return _Prepared(self, {})
+        sections = [corners_only(layer.plane.polygon) for layer in layers]
+        unequal = list(dict.fromkeys(sections))
+        with ThreadPoolExecutor(os.cpu_count()) as pool:
+            made = list(pool.map(partial(self.prepare, machine=machine), unequal))
+        known = dict(zip(unequal, made, strict=True))
+        index = [layer.index for layer in layers]
+        return _Prepared(self, {k: known[s] for k, s in zip(index, sections, strict=True)})
+
+    def __call__(self, layer: Layer, stress: LayerStress, machine: Machine) -> Toolpaths:
+        """Plan the paths of one layer; none where the section is thinner than a fibre."""
+        return self.for_part(None, [layer], machine)(layer, stress, machine)
+
+
+@dataclass(frozen=True)
+class _Prepared:
+    """An infill with what it has prepared for each layer of a part, by `Layer.index`."""
+
+    infill: Infill
+    known: dict[int, Any]
+
+    def __call__(self, layer: Layer, stress: LayerStress, machine: Machine) -> Toolpaths:
+        infill = self.infill
+        if infill.mode == "raster":
+            paths = infill.raster(layer, stress, machine).toolpaths(layer)
+        else:
+            lines = infill.strands(layer, stress, machine, self.known[layer.index])
+            paths = Toolpaths.from_plane(lines, layer)
+        return long_enough(paths, infill.minimum_length, machine)

@@ -1,0 +1,29 @@
+"""The curve f(theta) through the energies of turned fibre."""
+
+import numpy as np
+import pytest
+
+from benchmarks.papers.plocher_2022.sensitivity import ANGLES, Sensitivity
+from ccfem.errors import InputError
+from ccfem.evaluation.sensitivity import OffAxis
+from ccfem.materials import named_material
+
+
+def test_fit_through_the_eleven_angles_stays_near_the_curve():
+    curve = OffAxis(named_material("c_fram"))
+    fit = Sensitivity(np.array(ANGLES), curve.compliance(np.radians(ANGLES)))
+    np.testing.assert_allclose(fit(np.radians(ANGLES)), fit.values, rtol=1e-12)
+    angle = np.radians(np.linspace(0.0, 90.0, 361))
+    assert np.abs(fit(angle) - curve(angle)).max() < 0.015
+    np.testing.assert_allclose(fit(-angle), fit(angle), atol=1e-12)
+    np.testing.assert_allclose(fit(np.pi - angle), fit(angle), atol=1e-12)
+    assert (np.diff(fit(angle)) <= 0.0).all()
+
+
+def test_curves_that_are_none_are_refused():
+    with pytest.raises(InputError, match="rising angles"):
+        Sensitivity(np.array([0.0, 0.0, 90.0]), np.ones(3))
+    with pytest.raises(InputError, match="from 0 to 90 degrees"):
+        Sensitivity(np.array([5.0, 90.0]), np.ones(2))
+    with pytest.raises(InputError, match="energies above 0"):
+        Sensitivity(np.array([0.0, 90.0]), np.array([1.0, 0.0]))

@@ -1,0 +1,86 @@
+"""The public face: what ``import ccfem`` gives, and how values show themselves."""
+
+import subprocess
+import sys
+
+import pytest
+
+import ccfem
+from ccfem.errors import InputError
+
+
+@pytest.fixture(scope="module")
+def flow():
+    case = ccfem.read("bar", element_size=5.0)
+    stress = ccfem.solve(case.problem)["pull"]
+    layers = ccfem.slice(stress, 2, case.build)
+    paths = ccfem.plan(ccfem.strategies.Zigzag(spacing=4.0), layers, stress, case.machine)
+    return case, stress, layers, paths
+
+
+def test_every_name_is_there():
+    for name in dir(ccfem):
+        assert getattr(ccfem, name) is not None
+    with pytest.raises(AttributeError, match="no attribute 'compair'"):
+        _ = ccfem.compair
+
+
+def test_importing_loads_nothing_heavy():
+    """Whoever asks for help or one function does not wait for the rest."""
+    said = "import sys, ccfem; print(sorted({'numpy', 'pyvista', 'numba'} & set(sys.modules)))"
+    done = subprocess.run([sys.executable, "-c", said], capture_output=True, text=True, check=True)
+    assert done.stdout.strip() == "[]"
+
+
+def test_strategies_and_slicers_by_their_class():
+    assert ccfem.strategies.StreamFunction(coverage=0.3).coverage == 0.3
+    assert ccfem.layers.slicing.Planar(count=3).count == 3
+    with pytest.raises(AttributeError):
+        _ = ccfem.strategies.Isokurve
+
+
+def test_values_show_themselves_in_one_line(flow):
+    case, stress, layers, paths = flow
+    evaluation = ccfem.evaluate(paths, layers, stress, case.machine)
+    test = ccfem.virtual_test(paths, stress)
+    values = [
+        *(case, case.problem, case.problem.mesh, case.problem.material, stress, layers[0], paths),
+        *(evaluation, test, test.strands),
+    ]
+    for value in values:
+        text = repr(value)
+        assert type(value).__name__ in text
+        assert "\n" not in text
+        assert len(text) < 300
+    assert "346 nodes, 768 cells" in repr(case.problem.mesh)
+    assert f"{paths.lengths.sum():.0f} mm of fibre" in repr(paths)
+
+
+def test_an_evaluation_is_a_table_in_a_notebook(flow):
+    case, stress, layers, paths = flow
+    page = ccfem.evaluate(paths, layers, stress, case.machine)._repr_html_()
+    assert "<table" in page
+    assert "fibre_length" in page
+
+
+def test_a_case_by_its_name_and_strategies_themselves(flow):
+    case = flow[0]
+    zigzag = ccfem.strategies.Zigzag
+    given = [zigzag(spacing=6.0), "concentric", zigzag(spacing=8.0, angle=30.0)]
+    found = ccfem.compare(case, given, layers=1, natural=True, strand=None)
+    assert [run.name for run in found.runs] == ["zigzag", "concentric", "zigzag_2"]
+    assert found.runs[2].strategy.spacing == 8.0
+    named = ccfem.compare(case, {"a": given[0], "b": given[2]}, layers=1, natural=True, strand=None)
+    assert [run.length_per_layer for run in named.runs] == [
+        found.runs[0].length_per_layer,
+        found.runs[2].length_per_layer,
+    ]
+
+
+def test_wrong_names_are_one_line():
+    with pytest.raises(InputError, match=r"no case named 'barr'; .*did you mean 'bar'"):
+        ccfem.compare("barr", ["zigzag"])
+    with pytest.raises(InputError, match=r"parameters are for cases by name"):
+        ccfem.read("hook.toml", element_size=2.0)
+    with pytest.raises(InputError, match=r"part file .*hook.toml.* does not exist"):
+        ccfem.read("hook.toml")
