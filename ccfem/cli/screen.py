@@ -20,6 +20,7 @@ from ccfem.comparison.headline import HEADLINE, cell_text, headline_values
 from ccfem.comparison.ranking import best_values, ranking
 from ccfem.comparison.remarks import remarks, verdict
 from ccfem.comparison.result import Comparison, Run
+from ccfem.elasticity.stress_field import about_cells
 from ccfem.virtual_testing.stiffer import HONEST_PROMISE
 
 __all__ = ["print_cases", "print_comparison", "print_member", "print_members"]
@@ -133,8 +134,9 @@ def print_comparison(comparison: Comparison, where: Path, seconds: float) -> Non
         console.width = max(console.width, _TITLES + _NUMBERS * len(runs))
     console.print(comparison.case.title, style="bold", markup=False)
     console.print(_headline_table(runs, best_values(comparison)))
-    for line in comparison.case.findings:
+    for line in (*comparison.case.findings, *comparison.stress.findings):
         console.print(f"mesh: {line}", style="dim", markup=False)
+    console.print(about_cells(comparison.stress), style="dim", markup=False)
     for line in remarks(comparison):
         console.print(line, style="dim", markup=False)
     said = verdict(comparison)

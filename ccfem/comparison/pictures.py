@@ -8,6 +8,7 @@ import numpy as np
 
 from ccfem.arrays import FloatArray
 from ccfem.comparison.result import Comparison, Run
+from ccfem.elasticity.stress_field import StressField
 from ccfem.evaluation.matching import THRESHOLDS, along_fibre, matching_curve
 from ccfem.evaluation.plane_paths import pool
 from ccfem.layers import Layer
@@ -15,7 +16,7 @@ from ccfem.layers.layer_stress import LayerStress, stress_on
 from ccfem.plot.canvas import png
 from ccfem.plot.colours import palette
 from ccfem.plot.curves import curvature_curves, matching_curves
-from ccfem.plot.fields import tension_picture
+from ccfem.plot.fields import error_picture, tension_picture
 from ccfem.plot.forces import force_on_paths
 from ccfem.plot.paths import Coloured, compare_layer, layer_picture, mark_failure, tension_limit
 from ccfem.progress import Progress, silent
@@ -37,6 +38,8 @@ class Pictures:
         Force in the fibres of the middle layer, where there was a virtual test.
     tension : bytes
         Tension in the middle layer.
+    error : bytes
+        Estimated error of the cells in the middle layer.
     overview : bytes
         All strategies side by side on the middle layer.
     matching, curvature : bytes
@@ -48,6 +51,7 @@ class Pictures:
     paths: dict[tuple[str, int], bytes]
     forces: dict[str, bytes]
     tension: bytes
+    error: bytes
     overview: bytes
     matching: bytes
     curvature: bytes
@@ -67,6 +71,7 @@ def draw_pictures(comparison: Comparison, progress: Progress = silent) -> Pictur
         _layers(runs, stresses, machine.fibre_width, limit, colours, progress),
         _forces(runs, middle.layer, machine.fibre_width, colours),
         png(tension_picture(middle, heading, "size and direction", limit)),
+        png(_error(comparison.stress, middle.layer)),
         png(_overview(runs, middle, machine.fibre_width, limit)),
         png(matching_curves(rates, THRESHOLDS, "fibre along the stress", colours)),
         png(curvature_curves(bends, machine.minimum_radius, "curvature", colours)),
@@ -100,6 +105,13 @@ def _layers(
             )
             drawn[run.name, layer.index] = png(figure)
     return drawn
+
+
+def _error(stress: StressField, layer: Layer) -> "Figure":
+    """Estimated error of the cells in a layer."""
+    error = stress.error.densities(stress.mesh.volumes)
+    heading = f"estimated error of the cells in layer {layer.index}"
+    return error_picture(layer, error, heading, f"{stress.error.relative:.1%} of the whole part")
 
 
 def _overview(runs: Sequence[Run], stress: LayerStress, width: float, limit: float) -> "Figure":

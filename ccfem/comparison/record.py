@@ -68,7 +68,7 @@ def record(comparison: Comparison, command: str, seconds: Mapping[str, float]) -
         note, failure, times and total indices.
     """
     case, stress = comparison.case, comparison.stress
-    mesh = case.problem.mesh
+    mesh = stress.mesh
     return _plain(
         {
             "ccfem": version("ccfem"),
@@ -79,7 +79,7 @@ def record(comparison: Comparison, command: str, seconds: Mapping[str, float]) -
                 "name": case.name,
                 "title": case.title,
                 "source": case.source,
-                "findings": case.findings,
+                "findings": (*case.findings, *stress.findings),
                 "load_case": stress.case,
                 "load": _load(stress),
                 "material": case.problem.material.name,

@@ -45,7 +45,7 @@ def about_error(error: float, problem: Problem) -> str:
         return ""
     cure = "shorten the edges of the cells"
     if problem.mesh.order == 1:
-        cure = 'take quadratic cells (order = 2 or "auto"), or shorten the edges'
+        cure = "take quadratic cells (order = 2), or shorten the edges"
     return (
         f"the cells leave an estimated error of {error:.0%} in energy norm, about {error**2:.0%} "
         f"of the displacement: {cure}"

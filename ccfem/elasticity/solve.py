@@ -67,17 +67,17 @@ def solve(
         wanted = problem if problem.order != 2 else on_quadratic(problem)
         return _solved_as_it_is(wanted, backend, tolerance, "")
     if len(problem.mesh.cells) > MOST_CELLS:
-        why = f"linear: more than {MOST_CELLS:,} cells"
+        why = f"more than {MOST_CELLS:,} cells"
         return _solved_as_it_is(replace(problem, order=1), backend, tolerance, why)
     if linear_locks(problem):
-        why = "quadratic: the material hardly changes its volume, where linear cells lock"
+        why = "the material hardly changes its volume, where linear cells lock"
         return _solved_as_it_is(on_quadratic(problem), backend, tolerance, why)
-    why = f"linear: estimated error at most {LARGEST_ERROR:.0%}"
+    why = f"estimated error at most {LARGEST_ERROR:.0%}"
     fields = _solved_as_it_is(replace(problem, order=1), backend, tolerance, why)
     worst = max(field.record.error for field in fields.values())
     if worst <= LARGEST_ERROR:
         return fields
-    why = f"quadratic: linear cells leave an estimated error of {worst:.0%}"
+    why = f"linear ones leave an estimated error of {worst:.0%}"
     return _solved_as_it_is(on_quadratic(problem), backend, tolerance, why)
 
 

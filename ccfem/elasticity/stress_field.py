@@ -15,7 +15,7 @@ from ccfem.errors import InputError
 from ccfem.geometry.locate import locate_tets
 from ccfem.mesh.tet_mesh import TetMesh
 
-__all__ = ["SolveRecord", "StressField", "solved"]
+__all__ = ["SolveRecord", "StressField", "about_cells", "solved"]
 
 
 @dataclass(frozen=True)
@@ -148,6 +148,17 @@ class StressField:
                 f"lie outside, the first at {np.round(points[first], 6).tolist()}: check the frame"
             )
         return np.einsum("qk,qkij->qij", weights, self.nodal[self.mesh.corners[cell]])
+
+
+def about_cells(field: StressField) -> str:
+    """Say in one line on what cells a solution stands, why, and what error they leave."""
+    record, mesh = field.record, field.mesh
+    why = f" ({record.order_because})" if record.order_because else ""
+    kind = "linear" if mesh.order == 1 else "quadratic"
+    return (
+        f"{len(mesh.cells):,} {kind} cells{why}; estimated error {field.error.relative:.1%} in "
+        "energy norm"
+    )
 
 
 def solved(stress: PartStress, purpose: str) -> StressField:

@@ -247,8 +247,11 @@ def on_linear_cells(stress: StressField, backend: str = "auto") -> StressField:
     mesh = problem.mesh
     if mesh.order == 1:
         return stress
-    loads = {stress.case: problem.loads[stress.case]}
-    return solve(replace(problem, mesh=mesh.linear(), loads=loads), backend)[stress.case]
+    case = stress.case
+    loads = {name: problem.loads[name] for name in problem.factors(case)}
+    sums = {case: problem.factors(case)} if case in problem.combinations else {}
+    on_corners = replace(problem, mesh=mesh.linear(), order=1, loads=loads, combinations=sums)
+    return solve(on_corners, backend)[case]
 
 
 @njit(cache=True)
