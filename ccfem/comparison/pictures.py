@@ -61,7 +61,7 @@ class Pictures:
 def draw_pictures(comparison: Comparison, progress: Progress = silent) -> Pictures:
     """Draw every layer of every strategy that did not fail, all on one colour scale."""
     runs, machine = comparison.succeeded, comparison.case.machine
-    stresses = [stress_on(layer, comparison.stress) for layer in comparison.layers]
+    stresses = [stress_on(layer, comparison.planned_on) for layer in comparison.layers]
     limit = max(tension_limit(stress) for stress in stresses)
     colours = palette(run.name for run in comparison.runs)
     middle = stresses[len(stresses) // 2]

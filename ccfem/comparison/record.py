@@ -92,6 +92,7 @@ def record(comparison: Comparison, command: str, seconds: Mapping[str, float]) -
             },
             "machine": dataclasses.asdict(case.machine),
             "solver": vars(stress.record),
+            "planned_on_given_stress": comparison.given is not None,
             "strain_energy": stress.strain_energy,
             "fibre_per_layer": comparison.fibre_per_layer,
             "upper_bound": None if comparison.bound is None else comparison.bound.ratio,

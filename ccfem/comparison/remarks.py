@@ -23,6 +23,8 @@ def remarks(comparison: Comparison) -> list[str]:
         for line in _about(run, comparison):
             lines.setdefault(line, []).append(run.name)
     found = [f"{', '.join(names)}: {line}" for line, names in lines.items()]
+    if comparison.given is not None:
+        found.append("paths are planned and evaluated on the stress of another program")
     found += _about_orders([run for run in ranking(comparison) if run.tested is not None])
     return [*found, bound_remark(comparison)] if comparison.bound is not None else found
 

@@ -12,6 +12,7 @@ from ccfem.comparison.pictures import Pictures
 from ccfem.comparison.ranking import best_values, ranking, stiffness_ratios
 from ccfem.comparison.remarks import remarks, verdict
 from ccfem.comparison.result import Comparison, Run
+from ccfem.elasticity.stress_field import about_cells
 from ccfem.evaluation import COLUMNS, Column
 from ccfem.virtual_testing.stiffer import HONEST_PROMISE
 
@@ -108,7 +109,6 @@ def _header(comparison: Comparison, record: Mapping[str, Any]) -> str:
     facts = [
         f"load case “{about['load_case']}”{load}",
         f"{about['cells']:,} tetrahedra of order {about['order']}",
-        f"estimated error {record['solver']['error']:.1%} in energy norm",
         f"{about['layers']} layers",
         amount,
         f"fibre width W {case.machine.fibre_width:g} mm",
@@ -311,10 +311,8 @@ def _computation(comparison: Comparison, record: Mapping[str, Any]) -> str:
         + (f"{solver['iterations']} iterations, " if solver["iterations"] else "direct, ")
         + f"relative residual {solver['residual']:.1e}, assembly "
         f"{solver['assembly_seconds']:.2f} s, solve {solver['solve_seconds']:.2f} s.",
-        f"Order of the displacement: {record['case']['order']}"
-        + (f", left open: {solver['order_because']}. " if solver["order_because"] else ". ")
-        + f"Estimated error of the cells {solver['error']:.1%} in energy norm; backward error of "
-        f"the equations {solver['backward_error']:.1e}.",
+        f"{about_cells(comparison.stress)}; backward error of the equations "
+        f"{solver['backward_error']:.1e}.",
         f"Material: {record['case']['material']}. Strain energy "
         f"{record['strain_energy']:.4g} N mm.",
     ]

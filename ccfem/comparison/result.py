@@ -7,6 +7,7 @@ from typing import Any
 
 from ccfem.arrays import freeze
 from ccfem.cases.case import Case
+from ccfem.elasticity.part_stress import GivenStress, PartStress
 from ccfem.elasticity.stress_field import StressField
 from ccfem.evaluation import Evaluation
 from ccfem.export.print_plan import PrintPlan
@@ -107,6 +108,8 @@ class Comparison:
         Length that every strategy was held to; None where each laid its own.
     seconds : mapping of stage to float
         Solve and slice; the stages of each strategy are in its run.
+    given : GivenStress, optional
+        Stress of another program, where paths are planned and evaluated on that.
     bound : UpperBound or None
         Stiffness that no paths exceed at the largest length of any run; None without virtual tests.
     """
@@ -118,6 +121,12 @@ class Comparison:
     fibre_per_layer: float | None
     seconds: Mapping[str, float]
     bound: UpperBound | None = None
+    given: GivenStress | None = None
+
+    @property
+    def planned_on(self) -> PartStress:
+        """Stress that the paths are planned and evaluated on."""
+        return self.stress if self.given is None else self.given
 
     def __post_init__(self) -> None:
         freeze(self, seconds=dict)

@@ -7,6 +7,7 @@ from dataclasses import dataclass, replace
 from typing import Any
 
 from ccfem.comparison.result import Run, Tested
+from ccfem.elasticity.part_stress import PartStress
 from ccfem.elasticity.stress_field import StressField
 from ccfem.errors import InputError, SolveError
 from ccfem.evaluation import evaluate
@@ -33,7 +34,7 @@ Tell = Callable[[str], None]
 class Part:
     """What all runs share: the stress that counts, the layers and the machine."""
 
-    stress: StressField
+    stress: PartStress
     layers: tuple[Layer, ...]
     machine: Machine
 

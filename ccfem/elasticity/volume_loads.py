@@ -69,7 +69,7 @@ def free_strain(problem: Problem, case: str) -> FloatArray | None:
     change = sum(
         factor * load.change
         for name, factor in problem.factors(case).items()
-        for load in problem.loads[name]
+        for load in problem.loads.get(name, ())
         if isinstance(load, Temperature)
     )
     if not change:
