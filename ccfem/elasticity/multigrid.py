@@ -11,10 +11,15 @@ from ccfem.elasticity.direct import Apply
 from ccfem.elasticity.gauss_seidel import GaussSeidel
 from ccfem.elasticity.held import rigid_modes
 
-__all__ = ["Coarse", "petsc_gamg", "smoothed_aggregation", "two_level"]
+__all__ = ["Coarse", "smoothed_aggregation", "two_level"]
 
 _COARSEST = 50
 """Aggregates below which a level is inverted."""
+
+
+_ENERGY = ("energy", {"krylov": "cg", "maxiter": 4, "degree": 1})
+_JACOBI = ("jacobi", {"omega": 4.0 / 3.0})
+"""What smooths the prolongation."""
 
 
 @dataclass(frozen=True)
@@ -64,8 +69,8 @@ def _coarser(levels: Any) -> Apply:
     return apply
 
 
-def smoothed_aggregation(matrix: sp.bsr_array, points: FloatArray) -> Apply:
-    """One V-cycle of smoothed aggregation with rigid-body modes and energy-smoothed prolongation.
+def smoothed_aggregation(matrix: sp.bsr_array, points: FloatArray, frugal: bool = False) -> Apply:
+    """One V-cycle of smoothed aggregation with rigid-body modes.
 
     Vanek, Mandel and Brezina, Computing 56 (1996) 179-196; Olson, Schroder and Tuminaro, SIAM J.
     Sci. Comput. 33 (2011) 966-991.
@@ -74,6 +79,10 @@ def smoothed_aggregation(matrix: sp.bsr_array, points: FloatArray) -> Apply:
     ----------
     matrix : bsr_array (3n, 3n) with 3x3 blocks
     points : (n, 3) array, mm; or (3n, 6) rigid motions
+    frugal : bool, default False
+        Whether one damped Jacobi step smooths the prolongation, where by default four steps lower
+        its energy: made two to three times as fast, from less memory, for up to twice the
+        iterations on thin parts.
     """
     import pyamg
 
@@ -88,8 +97,8 @@ def smoothed_aggregation(matrix: sp.bsr_array, points: FloatArray) -> Apply:
     levels = pyamg.smoothed_aggregation_solver(
         sp.bsr_matrix(matrix),
         B=near_kernel,
-        strength=("symmetric", {"theta": 0.08}),
-        smooth=("energy", {"krylov": "cg", "maxiter": 4, "degree": 1}),
+        strength=("symmetric", {"theta": 0.02 if frugal else 0.08}),
+        smooth=_JACOBI if frugal else _ENERGY,
         improve_candidates=None,
         presmoother=sweeps["forward"],
         postsmoother=sweeps["backward"],
@@ -142,31 +151,3 @@ def _corners(parents: IntArray) -> Coarse:
         (blocks, weights.indices, weights.indptr), shape=3 * np.array(weights.shape)
     )
     return Coarse(prolong, nodes)
-
-
-def petsc_gamg(matrix: sp.bsr_array, points: FloatArray) -> Apply:
-    """One V-cycle of PETSc's smoothed aggregation (GAMG) with rigid-body modes.
-
-    Each process of an MPI run solves the whole problem.
-    """
-    from petsc4py import PETSc
-
-    rows = matrix.tocsr()
-    operator = PETSc.Mat().createAIJ(
-        size=rows.shape, bsize=3, csr=(rows.indptr, rows.indices, rows.data), comm=PETSc.COMM_SELF
-    )
-    operator.setOption(PETSc.Mat.Option.SPD, True)
-    place = PETSc.Vec().createWithArray(np.ascontiguousarray(points), bsize=3, comm=PETSc.COMM_SELF)
-    operator.setNearNullSpace(PETSc.NullSpace().createRigidBody(place))
-    preconditioner = PETSc.PC().create(comm=PETSc.COMM_SELF)
-    preconditioner.setOperators(operator)
-    preconditioner.setType("gamg")
-    preconditioner.setUp()
-    left, right = operator.createVecs()
-
-    def apply(rhs: FloatArray) -> FloatArray:
-        left.setArray(rhs)
-        preconditioner.apply(left, right)
-        return np.array(right.getArray())
-
-    return apply

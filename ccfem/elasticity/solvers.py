@@ -19,20 +19,26 @@ from ccfem.errors import InputError
 __all__ = ["BACKENDS", "DIRECT", "Solution", "Solver", "factorise", "preconditioned_cg"]
 
 DIRECT = ("pypardiso", "cholmod", "superlu", "skyline")
-BACKENDS = (*DIRECT, "amg", "two-level", "petsc")
+BACKENDS = (*DIRECT, "amg", "two-level")
 
 _CURES = {
     "pypardiso": 'pip install "ccfem[mkl]"',
     "cholmod": 'pip install "scikit-sparse<0.5"',
-    "petsc": "install petsc4py",
 }
-_MODULES = {"pypardiso": "pypardiso", "cholmod": "sksparse", "petsc": "petsc4py"}
+_MODULES = {"pypardiso": "pypardiso", "cholmod": "sksparse"}
 
 _SMALL = 6_000
 """Unknowns up to which SuperLU is quicker than setting up a multigrid (measured)."""
 
 _MANY = 4
 """Right-hand sides from which a sparse Cholesky is quicker than a multigrid (measured)."""
+
+_SEVERAL = 3
+"""Right-hand sides from which a multigrid that takes longer to make is worth it (measured)."""
+
+_THIN = 12.4
+"""Neighbours of a node of linear cells, itself among them, below which a part is so thin that
+PARDISO is quicker than a multigrid for one right-hand side already (measured): two cells high."""
 
 _REFINEMENTS = 2
 """Times that a solution is improved by solving for what its residual leaves."""
@@ -215,7 +221,7 @@ def choose_direct(matrix: sp.bsr_array, renewed: bool = False) -> str:
     return "skyline" if skyline_operations(matrix) <= limit else best
 
 
-def choose(unknowns: int, order: int, solves: int = 1) -> str:
+def choose(unknowns: int, order: int, solves: int = 1, neighbours: float = np.inf) -> str:
     """Name the backend that suits a system and what is installed.
 
     Parameters
@@ -225,14 +231,18 @@ def choose(unknowns: int, order: int, solves: int = 1) -> str:
         Of the displacement: 1 or 2.
     solves : int
         Right-hand sides to expect.
+    neighbours : float
+        Of a node, itself among them, in the mean.
     """
     if unknowns <= _SMALL:
         return "superlu"
-    if order == 1 and solves >= _MANY and unknowns <= LARGEST_DIRECT:
-        backend = direct_backend()
-        if backend != "superlu":
-            return backend
-    return "amg" if order == 1 else "two-level"
+    if order == 2:
+        return "two-level"
+    best = direct_backend()
+    thin = best == "pypardiso" and neighbours < _THIN
+    if unknowns <= LARGEST_DIRECT and best != "superlu" and (solves >= _MANY or thin):
+        return best
+    return "amg"
 
 
 def factorise(
@@ -269,11 +279,12 @@ def factorise(
         When the factorisation fails.
     """
     if backend == "auto":
-        backend = choose(matrix.shape[0], 1 if parents is None else 2, solves)
+        neighbours = len(matrix.indices) / max(1, len(matrix.indptr) - 1)
+        backend = choose(matrix.shape[0], 1 if parents is None else 2, solves, neighbours)
     check_known("backend", backend, ["auto", *BACKENDS])
     if backend in _MODULES and find_spec(_MODULES[backend]) is None:
         raise InputError(f"backend '{backend}' is not installed: {_CURES[backend]}")
-    make = _maker(backend, matrix, points, parents)
+    make = _maker(backend, matrix, points, parents, solves)
     return Solver(backend, matrix, make(matrix), backend in DIRECT, make)
 
 
@@ -282,6 +293,7 @@ def _maker(
     matrix: sp.bsr_array,
     points: FloatArray,
     parents: IntArray | multigrid.Coarse | None,
+    solves: int,
 ) -> Callable[[sp.bsr_array], Callable[[FloatArray], FloatArray]]:
     """Choose what makes `Solver.apply` of this matrix, and of others of its pattern."""
     if backend == "pypardiso":
@@ -291,7 +303,6 @@ def _maker(
             raise InputError("backend 'two-level' is for quadratic meshes: use mesh.quadratic()")
         return partial(multigrid.two_level, points=points, parents=parents)
     if backend == "amg":
-        return partial(multigrid.smoothed_aggregation, points=points)
-    if backend == "petsc":
-        return partial(multigrid.petsc_gamg, points=points)
+        frugal = solves < _SEVERAL
+        return partial(multigrid.smoothed_aggregation, points=points, frugal=frugal)
     return {"cholmod": direct.cholmod, "superlu": direct.superlu, "skyline": skyline}[backend]

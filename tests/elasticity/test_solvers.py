@@ -17,7 +17,7 @@ from ccfem.errors import InputError, SolveError
 from ccfem.materials import isotropic, transversely_isotropic
 from ccfem.mesh.box import box_mesh
 
-MODULES = {"pypardiso": "pypardiso", "cholmod": "sksparse", "petsc": "petsc4py"}
+MODULES = {"pypardiso": "pypardiso", "cholmod": "sksparse"}
 
 
 def installed(backend):
@@ -139,6 +139,36 @@ def test_the_choice_follows_size_order_and_what_is_installed(monkeypatch):
     monkeypatch.setattr(solvers, "find_spec", lambda name: True)
     assert choose(20_000, 1, solves=10) == "pypardiso"
     assert choose(500_000, 1, solves=10) == "amg"
+    assert choose(20_000, 1, neighbours=14.0) == "amg"
+    assert choose(20_000, 1, neighbours=11.0) == "pypardiso"
+    assert choose(500_000, 1, neighbours=11.0) == "amg"
+    assert choose(20_000, 2, neighbours=11.0) == "two-level"
+
+
+def test_thin_parts_are_told_by_the_neighbours_of_a_node(monkeypatch):
+    monkeypatch.setattr(solvers, "_SMALL", 0)
+    chosen = []
+    monkeypatch.setattr(
+        solvers,
+        "_maker",
+        lambda backend, *_: chosen.append(backend) or (lambda matrix: lambda rhs: rhs),
+    )
+    monkeypatch.setattr(solvers, "find_spec", lambda name: True)
+    for layers in (1, 2, 3, 4):
+        prepared = system(1, (40, 30, layers))
+        prepared.factorise(prepared.assemble())
+    assert chosen == ["pypardiso", "pypardiso", "amg", "amg"]
+
+
+@pytest.mark.parametrize("solves", [1, 5])
+@pytest.mark.parametrize("divisions", [(20, 12, 8), (40, 15, 1)])
+def test_both_multigrids_solve_thick_and_thin_parts(solves, divisions):
+    prepared = system(1, divisions)
+    matrix, rhs, points = equations(prepared)
+    found = factorise(matrix, points, "amg", solves=solves).solve(rhs, tolerance=1e-10)
+    exact = factorise(matrix, points, "superlu").solve(rhs).values
+    np.testing.assert_allclose(found.values, exact, atol=1e-7 * np.abs(exact).max())
+    assert found.iterations <= (60 if divisions[2] > 1 else 150)
 
 
 @pytest.mark.parametrize("backend", ["superlu", "amg"])
@@ -162,7 +192,7 @@ def test_automatic_choice_goes_on_with_a_direct_backend(monkeypatch):
     monkeypatch.setattr(solvers, "find_spec", lambda name: None)
     monkeypatch.setattr(
         "ccfem.elasticity.multigrid.smoothed_aggregation",
-        lambda matrix, points: lambda rhs: 0 * rhs,
+        lambda matrix, points, frugal: lambda rhs: 0 * rhs,
     )
     problem = replace(system().problem, order=1)
     fields = solve(problem)
