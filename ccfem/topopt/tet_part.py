@@ -6,7 +6,7 @@ import numpy as np
 from scipy.spatial import cKDTree
 
 from ccfem.arrays import BoolArray, FloatArray, IntArray
-from ccfem.elasticity.problem import Order, PointForce, Problem
+from ccfem.elasticity.problem import PointForce, Problem
 from ccfem.errors import InputError
 from ccfem.materials import Material
 from ccfem.mesh.facets import unique_edges
@@ -91,8 +91,7 @@ def tet_part(design: Design, material: Material, volume_fraction: float | None) 
     assert isinstance(problem, Problem)
     mesh = part_mesh(design, volume_fraction)
     axes = design.axes_at(mesh.points[mesh.corners].mean(axis=1))
-    order: Order = 1 if mesh.order == 1 else 2
-    return Problem(mesh, material, problem.supports, problem.loads, axes, order=order)
+    return Problem(mesh, material, problem.supports, problem.loads, axes, order=problem.order)
 
 
 def _field(problem: Problem, density: FloatArray) -> _Field:
