@@ -121,11 +121,9 @@ class Problem:
         self._check_arrays()
         self._check_regions()
         self._check_names()
-        if self.order not in ("auto", 1, 2) or (self.order == 1 and self.mesh.order == 2):
-            cells = "quadratic" if self.mesh.order == 2 else "linear"
+        if self.order not in ("auto", 1, 2):
             raise InputError(
-                f"order of the displacement must be 'auto', 1 or 2, and not 1 on quadratic cells; "
-                f"got {self.order!r} on {cells} ones: choose another"
+                f"order of the displacement must be 'auto', 1 or 2; got {self.order!r}: choose one"
             )
 
     def _check_arrays(self) -> None:

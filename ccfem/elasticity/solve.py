@@ -64,7 +64,7 @@ def solve(
         When a solution is not accepted; what makes the equations ill-conditioned is named.
     """
     if problem.order != "auto" or problem.mesh.order == 2:
-        wanted = problem if problem.order != 2 else on_quadratic(problem)
+        wanted = on_quadratic(problem) if problem.order == 2 else problem
         return _solved_as_it_is(wanted, backend, tolerance, "")
     if len(problem.mesh.cells) > MOST_CELLS:
         why = f"more than {MOST_CELLS:,} cells"

@@ -1,10 +1,9 @@
 """Nodes that lie on a facet of a cell without being a node of it, so that nothing joins them."""
 
 import numpy as np
-from numba import njit
+from scipy.spatial import cKDTree
 
-from ccfem.arrays import IntArray
-from ccfem.geometry.buckets import bucket
+from ccfem.arrays import BoolArray, FloatArray, IntArray
 from ccfem.mesh.tet_mesh import TetMesh
 
 __all__ = ["hanging_nodes"]
@@ -27,52 +26,34 @@ def hanging_nodes(mesh: TetMesh) -> IntArray:
     facets = mesh.boundary
     nodes = np.unique(facets)
     corners = mesh.points[facets]
-    low, high = corners.min(axis=1), corners.max(axis=1)
-    margin = _TOUCH * float((high - low).max())
-    grid = bucket(low - margin, high + margin)
-    found = np.zeros(len(nodes), dtype=np.bool_)
-    _hang(grid.origin, grid.cell, grid.shape, grid.starts, grid.items, mesh.points, nodes, facets,
-          found)  # fmt: skip
-    return nodes[found]
+    centre = corners.mean(axis=1)
+    reach = np.linalg.norm(corners - centre[:, None], axis=2).max(axis=1)
+    tree = cKDTree(mesh.points[nodes])
+    near = tree.query_ball_point(centre, (1.0 + _TOUCH) * reach, return_sorted=False)
+    facet = np.repeat(np.arange(len(facets)), [len(each) for each in near])
+    node = nodes[np.concatenate([np.asarray(each, dtype=np.int64) for each in near])]
+    other = (facets[facet] != node[:, None]).all(axis=1)
+    facet, node = facet[other], node[other]
+    return np.unique(node[_lies_on(mesh.points[node], *np.moveaxis(corners[facet], 1, 0))])
 
 
-@njit(cache=True)
-def _hang(origin, cell, shape, starts, items, points, nodes, facets, found):  # type: ignore[no-untyped-def]
-    """Mark the nodes that lie on a facet in their bucket."""
-    e, f, g = np.empty(3), np.empty(3), np.empty(3)
-    for k in range(len(nodes)):
-        node, box = nodes[k], 0
-        for d in range(3):
-            at = int(np.floor((points[node, d] - origin[d]) / cell))
-            box = box * shape[d] + min(max(at, 0), shape[d] - 1)
-        for item in range(starts[box], starts[box + 1]):
-            a, b, c = facets[items[item]]
-            if node in (a, b, c):
-                continue
-            ee = ff = ef = ge = gf = gg = 0.0
-            for d in range(3):
-                e[d] = points[b, d] - points[a, d]
-                f[d] = points[c, d] - points[a, d]
-                g[d] = points[node, d] - points[a, d]
-                ee += e[d] * e[d]
-                ff += f[d] * f[d]
-                ef += e[d] * f[d]
-                ge += g[d] * e[d]
-                gf += g[d] * f[d]
-                gg += g[d] * g[d]
-            size = max(ee, ff, ee + ff - 2.0 * ef)
-            area = ee * ff - ef * ef
-            if area <= 1e-12 * size * size:
-                continue
-            s, t = (ff * ge - ef * gf) / area, (ee * gf - ef * ge) / area
-            if s < -1e-6 or t < -1e-6 or s + t > 1.0 + 1e-6:
-                continue
-            if max(s, t, 1.0 - s - t) > 1.0 - 1e-6:  # on a corner
-                continue
-            off = 0.0
-            for d in range(3):
-                rest = g[d] - s * e[d] - t * f[d]
-                off += rest * rest
-            if off <= 1e-12 * size:
-                found[k] = True
-                break
+def _lies_on(
+    points: FloatArray, first: FloatArray, second: FloatArray, third: FloatArray
+) -> BoolArray:
+    """Whether each point (k, 3) lies on its triangle, and not on a corner of it."""
+    e, f, g = second - first, third - first, points - first
+    ee, ff, ef = _dot(e, e), _dot(f, f), _dot(e, f)
+    ge, gf = _dot(g, e), _dot(g, f)
+    size = np.maximum(np.maximum(ee, ff), ee + ff - 2.0 * ef)
+    area = ee * ff - ef * ef
+    proper = area > 1e-12 * size * size
+    area = np.where(proper, area, 1.0)
+    s, t = (ff * ge - ef * gf) / area, (ee * gf - ef * ge) / area
+    weights = np.stack([1.0 - s - t, s, t])
+    off = g - s[:, None] * e - t[:, None] * f
+    inside = (weights.min(axis=0) >= -_TOUCH) & (weights.max(axis=0) <= 1.0 - _TOUCH)
+    return proper & inside & (_dot(off, off) <= _TOUCH**2 * size)
+
+
+def _dot(a: FloatArray, b: FloatArray) -> FloatArray:
+    return np.einsum("ij,ij->i", a, b)

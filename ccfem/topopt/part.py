@@ -4,7 +4,7 @@ from typing import Any
 
 import numpy as np
 
-from ccfem.elasticity.problem import Order, Problem
+from ccfem.elasticity.problem import Problem
 from ccfem.errors import InputError
 from ccfem.io.surface import Surface
 from ccfem.materials import Material
@@ -109,5 +109,4 @@ def as_problem(
     _no_plate(thickness=thickness, edge_length=edge_length, domain=domain)
     mesh = part_mesh(design, volume_fraction)
     axes = design.axes_at(mesh.points[mesh.corners].mean(axis=1))
-    order: Order = 1 if mesh.order == 1 else 2
-    return Problem(mesh, material, full.supports, full.loads, axes, order=order)
+    return Problem(mesh, material, full.supports, full.loads, axes, order=full.order)
