@@ -51,10 +51,13 @@ def planned(
 
     def work() -> Run:
         layers, stress, machine = part.layers, part.stress, part.machine
-        if wanted is None or isinstance(run.strategy, GivenPaths):
-            paths = plan(run.strategy, layers, stress, machine)
+        if isinstance(run.strategy, GivenPaths):
+            paths = run.strategy.toolpaths
             laid = length_per_layer(paths, layers)
             found = Planned(run.strategy, paths, laid, _as_given(laid, wanted))
+        elif wanted is None:
+            paths = plan(run.strategy, layers, stress, machine)
+            found = Planned(run.strategy, paths, length_per_layer(paths, layers))
         else:
             found = plan_to_length(run.strategy, layers, stress, machine, wanted, start=start)
         return replace(
