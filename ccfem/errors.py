@@ -1,4 +1,4 @@
-"""The two ways in which ccfem refuses to go on."""
+"""The two errors that ccfem raises."""
 
 import difflib
 from collections.abc import Iterable

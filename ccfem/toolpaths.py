@@ -122,6 +122,38 @@ class Toolpaths:
         )
 
     @classmethod
+    def in_space(
+        cls,
+        lines: Sequence[FloatArray],
+        normals: Sequence[FloatArray],
+        layer: Layer,
+        kind: int = FIBRE,
+    ) -> "Toolpaths":
+        """Paths on one layer, flat or curved, from polylines in space.
+
+        Parameters
+        ----------
+        lines : sequence of (n_i, 3) arrays, mm
+            Polylines with at least two points; others are dropped. A line is closed when its last
+            point equals its first.
+        normals : sequence of (n_i, 3) arrays
+            Unit normal of the layer at each of their points.
+        layer : Layer
+        kind : int, default FIBRE
+        """
+        keep = [k for k, line in enumerate(lines) if len(line) >= 2]
+        if not keep:
+            return cls.empty()
+        return cls(
+            points=np.concatenate([lines[k] for k in keep]),
+            normals=np.concatenate([normals[k] for k in keep]),
+            offsets=np.concatenate([[0], np.cumsum([len(lines[k]) for k in keep])]),
+            layer=np.full(len(keep), layer.index),
+            kind=np.full(len(keep), kind),
+            closed=np.array([np.array_equal(lines[k][0], lines[k][-1]) for k in keep]),
+        )
+
+    @classmethod
     def concatenate(cls, parts: Iterable["Toolpaths"]) -> "Toolpaths":
         """All paths of `parts`, in their order."""
         found = [part for part in parts if len(part)]

@@ -16,7 +16,8 @@ them with a minus ("-z"), or three numbers.
     edge_length = 2.0                 # ... of this edge length
     scale = 1.0                       # factor on the coordinates of either file; 1000 for metres
     merge_nodes = false               # join pieces of a mesh where their nodes coincide
-    order = 1                         # 1 or 2, linear or quadratic cells; default: as the file has
+    order = "auto"                    # linear (1) or quadratic cells (2), or what the estimated
+                                      # error of linear ones calls for (default)
 
     [planform]                        # a flat part that stands on z = 0
     outline = [[0, 0], [80, 0], [80, 30], [0, 30]]
@@ -123,13 +124,14 @@ them with a minus ("-z"), or three numbers.
 
 import os
 import tomllib
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Callable, Mapping
 from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Any
 
 from ccfem.cases.case import Case
 from ccfem.cases.part_body import Body
+from ccfem.elasticity.load_kinds import patches_in_use
 from ccfem.elasticity.problem import (
     Bearing,
     Force,
@@ -212,7 +214,7 @@ def read_part(path: str | os.PathLike[str]) -> Case:
     Returns
     -------
     Case
-        `Case.findings` says what was mended in the mesh.
+        `Case.findings` says what was repaired in the mesh.
 
     Raises
     ------
@@ -250,14 +252,12 @@ def _case(content: Mapping[str, Any], path: Path) -> Case:
     mesh, findings = part.read(path.parent)
     mesh = patches_from_rules(mesh, rules)
     findings = (*findings, *about_patches(mesh, rules))
-    mesh = without_faces(mesh, (*rules, *_patches_of(supports, loads)))
-    for patch in _patches_of(supports, loads):
-        mesh.patch(patch)
+    mesh = without_faces(mesh, (*rules, *patches_in_use(supports, loads)))
     name = part.name or path.stem
     return Case(
         name=name,
         title=part.title or name,
-        problem=Problem(mesh, material, supports, loads),
+        problem=Problem(mesh, material, supports, loads, order=part.order),
         build=(float(build[0]), float(build[1]), float(build[2])),
         slicing=slicing,
         machine=machine,
@@ -265,14 +265,6 @@ def _case(content: Mapping[str, Any], path: Path) -> Case:
         source=part.source,
         findings=findings,
     )
-
-
-def _patches_of(
-    supports: Sequence[Support], loads: Mapping[str, Sequence[Load]]
-) -> tuple[str, ...]:
-    """Patches that supports and loads name."""
-    values = (*supports, *(load for case in loads.values() for load in case))
-    return tuple(value.patch for value in values if not isinstance(value, PointForce))
 
 
 def _slicing(part: _Part) -> Slicer:

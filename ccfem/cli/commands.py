@@ -25,9 +25,11 @@ from ccfem.cli.options import (
     Out,
     SetCase,
     Slicing,
+    StressFile,
+    StressUnit,
     VirtualTest,
 )
-from ccfem.cli.run import layers_of, load, options_of, run
+from ccfem.cli.run import foreign_stress, layers_of, load, options_of, run
 from ccfem.errors import InputError, SolveError
 
 __all__ = ["app", "main"]
@@ -134,10 +136,28 @@ def compare(
         list[str] | None,
         typer.Option("--set", metavar="STRATEGY.NAME=VALUE", help="Set a parameter; repeatable."),
     ] = None,
+    paths: Annotated[
+        str | None,
+        typer.Option(
+            metavar="FILE,..",
+            help="Paths of other programs, judged beside the strategies: waypoints, or CSV with "
+            "x,y,z,path,layer.",
+        ),
+    ] = None,
+    paths_frame: Annotated[
+        str | None,
+        typer.Option(
+            metavar="mesh|tool",
+            help="What their coordinates are in; default mesh for CSV, the printer's tool for "
+            "waypoints.",
+        ),
+    ] = None,
     virtual_test: VirtualTest = True,
     load_case: LoadCase = None,
     calibration: Calibration = None,
     backend: Backend = "auto",
+    stress: StressFile = None,
+    stress_unit: StressUnit = None,
     out: Out = None,
     force: Force = False,
 ) -> None:
@@ -149,7 +169,20 @@ def compare(
     chosen = layers_of(layers, heights, slicing)
     options = options_of(chosen, fibre_per_layer, virtual_test, load_case, backend)
     options["natural"] = natural
-    run(case, set_case, names, parameters, options, calibration, out, force=force)
+    options["stress"] = foreign_stress(stress, stress_unit)
+    files = names_of(paths) if paths is not None else ()
+    run(
+        case,
+        set_case,
+        names,
+        parameters,
+        options,
+        calibration,
+        out,
+        paths=files,
+        frame=paths_frame,
+        force=force,
+    )
 
 
 @app.command()
@@ -173,6 +206,8 @@ def plan(
         bool,
         typer.Option("--gcode", help="Also write STRATEGY.gcode, matrix and fibre of the part."),
     ] = False,
+    stress: StressFile = None,
+    stress_unit: StressUnit = None,
     out: Out = None,
     force: Force = False,
 ) -> None:
@@ -182,8 +217,49 @@ def plan(
     options = options_of(chosen, fibre_per_layer, virtual_test, load_case, backend)
     options["natural"] = fibre_per_layer is None
     options["print_plans"] = gcode
+    options["stress"] = foreign_stress(stress, stress_unit)
     suffix = f"-{strategy}"
-    run(case, set_case, (strategy,), parameters, options, calibration, out, suffix, force)
+    run(case, set_case, (strategy,), parameters, options, calibration, out, suffix, force=force)
+
+
+@app.command()
+def solve(
+    case: CasePath,
+    out: Annotated[
+        Path,
+        typer.Option("-o", "--out", metavar="RESULT.vtu", help="File that is written."),
+    ],
+    set_case: SetCase = None,
+    load_case: Annotated[
+        str | None,
+        typer.Option(
+            "--load-case",
+            metavar="NAME",
+            help="Only this one; default all, the name of each behind that of the file where "
+            "there are several.",
+        ),
+    ] = None,
+    backend: Backend = "auto",
+) -> None:
+    """Solve a part and write displacement, strain, stress, reactions and error for ParaView."""
+    from ccfem.checks import check_known
+    from ccfem.cli.screen import print_solution
+    from ccfem.elasticity.solve import solve as solved
+    from ccfem.export.vtu_result import result_path, write_result
+    from ccfem.io.whole import check_writable
+
+    loaded = load(case, set_case)
+    names = loaded.problem.cases
+    if load_case is not None:
+        check_known("load case", load_case, names)
+        names = (load_case,)
+    files = {name: out if len(names) == 1 else result_path(out, name) for name in names}
+    for file in files.values():
+        check_writable(result_path(file))
+    fields = solved(loaded.problem, backend=backend)
+    for name, file in files.items():
+        write_result(fields[name], file)
+        print_solution(fields[name], loaded.findings, file)
 
 
 @app.command()
@@ -238,7 +314,7 @@ def calibrate(
     found.write(out)
     rho = "" if found.rho is None else f", rho {found.rho:.3g} mm^2"
     print(
-        f"{out}: modulus {found.modulus:.4g} MPa, matrix strength {found.matrix_strength:.3g} MPa"
+        f"{out}: modulus {found.modulus:.4g} MPa, matrix strength {found.tensile_strength:.3g} MPa"
         f"{rho}; use it with --calibration {out}"
     )
 

@@ -1,4 +1,4 @@
-"""What a class says of itself: the numpydoc docstring, read for people who see no code."""
+"""What a class says about itself: its numpydoc docstring, for people who do not read code."""
 
 import inspect
 import re

@@ -19,7 +19,7 @@ if TYPE_CHECKING:
     from ccfem.cases.case import Case
     from ccfem.comparison.result import Comparison
 
-__all__ = ["layers_of", "load", "options_of", "run"]
+__all__ = ["foreign_stress", "layers_of", "load", "options_of", "run"]
 
 _STARTED = time.perf_counter()
 
@@ -50,6 +50,17 @@ def layers_of(layers: int | None, heights: str | None, slicing: str | None) -> A
     return layers if slicing is None else slicer_of(slicing)
 
 
+def foreign_stress(path: Path | None, unit: str | None) -> Any:
+    """Stress of another program to plan on; None for the part's own."""
+    from ccfem.comparison.compare import ForeignStress
+
+    if path is None:
+        if unit is not None:
+            raise InputError("--stress-unit belongs to --stress; got no file: name it")
+        return None
+    return ForeignStress(path, unit)
+
+
 def options_of(
     layers: Any,
     fibre_per_layer: float | None,
@@ -78,6 +89,8 @@ def run(
     calibration: Path | None,
     out: Path | None,
     suffix: str = "",
+    paths: Sequence[str] = (),
+    frame: str | None = None,
     force: bool = False,
 ) -> None:
     """Compare strategies, write the results and print the table; a failure leaves nothing behind.
@@ -97,6 +110,10 @@ def run(
     out : Path, optional
         Folder; default ``results/`` and the name of the case with `suffix`.
     suffix : str
+    paths : sequence of str
+        Files with paths of other programs, to be judged beside the strategies.
+    frame : {"mesh", "tool"}, optional
+        What the coordinates of these files are in.
     force : bool
         Replace files in the folder that ccfem did not write, too.
     """
@@ -110,7 +127,8 @@ def run(
     seconds = {"start": imported - _STARTED, "mesh": time.perf_counter() - imported}
     if calibration is not None:
         case, options = _calibrated(case, options, calibration)
-    chosen = create_all(case, strategies, parameters)
+    chosen = create_all(case, strategies, parameters) if strategies else {}
+    chosen |= _given(case, paths, frame, chosen)
     where = out if out is not None else Path("results") / f"{case.name}{suffix}"
     with whole_folder(where, force) as folder, progress_bar() as progress:
         comparison = compare(case, chosen, progress=_part(progress, 0.0, _SOLVED), **options)
@@ -118,6 +136,30 @@ def run(
         command = shlex.join(["ccfem", *sys.argv[1:]])
         write_results(comparison, folder, command, seconds, _part(progress, _SOLVED, 1.0))
     print_comparison(comparison, where, time.perf_counter() - _STARTED)
+
+
+def _given(
+    case: "Case", files: Sequence[str], frame: str | None, taken: Mapping[str, Any]
+) -> dict[str, Any]:
+    """Paths of other programs, by the names of their files."""
+    if not files:
+        if frame is not None:
+            raise InputError("--paths-frame says what the files of --paths are in; got no --paths")
+        return {}
+    from ccfem.export.path_table import read_paths
+    from ccfem.layers.plane import plane_frame
+    from ccfem.planning.given_paths import GivenPaths
+
+    found: dict[str, Any] = {}
+    for file in files:
+        name = Path(file).stem
+        if name in taken or name in found:
+            raise InputError(f"'{name}' is the name of two runs: rename the file {file}")
+        toolpaths = read_paths(file, plane_frame(case.build), frame)
+        if not len(toolpaths):
+            raise InputError(f"{file} holds no paths: check its name")
+        found[name] = GivenPaths(toolpaths, file)
+    return found
 
 
 def _calibrated(

@@ -7,9 +7,17 @@ import numpy as np
 from ccfem.comparison.headline import HEADLINE, headline_values
 from ccfem.comparison.runs import Run
 from ccfem.planning.equal_fibre import TOLERANCE
-from ccfem.virtual_testing.stiffer import FIRST, SAME, UNDECIDED, stiffer
+from ccfem.virtual_testing.stiffer import FIRST, RESOLUTION, SAME, UNDECIDED, stiffer
 
 __all__ = ["best_values", "order_of", "ranking", "stiffness_ratio", "stiffness_ratios", "too_long"]
+
+_STIFFNESSES = (
+    "stiffness",
+    "stiffness_ratio_tension",
+    "stiffness_ratio_bonded",
+    "displacement",
+)
+"""Columns of which the best is that of the stiffest run, where one is."""
 
 
 def ranking(runs: Sequence[Run], wanted: float | None) -> tuple[Run, ...]:
@@ -41,19 +49,30 @@ def ranking(runs: Sequence[Run], wanted: float | None) -> tuple[Run, ...]:
 
 
 def best_values(runs: Sequence[Run], wanted: float | None) -> dict[str, float]:
-    """Best value of each headline column where the runs differ.
+    """Best value of each headline column where a run is really better than another.
 
-    Runs that cannot be printed, lay too much fibre or leave layers empty have no best value.
+    Runs that cannot be printed, lay too much fibre or leave layers empty have no best value. A
+    stiffness is best only where its run is stiffer than every other, by more than the test
+    resolves and whatever fibres in compression do; a load at first failure where it is the largest
+    by more than that.
     """
-    best = {}
     equal = [
         run for run in runs if run.printable and not too_long(run, wanted) and not run.empty_layers
     ]
+    order = ranking(equal, wanted)
+    stiffest = len(order) > 1 and all(order_of(order[0], other) == FIRST for other in order[1:])
+    best = {}
     for head in HEADLINE:
         values = [headline_values(run).get(head.column, np.nan) for run in equal]
-        known = [value for value in values if np.isfinite(value)]
-        if head.better and len(known) > 1 and min(known) < max(known):
-            best[head.column] = max(known) if head.better == "high" else min(known)
+        known = sorted(value for value in values if np.isfinite(value))
+        if not head.better or len(known) < 2 or known[0] == known[-1]:
+            continue
+        if head.column in _STIFFNESSES and not stiffest:
+            continue
+        found = known[-1] if head.better == "high" else known[0]
+        if head.column == "first_failure_load" and found < (1.0 + RESOLUTION) * known[-2]:
+            continue
+        best[head.column] = found
     return best
 
 
@@ -82,9 +101,11 @@ def order_of(better: Run, other: Run) -> str:
     -------
     str
         FIRST, SAME or UNDECIDED of `ccfem.virtual_testing.stiffer`: undecided also where only
-        bonded fibres tell them apart, the other way round. SAME where one is untested.
+        bonded fibres tell them apart. SAME where one is untested.
     """
     if better.tested is None or other.tested is None:
         return SAME
     found = stiffer(better.tested.bracket, other.tested.bracket)
+    if found == FIRST and stiffness_ratios(better, other)[0] <= 1.0 + RESOLUTION:
+        return UNDECIDED
     return found if found in (FIRST, SAME) else UNDECIDED

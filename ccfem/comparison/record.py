@@ -69,7 +69,7 @@ def record(comparison: Comparison, command: str, seconds: Mapping[str, float]) -
         note, failure, times and total indices.
     """
     case, stress = comparison.case, comparison.stress
-    mesh = case.problem.mesh
+    mesh = stress.mesh
     return _plain(
         {
             "ccfem": version("ccfem"),
@@ -80,19 +80,22 @@ def record(comparison: Comparison, command: str, seconds: Mapping[str, float]) -
                 "name": case.name,
                 "title": case.title,
                 "source": case.source,
-                "findings": case.findings,
+                "findings": (*case.findings, *stress.findings),
                 "load_case": stress.case,
                 "load": _load(stress),
                 "material": case.problem.material.name,
                 "build": case.build,
                 "layers": len(comparison.layers),
-                "heights": [layer.plane.height for layer in comparison.layers],
+                "heights": [
+                    None if layer.flat is None else layer.flat.height for layer in comparison.layers
+                ],
                 "nodes": len(mesh.points),
                 "cells": len(mesh.cells),
                 "order": mesh.order,
             },
             "machine": dataclasses.asdict(case.machine),
             "solver": vars(stress.record),
+            "planned_on_given_stress": comparison.given is not None,
             "strain_energy": stress.strain_energy,
             "fibre_per_layer": comparison.fibre_per_layer,
             "upper_bound": None if comparison.bound is None else comparison.bound.ratio,
@@ -118,6 +121,8 @@ def _run_record(run: Run) -> dict[str, Any]:
         "length_per_layer": run.length_per_layer,
         "note": run.note,
         "failure": run.failure,
+        "printable": run.printable,
+        "why_not": run.why_not,
         "seconds": run.seconds,
         "untested": run.untested,
         "total": headline_values(run),

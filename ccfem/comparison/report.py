@@ -12,7 +12,9 @@ from ccfem.comparison.pictures import Pictures
 from ccfem.comparison.ranking import best_values, stiffness_ratios
 from ccfem.comparison.result import Comparison
 from ccfem.comparison.runs import Run
+from ccfem.elasticity.stress_field import about_cells
 from ccfem.evaluation import COLUMNS, Column
+from ccfem.layers.layer import Layer
 from ccfem.virtual_testing.stiffer import HONEST_PROMISE
 
 __all__ = ["report_html"]
@@ -113,7 +115,8 @@ def _header(comparison: Comparison, record: Mapping[str, Any]) -> str:
         f"fibre width W {case.machine.fibre_width:g} mm",
     ]
     source = f"<br>Source: {escape(case.source)}." if case.source else ""
-    source += "".join(f"<br>Mesh: {escape(found)}." for found in case.findings)
+    findings = (*case.findings, *comparison.stress.findings)
+    source += "".join(f"<br>Mesh: {escape(found)}." for found in findings)
     return (
         f"<h1>{escape(case.title)}</h1>\n"
         f'<p class="sub">{escape(" · ".join(facts))}{source}<br>Units: mm, N, MPa.</p>\n'
@@ -131,7 +134,10 @@ def _headline(comparison: Comparison) -> str:
             rows.append(f"<tr><td>{escape(run.name)}</td>{reason}</tr>")
             continue
         cells = "".join(
-            _cell(*cell_text(run, h), values[run.name].get(h.column) == best.get(h.column, np.nan))
+            _cell(
+                *cell_text(run, h),
+                run.printable and values[run.name].get(h.column) == best.get(h.column, np.nan),
+            )
             for h in heads
         )
         first = ' class="first"' if not rows else ""
@@ -147,7 +153,8 @@ def _headline(comparison: Comparison) -> str:
         + f'<div class="scroll"><table><tr><th>strategy</th>{titles}</tr>\n'
         + "\n".join(rows)
         + f"</table></div>\n{notes}"
-        '<p class="note">Best values are marked. Alignment and efficiency are measured on the '
+        '<p class="note">Best values are marked where they really are: of runs that can be '
+        "printed, of stiffnesses that the test tells apart. Alignment and efficiency are of the "
         "stress that a strategy may itself have followed: they say how well the paths do what they "
         "set out to do, not how strong the printed part is.</p>\n"
     )
@@ -183,25 +190,34 @@ def _against_each_other(comparison: Comparison) -> str:
 
 def _pictures(comparison: Comparison, pictures: Pictures) -> str:
     runs = [run for run in comparison.ranking if run.evaluation is not None]
-    heights = {layer.index: layer.plane.height for layer in comparison.layers}
-    rows = [_layer(index, height, runs, pictures) for index, height in heights.items()]
+    drawn = {index for _, index in pictures.paths}
+    places = {layer.index: _place(layer) for layer in comparison.layers if layer.index in drawn}
+    rows = [_layer(index, place, runs, pictures) for index, place in places.items()]
     every = ""
     if len(rows) > 1:
         every = f"<details><summary>All {len(rows)} layers</summary>\n{''.join(rows)}</details>\n"
     tension = _figure(pictures.tension, "tension in the middle layer")
+    error = _figure(pictures.error, "estimated error of the cells in the middle layer")
     return (
-        f"<h2>Paths</h2>\n{_layer(pictures.middle, heights[pictures.middle], runs, pictures)}"
+        f"<h2>Paths</h2>\n{_layer(pictures.middle, places[pictures.middle], runs, pictures)}"
         f"{every}{_forces(runs, pictures)}{_curves(pictures)}"
-        f"<h2>Tension without fibres</h2>\n{_grid([tension, '', '', ''])}\n"
+        f"<h2>Tension without fibres</h2>\n{_grid([tension, error, '', ''])}\n"
     )
 
 
-def _layer(index: int, height: float, runs: Sequence[Run], pictures: Pictures) -> str:
+def _place(layer: Layer) -> str:
+    """Where a layer is, in words."""
+    if layer.flat is None:
+        return "curved, laid flat"
+    return f"at {layer.flat.height:.2f} mm along the build direction"
+
+
+def _layer(index: int, place: str, runs: Sequence[Run], pictures: Pictures) -> str:
     """One layer of every run side by side."""
     figures = [
         _figure(pictures.paths[run.name, index], f"{run.name}, layer {index}") for run in runs
     ]
-    title = f"<h3>Layer {index}, at {height:.2f} mm along the build direction</h3>"
+    title = f"<h3>Layer {index}, {place}</h3>"
     return f"{title}{_grid(figures)}\n"
 
 
@@ -308,6 +324,8 @@ def _computation(comparison: Comparison, record: Mapping[str, Any]) -> str:
         + (f"{solver['iterations']} iterations, " if solver["iterations"] else "direct, ")
         + f"relative residual {solver['residual']:.1e}, assembly "
         f"{solver['assembly_seconds']:.2f} s, solve {solver['solve_seconds']:.2f} s.",
+        f"{about_cells(comparison.stress)}; backward error of the equations "
+        f"{solver['backward_error']:.1e}.",
         f"Material: {record['case']['material']}. Strain energy "
         f"{record['strain_energy']:.4g} N mm.",
     ]

@@ -42,5 +42,5 @@ def frame(ranking: Sequence[Run]) -> "pd.DataFrame":
         "failure": [run.failure for run in ranking],
         "empty_layers": [run.empty_layers for run in ranking],
     }
-    columns |= {name: [found.get(name, np.nan) for found in values] for name in names}
-    return pd.DataFrame(columns)
+    numbers = {name: [found.get(name, np.nan) for found in values] for name in names}
+    return pd.DataFrame(numbers | columns)[[*columns, *(n for n in names if n not in columns)]]

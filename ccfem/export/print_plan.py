@@ -24,14 +24,14 @@ COORDINATE_DIGITS = 3
 """Decimals of coordinates, mm."""
 
 _SAME = 1e-6
-"""Heights nearer than this, mm, are one."""
+"""Heights closer than this, mm, are the same."""
 
 _OVERLAP = 0.25
-"""How far the ends of the zigzag reach into the contour, in line widths. Our choice: the lines
-then hold the volume of a section to 3 % (`tests/export/test_gcode.py`)."""
+"""Overlap of the ends of the zigzag with the contour, in line widths. Our choice: the lines then
+have the volume of the section to 3 % (`tests/export/test_gcode.py`)."""
 
 _SHORT = 1e-6
-"""A path short of the cutter's distance by no more than this share of it is long enough."""
+"""Share of the cutter's distance by which a path may be too short through rounding."""
 
 
 @dataclass(frozen=True)
@@ -143,7 +143,7 @@ def plan_print(
 
 
 def _check_fibre(fibre: Toolpaths, layers: Sequence[Layer], machine: Machine) -> None:
-    """Every path lies on a layer given and is long enough for the cutter."""
+    """Check that every path lies on a given layer and is long enough for the cutter."""
     if not layers:
         raise InputError("a print needs at least one layer; got none: give those of the plan")
     missing = set(fibre.layer.tolist()) - {layer.index for layer in layers}
@@ -235,7 +235,7 @@ def _printed(lines: list[FloatArray], height: float, number: int, kind: int) -> 
 
 
 def _check_bed(plan: PrintPlan, machine: Machine) -> None:
-    """Everything lies in the space that the printer reaches."""
+    """Check that everything lies in the space that the printer reaches."""
     points, bed = plan.paths.points, np.array(machine.gcode.bed)
     if not len(points):
         raise InputError("there is nothing to print: the part is thinner than a line of matrix")

@@ -18,7 +18,7 @@ from ccfem.toolpaths import Toolpaths
 __all__ = ["write_paths"]
 
 _EFFORT = 4
-"""Of zlib, 1 to 9; above it the files of the loop get no smaller."""
+"""Compression level of zlib, 1 to 9; higher ones make the files of the loop no smaller."""
 
 _TYPES = {"f": ("f8", "Float64"), "b": ("u1", "UInt8")}
 """Of arrays by the kind of their data type; Int64 for all others."""
@@ -40,7 +40,7 @@ def write_paths(
     toolpaths : Toolpaths
     path : str or Path
     path_data : mapping of name to (K,) array, optional
-        More values of the paths.
+        Further values, one per path.
 
     Raises
     ------

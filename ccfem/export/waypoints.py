@@ -2,8 +2,8 @@
 
 A line ``;Layer_CCF: i`` starts layer i. Coordinates are those of the tool: X and Y along the two
 in-plane axes of a layer's frame, Z along the build direction. (For the authors' meshes, built along
-y, the tool's X, Y, Z are x, -z, y of the mesh.) The format has no place for which steps are links
-(`Toolpaths.link`): paths that are read back have none.
+y, the tool's X, Y, Z are x, -z, y of the mesh.) The format cannot mark links (`Toolpaths.link`):
+paths that are read back have none.
 """
 
 from collections.abc import Sequence

@@ -25,7 +25,7 @@ _STEP = 0.1
 _LEAST = 0.02
 """As `least` of `streamlines`."""
 _SLACK = 1e-3
-"""By how much less than the separation a new line may be off, for rounding and finite steps."""
+"""Share of the separation by which a new line may be too near: rounding and finite steps."""
 _MOST_POINTS = 20_000_000
 
 
@@ -36,6 +36,7 @@ def evenly_spaced_streamlines(
     region: Region,
     separation: float,
     closest: float = 0.5,
+    least_length: float = 0.0,
 ) -> list[FloatArray]:
     """Lines along the principal stress of the largest size, a distance apart.
 
@@ -48,16 +49,16 @@ def evenly_spaced_streamlines(
 
     Parameters
     ----------
-    points : (n, 2) array, mm
-    triangles : (t, 3) int array
-    plane_stress : (n, 3) array, MPa
-        s11, s22, s12 at the points.
+    points, triangles, plane_stress
+        As in `streamlines`.
     region : shapely (Multi)Polygon, mm
         Lines stay in it.
     separation : float, mm
         Distance at which lines begin beside each other (d_sep), > 0.
     closest : float in (0, 1), default 0.5
-        Least distance of lines in separations (d_test / d_sep).
+        Minimum distance of lines in separations (d_test / d_sep).
+    least_length : float, mm, default 0
+        Shorter lines are not laid and block no other line; never below one separation.
 
     Returns
     -------
@@ -90,6 +91,7 @@ def evenly_spaced_streamlines(
         separation,
         closest * separation,
         step,
+        max(least_length, separation),
     )
     lines = []
     for (start, turn, end), ring in zip(spans, closed, strict=True):
@@ -133,7 +135,7 @@ def _empty(grid: SectionGrid, cell: float, room: int) -> _Laid:
 
 
 @njit(cache=True, nogil=True)
-def _lay(field, grid, laid, seeds, homes, apart, test, step):  # type: ignore[no-untyped-def]
+def _lay(field, grid, laid, seeds, homes, apart, test, step, least):  # type: ignore[no-untyped-def]
     """Points of all lines, (start, turn, end) of each among them, and whether it is closed.
 
     From start to turn the points run ahead from the seed, from turn to end back from it.
@@ -157,7 +159,7 @@ def _lay(field, grid, laid, seeds, homes, apart, test, step):  # type: ignore[no
         if taken or not contains(grid, x, y):
             continue
         turn, end, ring = _trace(field, grid, laid, count, lines, x, y, home, test, step)
-        if end - count < apart / step:
+        if (end - count) * step < least:
             _take_back(laid, count, end)
             continue
         spans[lines, 0], spans[lines, 1], spans[lines, 2] = count, turn, end
@@ -222,7 +224,7 @@ def _add(laid, p, x, y, dx, dy, home, along, number):  # type: ignore[no-untyped
 
 @njit(cache=True, nogil=True)
 def _take_back(laid, first, end):  # type: ignore[no-untyped-def]
-    """Forget points, the last ones that were added."""
+    """Remove points, the last ones that were added."""
     for p in range(end - 1, first - 1, -1):
         i, j = _cell(laid, laid.spot[p, 0], laid.spot[p, 1])
         laid.head[i, j] = laid.following[p]

@@ -1,4 +1,4 @@
-"""Tension sampled on the triangles of a layer: from its own plane, or from the whole part."""
+"""Tension on the triangles of a layer: from the stress in its plane, or from the whole part."""
 
 from typing import Literal
 

@@ -48,7 +48,7 @@ def fit_weighted(
     weight: FloatArray,
     spacing_weight: float = 0.1,
 ) -> FloatArray:
-    """Field that runs along the tension first and keeps the wanted density second.
+    """Field, (n,) at the points, along the tension first, and of the wanted density second.
 
     Minimises ``sum_f w_f A_f [(t . grad s)^2 + spacing_weight (n . grad s - m)^2]`` with t the
     direction, n its normal and m the wanted density of isocurves.
@@ -63,11 +63,6 @@ def fit_weighted(
     weight : (t,) array
     spacing_weight : float, default 0.1
         The smaller, the better the alignment and the less even the spacing.
-
-    Returns
-    -------
-    (n,) array
-        At the points.
     """
     metric, flux = _weighted_form(surface, direction, density, weight, spacing_weight)
     return _solve(surface, metric, flux)
@@ -88,8 +83,8 @@ def fit_constrained(
     convex problem is solved by the alternating direction method of multipliers (Boyd et al.,
     Foundations and Trends in Machine Learning 3 (2011) 1, section 3): one factorisation, and a
     back-substitution and a projection an iteration. After 20 iterations the objective is within
-    1 % of the optimum and single triangles exceed the bound by some per cent, so that strands are
-    still to be trimmed.
+    1 % of the optimum and single triangles exceed the bound by some per cent, so that strands
+    still have to be trimmed.
 
     Parameters
     ----------

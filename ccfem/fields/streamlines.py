@@ -17,8 +17,8 @@ _LONGEST = 10.0
 """Length at which a line stops in either sense, in diagonals of the points."""
 
 _SHARPEST = 0.5
-"""Cosine of the largest turn of the direction within one step: beyond 60 degrees two families of
-principal directions take turns."""
+"""Cosine of the largest turn of the direction within one step: a line that turns by more than 60
+degrees has changed to the other family of principal directions."""
 
 
 def streamlines(
@@ -33,8 +33,8 @@ def streamlines(
 
     Runge-Kutta of fourth order in both senses from each start; the sign follows the step before.
     The direction is that of the linearly interpolated stress, in double-angle form: no eigenvector
-    is ever averaged, and where tension and compression take turns the direction jumps within a
-    triangle.
+    is ever averaged, and where tension and compression change places the direction jumps within
+    a triangle.
 
     Parameters
     ----------

@@ -36,7 +36,10 @@ class Tension:
 
     def on(self, layer: Layer) -> "Tension":
         """Project from tetrahedra to a flat layer: each triangle takes the values of its own."""
-        plane = self.direction[layer.cell] @ layer.plane.frame[:2].T
+        direction = self.direction[layer.cell]
+        if layer.turns is not None:
+            direction = np.einsum("tij,tj->ti", layer.turns, direction)
+        plane = direction @ layer.plane.frame[:2].T
         length = np.linalg.norm(plane, axis=1)
         defined = self.defined[layer.cell] & (length > 1e-6)
         unit = plane / np.maximum(length, 1e-300)[:, None]
@@ -75,14 +78,7 @@ def plane_tension(plane_stress: FloatArray, compression_limit: float = 3.0) -> T
 
     A fibre that lies in a flat layer carries the stress in that plane only, so this is what the
     planning uses by default; for stress in the plane it equals the projection of
-    `spatial_tension`.
-
-    Parameters
-    ----------
-    plane_stress : (k, 3) array, MPa
-        s11, s22, s12 in the plane.
-    compression_limit : float, default 3.0
-        The paper's mu.
+    `spatial_tension`. The plane stress (k, 3), MPa, is s11, s22, s12; the limit is the paper's mu.
     """
     largest, smallest, angle = largest_in_plane(plane_stress)
     defined = (largest > 0.0) & (-smallest < compression_limit * largest)

@@ -72,13 +72,14 @@ def _shared(  # type: ignore[no-untyped-def]
     layer, line, apart, ring, width, height, same_cosine
 ):  # fmt: skip  # pragma: no cover
     half = 0.5 * width
+    # The furthest that a middle may lie whose rectangle meets the line across a part.
+    reach = (half + np.sqrt(half * half + 0.25 * ahead.max() ** 2)) * (1.0 + 1e-9)
     found = np.ones((len(middle), 4))
     room = 64
     at, change = np.empty(room), np.empty((room, 4))
     low, high = np.empty(3, np.int64), np.empty(3, np.int64)
     current = np.empty(4)
     for k in range(len(middle)):
-        reach = width + 0.5 * ahead[k]
         for i in range(3):
             low[i] = max(int(np.floor((middle[k, i] - reach - origin[i]) / cell)), 0)
             high[i] = min(int(np.floor((middle[k, i] + reach - origin[i]) / cell)), shape[i] - 1)
@@ -89,6 +90,11 @@ def _shared(  # type: ignore[no-untyped-def]
                     box = (a * shape[1] + b) * shape[2] + c
                     for item in range(starts[box], starts[box + 1]):
                         other = items[item]
+                        square = 0.0
+                        for i in range(3):
+                            square += (middle[k, i] - middle[other, i]) ** 2
+                        if square > reach * reach:
+                            continue
                         if line[other] == line[k]:
                             between = abs(other - k)
                             if ring[k]:

@@ -113,7 +113,7 @@ def beads(
     direction = direction - np.einsum("ij,ij->i", direction, normal)[:, None] * normal
     direction /= np.maximum(np.linalg.norm(direction, axis=1), 1e-300)[:, None]
     found = share_room(
-        bucket(middle, middle, 1.25 * width),
+        bucket(middle, middle, 1.05 * width),
         middle,
         direction,
         normal,

@@ -77,8 +77,7 @@ def _near(
                     continue
                 if found == len(pairs):
                     longer = np.empty((2 * found, 2), np.int64)
-                    for k in range(found):
-                        longer[k, 0], longer[k, 1] = pairs[k, 0], pairs[k, 1]
+                    longer[:found] = pairs
                     pairs = longer
                 pairs[found, 0], pairs[found, 1] = min(i, j), max(i, j)
                 found += 1

@@ -11,7 +11,7 @@ from ccfem.geometry.shells import concentric
 __all__ = ["medial_fill"]
 
 _SHORTEST = 4.0
-"""Segments of the medial axis shorter than so many pitches are left out."""
+"""Segments of the medial axis shorter than this many pitches are left out."""
 
 
 def medial_fill(section: Region, pitch: float, closest: float) -> list[FloatArray]:
@@ -24,10 +24,8 @@ def medial_fill(section: Region, pitch: float, closest: float) -> list[FloatArra
     ----------
     section : shapely (Multi)Polygon, mm
         Its border is the edge of other strands.
-    pitch : float, mm
-        Distance of neighbouring strands.
-    closest : float
-        As in `geometry.parallel_strands.parallels`.
+    pitch, closest
+        As in `geometry.parallel_strands.grow`.
     """
     axis = medial_axis(section, 0.5 * pitch)
     segments = [s for s in axis.segments if s.length >= _SHORTEST * pitch]

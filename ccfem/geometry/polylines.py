@@ -57,7 +57,7 @@ def starts_segment(offsets: IntArray) -> BoolArray:
 
 
 def inner_points(offsets: IntArray, closed: BoolArray) -> BoolArray:
-    """Mask (P,) of the points at which polylines go on: of closed ones also the first."""
+    """Mask (P,) of the points with a segment on both sides: of closed ones also the first."""
     mask = starts_segment(offsets)
     held = np.diff(offsets) > 0
     mask[offsets[:-1][held]] &= np.asarray(closed, dtype=bool)[held]

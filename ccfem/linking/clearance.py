@@ -1,4 +1,4 @@
-"""Keeping strands apart: what lies nearer than a strand's width to a longer one is cut away."""
+"""Strands kept apart: what lies closer than a strand's width to a longer one is cut away."""
 
 from collections.abc import Sequence
 
@@ -14,7 +14,7 @@ __all__ = ["trim_to_clearance"]
 def trim_to_clearance(
     lines: Sequence[FloatArray], clearance: float, least_length: float, first: int = 0
 ) -> list[FloatArray]:
-    """Cut strands so that no two are nearer than a clearance, the longest first.
+    """Cut strands so that no two are closer than a clearance, the longest first.
 
     Of each strand, only the stretches that keep the clearance from those laid before, and from
     earlier parts of itself, remain; stretches shorter than `least_length` are dropped.
@@ -26,7 +26,7 @@ def trim_to_clearance(
     clearance : float, mm
     least_length : float, mm
     first : int, default 0
-        So many strands at the start of `lines` are laid before all others.
+        Number of strands at the start of `lines` that are laid before all others.
 
     Returns
     -------

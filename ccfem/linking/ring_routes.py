@@ -16,12 +16,12 @@ from ccfem.linking.link_curves import curve_cost
 __all__ = ["RingRoutes", "ring_cost", "ring_curve", "ring_routes"]
 
 _DISTANCE = 5.0
-"""Distance, mm, of the ring to the part; at least the radius."""
+"""Distance, mm, from the ring to the part; at least the radius."""
 _LEADS = (5.0, 10.0, 16.0)
 """How far ahead on the ring, mm, a lead may end; more where turns are wide."""
 
 _NEAR = 0.01
-"""Half the chord, mm, that is taken for a tangent of the ring."""
+"""Half the length, mm, of the chord taken as a tangent of the ring."""
 
 
 class RingRoutes(NamedTuple):

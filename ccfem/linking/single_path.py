@@ -10,6 +10,7 @@ the order of the tracks is the one whose links cost least (`ordering`).
 from collections.abc import Sequence
 from dataclasses import dataclass
 from itertools import pairwise
+from typing import NamedTuple
 
 import numpy as np
 import shapely
@@ -89,10 +90,7 @@ class LinkedPath:
 
 
 def link_tracks(
-    groups: Sequence[Sequence[FloatArray]],
-    section: Region,
-    radius: float,
-    width: float,
+    groups: Sequence[Sequence[FloatArray]], section: Region, radius: float, width: float
 ) -> LinkedPath:
     """Join the tracks of all groups to one path.
 
@@ -109,7 +107,7 @@ def link_tracks(
     Parameters
     ----------
     groups : sequence of sequences of (n_i, 2) arrays, mm
-        One group for each main path. Tracks with less than two points are left out, and so are
+        One group for each main path. Tracks with fewer than two points are left out, and so are
         repeated points; a track whose last point is its first is closed, and is opened at the same
         place as the others of its group, with a gap for the link to the next. Tracks go on straight
         at their ends for a millimetre at least, so these should lie on the border of the section.
@@ -117,7 +115,7 @@ def link_tracks(
     radius : float, mm
         Tightest turn of a link.
     width : float, mm
-        Distance of neighbouring tracks.
+        Spacing of neighbouring tracks.
 
     Returns
     -------
@@ -180,39 +178,19 @@ def _opened(
     return found
 
 
-@dataclass(frozen=True)
-class _Network:
-    """Links between all ends of tracks.
+class _Network(NamedTuple):
+    """Links between all ends of tracks: ends 2k and 2k + 1 are those of track k."""
 
-    Attributes
-    ----------
-    ends : (t, 3) array
-        Poses at the ends, heading out of the track: 2k and 2k + 1 are those of track k.
-    reach : (t,) array, mm
-        Straight extension of an end before a way round the part.
-    cost : (t, t) array, mm
-    curves : LinkCurves
-    routes : RingRoutes
-    by_ring : (t, t) bool array
-    way : (t, t) int array
-        On the ring.
-    """
-
-    ends: FloatArray
-    reach: FloatArray
-    cost: FloatArray
+    ends: FloatArray  # (t, 3), poses that head out of the track
+    reach: FloatArray  # (t,), mm, straight extension before a way round the part
+    cost: FloatArray  # (t, t), mm
     curves: LinkCurves
     routes: RingRoutes
-    by_ring: BoolArray
-    way: IntArray
+    way: IntArray  # (t, t), on the ring
 
     @classmethod
     def between(
-        cls,
-        tracks: Sequence[FloatArray],
-        closed: BoolArray,
-        section: Region,
-        radius: float,
+        cls, tracks: Sequence[FloatArray], closed: BoolArray, section: Region, radius: float
     ) -> "_Network":
         ends = _end_poses(tracks)
         grid, weights = section_grid(section, 30.0), np.array(_WEIGHTS)
@@ -224,11 +202,11 @@ class _Network:
         around = around + reach[:, 0] + reach[:, :1]
         curves = link_curves(ends, reach, radius, grid, weights, around)
         cost = np.minimum(curves.cost, np.minimum(around, around.T))
-        return cls(ends, reach[:, 0], cost, curves, routes, ~np.isfinite(curves.cost), way)
+        return cls(ends, reach[:, 0], cost, curves, routes, way)
 
     def link(self, a: int, b: int) -> FloatArray:
         """Points (n, 2), mm, from end a to end b."""
-        if not self.by_ring[a, b]:
+        if np.isfinite(self.curves.cost[a, b]):
             return link_curve(self.ends, a, b, self.curves, self.routes.radius, _STEP)
         curve = ring_curve(self.routes, a, b, int(self.way[a, b]), _STEP)
         before, after = (stub_points(self.ends[k], self.reach[k], _STEP) for k in (a, b))
@@ -236,12 +214,9 @@ class _Network:
 
 
 def _end_poses(tracks: Sequence[FloatArray]) -> FloatArray:
-    ends = np.empty((2 * len(tracks), 3))
-    for k, track in enumerate(tracks):
-        for end, (tip, before) in enumerate(((track[0], track[1]), (track[-1], track[-2]))):
-            out = tip - before
-            ends[2 * k + end] = *tip, np.arctan2(out[1], out[0])
-    return ends
+    tips = np.concatenate([track[[0, -1]] for track in tracks])
+    x, y = (tips - np.concatenate([track[[1, -2]] for track in tracks])).T
+    return np.column_stack([tips, np.arctan2(y, x)])
 
 
 def _order(cost: FloatArray, offsets: IntArray) -> IntArray:

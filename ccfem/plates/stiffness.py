@@ -67,7 +67,7 @@ def turned_by(angle: FloatArray, derivative: bool = False) -> FloatArray:
 
 
 def stack_plane(layers: FloatArray, thickness: ArrayLike | None = None) -> FloatArray:
-    """Stiffness of layers that are strained alike in their plane.
+    """Stiffness of layers that share the strain in their plane.
 
     Parameters
     ----------

@@ -1,4 +1,4 @@
-"""Figures of sections: size, scale bar, colour bar, and files. No state of pyplot is touched."""
+"""Figures of sections: size, scale bar, colour bar, and files. Pyplot's state is left alone."""
 
 import io
 from collections.abc import Sequence
@@ -48,12 +48,7 @@ def new_figure(extents: Sequence[float], columns: int = 1) -> tuple["Figure", li
         x and y of the lower left, then of the upper right corner of what is drawn.
     columns : int, default 1
         Pictures; the height of each follows the section's shape, up to one and a half times its
-        width.
-
-    Returns
-    -------
-    figure, list of axes
-        Axes without frame and ticks, in mm, both directions to one scale.
+        width. Their axes have no frame and no ticks, and are in mm, both to one scale.
     """
     from matplotlib.backends.backend_agg import FigureCanvasAgg
     from matplotlib.figure import Figure

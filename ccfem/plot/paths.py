@@ -24,6 +24,7 @@ __all__ = [
     "compare_layer",
     "draw_section",
     "draw_stress",
+    "force_on_paths",
     "layer_picture",
     "mark_failure",
     "picture_extents",
@@ -53,6 +54,23 @@ class Coloured:
     values: FloatArray
     label: str
     limits: tuple[float, float]
+
+
+def force_on_paths(
+    middle: FloatArray, tangent: FloatArray, length: FloatArray, force: FloatArray, layer: Layer
+) -> Coloured:
+    """Axial force in the pieces of fibre of a flat layer, N.
+
+    Pieces of all layers are given by their middle (s, 3), mm, unit tangent (s, 3), length (s,), mm,
+    and force (s,), N. The scale ends at the force that 99 % of those of the layer stay below.
+    """
+    plane = layer.plane
+    here = np.abs(middle @ plane.frame[2] - plane.height) < 1e-6 * (1.0 + abs(plane.height))
+    along = 0.5 * length[here, None] * plane.project(tangent[here])
+    centre = plane.project(middle[here])
+    most = float(np.quantile(force[here], 0.99)) if here.any() else 1.0
+    pieces = np.stack([centre - along, centre + along], axis=1)
+    return Coloured(pieces, force[here], "N in the fibre", (0.0, max(most, 1e-12)))
 
 
 def tension_limit(stress: LayerStress) -> float:
@@ -190,7 +208,7 @@ def mark_failure(axes: "Axes", point: FloatArray, label: str = "") -> None:
 
 
 def _points(axes: "Axes", length: float) -> float:
-    """Size in points of a length, mm, on the axes, at least a hair."""
+    """Size in points of a length, mm, on the axes, at least that of a hairline."""
     return max(72.0 * inches_per_mm(axes) * length, 0.3)
 
 
@@ -225,11 +243,6 @@ def layer_picture(
         Pieces drawn instead of the paths in one colour.
     colour : str, optional
         Of the mark before the heading: that of the strategy.
-
-    Returns
-    -------
-    Figure
-        For `plot.canvas.png` or `plot.canvas.save`.
     """
     figure, (axes,) = new_figure(picture_extents(layer, [paths]))
     _draw(axes, layer, stress, paths, width, limit, coloured)

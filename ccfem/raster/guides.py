@@ -14,12 +14,12 @@ from ccfem.raster.skeleton import segments, skeleton
 from ccfem.raster.thinning import thin
 from ccfem.tensor import in_plane
 
-__all__ = ["guide_pixels", "segment_seeds", "stress_guides"]
+__all__ = ["segment_seeds", "stress_guides"]
 
 _STEP = 0.5
 _APART = 2.0
 _SHORTEST = 6
-"""In pixels: step along a streamline, least distance of guides, and least number of pixels."""
+"""In pixels: step along a streamline, minimum distance of guides, minimum number of pixels."""
 
 
 def segment_seeds(inside: BoolArray) -> IntArray:
@@ -53,25 +53,13 @@ def segment_seeds(inside: BoolArray) -> IntArray:
     return np.array(seeds, dtype=np.int64).reshape(-1, 2)
 
 
-def guide_pixels(
+def _guide_pixels(
     raster: Bitmap, inside: BoolArray, curves: Sequence[FloatArray], seeds: IntArray
 ) -> IntArray:
-    """Guide that each pixel is on, cut where it comes near to one before it.
+    """Guide (H, W) that each pixel is on, -1 for none, cut where it comes near to one before it.
 
-    Parameters
-    ----------
-    raster : Bitmap
-    inside : (H, W) bool array
-        Pixels that guides stay in.
-    curves : sequence of (m, 2) arrays, mm
-        With steps of at most half a pixel; in the order of their importance.
-    seeds : (k, 2) int array
-        Pixel of each curve that its guide has to hold.
-
-    Returns
-    -------
-    (H, W) int array
-        -1 where there is none.
+    Curves are in the order of their importance, with steps of at most half a pixel; a guide holds
+    the seed (k, 2) of its curve.
     """
     guides = np.full(inside.shape, -1, dtype=np.int64)
     free = inside.copy()
@@ -129,4 +117,4 @@ def stress_guides(
     starts = raster.centres(seeds)
     step = _STEP * raster.pixel
     curves = streamlines(layer.plane.points, layer.triangles, plane, starts, step)
-    return guide_pixels(raster, inside, curves, seeds)
+    return _guide_pixels(raster, inside, curves, seeds)

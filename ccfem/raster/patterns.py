@@ -11,7 +11,6 @@ from scipy import ndimage
 
 from ccfem.arrays import BoolArray, IntArray, freeze
 from ccfem.raster.bands import Metric, bands
-from ccfem.raster.hatch import hatch_lines
 from ccfem.raster.skeleton import nearest_segment, skeleton
 
 __all__ = [
@@ -22,6 +21,7 @@ __all__ = [
     "concentric_regions",
     "first_touch",
     "grid_regions",
+    "hatch_lines",
     "inside_shells",
     "medial_regions",
     "rings_round",
@@ -80,9 +80,37 @@ def rings_round(guides: IntArray, inside: BoolArray) -> tuple[IntArray, IntArray
 
 
 def first_touch(ring: IntArray) -> int:
-    """Find the first ring with a pixel at a side of one outside."""
+    """Find the first ring with a pixel that shares a side with one outside."""
     inside = ring >= 0
     return int(ring[inside & ~ndimage.binary_erosion(inside)].min())
+
+
+def hatch_lines(mask: BoolArray, angle: float, every_row: bool = False) -> IntArray:
+    """Find the line that each pixel lies on.
+
+    Parameters
+    ----------
+    mask : (H, W) bool array
+    angle : float, radians
+        Of the lines to the rows of pixels.
+    every_row : bool, default False
+        Lines of one pixel in every column (or row), which are nearer than a pixel to each other
+        unless they run along rows or columns: at 45 degrees every diagonal is one. Otherwise the
+        lines are strips a pixel wide.
+
+    Returns
+    -------
+    (H, W) int array
+        -1 where the mask is empty.
+    """
+    height, width = mask.shape
+    x = np.arange(width) - 0.5 * (width - 1)
+    y = (0.5 * (height - 1) - np.arange(height))[:, None]
+    across, down = np.cos(angle), np.sin(angle)
+    step = max(abs(across), abs(down)) if every_row else 1.0
+    # Half an odd number of lines falls between two: a small shift decides alike everywhere.
+    line = np.floor((across * y - down * x) / step + 0.5 + 1e-9).astype(np.int64)
+    return np.where(mask, line - line.min(), -1)
 
 
 def _stack(*parts: tuple[IntArray, int]) -> Regions:
@@ -108,7 +136,7 @@ def _shells(
 def concentric_regions(
     mask: BoolArray, shells: int = 3, rings: int | None = None, metric: Metric = "euclid"
 ) -> Regions:
-    """Rings from the border to the middle, or so many of them."""
+    """Rings from the border to the middle, or the first few of them."""
     ring = bands(mask, metric)
     if rings is not None:
         ring = np.where(ring < rings, ring, -1)

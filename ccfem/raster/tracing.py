@@ -26,7 +26,7 @@ _ROUNDS = 20
 
 @dataclass(frozen=True)
 class PixelPaths:
-    """Paths as chains of neighbouring pixels, and the path that every solid pixel belongs to.
+    """Paths as chains of neighbouring pixels, and the path that each solid pixel belongs to.
 
     Attributes
     ----------

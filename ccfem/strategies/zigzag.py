@@ -40,7 +40,7 @@ class Zigzag:
     turn: float = 90.0
 
     amount: ClassVar[Amount] = SPACING
-    flat_layers_only: ClassVar[bool] = True
+    in_plane: ClassVar[bool] = True
     direction: ClassVar[str] = "angle"
 
     def __post_init__(self) -> None:

@@ -11,13 +11,13 @@ from ccfem.geometry.medial_axis import MedialAxis, MedialSegment, medial_axis
 from ccfem.geometry.shapes import Region
 from ccfem.mesh.measures import connected
 
-__all__ = ["FREE", "Frame", "Member", "ends_at", "frame"]
+__all__ = ["ARC_CHORD", "FREE", "Frame", "Member", "ends_at", "frame"]
 
 FREE = -1
 """Joint of an end that meets no other member."""
 
-_ARC_CHORD = 1.6
-"""Way along the border over its chord up to which a branch is the bisector of a corner; a square
+ARC_CHORD = 1.6
+"""Maximum ratio of the length along the border to its chord for the bisector of a corner; a square
 corner has 1.41."""
 
 _CONTRACTION = 1.25
@@ -100,7 +100,7 @@ def frame(section: Region, step: float) -> Frame:
     step : float, mm
         Largest distance of the samples along the border.
     """
-    axis = medial_axis(section, step, object_angle=None, arc_chord=_ARC_CHORD)
+    axis = medial_axis(section, step, object_angle=None, arc_chord=ARC_CHORD)
     joint, short = _joints(axis)
     members = []
     for segment, within in zip(axis.segments, short, strict=True):
@@ -133,7 +133,7 @@ def _joints(axis: MedialAxis) -> tuple[IntArray, BoolArray]:
 
 
 def _joined(members: list[Member], joint: int) -> list[Member]:
-    """Members with those two joined that are alone in a joint; one that is alone is a ring."""
+    """Members, with the two joined that alone meet in a joint; a single one becomes a ring."""
     ends = ends_at(members, joint)
     if len(ends) != 2:
         return members

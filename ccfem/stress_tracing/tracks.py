@@ -155,17 +155,15 @@ def _held(line: FloatArray, section: Region, inner: Region, closed: bool) -> Flo
     """Push a line back where it leaves a section between its ends, and its neighbours less."""
     step = 0.2 * STEP
     fine, _, _ = subdivide(line, np.array([0, len(line)]), step)
-    ends = round(STEP / step)
-    outside = ~shapely.contains_xy(section, fine)
-    if not closed:
-        outside[:ends] = outside[-ends:] = False
+    ends = 0 if closed else round(STEP / step)
+    between = np.arange(len(fine)) >= ends
+    between &= between[::-1]
+    outside = between & ~shapely.contains_xy(section, fine)
     if not outside.any() or shapely.is_empty(inner):
         return line
     mode = "wrap" if closed else "nearest"
     reach = 2 * round(2.0 * _SPREAD / step) + 1
-    beside = maximum_filter1d(outside.astype(np.float64), reach, mode=mode) > 0.0
-    if not closed:
-        beside[:ends] = beside[-ends:] = False
+    beside = between & (maximum_filter1d(outside.astype(np.float64), reach, mode=mode) > 0.0)
     push = np.zeros_like(fine)
     for _ in range(_ROUNDS):
         out = np.flatnonzero(beside)[~shapely.contains_xy(inner, fine[beside])]

@@ -9,13 +9,11 @@ old place. That distance counts much in members, whose width the tracks fill eve
 joints. Where r is over 45 degrees, in joints that it crosses, a track is left alone.
 """
 
-from typing import Any
-
 import numpy as np
 import shapely
 from scipy.ndimage import gaussian_filter1d
 from scipy.optimize import isotonic_regression
-from scipy.sparse import coo_array
+from scipy.sparse import diags_array, eye_array
 from scipy.sparse.linalg import spsolve
 
 from ccfem.arrays import FloatArray
@@ -93,17 +91,11 @@ def _wanted(
 
 def _least(weight: FloatArray, slope: FloatArray, hold: FloatArray, closed: bool) -> FloatArray:
     """Move (n,) of one line that minimises the sum."""
-    count = len(hold)
-    first = np.arange(len(weight))
-    bent = np.arange(count) if closed else np.arange(1, count - 1)
-    rise = _rows([(first, -1.0), ((first + 1) % count, 1.0)], count) / STEP
-    bend = _rows([(bent - 1, 1.0), (bent, -2.0), ((bent + 1) % count, 1.0)], count) / STEP**2
-    diagonal = np.arange(count)
-    matrix = (
-        rise.T @ (weight[:, None] * rise)
-        + _BENDING**2 * (bend.T @ bend)
-        + coo_array((hold, (diagonal, diagonal)), shape=(count, count))
-    )
+    here = eye_array(len(hold), format="csr")
+    ahead = here[np.roll(np.arange(len(hold)), -1)]
+    rise = (ahead - here)[: len(weight)] / STEP
+    bend = (ahead - 2.0 * here + ahead.T)[slice(None) if closed else slice(1, -1)] / STEP**2
+    matrix = rise.T @ (weight[:, None] * rise) + _BENDING**2 * (bend.T @ bend) + diags_array(hold)
     return np.asarray(spsolve(matrix.tocsc(), rise.T @ (weight * slope)))
 
 
@@ -119,12 +111,3 @@ def _apart(moved: FloatArray, band: Band) -> FloatArray:
         place[:, column] = isotonic_regression(place[:, column]).x
     mode = "wrap" if band.closed else "nearest"
     return np.asarray(gaussian_filter1d(even - place - least, 1.0 / STEP, axis=1, mode=mode))
-
-
-def _rows(terms: list[tuple[Any, float]], count: int) -> Any:
-    """Sparse matrix with one row for every entry of the columns of each term."""
-    size = len(terms[0][0])
-    row = np.tile(np.arange(size), len(terms))
-    column = np.concatenate([index % count for index, _ in terms])
-    value = np.repeat([factor for _, factor in terms], size)
-    return coo_array((value, (row, column)), shape=(size, count)).tocsr()

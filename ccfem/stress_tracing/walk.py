@@ -14,12 +14,12 @@ from ccfem.geometry.polylines import inner_points, pack, resample
 from ccfem.geometry.shapes import Region
 from ccfem.layers.layer_stress import LayerStress
 from ccfem.stress_tracing.criterion import Criterion
+from ccfem.stress_tracing.frame import ARC_CHORD
 from ccfem.stress_tracing.stress_lines import misalignment, plane_stress_at, stress_lines
 
 __all__ = ["walk"]
 
 _LEAST_POINTS = 3
-_ARC_CHORD = 1.6
 _STEP = 1.0
 """Distance, mm, of the points of the axis."""
 _RULE = Criterion(90.0, 45.0, 3.0 * _STEP)
@@ -79,7 +79,7 @@ def walk(section: Region, stress: LayerStress, sampling: float) -> list[FloatArr
 
 def _points(section: Region, sampling: float) -> tuple[FloatArray, IntArray, BoolArray]:
     """Points (n, 2) of the axis, how often each may be passed, and which are ends."""
-    axis = medial_axis(section, sampling, object_angle=None, arc_chord=_ARC_CHORD)
+    axis = medial_axis(section, sampling, object_angle=None, arc_chord=ARC_CHORD)
     if not axis.segments:
         return np.zeros((0, 2)), np.zeros(0, dtype=np.int64), np.zeros(0, dtype=bool)
     lines, offsets = resample(*pack([segment.points for segment in axis.segments]), _STEP)

@@ -7,7 +7,7 @@ from scipy.spatial import cKDTree
 
 from ccfem.arrays import BoolArray, FloatArray, freeze, in_brief
 from ccfem.checks import check_number
-from ccfem.elasticity.problem import Problem
+from ccfem.elasticity.problem import Order, Problem
 from ccfem.plates.problem import PlaneProblem
 from ccfem.topopt.material_axes import axes_about_z
 
@@ -31,8 +31,8 @@ class Design:
     density : (m,) array in [0, 1]
         Of each cell (filtered, with a density filter).
     variables : (m,) array in [0, 1]
-        What the optimiser moves: equal to `density` unless that is filtered. Start from them to go
-        on with a run.
+        What the optimiser changes: equal to `density` unless that is filtered. Start from them to
+        continue a run.
     factor : (m,) array in (0, 1]
         On the stiffness of each cell, from its density.
     compliance : (k,) array, N mm
@@ -83,10 +83,11 @@ class Design:
 
     @property
     def problem(self) -> PlaneProblem | Problem:
-        """The problem with the stiffness that the densities give."""
+        """The problem with the stiffness that the densities give, on the cells as they are."""
         if isinstance(self.full, PlaneProblem):
             return replace(self.full, stiffness=self.factor[:, None, None] * self.full.stiffness)
-        return replace(self.full, density=self.factor)
+        order: Order = 1 if self.full.mesh.order == 1 else 2
+        return replace(self.full, density=self.factor, order=order)
 
     def axes_at(self, points: FloatArray) -> FloatArray | None:
         """Material axes (k, 3, 3), as columns, of the cells nearest to points (k, 3), mm.

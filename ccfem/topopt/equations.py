@@ -4,11 +4,10 @@ import numpy as np
 import scipy.sparse as sp
 
 from ccfem.arrays import FloatArray
-from ccfem.elasticity.assembly import assemble
 from ccfem.elasticity.problem import Problem
 from ccfem.elasticity.recovery import cell_strain
-from ccfem.elasticity.solve import prepare as prepare_tets
 from ccfem.elasticity.solvers import LARGEST_DIRECT, choose_direct, direct_backend
+from ccfem.elasticity.system import prepare as prepare_tets
 from ccfem.errors import InputError
 from ccfem.plates.problem import PlaneProblem
 from ccfem.plates.solve import prepare as prepare_plate
@@ -71,17 +70,17 @@ class TetEquations:
         self.volumes = problem.mesh.volumes
 
     def backend(self) -> str:
-        """Name the backend for many solves of parts with voids, which a multigrid is slow on."""
+        """Name the backend for many solves of parts with voids, for which multigrid is slow."""
         best, unknowns = direct_backend(), 3 * len(self.system.held.nodes)
         return best if best != "superlu" and unknowns <= LARGEST_DIRECT else "auto"
 
     def elements(self, stiffness: FloatArray | None) -> FloatArray:
-        """Return the stiffness, where there is none that of the problem."""
+        """Return the stiffness, by default that of the problem."""
         return self.system.stiffness if stiffness is None else stiffness
 
     def assemble(self, factor: FloatArray, elements: FloatArray) -> sp.bsr_array:
         """Stiffness matrix (3n, 3n), N/mm, with a factor (m,) on the stiffness of each cell."""
-        return assemble(self.system.problem.mesh, elements, factor, self.system.where)
+        return self.system.assemble(elements, factor)
 
     def energy(self, displacement: FloatArray, elements: FloatArray) -> FloatArray:
         """Energy ``u^T k u`` (m,), N mm, of each cell."""

@@ -21,8 +21,8 @@ def sheet(plane: FloatArray) -> FloatArray:
     Returns
     -------
     (6, 6) array, MPa
-        Stress and strain along z have nothing to do with those in the plane; the shears across it
-        are as stiff as the one in it. For tetrahedra that are held along z at every node.
+        Stress and strain along z are uncoupled from those in the plane; the shears across it are
+        as stiff as the one in it. For tetrahedra that are held along z at every node.
     """
     solid = np.diag([0.0, 0.0, 0.5 * (plane[0, 0] + plane[1, 1]), plane[2, 2], plane[2, 2], 0.0])
     solid[np.ix_([0, 1, 5], [0, 1, 5])] = plane
@@ -51,7 +51,7 @@ def harmonics(material: FloatArray) -> FloatArray:
     Raises
     ------
     InputError
-        For a solid that is not alike on both sides of the x-y plane.
+        For a solid that is not symmetric about the x-y plane.
     """
     if material.shape == (3, 3):
         return fitted_harmonics(lambda angle: rotate_plane(material, angle))
@@ -64,7 +64,7 @@ def harmonics(material: FloatArray) -> FloatArray:
     missed = turned(other) - np.tensordot(turned_by(other), found, axes=1)
     if np.abs(missed).max() > 1e-9 * np.abs(material).max():
         raise InputError(
-            "a material whose axis turns about z must be alike on both sides of the x-y plane: "
+            "a material whose axis turns about z must be symmetric about the x-y plane: "
             "give one with an axis of symmetry along z"
         )
     return found

@@ -91,7 +91,7 @@ def to_principal_stress(
 def down_the_gradient(
     model: OrientedCompliance, response: Response, factor: FloatArray, cone: ConeFilter
 ) -> OrientedCompliance:
-    """Step down the filtered gradient, by 5 degrees where it is as large as at most cells."""
+    """Step down the filtered gradient, by 5 degrees where it reaches its 90th percentile."""
     gradient = cone.average(model.angle_gradient(response, factor) / cone.volumes)
     scale = float(np.percentile(np.abs(gradient), 90.0))
     if not scale > 0.0:

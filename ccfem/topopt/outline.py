@@ -143,8 +143,8 @@ def outline(
     inside : (H, W) bool array, optional
         Pixels of the domain; default all.
     keep : (k, 2) array, mm, optional
-        Points, such as loads and supports, that must hang together; by default the largest piece
-        is the part.
+        Points, such as loads and supports, that must be joined; by default the largest piece is
+        the part.
     least_hole : float, default 4
         Holes below this many pixels are closed.
 

@@ -75,9 +75,9 @@ class Simp(Parameters):
         groups : (m,) int array, optional
             Cells with the same number share one density: the columns of a plate of tetrahedra.
         start : (m,) array in [0, 1], optional
-            Variables to start from (`Design.variables` to go on with a run); default uniform.
+            Variables to start from (`Design.variables` to continue a run); default uniform.
         progress : callable, optional
-            Told the compliance, the volume and the change of each iteration.
+            Told the compliance, volume and change of each iteration.
 
         Raises
         ------

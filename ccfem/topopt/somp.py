@@ -95,7 +95,7 @@ class Somp(Parameters):
             Cells with the same number share density and angle: the columns of a plate of
             tetrahedra.
         start : (m,) array in [0, 1], optional
-            As in `Simp`. To go on with a run give its variables, and its `angle` as `angle`.
+            As in `Simp`. To continue a run give its variables, and its `angle` as `angle`.
 
         Returns
         -------
@@ -105,7 +105,7 @@ class Somp(Parameters):
         Raises
         ------
         InputError
-            As in `Simp`, and for a material that is not alike on both sides of the x-y plane.
+            As in `Simp`, and for a material that is not symmetric about the x-y plane.
         SolveError
             When a solve misses its tolerance.
         """

@@ -23,18 +23,11 @@ _LEAST_VOID = 30.0
 
 
 class _Field(NamedTuple):
-    """Density at the nodes of a mesh, and what has to hang together.
+    """Density at the nodes of a mesh, and what has to be joined.
 
-    Attributes
-    ----------
-    mesh : TetMesh
-    values : (n,) array
-    share : (n,) array
-        Volume of the cells round each node that is its own, in mean cells.
-    pairs : (e, 2) int array
-        Nodes joined by an edge.
-    anchors : list of int arrays
-        Nodes of every loaded and held patch, and of point forces.
+    The share (n,) of a node is its part of the volume of the cells round it, in mean cells; pairs
+    (e, 2) are joined by an edge; anchors are the nodes of every loaded and held patch, and of
+    point forces.
     """
 
     mesh: TetMesh

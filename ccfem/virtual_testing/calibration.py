@@ -14,11 +14,11 @@ from pathlib import Path
 import numpy as np
 from scipy.optimize import brentq
 
-from ccfem.checks import check_number
 from ccfem.elasticity.problem import Problem
 from ccfem.elasticity.solve import solve
 from ccfem.elasticity.stress_field import StressField
 from ccfem.errors import InputError
+from ccfem.io.toml import from_table
 from ccfem.io.whole import existing_file, whole_file
 from ccfem.materials import Material, isotropic
 from ccfem.toolpaths import Toolpaths
@@ -47,8 +47,9 @@ class Calibration:
         Young's modulus of the printed matrix.
     poisson : float
         As assumed for the calibration.
-    matrix_strength : float, MPa
-        Von Mises stress, averaged over a ball, at which the part without fibre failed.
+    tensile_strength : float, MPa
+        Of the matrix: von Mises stress, averaged over a ball, at which the part without fibre
+        failed.
     rho : float or None, mm^2
         EA of a strand over the modulus; None without a reinforced test.
     source : str
@@ -58,7 +59,7 @@ class Calibration:
     name: str
     modulus: float
     poisson: float
-    matrix_strength: float
+    tensile_strength: float
     rho: float | None = None
     source: str = ""
 
@@ -66,7 +67,7 @@ class Calibration:
     def material(self) -> Material:
         """The matrix."""
         return isotropic(
-            self.modulus, self.poisson, self.name, self.matrix_strength, source=self.source
+            self.modulus, self.poisson, self.name, self.tensile_strength, source=self.source
         )
 
     def strand(self, default: Strand | None = None) -> Strand:
@@ -76,16 +77,12 @@ class Calibration:
 
     def write(self, path: str | Path) -> None:
         """Write a material file (TOML) that `read_calibration` reads."""
-        lines = [
-            "# Material calibrated on printed parts. Units: mm, N, MPa.",
-            f"name = {_quoted(self.name)}",
-            f"modulus = {self.modulus!r}",
-            f"poisson = {self.poisson!r}",
-            f"tensile_strength = {self.matrix_strength!r}",
-            f"source = {_quoted(self.source)}",
-        ]
-        if self.rho is not None:
-            lines.append(f"rho = {self.rho!r}")
+        lines = ["# Material calibrated on printed parts. Units: mm, N, MPa."]
+        for key, value in vars(self).items():
+            if value is not None:
+                # JSON writes strings and numbers as TOML does, but for the delete character.
+                text = json.dumps(value, ensure_ascii=False).replace("\x7f", "\\u007f")
+                lines.append(f"{key} = {text}")
         with whole_file(path) as temporary:
             temporary.write_text("\n".join(lines) + "\n", encoding="utf-8")
 
@@ -98,7 +95,7 @@ def calibrate(
     case: str | None = None,
     name: str = "calibrated",
 ) -> Calibration:
-    """Fit matrix and strand to tests of one part, the strand with fibres that carry tension only.
+    """Fit matrix and strand to tests of one part, with fibres that carry tension only.
 
     Parameters
     ----------
@@ -108,16 +105,13 @@ def calibrate(
     unreinforced : Curve
         Of the part without fibre. The displacement is taken as that of the load.
     reinforced : Curve, optional
-        Of the same part with `toolpaths` in it.
+        Of the same part with fibres.
     toolpaths : Toolpaths, optional
+        Fibres in the reinforced part.
     case : str, optional
         Load case that stands for the test; needed where there are several.
     name : str
         Name of the material.
-
-    Returns
-    -------
-    Calibration
 
     Raises
     ------
@@ -139,7 +133,7 @@ def calibrate(
         name=name,
         modulus=specimen.modulus * slope / computed,
         poisson=poisson,
-        matrix_strength=index * unreinforced.peak / specimen.force(field.reactions),
+        tensile_strength=index * unreinforced.peak / specimen.force(field.reactions),
         source=source,
     )
     if reinforced is None or toolpaths is None:
@@ -213,28 +207,14 @@ def read_calibration(path: str | Path) -> Calibration:
     Raises
     ------
     InputError
-        When the file cannot be read or a value is missing.
+        When the file cannot be read, or its values are not those of a calibration.
     """
     path = existing_file(path, "material file")
     try:
-        values = tomllib.loads(path.read_text(encoding="utf-8"))
-    except (OSError, UnicodeDecodeError, tomllib.TOMLDecodeError) as error:
+        values = {"name": path.stem, **tomllib.loads(path.read_text(encoding="utf-8"))}
+        return from_table(Calibration, values, "material")
+    except (OSError, UnicodeDecodeError, tomllib.TOMLDecodeError, InputError) as error:
         raise InputError(
             f"expected a material file at {path}; it cannot be read: {error}: write it by ccfem "
             "calibrate"
         ) from None
-    for key in ("modulus", "poisson", "tensile_strength", *(["rho"] if "rho" in values else [])):
-        check_number(f"{path}: {key}", values.get(key))
-    return Calibration(
-        name=str(values.get("name", path.stem)),
-        modulus=float(values["modulus"]),
-        poisson=float(values["poisson"]),
-        matrix_strength=float(values["tensile_strength"]),
-        rho=float(values["rho"]) if "rho" in values else None,
-        source=str(values.get("source", "")),
-    )
-
-
-def _quoted(text: str) -> str:
-    """Text as a TOML string: as in JSON, which leaves the delete character as it is."""
-    return json.dumps(text, ensure_ascii=False).replace("\x7f", "\\u007f")

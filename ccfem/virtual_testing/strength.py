@@ -6,14 +6,17 @@ after the first failure.
 """
 
 from dataclasses import dataclass
+from typing import Any
 
 import numpy as np
 from numba import njit
 from scipy.spatial import cKDTree
 
 from ccfem.arrays import FloatArray, IntArray
-from ccfem.elasticity.problem import PointForce, Support
+from ccfem.elasticity.load_kinds import patches_of, points_of
+from ccfem.elasticity.nodes import edge_nodes
 from ccfem.elasticity.stress_field import StressField
+from ccfem.elasticity.support_kinds import AnySupport, EdgeSupport, Support
 from ccfem.errors import InputError
 from ccfem.mesh.facets import are_among
 from ccfem.mesh.tet_mesh import TetMesh
@@ -21,20 +24,12 @@ from ccfem.tensor import von_mises
 from ccfem.virtual_testing.strand import Strand
 from ccfem.virtual_testing.virtual_test import VirtualTest
 
-__all__ = [
-    "BALL",
-    "FIBRE_SHARE",
-    "ZONE",
-    "FirstFailure",
-    "fibre_peak",
-    "first_failure",
-    "matrix_peak",
-]
+__all__ = ["FIBRE_SHARE", "FirstFailure", "fibre_peak", "first_failure", "matrix_peak"]
 
-BALL = 2.0
+_BALL = 2.0
 """Radius, mm, of the ball over which the von Mises stress is averaged."""
 
-ZONE = 3.0
+_ZONE = 3.0
 """Distance, mm, from patches of loads and supports within which stress is not judged."""
 
 FIBRE_SHARE = 0.99
@@ -130,21 +125,13 @@ def fibre_peak(test: VirtualTest, share: float = FIBRE_SHARE) -> tuple[float, Fl
     return float(test.axial_force[at]), test.strands.middle[at]
 
 
-def matrix_peak(
-    stress: StressField, ball: float = BALL, zone: float = ZONE
-) -> tuple[float, FloatArray]:
-    """Largest averaged von Mises stress, MPa, and its place (3,).
+def matrix_peak(stress: StressField) -> tuple[float, FloatArray]:
+    """Largest averaged von Mises stress of the matrix, MPa, and its place (3,).
 
-    Parameters
-    ----------
-    stress : StressField
-        Stress of the matrix.
-    ball : float, mm
-        Radius of the ball over which the von Mises stress of the cells is averaged by volume.
-    zone : float, mm
-        Cells whose centroid is closer to a patch with a load or a support are left out, though
-        they count in the averages of others. A whole flat face that slides in its plane, as a
-        plane of symmetry does, is no such patch: no stress peaks there.
+    The von Mises stress of the cells is averaged by volume over a ball of 2 mm radius. Cells whose
+    centroid is closer than 3 mm to a patch with a load or a support are left out, though they count
+    in the averages of others. A whole flat face that slides in its plane, as a plane of symmetry
+    does, is no such patch: no stress peaks there.
 
     Raises
     ------
@@ -154,15 +141,15 @@ def matrix_peak(
     mesh = stress.mesh
     centroid = mesh.points[mesh.corners].mean(axis=1)
     # Beyond the bound the distance is infinite, and the search short.
-    tree, bound = cKDTree(_held_and_loaded(stress)), np.nextafter(zone, np.inf)
+    tree, bound = cKDTree(_held_and_loaded(stress)), np.nextafter(_ZONE, np.inf)
     distance, _ = tree.query(centroid, distance_upper_bound=bound)
     judged = np.flatnonzero(np.isinf(distance))
     if not len(judged):
         raise InputError(
-            f"no cell lies farther than {zone:g} mm from the patches of loads and supports, so "
+            f"no cell lies farther than {_ZONE:g} mm from the patches of loads and supports, so "
             "no matrix stress can be judged: the part is too small for this index"
         )
-    average = _averages(centroid, von_mises(stress.stress), mesh.volumes, judged, ball)
+    average = _averages(centroid, von_mises(stress.stress), mesh.volumes, judged, _BALL)
     peak = average.argmax()
     return float(average[peak]), centroid[judged[peak]]
 
@@ -170,18 +157,25 @@ def matrix_peak(
 def _held_and_loaded(stress: StressField) -> FloatArray:
     """Points (k, 3) that cover the patches of the supports and of the load case."""
     problem = stress.problem
-    loads = problem.loads[stress.case]
+    mesh = problem.mesh
+    edges = [each.patches for each in problem.supports if isinstance(each, EdgeSupport)]
+    kinds: list[Any] = [*problem.loads_of(stress.case)]
+    kinds += [
+        each
+        for each in problem.supports
+        if not isinstance(each, EdgeSupport) and not _slides(mesh, each)
+    ]
     points = [np.zeros((0, 3))]
-    points += [np.array([load.point]) for load in loads if isinstance(load, PointForce)]
-    names = {load.patch for load in loads if not isinstance(load, PointForce)}
-    names |= {each.patch for each in problem.supports if not _slides(problem.mesh, each)}
-    points += [_cover(problem.mesh, name) for name in sorted(names)]
+    points += [np.array([point]) for kind in kinds for point in points_of(kind)]
+    points += [mesh.points[edge_nodes(mesh, names)] for names in edges]
+    names = {name for kind in kinds for name in patches_of(kind)}
+    points += [_cover(mesh, name) for name in sorted(names)]
     return np.concatenate(points)
 
 
-def _slides(mesh: TetMesh, support: Support) -> bool:
+def _slides(mesh: TetMesh, support: AnySupport) -> bool:
     """Whether a support holds a whole flat face across its plane and nothing else."""
-    if len(support.components) > 1:
+    if not isinstance(support, Support) or len(support.components) > 1:
         return False
     place = mesh.points[:, "xyz".index(support.components)]
     patch = mesh.patch(support.patch)

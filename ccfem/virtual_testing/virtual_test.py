@@ -101,7 +101,6 @@ def virtual_test(
     strand: Strand | None = None,
     mode: str = TENSION,
     span: Sequence[float] = RHO_SPAN,
-    backend: str = "auto",
     machine: Machine | None = None,
 ) -> VirtualTest:
     """Test a part with its fibres under the load case that it was solved for.
@@ -114,15 +113,14 @@ def virtual_test(
     fibres : Toolpaths or Strands
         In the frame of the mesh; only fibre counts.
     part : StressField or Specimen
-        The part without fibres; a specimen shares its factorisation among tests.
+        The part without fibres. A specimen shares its factorisation, by the solver that it was
+        made with, among tests.
     strand : Strand, optional
         Stiffness of a strand; default rho = EA/E = 4 mm^2.
     mode : str, default "tension"
         "tension": fibres in compression carry nothing. "bonded": all fibres carry.
     span : sequence of float, mm^2, default (2, 6)
         Further values of rho to report the ratio at; () for none.
-    backend : str, default "auto"
-        Solver, where `part` is a StressField.
     machine : Machine, optional
         Whose strands keep their room, where `fibres` are Toolpaths: fibre on other fibre lends
         nothing. Default: every strand counts in full.
@@ -138,7 +136,7 @@ def virtual_test(
     SolveError
         When the solve misses its tolerance.
     """
-    specimen, strands = _prepared(fibres, part, backend, machine)
+    specimen, strands = _prepared(fibres, part, machine)
     before = specimen.unreinforced
     axial = (Strand() if strand is None else strand).stiffness(specimen.modulus)
     started = perf_counter()
@@ -185,12 +183,9 @@ def virtual_test(
 
 
 def _prepared(
-    fibres: Toolpaths | Strands,
-    part: StressField | Specimen,
-    backend: str = "auto",
-    machine: Machine | None = None,
+    fibres: Toolpaths | Strands, part: StressField | Specimen, machine: Machine | None
 ) -> tuple[Specimen, Strands]:
-    specimen = Specimen.of(part, backend) if isinstance(part, StressField) else part
+    specimen = Specimen.of(part) if isinstance(part, StressField) else part
     if isinstance(fibres, Toolpaths):
         fibres = cut_strands(fibres, specimen.unreinforced.mesh, machine=machine)
     return specimen, fibres
@@ -204,6 +199,6 @@ def virtual_bracket(
     machine: Machine | None = None,
 ) -> Bracket:
     """Both tests of `virtual_test`, with one factorisation; parameters as there."""
-    specimen, strands = _prepared(fibres, part, machine=machine)
+    specimen, strands = _prepared(fibres, part, machine)
     tension = virtual_test(strands, specimen, strand, TENSION, span)
     return Bracket(tension, virtual_test(strands, specimen, strand, BONDED, span))

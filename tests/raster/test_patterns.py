@@ -5,7 +5,6 @@ from scipy.spatial.distance import cdist
 
 from ccfem.raster.bands import bands, depth
 from ccfem.raster.guides import segment_seeds
-from ccfem.raster.hatch import hatch_lines
 from ccfem.raster.patterns import (
     GUIDE,
     INFILL,
@@ -13,6 +12,7 @@ from ccfem.raster.patterns import (
     concentric_regions,
     first_touch,
     grid_regions,
+    hatch_lines,
     inside_shells,
     medial_regions,
     rings_round,

@@ -5,7 +5,7 @@ from collections.abc import Callable
 from ccfem.cases.case import Case
 from ccfem.cases.designed.plate import DesignPlate
 from ccfem.cases.stored.stored_files import mesh_of_case
-from ccfem.elasticity.problem import Force, Problem, Support
+from ccfem.elasticity.problem import Force, Order, Problem, Support
 from ccfem.layers.slicing.planar import Planar
 from ccfem.machine.machine import Machine
 from ccfem.machine.speed_table import SpeedTable
@@ -36,41 +36,18 @@ def prepreg_printer() -> Machine:
 
 
 def case_of(plate: Callable[..., DesignPlate], title: str) -> Callable[..., Case]:
-    """Make the case of a plate: a function of the parameters that all of them share.
-
-    Parameters
-    ----------
-    plate : callable
-        Makes the plate, of its `force`.
-    title : str
-        What it is, for the list of cases.
-    """
+    """Make the case of a plate, made of its force: a function of the parameters that all share."""
 
     def case(
         optimised: bool = True,
         element_size: float = ELEMENT_SIZE,
-        order: int = 1,
+        order: Order = 1,
         force: float = 100.0,
         thickness: float = THICKNESS,
     ) -> Case:
         return designed_case(plate(force=force), optimised, element_size, order, thickness)
 
-    case.__doc__ = f"""{title}: optimised, or the full plate.
-
-    It is printed of plain matrix, so that the virtual test adds the fibre, and stands on its face
-    at z = 0 without friction, so that it stays plane.
-
-    Parameters
-    ----------
-    optimised : bool, default True
-        Whether to take the optimised part, or the full plate.
-    element_size : float, mm
-        Edge length of the cells aimed at.
-    order : {{1, 2}}
-        Linear or quadratic cells.
-    force : float, N
-    thickness : float, mm
-    """
+    case.__doc__ = f"{title}: optimised, or the full plate.\n\nParameters as in `designed_case`."
     return case
 
 
@@ -78,10 +55,24 @@ def designed_case(
     plate: DesignPlate,
     optimised: bool = True,
     element_size: float = ELEMENT_SIZE,
-    order: int = 1,
+    order: Order = 1,
     thickness: float = THICKNESS,
 ) -> Case:
-    """Make the case of one plate; parameters as those of the functions that `case_of` makes."""
+    """Make the case of one plate.
+
+    It is printed of plain matrix, so that the virtual test adds the fibre, and stands on its face
+    at z = 0 without friction, so that it stays plane.
+
+    Parameters
+    ----------
+    plate : DesignPlate
+        With its force.
+    optimised : bool, default True
+        Whether to take the optimised part, or the full plate.
+    element_size, order
+        As in `ccfem.cases.bar`.
+    thickness : float, mm
+    """
     polygon = None if optimised else plate.domain
     key = plate.name if optimised and thickness == THICKNESS else ""
 
@@ -96,6 +87,7 @@ def designed_case(
             Support("bottom", "z"),
         ),
         {"down": (Force("load", (0.0, -plate.force, 0.0)),)},
+        order=order,
     )
     what = "optimised" if optimised else "full plate"
     return Case(

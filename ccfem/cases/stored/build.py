@@ -13,26 +13,13 @@ from ccfem.mesh.tet_mesh import TetMesh
 
 __all__ = ["CASES", "DESIGNED", "build"]
 
-CASES = ("bar", "loop", "open_hole", "bracket")
+CASES = ("bar", "loop", "open_hole", "bracket", "t_bracket")
 DESIGNED = ("bridge", "suspension", "cantilever", "m_shape", "l_shape")
 """Cases of optimised plates: an outline and its mesh each."""
 
 
 def build(folder: Path, names: Sequence[str] = (*CASES, *DESIGNED)) -> Path:
-    """Make the stored meshes and outlines, and their manifest.
-
-    Parameters
-    ----------
-    folder : Path
-        Where to write; it must exist.
-    names : sequence of str
-        Cases to make.
-
-    Returns
-    -------
-    Path
-        The manifest.
-    """
+    """Make the stored meshes and outlines of cases in a folder, and their manifest: its path."""
     text = (
         "# Meshes of the cases at their default element size, mm, and outlines of the optimised\n"
         f"# plates. Made by: {COMMAND}\n"

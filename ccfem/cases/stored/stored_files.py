@@ -12,6 +12,7 @@ from typing import Any
 import numpy as np
 import shapely
 
+from ccfem.elasticity.problem import Order
 from ccfem.errors import InputError
 from ccfem.io import read_mesh
 from ccfem.mesh.tet_mesh import TetMesh
@@ -47,27 +48,13 @@ def manifest() -> dict[str, Any]:
 
 
 def stored_mesh(name: str, element_size: float) -> TetMesh | None:
-    """Read the stored mesh of a case; None where there is none of this element size, mm.
-
-    Raises
-    ------
-    InputError
-        When the file is not the one that the manifest names.
-    """
+    """Read the stored mesh of a case; None where there is none of this element size, mm."""
     path = _stored_file(name, "element_size", element_size)
     return None if path is None else read_mesh(path, check=False)
 
 
 def stored_outline(name: str, volume_fraction: float) -> shapely.Polygon | None:
-    """Read the stored outline of an optimised plate, mm: a shapely Polygon.
-
-    None where there is none of this share of the plate's volume.
-
-    Raises
-    ------
-    InputError
-        When the file is not the one that the manifest names.
-    """
+    """Read the stored outline of an optimised plate, mm; None where there is none of this share."""
     path = _stored_file(f"{name}_outline", "volume_fraction", volume_fraction)
     if path is None:
         return None
@@ -85,7 +72,13 @@ def write_outline(polygon: shapely.Polygon, path: Path) -> None:
 
 
 def _stored_file(name: str, key: str, value: float) -> Path | None:
-    """File of an entry of the manifest that has this value; None where there is none."""
+    """File of an entry of the manifest that has this value; None where there is none.
+
+    Raises
+    ------
+    InputError
+        When the file is not the one that the manifest names.
+    """
     entry = manifest().get(name)
     if entry is None or entry[key] != value:
         return None
@@ -102,7 +95,7 @@ def _stored_file(name: str, key: str, value: float) -> Path | None:
 
 
 def mesh_of_case(
-    name: str, element_size: float, order: int, make: Callable[[float], TetMesh]
+    name: str, element_size: float, order: Order, make: Callable[[float], TetMesh]
 ) -> TetMesh:
     """Mesh of a case: the stored one where it is of this element size, else a new one.
 
@@ -110,13 +103,13 @@ def mesh_of_case(
     ----------
     name : str
     element_size : float, mm
-    order : {1, 2}
+    order : 1, 2 or "auto"
         Linear or quadratic.
     make : callable
         Makes the linear mesh with its patches from the element size.
     """
-    if order not in (1, 2):
-        raise InputError(f"order of the elements must be 1 or 2; got {order}: choose one")
+    if order not in (1, 2, "auto"):
+        raise InputError(f"order of the elements must be 1, 2 or 'auto'; got {order!r}: choose one")
     mesh = stored_mesh(name, element_size)
     if mesh is None:
         mesh = make(element_size)
