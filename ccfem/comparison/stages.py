@@ -7,6 +7,7 @@ from dataclasses import dataclass, replace
 from typing import Any
 
 from ccfem.comparison.runs import Run, Tested
+from ccfem.elasticity.part_stress import PartStress
 from ccfem.elasticity.stress_field import StressField
 from ccfem.errors import InputError, SolveError
 from ccfem.evaluation import evaluate
@@ -35,7 +36,7 @@ Tell = Callable[[str], None]
 class Part:
     """What all runs share: the stress that counts, the layers and the machine."""
 
-    stress: StressField
+    stress: PartStress
     layers: tuple[Layer, ...]
     machine: Machine
 
@@ -146,18 +147,23 @@ def _volume(print_plan: PrintPlan, machine: Machine) -> float:
 
 
 def all_tested(
-    runs: Sequence[Run], part: Part, strand: Strand, backend: str, tell: Tell
+    runs: Sequence[Run],
+    stress: StressField,
+    machine: Machine,
+    strand: Strand,
+    backend: str,
+    tell: Tell,
 ) -> list[Run]:
     """Test every run that did not fail virtually, all on one factorisation."""
     try:
-        specimen = Specimen.of(part.stress, backend)
+        specimen = Specimen.of(stress, backend)
     except InputError as error:
         return [replace(run, untested=str(error)) for run in runs]
     try:
-        before, _ = matrix_peak(part.stress)
+        before, _ = matrix_peak(stress)
     except InputError:
         before = float("nan")
-    return [_tested(run, specimen, strand, part.machine, before, tell) for run in runs]
+    return [_tested(run, specimen, strand, machine, before, tell) for run in runs]
 
 
 def _tested(

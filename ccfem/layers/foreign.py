@@ -12,6 +12,9 @@ from ccfem.mesh.tet_mesh import TetMesh
 
 __all__ = ["layer_from_surface"]
 
+_ON_PATCH = 0.6
+"""Distance of both ends of a border edge from a patch, mm, up to which the edge lies on it."""
+
 
 def layer_from_surface(
     mesh: TetMesh,
@@ -34,8 +37,7 @@ def layer_from_surface(
         Position in the stack.
     thickness : float, mm
     tolerance : float, mm, default 1
-        The surface may be so far outside the part, and its border so far from a patch that it
-        lies on.
+        The surface may be so far outside the part.
 
     Raises
     ------
@@ -61,8 +63,8 @@ def layer_from_surface(
     border = border_edges(triangles, len(points))
     patches = {}
     for name, facets in mesh.patches.items():
-        near = nearest_on_triangles(mesh.points, facets, points[border].mean(axis=1)).distance
-        patches[name] = border[near <= tolerance]
+        ends = nearest_on_triangles(mesh.points, facets, points[border.ravel()]).distance
+        patches[name] = border[(ends.reshape(-1, 2) <= _ON_PATCH).all(axis=1)]
     return Layer(
         points=points,
         triangles=triangles,

@@ -71,7 +71,7 @@ def test_links_beyond_the_part_change_no_index_of_the_fibre_in_it(framed):
         *("fibre_length", "paths", "cuts", "length_min", "length_median", "length_max"),
         *("long_enough_count", "long_enough_length", "print_time", "mean_speed", "sinuosity"),
         *("sinuosity_mean", "over_40_count", "over_40_length", "turns_45", "turns_90"),
-        *("links", "link_inside", "link_over_void", "link_outside"),
+        *("links", "link_inside", "link_over_void", "link_outside", "free_span", "free_length"),
         # A link over a hole hangs there; the order and the mass are of all fibre too.
         *("free_span", "free_length", "print_time_nearest", "fibre_mass"),
         *("matrix_length", "matrix_mass"),

@@ -51,6 +51,7 @@ def bar(load, poisson=0.0, divisions=(4, 3, 2)):
         material=isotropic(MODULUS, poisson),
         supports=(Support("x_min", "x"), Support("y_min", "y"), Support("z_min", "z")),
         loads={"load": load},
+        order=1,
     )
 
 
