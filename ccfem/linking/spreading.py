@@ -30,7 +30,7 @@ _OVER = 1.2
 """Share of what is missing by which two strands together are pushed apart in one sweep."""
 _OWN = 5.0
 """Arc length, in widths, from which on a strand keeps a distance from itself."""
-_STEEP = 2.0
+_STEEP = 3.0
 """Length, in widths, of ends outside the room that are cut off: others lie along its border."""
 _SNAP = 1e-4
 """Depth, in widths, to which what is outside is put inside."""
