@@ -6,7 +6,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from ccfem.arrays import FloatArray, freeze
-from ccfem.checks import check_known, check_number
+from ccfem.checks import check_fields, check_known, check_number
 from ccfem.errors import InputError
 
 __all__ = [
@@ -33,6 +33,9 @@ class Material:
         Along axis 1.
     source : str
         Where the numbers come from, and which of them are assumed.
+    mass_density : float or None, g/cm^3
+    expansion : tuple of 3 floats or None, 1/K
+        Strain by heat along axes 1, 2 and 3.
     """
 
     name: str
@@ -40,6 +43,8 @@ class Material:
     tensile_strength: float | None = None
     compressive_strength: float | None = None
     source: str = ""
+    mass_density: float | None = None
+    expansion: tuple[float, float, float] | None = None
 
     def __repr__(self) -> str:
         modulus = 1.0 / np.linalg.inv(self.stiffness)[0, 0]
@@ -47,6 +52,7 @@ class Material:
 
     def __post_init__(self) -> None:
         freeze(self, stiffness=float)
+        check_fields(self, "tensile_strength", "compressive_strength", above=0.0, unit="MPa")
         stiffness = self.stiffness
         if stiffness.shape != (6, 6) or not np.allclose(stiffness, stiffness.T, rtol=1e-9):
             raise InputError(
@@ -58,6 +64,16 @@ class Material:
                 f"material '{self.name}': stiffness must be finite and positive definite; check "
                 "the moduli and Poisson's ratios"
             )
+        if self.mass_density is not None and not 0.0 < self.mass_density < np.inf:
+            raise InputError(
+                f"material '{self.name}': mass density must be above 0 g/cm^3; got "
+                f"{self.mass_density}: correct it"
+            )
+        if self.expansion is not None and not np.isfinite(self.expansion).all():
+            raise InputError(
+                f"material '{self.name}': expansion must be finite numbers, 1/K; got "
+                f"{self.expansion}: correct it"
+            )
 
 
 def isotropic(
@@ -67,15 +83,23 @@ def isotropic(
     tensile_strength: float | None = None,
     compressive_strength: float | None = None,
     source: str = "",
+    mass_density: float | None = None,
+    expansion: float | None = None,
 ) -> Material:
-    """Isotropic material from Young's modulus, MPa, and Poisson's ratio in (-1, 0.5)."""
+    """Isotropic material from Young's modulus, MPa, and Poisson's ratio in (-1, 0.5).
+
+    Mass density in g/cm^3, expansion by heat in 1/K.
+    """
     check_number(f"modulus of material '{name}'", modulus, above=0.0, unit="MPa")
     check_number(f"poisson of material '{name}'", poisson, above=-1.0, below=0.5)
     lame = modulus * poisson / ((1.0 + poisson) * (1.0 - 2.0 * poisson))
     shear = modulus / (2.0 * (1.0 + poisson))
     stiffness = np.diag([2.0 * shear] * 3 + [shear] * 3)
     stiffness[:3, :3] += lame
-    return Material(name, stiffness, tensile_strength, compressive_strength, source)
+    heat = None if expansion is None else (expansion, expansion, expansion)
+    return Material(
+        name, stiffness, tensile_strength, compressive_strength, source, mass_density, heat
+    )
 
 
 def transversely_isotropic(
@@ -88,6 +112,9 @@ def transversely_isotropic(
     tensile_strength: float | None = None,
     compressive_strength: float | None = None,
     source: str = "",
+    mass_density: float | None = None,
+    expansion_fibre: float | None = None,
+    expansion_transverse: float | None = None,
 ) -> Material:
     """Transversely isotropic material with the fibre along axis 1, moduli in MPa.
 
@@ -99,6 +126,9 @@ def transversely_isotropic(
         nu12 = nu13, with ``|nu12| < sqrt(E1 / E2)``.
     poisson_transverse : float, default 0.45
         nu23; unidirectional polymer composites have 0.35 to 0.5.
+    mass_density : float, g/cm^3, optional
+    expansion_fibre, expansion_transverse : float, 1/K, optional
+        Both or none.
     """
     e1, e2, nu, nu23 = modulus_fibre, modulus_transverse, poisson_fibre, poisson_transverse
     if not (min(e1, e2, shear_fibre) > 0.0 and -1.0 < nu23 < 1.0 - 2.0 * nu * nu * e2 / e1):
@@ -114,7 +144,14 @@ def transversely_isotropic(
     compliance[1, 2] = compliance[2, 1] = -nu23 / e2
     stiffness = np.linalg.inv(compliance)
     stiffness = 0.5 * (stiffness + stiffness.T)
-    return Material(name, stiffness, tensile_strength, compressive_strength, source)
+    if (expansion_fibre is None) != (expansion_transverse is None):
+        raise InputError(f"material '{name}': expansion along and across the fibre go together")
+    heat = None
+    if expansion_fibre is not None and expansion_transverse is not None:
+        heat = (expansion_fibre, expansion_transverse, expansion_transverse)
+    return Material(
+        name, stiffness, tensile_strength, compressive_strength, source, mass_density, heat
+    )
 
 
 def plane_stress(

@@ -24,9 +24,9 @@ import numpy as np
 import typer
 
 from ccfem.elasticity.assembly import assemble, pattern
+from ccfem.elasticity.held import Held
 from ccfem.elasticity.problem import Problem
-from ccfem.elasticity.solve import System
-from ccfem.elasticity.supports import Held
+from ccfem.elasticity.system import System
 from ccfem.io import read_mesh
 from ccfem.materials import isotropic
 from ccfem.mesh import TetMesh

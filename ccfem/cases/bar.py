@@ -4,6 +4,7 @@ import shapely
 
 from ccfem.cases.case import Case, pulled
 from ccfem.cases.stored import mesh_of_case
+from ccfem.elasticity.problem import Order
 from ccfem.layers.slicing.planar import Planar
 from ccfem.mesh.patches import Plane, patches_from_rules
 from ccfem.mesh.tet_mesh import TetMesh
@@ -34,22 +35,22 @@ def bar_mesh(element_size: float) -> TetMesh:
     return patches_from_rules(extrude(bar_outline(), THICKNESS, element_size), rules)
 
 
-def bar(element_size: float = ELEMENT_SIZE, order: int = 1, force: float = 1000.0) -> Case:
+def bar(element_size: float = ELEMENT_SIZE, order: Order = 1, force: float = 1000.0) -> Case:
     """Tensile bar, 125 x 25 x 5 mm, held at its left end and pulled at its right end along x.
 
     Parameters
     ----------
     element_size : float, mm
         Edge length of the cells aimed at.
-    order : {1, 2}
-        Linear or quadratic cells.
+    order : 1, 2 or "auto"
+        Linear or quadratic cells, or what their estimated error calls for.
     force : float, N
     """
     mesh = mesh_of_case("bar", element_size, order, bar_mesh)
     return Case(
         name="bar",
         title="Tensile bar, 125 x 25 x 5 mm, pulled at its ends",
-        problem=pulled(mesh, (force, 0.0, 0.0)),
+        problem=pulled(mesh, (force, 0.0, 0.0), order),
         slicing=Planar(count=10),
         source="size of the tensile bar of Chen et al. 2021 (Additive Manufacturing 49, 102470); "
         "own outline of lines and quarter circles",

@@ -1,12 +1,14 @@
 """A bracket with four bolt holes, as topology optimisation in space shapes it."""
 
+from dataclasses import replace
+
 import numpy as np
 import shapely
 
 from ccfem.arrays import BoolArray
 from ccfem.cases.case import Case
 from ccfem.cases.stored import mesh_of_case
-from ccfem.elasticity.problem import Bearing, Force, Problem, Support
+from ccfem.elasticity.problem import Bearing, Force, Order, Problem, Support
 from ccfem.materials import printed_pla
 from ccfem.mesh.patches import Cylinder, patches_from_rules
 from ccfem.mesh.tet_mesh import TetMesh
@@ -92,7 +94,7 @@ def bracket_mesh(element_size: float) -> TetMesh:
 def bracket(
     optimised: bool = True,
     element_size: float = ELEMENT_SIZE,
-    order: int = 1,
+    order: Order = 1,
     force: float = FORCE,
 ) -> Case:
     """Bracket of 52 x 52 x 27 mm with four bolt holes: optimised, or the full L.
@@ -110,8 +112,8 @@ def bracket(
         element size; any other takes a new optimisation.
     element_size : float, mm
         Edge length of the cells of the domain.
-    order : {1, 2}
-        Linear or quadratic cells.
+    order : 1, 2 or "auto"
+        Linear or quadratic cells, or what their estimated error calls for.
     force : float, N
         Of the load case "down", on both holes together.
     """
@@ -124,7 +126,7 @@ def bracket(
         name="bracket",
         title="Bracket 52 x 52 x 27 mm with four bolt holes"
         + (", optimised" if optimised else ": the design domain"),
-        problem=_problem(mesh, force),
+        problem=replace(_problem(mesh, force), order=order),
         source="size and number of holes of the optimised bracket of Kipping and Schueppstuhl, "
         "Materials 16 (2023) 998; L, loads and supports of our choice",
     )

@@ -5,7 +5,7 @@ from dataclasses import dataclass, field
 from typing import Any
 
 from ccfem.arrays import freeze
-from ccfem.elasticity.problem import Force, Problem, Support
+from ccfem.elasticity.problem import Force, Order, Problem, Support
 from ccfem.layers.slicer import Slicer
 from ccfem.layers.slicing.planar import Planar
 from ccfem.machine.machine import Machine
@@ -15,10 +15,10 @@ from ccfem.mesh.tet_mesh import TetMesh
 __all__ = ["Case", "pulled"]
 
 
-def pulled(mesh: TetMesh, force: tuple[float, float, float]) -> Problem:
+def pulled(mesh: TetMesh, force: tuple[float, float, float], order: Order) -> Problem:
     """Make a part of printed PLA, held at patch ``support`` and pulled at patch ``load``, N."""
     loads = {"pull": (Force("load", force),)}
-    return Problem(mesh, printed_pla(), (Support("support"),), loads)
+    return Problem(mesh, printed_pla(), (Support("support"),), loads, order=order)
 
 
 @dataclass(frozen=True)

@@ -6,6 +6,7 @@ import shapely
 from ccfem.arrays import FloatArray
 from ccfem.cases.case import Case, pulled
 from ccfem.cases.stored import mesh_of_case
+from ccfem.elasticity.problem import Order
 from ccfem.mesh.patches import Cylinder, patches_from_rules
 from ccfem.mesh.tet_mesh import TetMesh
 from ccfem.meshing import extrude
@@ -65,7 +66,7 @@ def loop_mesh(element_size: float) -> TetMesh:
     return patches_from_rules(extrude(loop_outline(), THICKNESS, element_size), rules)
 
 
-def loop(element_size: float = ELEMENT_SIZE, order: int = 1, force: float = 1000.0) -> Case:
+def loop(element_size: float = ELEMENT_SIZE, order: Order = 1, force: float = 1000.0) -> Case:
     """Ring with two lugs, 140 x 100 x 10 mm, pulled apart at the two holes.
 
     The outer half of the bottom hole is fixed, the outer half of the top hole pulled along y.
@@ -76,7 +77,7 @@ def loop(element_size: float = ELEMENT_SIZE, order: int = 1, force: float = 1000
     return Case(
         name="loop",
         title="Ring with two lugs, 140 x 100 x 10 mm, pulled at its two holes",
-        problem=pulled(mesh, (0.0, force, 0.0)),
+        problem=pulled(mesh, (0.0, force, 0.0), order),
         source="size and loading of the Loop of Chen et al. 2021 (Additive Manufacturing 49, "
         "102470); own outline of circles",
     )

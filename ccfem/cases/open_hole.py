@@ -4,6 +4,7 @@ import shapely
 
 from ccfem.cases.case import Case, pulled
 from ccfem.cases.stored import mesh_of_case
+from ccfem.elasticity.problem import Order
 from ccfem.layers.slicing.planar import Planar
 from ccfem.mesh.patches import Cylinder, PatchRule, Plane, patches_from_rules
 from ccfem.mesh.tet_mesh import TetMesh
@@ -32,7 +33,7 @@ def open_hole_mesh(element_size: float) -> TetMesh:
     return patches_from_rules(extrude(open_hole_outline(), THICKNESS, element_size), rules)
 
 
-def open_hole(element_size: float = ELEMENT_SIZE, order: int = 1, force: float = 1000.0) -> Case:
+def open_hole(element_size: float = ELEMENT_SIZE, order: Order = 1, force: float = 1000.0) -> Case:
     """Plate 200 x 36 x 4 mm with a hole of radius 6 mm, held left and pulled right along x.
 
     Parameters as in `ccfem.cases.bar`; the cells are shorter at the hole.
@@ -41,7 +42,7 @@ def open_hole(element_size: float = ELEMENT_SIZE, order: int = 1, force: float =
     return Case(
         name="open_hole",
         title="Plate 200 x 36 x 4 mm with a hole of radius 6 mm, in tension",
-        problem=pulled(mesh, (force, 0.0, 0.0)),
+        problem=pulled(mesh, (force, 0.0, 0.0), order),
         slicing=Planar(count=8),
         source="open-hole tension of laminates; the plate of ASTM D5766 with a hole twice as wide",
     )

@@ -2,11 +2,12 @@
 
 from dataclasses import dataclass
 from pathlib import Path
-from typing import Any, Literal
+from typing import Any
 
 import numpy as np
 import shapely
 
+from ccfem.elasticity.problem import Order
 from ccfem.errors import InputError
 from ccfem.io import read_mesh, read_surface
 from ccfem.io.toml import from_table
@@ -26,7 +27,7 @@ class Body:
     edge_length: float | None = None
     scale: float = 1.0
     merge_nodes: bool = False
-    order: Literal[1, 2] | None = None
+    order: Order = "auto"
 
     def read(self, folder: Path) -> tuple[TetMesh, tuple[str, ...]]:
         """Mesh of the part, checked, and what was found in it; files are relative to a folder."""

@@ -16,7 +16,8 @@ them with a minus ("-z"), or three numbers.
     edge_length = 2.0                 # ... of this edge length
     scale = 1.0                       # factor on the coordinates of either file; 1000 for metres
     merge_nodes = false               # join pieces of a mesh where their nodes coincide
-    order = 1                         # 1 or 2, linear or quadratic cells; default: as the file has
+    order = "auto"                    # linear (1) or quadratic cells (2), or what the estimated
+                                      # error of linear ones calls for (default)
 
     [planform]                        # a flat part that stands on z = 0
     outline = [[0, 0], [80, 0], [80, 30], [0, 30]]
@@ -235,14 +236,11 @@ def _case(content: Mapping[str, Any], path: Path) -> Case:
     _check_strategies(part.strategies)
     mesh, findings = part.read(path.parent)
     mesh = patches_from_rules(mesh, rules)
-    for value in (*supports, *(load for case in loads.values() for load in case)):
-        if not isinstance(value, PointForce):
-            mesh.patch(value.patch)
     name = part.name or path.stem
     return Case(
         name=name,
         title=part.title or name,
-        problem=Problem(mesh, material, supports, loads),
+        problem=Problem(mesh, material, supports, loads, order=part.order),
         build=(float(build[0]), float(build[1]), float(build[2])),
         slicing=slicing,
         machine=machine,

@@ -11,7 +11,7 @@ import shapely
 from ccfem.arrays import FloatArray
 from ccfem.cases.case import Case
 from ccfem.cases.stored import mesh_of_case
-from ccfem.elasticity.problem import Bearing, Force, Problem, Support
+from ccfem.elasticity.problem import Bearing, Force, Order, Problem, Support
 from ccfem.layers.slicing.spatial import Spatial
 from ccfem.materials import printed_pla
 from ccfem.mesh.check import check_mesh
@@ -105,7 +105,7 @@ def _write_surface(name: str, points: FloatArray, mesh: TetMesh) -> None:
     pyvista.PolyData(points, faces.ravel()).save(name)
 
 
-def t_bracket(element_size: float = ELEMENT_SIZE, order: int = 2, force: float = 1000.0) -> Case:
+def t_bracket(element_size: float = ELEMENT_SIZE, order: Order = 2, force: float = 1000.0) -> Case:
     """T-bracket of 130 x 60 x 30 mm: bolted down at its base, pulled by a bolt through its head.
 
     The shape is recovered from the layers that the authors published (GuoxinFang/
@@ -116,8 +116,8 @@ def t_bracket(element_size: float = ELEMENT_SIZE, order: int = 2, force: float =
     ----------
     element_size : float, mm
         The mesh is stored for the default; any other takes a quarter of an hour.
-    order : {1, 2}
-        Linear or quadratic cells.
+    order : 1, 2 or "auto"
+        Linear or quadratic cells, or what their estimated error calls for.
     force : float, N
         Of the pull; a quarter of it sideways.
     """
@@ -133,6 +133,7 @@ def t_bracket(element_size: float = ELEMENT_SIZE, order: int = 2, force: float =
                 "pull": (Bearing("pull", (0.0, force, 0.0)),),
                 "side": (Force("pull", (0.0, 0.0, 0.25 * force)),),
             },
+            order=order,
         ),
         build=(0.0, 1.0, 0.0),
         slicing=Spatial(),

@@ -22,9 +22,11 @@ from ccfem.cli.options import (
     Out,
     SetCase,
     Slicing,
+    StressFile,
+    StressUnit,
     VirtualTest,
 )
-from ccfem.cli.run import layers_of, load, options_of, run
+from ccfem.cli.run import foreign_stress, layers_of, load, options_of, run
 from ccfem.errors import InputError, SolveError
 
 __all__ = ["app", "main"]
@@ -129,6 +131,8 @@ def compare(
     load_case: LoadCase = None,
     calibration: Calibration = None,
     backend: Backend = "auto",
+    stress: StressFile = None,
+    stress_unit: StressUnit = None,
     out: Out = None,
 ) -> None:
     """Plan a part by several strategies and show which is best, with numbers and pictures."""
@@ -139,6 +143,7 @@ def compare(
     chosen = layers_of(layers, heights, slicing)
     options = options_of(chosen, fibre_per_layer, virtual_test, load_case, backend)
     options["natural"] = natural
+    options["stress"] = foreign_stress(stress, stress_unit)
     files = names_of(paths) if paths is not None else ()
     run(
         case,
@@ -174,6 +179,8 @@ def plan(
         bool,
         typer.Option("--gcode", help="Also write STRATEGY.gcode, matrix and fibre of the part."),
     ] = False,
+    stress: StressFile = None,
+    stress_unit: StressUnit = None,
     out: Out = None,
 ) -> None:
     """Plan a part by one strategy, by default with its natural amount of fibre."""
@@ -182,7 +189,48 @@ def plan(
     options = options_of(chosen, fibre_per_layer, virtual_test, load_case, backend)
     options["natural"] = fibre_per_layer is None
     options["print_plans"] = gcode
+    options["stress"] = foreign_stress(stress, stress_unit)
     run(case, set_case, (strategy,), parameters, options, calibration, out, f"-{strategy}")
+
+
+@app.command()
+def solve(
+    case: CasePath,
+    out: Annotated[
+        Path,
+        typer.Option("-o", "--out", metavar="RESULT.vtu", help="File that is written."),
+    ],
+    set_case: SetCase = None,
+    load_case: Annotated[
+        str | None,
+        typer.Option(
+            "--load-case",
+            metavar="NAME",
+            help="Only this one; default all, the name of each behind that of the file where "
+            "there are several.",
+        ),
+    ] = None,
+    backend: Backend = "auto",
+) -> None:
+    """Solve a part and write displacement, strain, stress, reactions and error for ParaView."""
+    from ccfem.checks import check_known
+    from ccfem.cli.screen import print_solution
+    from ccfem.elasticity.solve import solve as solved
+    from ccfem.export.vtu_result import result_path, write_result
+    from ccfem.io.whole import check_writable
+
+    loaded = load(case, set_case)
+    names = loaded.problem.cases
+    if load_case is not None:
+        check_known("load case", load_case, names)
+        names = (load_case,)
+    files = {name: out if len(names) == 1 else result_path(out, name) for name in names}
+    for file in files.values():
+        check_writable(result_path(file))
+    fields = solved(loaded.problem, backend=backend)
+    for name, file in files.items():
+        write_result(fields[name], file)
+        print_solution(fields[name], loaded.findings, file)
 
 
 @app.command()

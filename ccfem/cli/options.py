@@ -16,6 +16,8 @@ __all__ = [
     "Out",
     "SetCase",
     "Slicing",
+    "StressFile",
+    "StressUnit",
     "VirtualTest",
 ]
 
@@ -86,5 +88,20 @@ Backend = Annotated[
         "--backend",
         metavar="NAME",
         help="Linear solver, such as superlu, amg or pypardiso; default by size.",
+    ),
+]
+StressFile = Annotated[
+    Path | None,
+    typer.Option(
+        "--stress",
+        metavar="FILE",
+        help="Plan and evaluate on the stress of another program on the same mesh: .vtu with an "
+        "array named stress, .frd of CalculiX, or .csv by element or node.",
+    ),
+]
+StressUnit = Annotated[
+    str | None,
+    typer.Option(
+        "--stress-unit", metavar="UNIT", help="MPa, Pa, .., where the file does not say it."
     ),
 ]

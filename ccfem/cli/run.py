@@ -19,7 +19,7 @@ if TYPE_CHECKING:
     from ccfem.cases.case import Case
     from ccfem.comparison.result import Comparison
 
-__all__ = ["layers_of", "load", "options_of", "run"]
+__all__ = ["foreign_stress", "layers_of", "load", "options_of", "run"]
 
 _STARTED = time.perf_counter()
 
@@ -48,6 +48,17 @@ def layers_of(layers: int | None, heights: str | None, slicing: str | None) -> A
     if heights is not None:
         return numbers_of(heights)
     return layers if slicing is None else slicer_of(slicing)
+
+
+def foreign_stress(path: Path | None, unit: str | None) -> Any:
+    """Stress of another program to plan on; None for the part's own."""
+    from ccfem.comparison.compare import ForeignStress
+
+    if path is None:
+        if unit is not None:
+            raise InputError("--stress-unit belongs to --stress; got no file: name it")
+        return None
+    return ForeignStress(path, unit)
 
 
 def options_of(

@@ -20,9 +20,11 @@ from ccfem.comparison.headline import HEADLINE, cell_text, headline_values
 from ccfem.comparison.ranking import best_values
 from ccfem.comparison.result import Comparison
 from ccfem.comparison.runs import Run
+from ccfem.elasticity.stress_field import StressField, about_cells
+from ccfem.tensor import von_mises
 from ccfem.virtual_testing.stiffer import HONEST_PROMISE
 
-__all__ = ["print_cases", "print_comparison", "print_member", "print_members"]
+__all__ = ["print_cases", "print_comparison", "print_member", "print_members", "print_solution"]
 
 _TITLES, _NUMBERS = 30, 20
 """Characters that a table is given for its titles and for each strategy, where neither a terminal
@@ -133,8 +135,9 @@ def print_comparison(comparison: Comparison, where: Path, seconds: float) -> Non
         console.width = max(console.width, _TITLES + _NUMBERS * len(runs))
     console.print(comparison.case.title, style="bold", markup=False)
     console.print(_headline_table(runs, best_values(comparison.runs, comparison.fibre_per_layer)))
-    for line in comparison.case.findings:
+    for line in (*comparison.case.findings, *comparison.stress.findings):
         console.print(f"mesh: {line}", style="dim", markup=False)
+    console.print(about_cells(comparison.stress), style="dim", markup=False)
     for line in comparison.remarks:
         console.print(line, style="dim", markup=False)
     said = comparison.verdict
@@ -143,6 +146,34 @@ def print_comparison(comparison: Comparison, where: Path, seconds: float) -> Non
     if any(run.tested is not None for run in runs):
         console.print(HONEST_PROMISE, style="dim", markup=False)
     console.print(f"{where / 'report.html'}  ({seconds:.1f} s)", markup=False, soft_wrap=True)
+
+
+def print_solution(field: StressField, findings: Sequence[str], where: Path) -> None:
+    """Print what a solve found in one load case, and where it is written."""
+    console = Console(highlight=False)
+    sizes = np.linalg.norm(field.displacement, axis=1)
+    at = ", ".join(f"{x:.4g}" for x in field.mesh.points[sizes.argmax()])
+    mises = von_mises(field.stress)
+    record = field.record
+    lines = [
+        f"largest displacement {sizes.max():.4g} mm at ({at}) mm, strain energy "
+        f"{field.strain_energy:.4g} N mm",
+        f"von Mises stress of the cells up to {mises.max():.4g} MPa",
+    ]
+    for label, force in field.support_forces.items():
+        lines.append(f"support {label}: ({', '.join(f'{x:.4g}' for x in force)}) N")
+    lines.append(about_cells(field))
+    how = f"{record.iterations} iterations" if record.iterations else "direct"
+    lines.append(
+        f"{record.backend}, {record.unknowns:,} unknowns, {how}, backward error "
+        f"{record.backward_error:.1e}, {record.assembly_seconds + record.solve_seconds:.1f} s"
+    )
+    console.print(f"load case {field.case}", style="bold", markup=False)
+    for line in lines:
+        console.print(f"  {line}", markup=False, soft_wrap=True)
+    for line in (*findings, *field.findings):
+        console.print(f"  mesh: {line}", style="dim", markup=False, soft_wrap=True)
+    console.print(f"  {where}", markup=False, soft_wrap=True)
 
 
 def _headline_table(runs: Sequence[Run], best: Mapping[str, float]) -> Table:

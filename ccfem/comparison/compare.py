@@ -6,6 +6,7 @@ print, test, bound.
 
 import os
 from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
 from itertools import count
 from typing import Any
 
@@ -24,11 +25,13 @@ from ccfem.comparison.stages import (
     timed,
     with_print,
 )
+from ccfem.elasticity.part_stress import GivenStress
 from ccfem.elasticity.solve import solve
 from ccfem.elasticity.stress_field import StressField
 from ccfem.errors import InputError, known_names
 from ccfem.export.print_plan import check_machine
 from ccfem.fibre_aware.upper_bound import upper_bound
+from ccfem.io.stress_file import read_stress
 from ccfem.layers import Layer
 from ccfem.layers.plane import plane_frame
 from ccfem.layers.slicer import Slicer
@@ -41,7 +44,14 @@ from ccfem.strategies import create
 from ccfem.toolpaths import Toolpaths
 from ccfem.virtual_testing.strand import Strand
 
-__all__ = ["DEFAULT_STRAND", "STRATEGIES", "compare", "create_all", "solve_and_slice"]
+__all__ = [
+    "DEFAULT_STRAND",
+    "STRATEGIES",
+    "ForeignStress",
+    "compare",
+    "create_all",
+    "solve_and_slice",
+]
 
 STRATEGIES = ("isocurve", "concentric", "zigzag", "contour_zigzag")
 """The strategies that are compared when none are named."""
@@ -51,6 +61,24 @@ DEFAULT_STRAND = Strand()
 
 _BOUND_ITERATIONS = 7
 """The bound holds after any number of iterations; more than these lower it by half a per cent."""
+
+
+@dataclass(frozen=True)
+class ForeignStress:
+    """Stress of another program in a file: see `ccfem.io.read_stress`.
+
+    Attributes
+    ----------
+    path : path
+    unit : str, optional
+        Where the file does not say it.
+    array : str, default "stress"
+        Name of the array in a ``.vtu`` file.
+    """
+
+    path: str | os.PathLike[str]
+    unit: str | None = None
+    array: str = "stress"
 
 
 def create_all(
@@ -103,8 +131,9 @@ def solve_and_slice(
     layers: int | Sequence[float] | str | Slicer | None = None,
     load_case: str | None = None,
     backend: str = "auto",
-) -> tuple[StressField, tuple[Layer, ...], dict[str, float]]:
-    """Stress of one load case, the layers, and the seconds that each took.
+    given: ForeignStress | None = None,
+) -> tuple[StressField, GivenStress | None, tuple[Layer, ...], dict[str, float]]:
+    """Stress of one load case, that of another program, the layers, and the seconds of each.
 
     Parameters
     ----------
@@ -116,20 +145,26 @@ def solve_and_slice(
         By default the first one.
     backend : str, default "auto"
         As in `solve`.
+    given : ForeignStress, optional
+        Stress that the part is sliced on instead of the solved one.
 
     Raises
     ------
     InputError
-        For an unknown load case, or a problem that cannot be solved or sliced.
+        For an unknown load case, a problem that cannot be solved or sliced, and stress on another
+        mesh.
     """
     seconds: dict[str, float] = {}
     name = _load_case(case, load_case)
     with timed(seconds, "solve"):
         stress = solve(case.problem, backend=backend)[name]
+    read = None
+    if given is not None:
+        read = read_stress(given.path, stress.mesh, given.unit, given.array, stress.held_or_loaded)
     with timed(seconds, "slice"):
         slicer = case.slicing if layers is None else as_slicer(layers)
-        stack = slicer(stress, case.build, case.machine)
-    return stress, stack, seconds
+        stack = slicer(stress if read is None else read, case.build, case.machine)
+    return stress, read, stack, seconds
 
 
 def compare(
@@ -142,6 +177,7 @@ def compare(
     load_case: str | None = None,
     backend: str = "auto",
     print_plans: bool = False,
+    stress: ForeignStress | None = None,
     progress: Progress = silent,
 ) -> Comparison:
     """Solve a case once, and plan and evaluate each strategy on it.
@@ -174,6 +210,9 @@ def compare(
         As in `solve`.
     print_plans : bool, default False
         Also plan the print of the whole part by every strategy, matrix and fibre.
+    stress : ForeignStress, optional
+        File of another program with the stress, on the same mesh, to plan and evaluate on. Virtual
+        tests and the bound solve the part themselves all the same.
     progress : callable, optional
         Told what is being done, and the share that is done.
 
@@ -199,12 +238,12 @@ def compare(
     if not isinstance(strategies, Mapping):
         strategies = create_all(case, strategies)
 
-    given = [one for one in strategies.values() if isinstance(one, GivenPaths)]
-    if given and layers is None:
-        layers = tuple(given[0].heights(plane_frame(case.build)[2]).tolist())
+    foreign = [one for one in strategies.values() if isinstance(one, GivenPaths)]
+    if foreign and layers is None:
+        layers = tuple(foreign[0].heights(plane_frame(case.build)[2]).tolist())
     progress(f"solving {case.name}", 0.0)
-    stress, stack, seconds = solve_and_slice(case, layers, load_case, backend)
-    part = Part(stress, stack, case.machine)
+    field, given, stack, seconds = solve_and_slice(case, layers, load_case, backend, stress)
+    part = Part(field if given is None else given, stack, case.machine)
     tell = _counted(progress, 0.1, (5 if print_plans else 4) * len(strategies) + 1)
     runs = [
         Run(name, one.on(stack) if isinstance(one, GivenPaths) else one, Toolpaths.empty(), None)
@@ -218,7 +257,7 @@ def compare(
     if print_plans:
         runs = [with_print(run, part, tell) for run in runs]
     if strand is not None:
-        runs = all_tested(runs, part, strand, backend, tell)
+        runs = all_tested(runs, field, case.machine, strand, backend, tell)
     lengths = [float(run.toolpaths.lengths.sum()) for run in runs if run.tested is not None]
     bound = None
     # The bound is one for flat layers.
@@ -226,9 +265,9 @@ def compare(
         tell("bounding what any paths could reach")
         with timed(seconds, "bound"):
             bound = upper_bound(
-                stress, stack, max(lengths), case.machine, strand, iterations=_BOUND_ITERATIONS
+                field, stack, max(lengths), case.machine, strand, iterations=_BOUND_ITERATIONS
             )
-    return Comparison(case, stress, stack, tuple(runs), wanted, seconds, bound)
+    return Comparison(case, field, stack, tuple(runs), wanted, seconds, bound, given)
 
 
 def _load_case(case: Case, name: str | None) -> str:

@@ -148,7 +148,7 @@ def _write_pictures(pictures: "Pictures", folder: Path) -> None:
 def _write_in_space(comparison: Comparison, folder: Path) -> None:
     """Write a picture of the strands of every strategy in space, and a page on which they turn."""
     from ccfem.plot.canvas import png
-    from ccfem.plot.in_space import space_picture, turning_page
+    from ccfem.plot.stack_page import space_picture, turning_page
 
     layers, build = comparison.layers, comparison.case.build
     for run in comparison.succeeded:

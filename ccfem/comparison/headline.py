@@ -63,6 +63,19 @@ TEST_COLUMNS = (
         "> 0, lower is better under forces",
     ),
     Column(
+        "matrix_stress_change",
+        "1",
+        "Peak of the matrix's von Mises stress, averaged as for first_failure_load, over that of "
+        "the part without fibre under the same load, less 1.",
+        ">= -1, lower is better; missing where first_failure_load is",
+    ),
+    Column(
+        "printed_volume",
+        "1",
+        "Volume of matrix and fibre of the planned print over the volume of the part.",
+        "about 1 is right; missing where no print was planned",
+    ),
+    Column(
         "first_failure_load",
         "N",
         "Load at which the matrix (von Mises stress averaged over a 2 mm ball, away from loads and "
@@ -130,6 +143,7 @@ def headline_values(run: Run) -> Mapping[str, float]:
         "paths_per_layer": total["paths"] / layers,
         "all_crossings": total["crossings"] + total["self_crossings"],
         "printable": float(run.printable),
+        **({} if run.print_plan is None else {"printed_volume": run.printed_volume}),
     }
 
 
@@ -151,6 +165,9 @@ def _test_values(run: Run) -> dict[str, float]:
         values["stiffness_ratio_high"] = max(ratios)
     if run.tested.failure is not None:
         values["first_failure_load"] = run.tested.failure.load
+        values["matrix_stress_change"] = (
+            run.tested.failure.matrix_index / run.tested.matrix_before - 1.0
+        )
     return values
 
 

@@ -9,6 +9,7 @@ import numpy as np
 from ccfem.arrays import FloatArray
 from ccfem.comparison.result import Comparison
 from ccfem.comparison.runs import Run
+from ccfem.elasticity.stress_field import StressField
 from ccfem.evaluation.matching import THRESHOLDS, along_fibre, matching_curve
 from ccfem.evaluation.plane_paths import pool
 from ccfem.fields.chart import chart_of, flat_view, in_charts
@@ -17,7 +18,7 @@ from ccfem.layers.layer_stress import LayerStress, stress_on
 from ccfem.plot.canvas import png
 from ccfem.plot.colours import palette
 from ccfem.plot.curves import curvature_curves, matching_curves
-from ccfem.plot.fields import tension_picture
+from ccfem.plot.fields import error_picture, tension_picture
 from ccfem.plot.paths import (
     Coloured,
     compare_layer,
@@ -45,6 +46,8 @@ class Pictures:
         Force in the fibres of the middle layer, where there was a virtual test.
     tension : bytes
         Tension in the middle layer.
+    error : bytes
+        Estimated error of the cells in the middle layer.
     overview : bytes
         All strategies side by side on the middle layer.
     matching, curvature : bytes
@@ -56,6 +59,7 @@ class Pictures:
     paths: dict[tuple[str, int], bytes]
     forces: dict[str, bytes]
     tension: bytes
+    error: bytes
     overview: bytes
     matching: bytes
     curvature: bytes
@@ -70,7 +74,7 @@ def draw_pictures(comparison: Comparison, progress: Progress = silent) -> Pictur
         for run in comparison.succeeded
     ]
     layers = [flat_view(layer) for layer in _drawn(comparison)]
-    stresses = [stress_on(layer, comparison.stress) for layer in layers]
+    stresses = [stress_on(layer, comparison.planned_on) for layer in layers]
     limit = max(tension_limit(stress) for stress in stresses)
     colours = palette(run.name for run in comparison.runs)
     middle = stresses[len(stresses) // 2]
@@ -81,6 +85,7 @@ def draw_pictures(comparison: Comparison, progress: Progress = silent) -> Pictur
         _layers(runs, stresses, machine.fibre_width, limit, colours, progress),
         _forces(runs, centre, machine.fibre_width, colours),
         png(tension_picture(middle, heading, "size and direction", limit)),
+        png(_error(comparison.stress, middle.layer)),
         png(_overview(runs, middle, machine.fibre_width, limit)),
         png(matching_curves(rates, THRESHOLDS, "fibre along the stress", colours)),
         png(curvature_curves(bends, machine.minimum_radius, "curvature", colours)),
@@ -121,6 +126,13 @@ def _layers(
             )
             drawn[run.name, layer.index] = png(figure)
     return drawn
+
+
+def _error(stress: StressField, layer: Layer) -> "Figure":
+    """Estimated error of the cells in a layer."""
+    error = stress.error.densities(stress.mesh.volumes)
+    heading = f"estimated error of the cells in layer {layer.index}"
+    return error_picture(layer, error, heading, f"{stress.error.relative:.1%} of the whole part")
 
 
 def _overview(runs: Sequence[Run], stress: LayerStress, width: float, limit: float) -> "Figure":

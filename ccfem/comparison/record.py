@@ -69,7 +69,7 @@ def record(comparison: Comparison, command: str, seconds: Mapping[str, float]) -
         note, failure, times and total indices.
     """
     case, stress = comparison.case, comparison.stress
-    mesh = case.problem.mesh
+    mesh = stress.mesh
     return _plain(
         {
             "ccfem": version("ccfem"),
@@ -80,7 +80,7 @@ def record(comparison: Comparison, command: str, seconds: Mapping[str, float]) -
                 "name": case.name,
                 "title": case.title,
                 "source": case.source,
-                "findings": case.findings,
+                "findings": (*case.findings, *stress.findings),
                 "load_case": stress.case,
                 "load": _load(stress),
                 "material": case.problem.material.name,
@@ -95,6 +95,7 @@ def record(comparison: Comparison, command: str, seconds: Mapping[str, float]) -
             },
             "machine": dataclasses.asdict(case.machine),
             "solver": vars(stress.record),
+            "planned_on_given_stress": comparison.given is not None,
             "strain_energy": stress.strain_energy,
             "fibre_per_layer": comparison.fibre_per_layer,
             "upper_bound": None if comparison.bound is None else comparison.bound.ratio,

@@ -12,6 +12,7 @@ from ccfem.comparison.pictures import Pictures
 from ccfem.comparison.ranking import best_values, stiffness_ratios
 from ccfem.comparison.result import Comparison
 from ccfem.comparison.runs import Run
+from ccfem.elasticity.stress_field import about_cells
 from ccfem.evaluation import COLUMNS, Column
 from ccfem.layers.layer import Layer
 from ccfem.virtual_testing.stiffer import HONEST_PROMISE
@@ -114,7 +115,8 @@ def _header(comparison: Comparison, record: Mapping[str, Any]) -> str:
         f"fibre width W {case.machine.fibre_width:g} mm",
     ]
     source = f"<br>Source: {escape(case.source)}." if case.source else ""
-    source += "".join(f"<br>Mesh: {escape(found)}." for found in case.findings)
+    findings = (*case.findings, *comparison.stress.findings)
+    source += "".join(f"<br>Mesh: {escape(found)}." for found in findings)
     return (
         f"<h1>{escape(case.title)}</h1>\n"
         f'<p class="sub">{escape(" · ".join(facts))}{source}<br>Units: mm, N, MPa.</p>\n'
@@ -195,10 +197,11 @@ def _pictures(comparison: Comparison, pictures: Pictures) -> str:
     if len(rows) > 1:
         every = f"<details><summary>All {len(rows)} layers</summary>\n{''.join(rows)}</details>\n"
     tension = _figure(pictures.tension, "tension in the middle layer")
+    error = _figure(pictures.error, "estimated error of the cells in the middle layer")
     return (
         f"<h2>Paths</h2>\n{_layer(pictures.middle, places[pictures.middle], runs, pictures)}"
         f"{every}{_forces(runs, pictures)}{_curves(pictures)}"
-        f"<h2>Tension without fibres</h2>\n{_grid([tension, '', '', ''])}\n"
+        f"<h2>Tension without fibres</h2>\n{_grid([tension, error, '', ''])}\n"
     )
 
 
@@ -321,6 +324,8 @@ def _computation(comparison: Comparison, record: Mapping[str, Any]) -> str:
         + (f"{solver['iterations']} iterations, " if solver["iterations"] else "direct, ")
         + f"relative residual {solver['residual']:.1e}, assembly "
         f"{solver['assembly_seconds']:.2f} s, solve {solver['solve_seconds']:.2f} s.",
+        f"{about_cells(comparison.stress)}; backward error of the equations "
+        f"{solver['backward_error']:.1e}.",
         f"Material: {record['case']['material']}. Strain energy "
         f"{record['strain_energy']:.4g} N mm.",
     ]

@@ -12,6 +12,7 @@ from ccfem.comparison.runs import Run
 from ccfem.comparison.summary import summary_html, summary_text
 from ccfem.comparison.table import frame
 from ccfem.comparison.verdict import verdict
+from ccfem.elasticity.part_stress import GivenStress, PartStress
 from ccfem.elasticity.stress_field import StressField
 from ccfem.fibre_aware.upper_bound import UpperBound
 from ccfem.layers import Layer
@@ -38,6 +39,8 @@ class Comparison:
         Length that every strategy was held to; None where each laid its own.
     seconds : mapping of stage to float
         Solve and slice; the stages of each strategy are in its run.
+    given : GivenStress, optional
+        Stress of another program, where paths are planned and evaluated on that.
     bound : UpperBound or None
         Stiffness that no paths exceed at the largest length of any run; None without virtual tests.
     """
@@ -49,6 +52,12 @@ class Comparison:
     fibre_per_layer: float | None
     seconds: Mapping[str, float]
     bound: UpperBound | None = None
+    given: GivenStress | None = None
+
+    @property
+    def planned_on(self) -> PartStress:
+        """Stress that the paths are planned and evaluated on."""
+        return self.stress if self.given is None else self.given
 
     def __post_init__(self) -> None:
         freeze(self, seconds=dict)
@@ -85,7 +94,10 @@ class Comparison:
     @property
     def remarks(self) -> list[str]:
         """What has to stand next to the numbers, a line each."""
-        return remarks(self.runs, self.fibre_per_layer, self.bound)
+        found = remarks(self.runs, self.fibre_per_layer, self.bound)
+        if self.given is not None:
+            found.append("paths are planned and evaluated on the stress of another program")
+        return found
 
     @property
     def frame(self) -> "pd.DataFrame":

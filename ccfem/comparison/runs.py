@@ -28,11 +28,14 @@ class Tested:
         Of the tension-only test; None where a strength is unknown.
     note : str
         Why there is no first-failure load; else empty.
+    matrix_before : float, MPa
+        Peak of the averaged von Mises stress without fibre; NaN where it cannot be judged.
     """
 
     bracket: Bracket
     failure: FirstFailure | None
     note: str = ""
+    matrix_before: float = float("nan")
 
 
 @dataclass(frozen=True)
@@ -52,6 +55,8 @@ class Run:
     print_plan : PrintPlan or None
         The whole part, matrix and fibre; None where the strategy failed, and where no print was
         asked for or possible.
+    printed_volume : float
+        Volume of matrix and fibre of the print plan over that of the part; NaN without a plan.
     length_per_layer : float, mm
     note : str
         Why the length is not the wanted one, or that it sets it; else empty.
@@ -73,6 +78,7 @@ class Run:
     evaluation: Evaluation | None
     tested: Tested | None = None
     print_plan: PrintPlan | None = None
+    printed_volume: float = float("nan")
     length_per_layer: float = 0.0
     note: str = ""
     failure: str = ""

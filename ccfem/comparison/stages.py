@@ -7,22 +7,23 @@ from dataclasses import dataclass, replace
 from typing import Any
 
 from ccfem.comparison.runs import Run, Tested
+from ccfem.elasticity.part_stress import PartStress
 from ccfem.elasticity.stress_field import StressField
 from ccfem.errors import InputError, SolveError
 from ccfem.evaluation import evaluate
 from ccfem.evaluation.printable import why_not
-from ccfem.export.print_plan import plan_print
+from ccfem.export.print_plan import PrintPlan, plan_print
 from ccfem.layers import Layer
 from ccfem.machine.machine import Machine
 from ccfem.planning.equal_fibre import TOLERANCE, Planned, length_per_layer, plan_to_length
 from ccfem.planning.given_paths import GivenPaths
 from ccfem.planning.plan import plan
-from ccfem.toolpaths import Toolpaths
+from ccfem.toolpaths import FIBRE, MATRIX, Toolpaths
 from ccfem.virtual_testing.equilibrium import BONDED, TENSION
 from ccfem.virtual_testing.specimen import Specimen
 from ccfem.virtual_testing.strand import Strand
 from ccfem.virtual_testing.strands import cut_strands
-from ccfem.virtual_testing.strength import first_failure
+from ccfem.virtual_testing.strength import first_failure, matrix_peak
 from ccfem.virtual_testing.virtual_test import Bracket, virtual_test
 
 __all__ = ["Part", "Tell", "all_tested", "evaluated", "levelled", "planned", "timed", "with_print"]
@@ -35,7 +36,7 @@ Tell = Callable[[str], None]
 class Part:
     """What all runs share: the stress that counts, the layers and the machine."""
 
-    stress: StressField
+    stress: PartStress
     layers: tuple[Layer, ...]
     machine: Machine
 
@@ -50,10 +51,13 @@ def planned(
 
     def work() -> Run:
         layers, stress, machine = part.layers, part.stress, part.machine
-        if wanted is None or isinstance(run.strategy, GivenPaths):
-            paths = plan(run.strategy, layers, stress, machine)
+        if isinstance(run.strategy, GivenPaths):
+            paths = run.strategy.toolpaths
             laid = length_per_layer(paths, layers)
             found = Planned(run.strategy, paths, laid, _as_given(laid, wanted))
+        elif wanted is None:
+            paths = plan(run.strategy, layers, stress, machine)
+            found = Planned(run.strategy, paths, length_per_layer(paths, layers))
         else:
             found = plan_to_length(run.strategy, layers, stress, machine, wanted, start=start)
         return replace(
@@ -130,21 +134,41 @@ def with_print(run: Run, part: Part, tell: Tell) -> Run:
         found = plan_print(run.toolpaths, part.layers, part.stress.mesh, part.machine)
     except InputError as error:
         return replace(run, unprinted=str(error))
-    return replace(run, print_plan=found)
+    share = _volume(found, part.machine) / float(part.stress.mesh.volumes.sum())
+    return replace(run, print_plan=found, printed_volume=share)
+
+
+def _volume(print_plan: PrintPlan, machine: Machine) -> float:
+    """Volume that a print lays, mm^3: lines of matrix as high as their layer, and strands."""
+    paths = print_plan.paths
+    matrix = (paths.lengths * print_plan.thickness[paths.layer])[paths.kind == MATRIX].sum()
+    fibre = paths.of_kind(FIBRE).lengths.sum()
+    return float(machine.matrix_width * matrix + machine.filament_area * fibre)
 
 
 def all_tested(
-    runs: Sequence[Run], part: Part, strand: Strand, backend: str, tell: Tell
+    runs: Sequence[Run],
+    stress: StressField,
+    machine: Machine,
+    strand: Strand,
+    backend: str,
+    tell: Tell,
 ) -> list[Run]:
     """Test every run that did not fail virtually, all on one factorisation."""
     try:
-        specimen = Specimen.of(part.stress, backend)
+        specimen = Specimen.of(stress, backend)
     except InputError as error:
         return [replace(run, untested=str(error)) for run in runs]
-    return [_tested(run, specimen, strand, part.machine, tell) for run in runs]
+    try:
+        before, _ = matrix_peak(stress)
+    except InputError:
+        before = float("nan")
+    return [_tested(run, specimen, strand, machine, before, tell) for run in runs]
 
 
-def _tested(run: Run, specimen: Specimen, strand: Strand, machine: Machine, tell: Tell) -> Run:
+def _tested(
+    run: Run, specimen: Specimen, strand: Strand, machine: Machine, before: float, tell: Tell
+) -> Run:
     """Test a run virtually, or say why it cannot be tested."""
     tell(f"testing {run.name}")
     if run.evaluation is None:
@@ -156,7 +180,7 @@ def _tested(run: Run, specimen: Specimen, strand: Strand, machine: Machine, tell
         tension = virtual_test(strands, specimen, strand, TENSION)
         bracket = Bracket(tension, virtual_test(strands, specimen, strand, BONDED, span=()))
         try:
-            test = Tested(bracket, first_failure(tension, strand))
+            test = Tested(bracket, first_failure(tension, strand), matrix_before=before)
         except InputError as error:
             test = Tested(bracket, None, str(error))
         return replace(run, tested=test)

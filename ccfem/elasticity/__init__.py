@@ -1,37 +1,65 @@
 """Linear elasticity on tetrahedra: problem, assembly, solvers, recovery."""
 
 from ccfem.elasticity.assembly import add_blocks, assemble, cell_gradients, pattern
-from ccfem.elasticity.part_stress import GivenStress, PartStress
-from ccfem.elasticity.problem import (
+from ccfem.elasticity.load_kinds import (
     Bearing,
+    BodyForce,
+    Displacement,
     Force,
+    Gravity,
     Load,
     PointForce,
     Pressure,
-    Problem,
-    Support,
+    Temperature,
     Traction,
 )
+from ccfem.elasticity.part_stress import GivenStress, PartStress
+from ccfem.elasticity.problem import Problem, Region
 from ccfem.elasticity.recovery import cell_stress, nodal_stress
-from ccfem.elasticity.solve import System, prepare, solve
+from ccfem.elasticity.solve import solve
 from ccfem.elasticity.solvers import BACKENDS, Solver, factorise, preconditioned_cg
 from ccfem.elasticity.stress_field import SolveRecord, StressField
+from ccfem.elasticity.support_kinds import (
+    EdgeSupport,
+    Foundation,
+    Pin,
+    PointSpring,
+    PointSupport,
+    RigidPatch,
+    SlidingSupport,
+    Spring,
+    Support,
+)
+from ccfem.elasticity.system import System, prepare
 
 __all__ = [
     "BACKENDS",
     "Bearing",
+    "BodyForce",
+    "Displacement",
+    "EdgeSupport",
     "Force",
+    "Foundation",
     "GivenStress",
+    "Gravity",
     "Load",
     "PartStress",
+    "Pin",
     "PointForce",
+    "PointSpring",
+    "PointSupport",
     "Pressure",
     "Problem",
+    "Region",
+    "RigidPatch",
+    "SlidingSupport",
     "SolveRecord",
     "Solver",
+    "Spring",
     "StressField",
     "Support",
     "System",
+    "Temperature",
     "Traction",
     "add_blocks",
     "assemble",

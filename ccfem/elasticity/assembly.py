@@ -70,17 +70,32 @@ def cell_gradients(mesh: TetMesh) -> FloatArray:
         In a linear cell the displacement gradient is ``u.T @ gradients`` with the (4, 3)
         displacement of its corners.
     """
-    p = mesh.points[mesh.corners]
-    x, y, z = np.ascontiguousarray(np.moveaxis(p[:, 1:] - p[:, :1], 2, 0).transpose(0, 2, 1))
-    result = np.empty((len(p), 4, 3))
-    for a, (b, c) in enumerate(((1, 2), (2, 0), (0, 1)), start=1):
-        result[:, a, 0] = y[b] * z[c] - z[b] * y[c]
-        result[:, a, 1] = z[b] * x[c] - x[b] * z[c]
-        result[:, a, 2] = x[b] * y[c] - y[b] * x[c]
-    determinant = x[0] * result[:, 1, 0] + y[0] * result[:, 1, 1] + z[0] * result[:, 1, 2]
-    result[:, 1:] /= determinant[:, None, None]
-    result[:, 0] = -(result[:, 1] + result[:, 2] + result[:, 3])
+    result = np.empty((len(mesh.cells), 4, 3))
+    _gradients(mesh.points, mesh.cells, result)
     return result
+
+
+@njit(cache=True)
+def _gradients(points, cells, result):  # type: ignore[no-untyped-def]
+    e = np.empty((3, 3))
+    for cell in range(len(cells)):
+        for a in range(3):
+            for d in range(3):
+                e[a, d] = points[cells[cell, a + 1], d] - points[cells[cell, 0], d]
+        determinant = 0.0
+        for a in range(3):
+            b, c = (a + 1) % 3, (a + 2) % 3
+            for d in range(3):
+                p, q = (d + 1) % 3, (d + 2) % 3
+                result[cell, a + 1, d] = e[b, p] * e[c, q] - e[b, q] * e[c, p]
+        for d in range(3):
+            determinant += e[0, d] * result[cell, 1, d]
+        for d in range(3):
+            total = 0.0
+            for a in range(1, 4):
+                result[cell, a, d] /= determinant
+                total += result[cell, a, d]
+            result[cell, 0, d] = -total
 
 
 @njit(cache=True)

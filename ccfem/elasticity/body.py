@@ -4,7 +4,8 @@ from collections.abc import Mapping
 from typing import Protocol
 
 from ccfem.arrays import FloatArray, IntArray
-from ccfem.elasticity.problem import Load, Support
+from ccfem.elasticity.load_kinds import Load
+from ccfem.elasticity.support_kinds import AnySupport
 from ccfem.mesh.cell_mesh import CellMesh
 
 __all__ = ["LoadedBody", "SupportedProblem"]
@@ -55,7 +56,7 @@ class SupportedProblem(Protocol):
         ...
 
     @property
-    def supports(self) -> tuple[Support, ...]:
+    def supports(self) -> tuple[AnySupport, ...]:
         """What is held."""
         ...
 

@@ -4,15 +4,12 @@ from collections.abc import Callable
 from typing import Any
 
 import numpy as np
+from scipy.linalg import eigvalsh_tridiagonal
 
 from ccfem.arrays import FloatArray
+from ccfem.elasticity.solution import product
 
 __all__ = ["conjugate_gradient"]
-
-
-def _dot(a: FloatArray, b: FloatArray) -> float:
-    """Inner product without the threads of a BLAS, which cost more than they save here."""
-    return float(np.einsum("i,i->", a, b))
 
 
 def conjugate_gradient(
@@ -22,7 +19,7 @@ def conjugate_gradient(
     x0: FloatArray | None = None,
     tolerance: float = 1e-8,
     most: int = 1000,
-) -> tuple[FloatArray, int]:
+) -> tuple[FloatArray, int, float]:
     """Solve a symmetric positive definite system (Saad, Iterative Methods, 2003, algorithm 9.1).
 
     The step length ``beta`` is Polak and Ribiere's, which forgives a preconditioner that is not
@@ -45,25 +42,42 @@ def conjugate_gradient(
     -------
     x : (n,) array
     iterations : int
+    lowest : float
+        Lowest eigenvalue of the preconditioned matrix that the directions span (Saad, section
+        6.7.3), not below the lowest of all; 1 without any iteration.
     """
     x = np.zeros_like(rhs) if x0 is None else np.array(x0, dtype=np.float64)
     residual = rhs - matrix @ x if x0 is not None else rhs.copy()
-    target = tolerance**2 * _dot(rhs, rhs)
+    target = tolerance**2 * product(rhs, rhs)
     direction = np.zeros_like(rhs)
     previous, old = residual, 1.0
+    steps: list[float] = []
+    ratios: list[float] = []
     for iteration in range(most):
-        if not _dot(residual, residual) > target:
-            return x, iteration
+        if not product(residual, residual) > target:
+            break
         z = precondition(residual)
-        new = _dot(residual, z)
-        beta = (new - _dot(previous, z)) / old if iteration else 0.0
+        new = product(residual, z)
+        beta = (new - product(previous, z)) / old if iteration else 0.0
         direction = z + beta * direction
         image = matrix @ direction
-        curvature = _dot(direction, image)
+        curvature = product(direction, image)
         if not curvature > 0.0:  # not positive definite, or no direction left
-            return x, iteration
+            break
         step = new / curvature
         x += step * direction
         previous, old = residual, new
         residual = residual - step * image
-    return x, most
+        steps.append(step)
+        ratios.append(max(beta, 0.0))
+    return x, len(steps), _lowest(np.array(steps), np.array(ratios))
+
+
+def _lowest(steps: FloatArray, ratios: FloatArray) -> float:
+    """Lowest eigenvalue of the tridiagonal matrix that the coefficients make up."""
+    if not len(steps):
+        return 1.0
+    diagonal = 1.0 / steps
+    diagonal[1:] += ratios[1:] / steps[:-1]
+    beside = np.sqrt(ratios[1:]) / steps[:-1]
+    return float(eigvalsh_tridiagonal(diagonal, beside, select="i", select_range=(0, 0))[0])

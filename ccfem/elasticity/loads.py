@@ -1,36 +1,37 @@
 """Nodal forces of loads, consistent with linear and quadratic facets."""
 
 from collections.abc import Callable
+from typing import Any
 
 import numpy as np
 
 from ccfem.arrays import FloatArray, IntArray
 from ccfem.elasticity.body import LoadedBody, SupportedProblem
-from ccfem.elasticity.problem import (
+from ccfem.elasticity.load_kinds import (
     Bearing,
+    BodyForce,
+    Displacement,
     Force,
+    Gravity,
     Load,
     PointForce,
     Pressure,
+    SurfaceLoad,
+    Temperature,
     Traction,
 )
+from ccfem.elasticity.nodes import nearest_node, patch_facets
+from ccfem.elasticity.problem import Problem
+from ccfem.elasticity.volume_loads import heat_forces, volume_forces
 from ccfem.errors import InputError
 from ccfem.mesh.facets import positions
 
-__all__ = ["load_case", "load_cases", "nodal_forces"]
-
-
-def _facets(mesh: LoadedBody, name: str) -> IntArray:
-    """Facets of a patch that must not be empty."""
-    facets = mesh.patch(name)
-    if not len(facets):
-        raise InputError(f"patch '{name}' is empty: no boundary facet meets its rule")
-    return facets
+__all__ = ["check_load", "load_case", "load_cases", "nodal_forces"]
 
 
 def _outward(mesh: LoadedBody, name: str) -> tuple[IntArray, FloatArray, FloatArray]:
     """Facets of a patch with their areas and outward unit normals."""
-    facets = _facets(mesh, name)
+    facets = patch_facets(mesh, name)
     at = positions(facets, mesh.boundary)
     if (at < 0).any():
         raise InputError(
@@ -61,13 +62,13 @@ def _vector(mesh: LoadedBody, load: Force | Traction | Bearing | PointForce) -> 
 
 
 def _force(mesh: LoadedBody, load: Force) -> FloatArray:
-    facets = _facets(mesh, load.patch)
+    facets = patch_facets(mesh, load.patch)
     area, _ = mesh.facet_areas(facets)
     return _spread(mesh, facets, area[:, None] / area.sum() * _vector(mesh, load))
 
 
 def _traction(mesh: LoadedBody, load: Traction) -> FloatArray:
-    facets = _facets(mesh, load.patch)
+    facets = patch_facets(mesh, load.patch)
     area, _ = mesh.facet_areas(facets)
     return _spread(mesh, facets, area[:, None] * _vector(mesh, load))
 
@@ -102,11 +103,8 @@ def _bearing(mesh: LoadedBody, load: Bearing) -> FloatArray:
 
 
 def _point(mesh: LoadedBody, load: PointForce) -> FloatArray:
-    used = np.unique(mesh.cells)
-    point = np.array(load.point)[: mesh.points.shape[1]]
-    distance = np.linalg.norm(mesh.points[used] - point, axis=1)
     result = np.zeros(mesh.points.shape)
-    result[used[distance.argmin()]] = _vector(mesh, load)
+    result[nearest_node(mesh, load.point, "a point force")] = _vector(mesh, load)
     return result
 
 
@@ -119,8 +117,19 @@ _KINDS: dict[type, Callable[..., FloatArray]] = {
 }
 
 
-def nodal_forces(mesh: LoadedBody, load: Load) -> FloatArray:
-    """Return the forces at the nodes that do the same work as a load.
+def check_load(load: Load) -> None:
+    """Raise for a load that is not finite, or zero; a displacement may be zero."""
+    for value in vars(load).values():
+        if value is not None and not isinstance(value, str) and not np.isfinite(value).all():
+            raise InputError(f"a load must be finite; got {load}: correct its numbers")
+    sizes = ("vector", "magnitude", "acceleration", "change")
+    size = next(getattr(load, name) for name in sizes if hasattr(load, name))
+    if not np.any(size) and not isinstance(load, Displacement):
+        raise InputError(f"a load must not be zero; got {load}: give it a size or leave it out")
+
+
+def nodal_forces(mesh: LoadedBody, load: SurfaceLoad) -> FloatArray:
+    """Return the forces at the nodes that do the same work as a load on the surface.
 
     Parameters
     ----------
@@ -134,15 +143,10 @@ def nodal_forces(mesh: LoadedBody, load: Load) -> FloatArray:
     Raises
     ------
     InputError
-        For a load that is zero or not finite, on an empty or unknown patch, or a bearing load
-        that no pressure on its patch can carry.
+        For a load that is zero or not finite, on an empty or unknown patch, a point force outside
+        the part, or a bearing load that no pressure on its patch can carry.
     """
-    for value in vars(load).values():
-        if not isinstance(value, str) and not np.isfinite(value).all():
-            raise InputError(f"a load must be finite; got {load}: correct its numbers")
-    size = load.magnitude if isinstance(load, Pressure) else load.vector
-    if not np.any(size):
-        raise InputError(f"a load must not be zero; got {load}: give it a size or leave it out")
+    check_load(load)
     return _KINDS[type(load)](mesh, load)
 
 
@@ -154,15 +158,26 @@ def load_case(problem: SupportedProblem, name: str) -> FloatArray:
     InputError
         For a bad load, or when the loads cancel at every node and no support moves.
     """
-    mesh = problem.body
-    total = np.zeros(mesh.points.shape)
-    largest = 0.0
-    for load in problem.loads[name]:
-        forces = nodal_forces(mesh, load)
-        largest = max(largest, float(np.abs(forces).max()))
-        total += forces
-    moved = any(np.any(support.value) for support in problem.supports)
-    if np.abs(total).max() <= 1e-12 * largest and not moved:
+    loads = problem.loads[name]
+    parts = []
+    for load in loads:
+        check_load(load)
+        if isinstance(load, SurfaceLoad):
+            parts.append(nodal_forces(problem.body, load))
+        elif isinstance(load, BodyForce | Gravity):
+            assert isinstance(problem, Problem)
+            parts.append(volume_forces(problem, load))
+    heat = any(isinstance(load, Temperature) for load in loads)
+    if heat:
+        assert isinstance(problem, Problem)
+        parts.append(heat_forces(problem, name))
+    total: FloatArray = sum(parts, np.zeros(problem.body.points.shape))
+    largest = max((float(np.abs(part).max()) for part in parts), default=0.0)
+    moved: list[Any] = [load.vector for load in loads if isinstance(load, Displacement)]
+    moved += [getattr(support, "value", 0.0) for support in problem.supports]
+    moved += [getattr(support, "angle", 0.0) for support in problem.supports]
+    still = not heat and not any(np.any(value) for value in moved)
+    if still and np.abs(total).max() <= 1e-12 * largest:
         raise InputError(
             f"load case '{name}' is zero and no support moves: nothing to solve for; give a load"
         )

@@ -1,126 +1,111 @@
-"""The boundary value problem: mesh, material, supports and loads."""
+"""The boundary value problem: mesh, materials, supports, loads and their combinations."""
 
 from collections.abc import Mapping
 from dataclasses import dataclass, field
+from typing import Literal
 
 import numpy as np
 
-from ccfem.arrays import FloatArray, freeze
+from ccfem.arrays import FloatArray, IntArray, freeze
+from ccfem.elasticity.load_kinds import (
+    Bearing,
+    Force,
+    Load,
+    PointForce,
+    Pressure,
+    Traction,
+    patches_in_use,
+    patches_of,
+)
+from ccfem.elasticity.support_kinds import AnySupport, Support
 from ccfem.errors import InputError
 from ccfem.materials import Material
 from ccfem.mesh.tet_mesh import TetMesh
+from ccfem.tensor import rotate_stiffness
 
 __all__ = [
     "Bearing",
     "Force",
     "Load",
+    "Order",
     "PointForce",
     "Pressure",
     "Problem",
+    "Region",
     "Support",
     "Traction",
     "patches_in_use",
 ]
 
+Order = Literal["auto", 1, 2]
+
+_ROTATION = 1e-6
+"""Deviation from orthonormal axes that is taken for rounding."""
+_SYMMETRIC = 1e-9
+"""Deviation of a stiffness from a symmetric one, over its size, that is taken for rounding."""
+
 
 @dataclass(frozen=True)
-class Support:
-    """Components of the displacement held on a patch.
+class Region:
+    """Cells of another material than the rest of the part.
 
     Attributes
     ----------
-    patch : str
-    components : str, default "xyz"
-        Which components are held.
-    value : tuple of 3 floats, mm, default zero
-        Displacement that the held components take.
+    material : Material
+    cells : (k,) int array
     """
 
-    patch: str
-    components: str = "xyz"
-    value: tuple[float, float, float] = (0.0, 0.0, 0.0)
+    material: Material
+    cells: IntArray
 
     def __post_init__(self) -> None:
-        if not self.components or set(self.components) - set("xyz"):
-            raise InputError(
-                f"support components must be letters of 'xyz'; got '{self.components}' on "
-                f"patch '{self.patch}'"
-            )
-
-
-@dataclass(frozen=True)
-class Force:
-    """A total force, N, spread evenly over the area of a patch."""
-
-    patch: str
-    vector: tuple[float, float, float]
-
-
-@dataclass(frozen=True)
-class Traction:
-    """A traction, MPa, on a patch."""
-
-    patch: str
-    vector: tuple[float, float, float]
-
-
-@dataclass(frozen=True)
-class Pressure:
-    """A pressure, MPa, on a patch; positive pushes inward."""
-
-    patch: str
-    magnitude: float
-
-
-@dataclass(frozen=True)
-class Bearing:
-    """A total force, N, on a cylindrical patch, as a pin presses it.
-
-    The pressure acts along the facet normals and varies as the cosine of the angle to the force,
-    on the half that the pin touches; it is scaled to the total force.
-    """
-
-    patch: str
-    vector: tuple[float, float, float]
-
-
-@dataclass(frozen=True)
-class PointForce:
-    """A force, N, at the mesh node nearest to a point, mm."""
-
-    point: tuple[float, float, float]
-    vector: tuple[float, float, float]
-
-
-Load = Force | Traction | Pressure | Bearing | PointForce
+        freeze(self, cells=int)
 
 
 @dataclass(frozen=True)
 class Problem:
-    """A linear elastic part with its supports and loads.
+    """A linear elastic part with its supports and loads; one that exists can be solved on.
 
     Attributes
     ----------
     mesh : TetMesh
     material : Material
-        One material for the whole part.
-    supports : tuple of Support
+        Of all cells that no region names.
+    supports : tuple of supports
+        See `ccfem.elasticity.support_kinds`.
     loads : mapping of load case name to tuple of loads
+        See `ccfem.elasticity.load_kinds`.
     axes : (m, 3, 3) array, optional
         Material axes of each cell as columns, the fibre first; default the global axes.
     density : (m,) array in (0, 1], optional
-        Factor on the stiffness of each cell; default 1.
+        Factor on the stiffness, and on the mass, of each cell; default 1.
     stiffness : (m, 6, 6) array, MPa, optional
-        Stiffness of each cell in the global frame; overrides `material` and `axes`.
+        Stiffness of each cell in the global frame; overrides that of materials and `axes`.
+    regions : tuple of Region
+        Cells of other materials; no cell in two of them.
+    combinations : mapping of name to mapping of load case name to factor
+        Further load cases: sums of others, each times its factor.
+    order : "auto", 1 or 2, default "auto"
+        Order of the displacement that `solve` takes on a mesh of linear cells: see
+        `ccfem.elasticity.order`. Quadratic cells stay.
+
+    Raises
+    ------
+    InputError
+        For a mesh that cannot be solved on, arrays that do not fit it or that no material can
+        have, patches that do not exist or are empty, and combinations of unknown cases.
     """
 
     mesh: TetMesh
     material: Material
-    supports: tuple[Support, ...]
+    supports: tuple[AnySupport, ...]
     loads: Mapping[str, tuple[Load, ...]] = field(default_factory=dict)
     axes: FloatArray | None = None
     density: FloatArray | None = None
     stiffness: FloatArray | None = None
+    regions: tuple[Region, ...] = ()
+    combinations: Mapping[str, Mapping[str, float]] = field(default_factory=dict)
+    order: Order = "auto"
 
     def __repr__(self) -> str:
         return (
@@ -129,7 +114,19 @@ class Problem:
         )
 
     def __post_init__(self) -> None:
-        freeze(self, supports=tuple, loads=tuple, axes=float, density=float, stiffness=float)
+        freeze(self, supports=tuple, loads=tuple, regions=tuple, combinations=dict)
+        freeze(self, axes=float, density=float, stiffness=float)
+        if self.mesh.flaw:
+            raise InputError(self.mesh.flaw)
+        self._check_arrays()
+        self._check_regions()
+        self._check_names()
+        if self.order not in ("auto", 1, 2):
+            raise InputError(
+                f"order of the displacement must be 'auto', 1 or 2; got {self.order!r}: choose one"
+            )
+
+    def _check_arrays(self) -> None:
         m = len(self.mesh.cells)
         for name, shape in (("axes", (m, 3, 3)), ("density", (m,)), ("stiffness", (m, 6, 6))):
             value = getattr(self, name)
@@ -146,6 +143,49 @@ class Problem:
                 f"problem.density must lie in (0, 1]; got {self.density.min()} to "
                 f"{self.density.max()}: give void cells a small positive density"
             )
+        if self.axes is not None:
+            off = np.abs(np.einsum("mji,mjk->mik", self.axes, self.axes) - np.eye(3))
+            off = off.max(axis=(1, 2))
+            if off.max() > _ROTATION:
+                raise InputError(
+                    "problem.axes must be three unit vectors at right angles, as columns; those of "
+                    f"cell {off.argmax()} are off by {off.max():.2g}: orthonormalise them"
+                )
+        if self.stiffness is not None:
+            _check_stiffness(self.stiffness)
+
+    def _check_regions(self) -> None:
+        m = len(self.mesh.cells)
+        seen = np.zeros(m, dtype=bool)
+        for k, region in enumerate(self.regions):
+            cells = region.cells
+            if cells.ndim != 1 or not len(cells) or cells.min() < 0 or cells.max() >= m:
+                raise InputError(
+                    f"problem.regions[{k}] must name cells 0 to {m - 1}, at least one; got "
+                    f"{cells.size} of them: correct it"
+                )
+            if seen[cells].any() or len(np.unique(cells)) < len(cells):
+                raise InputError(
+                    f"problem.regions[{k}] names cells that another region has, or twice: give "
+                    "each cell to one region"
+                )
+            seen[cells] = True
+
+    def _check_names(self) -> None:
+        for kind in (*self.supports, *(load for case in self.loads.values() for load in case)):
+            for name in patches_of(kind):
+                if not len(self.mesh.patch(name)):
+                    raise InputError(f"patch '{name}' is empty: no boundary facet meets its rule")
+        for name, factors in self.combinations.items():
+            unknown = sorted(set(factors) - set(self.loads))
+            if name in self.loads or unknown or not factors:
+                known = ", ".join(self.loads) or "none"
+                raise InputError(
+                    f"combination '{name}' must have a name of its own and name load cases "
+                    f"({known}); got {dict(factors)}: correct it"
+                )
+            if not np.isfinite(list(factors.values())).all():
+                raise InputError(f"factors of combination '{name}' must be finite; got {factors}")
 
     @property
     def body(self) -> TetMesh:
@@ -157,12 +197,55 @@ class Problem:
         """Names of the patches that carry a support or a load, sorted."""
         return patches_in_use(self.supports, self.loads)
 
+    @property
+    def cases(self) -> tuple[str, ...]:
+        """Names of the load cases, then of their combinations."""
+        return (*self.loads, *self.combinations)
 
-def patches_in_use(
-    supports: tuple[Support, ...], loads: Mapping[str, tuple[Load, ...]]
-) -> tuple[str, ...]:
-    """Names of the patches that carry a support or a load, sorted."""
-    names = {support.patch for support in supports}
-    for case in loads.values():
-        names |= {load.patch for load in case if not isinstance(load, PointForce)}
-    return tuple(sorted(names))
+    def factors(self, case: str) -> Mapping[str, float]:
+        """Load cases that one case consists of, with their factors."""
+        return self.combinations.get(case, {case: 1.0})
+
+    def loads_of(self, case: str) -> tuple[Load, ...]:
+        """Return the loads of a case; of a combination those of all that it consists of."""
+        return tuple(load for name in self.factors(case) for load in self.loads[name])
+
+    @property
+    def materials(self) -> tuple[tuple[Material, IntArray], ...]:
+        """Each material with its cells (k,)."""
+        rest = np.ones(len(self.mesh.cells), dtype=bool)
+        for region in self.regions:
+            rest[region.cells] = False
+        found = [(self.material, np.flatnonzero(rest))] if rest.any() else []
+        return (*found, *((region.material, region.cells) for region in self.regions))
+
+    @property
+    def cell_stiffness(self) -> FloatArray:
+        """Stiffness in the global frame without density: (6, 6), or (m, 6, 6) per cell, MPa."""
+        if self.stiffness is not None:
+            return self.stiffness
+        if not self.regions:
+            own = self.material.stiffness
+        else:
+            own = np.empty((len(self.mesh.cells), 6, 6))
+            for material, cells in self.materials:
+                own[cells] = material.stiffness
+        return own if self.axes is None else rotate_stiffness(own, self.axes)
+
+
+def _check_stiffness(stiffness: FloatArray) -> None:
+    """Raise where a cell has a stiffness that no material can have."""
+    size = np.abs(stiffness).max(axis=(1, 2))
+    skew = np.abs(stiffness - np.swapaxes(stiffness, 1, 2)).max(axis=(1, 2))
+    wrong = np.flatnonzero(skew > _SYMMETRIC * size)
+    what = "symmetric: average it with its transpose"
+    if not len(wrong):
+        what = "positive definite: give void cells a small positive stiffness"
+        try:
+            np.linalg.cholesky(stiffness)
+        except np.linalg.LinAlgError:
+            wrong = np.flatnonzero(~(np.linalg.eigvalsh(stiffness)[:, 0] > 0.0))
+    if len(wrong):
+        raise InputError(
+            f"problem.stiffness must be {what}; {len(wrong)} cells are not, the first is {wrong[0]}"
+        )

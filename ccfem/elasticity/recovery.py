@@ -8,10 +8,18 @@ from ccfem.elasticity.assembly import cell_gradients
 from ccfem.mesh.tet_mesh import TetMesh
 from ccfem.tensor import from_voigt
 
-__all__ = ["cell_strain", "cell_stress", "nodal_stress", "strain_at_nodes"]
+__all__ = [
+    "cell_strain",
+    "cell_stress",
+    "nodal_stress",
+    "shape_gradients",
+    "strain_at_nodes",
+    "times",
+    "voigt_strain",
+]
 
 
-def _voigt_strain(gradient: FloatArray) -> FloatArray:
+def voigt_strain(gradient: FloatArray) -> FloatArray:
     """Voigt strain (..., 6) of displacement gradients (..., 3, 3) with entries du_p / dx_r."""
     g = gradient
     return np.stack(
@@ -27,14 +35,14 @@ def _voigt_strain(gradient: FloatArray) -> FloatArray:
     )
 
 
-def _times(stiffness: FloatArray, strain: FloatArray) -> FloatArray:
+def times(stiffness: FloatArray, strain: FloatArray) -> FloatArray:
     """Stress (m, ..., 6) of strain (m, ..., 6) with one stiffness or one per cell."""
     if stiffness.ndim == 2:
         return strain @ stiffness.T
     return (strain.reshape(len(strain), -1, 6) @ stiffness.transpose(0, 2, 1)).reshape(strain.shape)
 
 
-def _shape_gradients(gradients: FloatArray, at: FloatArray, edges: FloatArray) -> FloatArray:
+def shape_gradients(gradients: FloatArray, at: FloatArray, edges: FloatArray) -> FloatArray:
     """Gradients (m, 10, 3) of the quadratic shape functions at barycentric coordinates (4,)."""
     corner = (4.0 * at - 1.0)[:, None] * gradients
     i, j = edges.T
@@ -46,8 +54,8 @@ def cell_strain(mesh: TetMesh, displacement: FloatArray) -> FloatArray:
     """Voigt strain (m, 6) with engineering shear, at the centroid of each cell."""
     gradients = cell_gradients(mesh)
     if mesh.order == 2:
-        gradients = _shape_gradients(gradients, np.full(4, 0.25), mesh.edges)
-    return _voigt_strain(displacement[mesh.cells].transpose(0, 2, 1) @ gradients)
+        gradients = shape_gradients(gradients, np.full(4, 0.25), mesh.edges)
+    return voigt_strain(displacement[mesh.cells].transpose(0, 2, 1) @ gradients)
 
 
 def strain_at_nodes(mesh: TetMesh, displacement: FloatArray) -> FloatArray:
@@ -57,13 +65,16 @@ def strain_at_nodes(mesh: TetMesh, displacement: FloatArray) -> FloatArray:
     gradients = cell_gradients(mesh)
     u = displacement[mesh.cells].transpose(0, 2, 1)
     barycentric = np.concatenate([np.eye(4), np.eye(4)[mesh.edges].mean(axis=1)])
-    at_nodes = [
-        _voigt_strain(u @ _shape_gradients(gradients, at, mesh.edges)) for at in barycentric
-    ]
+    at_nodes = [voigt_strain(u @ shape_gradients(gradients, at, mesh.edges)) for at in barycentric]
     return np.stack(at_nodes, axis=1)
 
 
-def cell_stress(mesh: TetMesh, displacement: FloatArray, stiffness: FloatArray) -> FloatArray:
+def cell_stress(
+    mesh: TetMesh,
+    displacement: FloatArray,
+    stiffness: FloatArray,
+    free: FloatArray | None = None,
+) -> FloatArray:
     """Stress of each cell, at its centroid.
 
     Parameters
@@ -71,15 +82,23 @@ def cell_stress(mesh: TetMesh, displacement: FloatArray, stiffness: FloatArray) 
     mesh : TetMesh
     displacement : (n, 3) array, mm
     stiffness : (6, 6) or (m, 6, 6) array, MPa
+    free : (m, 6) array, optional
+        Strain, Voigt, of each cell that is without stress, as heat makes it.
 
     Returns
     -------
     (m, 3, 3) array, MPa
     """
-    return from_voigt(_times(stiffness, cell_strain(mesh, displacement)))
+    strain = cell_strain(mesh, displacement)
+    return from_voigt(times(stiffness, strain if free is None else strain - free))
 
 
-def nodal_stress(mesh: TetMesh, displacement: FloatArray, stiffness: FloatArray) -> FloatArray:
+def nodal_stress(
+    mesh: TetMesh,
+    displacement: FloatArray,
+    stiffness: FloatArray,
+    free: FloatArray | None = None,
+) -> FloatArray:
     """Stress at the nodes: the average over the cells round each, weighted by their volumes.
 
     In quadratic cells the stress of a cell is taken at the node itself.
@@ -91,10 +110,13 @@ def nodal_stress(mesh: TetMesh, displacement: FloatArray, stiffness: FloatArray)
     """
     m, q = mesh.cells.shape
     if mesh.order == 1:
-        stress = _times(stiffness, cell_strain(mesh, displacement))
+        strain = cell_strain(mesh, displacement)
+        stress = times(stiffness, strain if free is None else strain - free)
         entries = np.repeat(np.arange(m), q)
     else:
-        stress = _times(stiffness, strain_at_nodes(mesh, displacement)).reshape(-1, 6)
+        strain = strain_at_nodes(mesh, displacement)
+        stress = times(stiffness, strain if free is None else strain - free[:, None])
+        stress = stress.reshape(-1, 6)
         entries = np.arange(m * q)
     weights = np.repeat(mesh.volumes, q)
     nodes, n = mesh.cells.reshape(-1), len(mesh.points)

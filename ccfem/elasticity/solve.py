@@ -1,131 +1,32 @@
 """The solve: from a problem to the stress field of every load case."""
 
-from collections.abc import Callable
-from dataclasses import dataclass, replace
-from functools import cached_property, partial
+from collections.abc import Callable, Mapping
+from dataclasses import replace
+from functools import partial
 from time import perf_counter
 from typing import Protocol, TypeVar
 
 import numpy as np
 import scipy.sparse as sp
 
-from ccfem.arrays import FloatArray, IntArray
-from ccfem.elasticity.assembly import Pattern, assemble, pattern
-from ccfem.elasticity.loads import load_cases
+from ccfem.arrays import FloatArray
+from ccfem.elasticity.conditioning import about_conditioning
+from ccfem.elasticity.held import Held
+from ccfem.elasticity.order import LARGEST_ERROR, MOST_CELLS, linear_locks, on_quadratic
 from ccfem.elasticity.problem import Problem
-from ccfem.elasticity.recovery import cell_stress, nodal_stress
-from ccfem.elasticity.solvers import LARGEST_DIRECT, Solver, direct_backend, factorise
+from ccfem.elasticity.solution import Solution
+from ccfem.elasticity.solvers import LARGEST_DIRECT, Solver, direct_backend
 from ccfem.elasticity.stress_field import SolveRecord, StressField
-from ccfem.elasticity.supports import Held, held
-from ccfem.errors import InputError, SolveError
-from ccfem.mesh.check import about_slivers
-from ccfem.mesh.tet_mesh import TetMesh
-from ccfem.tensor import rotate_stiffness
+from ccfem.elasticity.system import prepare
+from ccfem.errors import SolveError
 
-__all__ = ["System", "cell_stiffness", "prepare", "solve", "solve_system"]
+__all__ = ["solve", "solve_system"]
 
 FieldT = TypeVar("FieldT", covariant=True)
 
-
-def cell_stiffness(problem: Problem) -> FloatArray:
-    """Stiffness in the global frame without density: (6, 6), or (m, 6, 6) per cell, MPa."""
-    if problem.stiffness is not None:
-        return problem.stiffness
-    if problem.axes is None:
-        return problem.material.stiffness
-    return rotate_stiffness(problem.material.stiffness, problem.axes)
-
-
-@dataclass(frozen=True)
-class System:
-    """The equations of a problem: everything that stays when only the stiffness changes.
-
-    Attributes
-    ----------
-    problem : Problem
-    where : Pattern
-        Of the stiffness matrix.
-    held : Held
-        The supports.
-    forces : dict of load case name to (n, 3) array, N
-    """
-
-    problem: Problem
-    where: Pattern
-    held: Held
-    forces: dict[str, FloatArray]
-
-    @cached_property
-    def stiffness(self) -> FloatArray:
-        """Stiffness of the problem in the global frame, (6, 6) or (m, 6, 6), MPa."""
-        return cell_stiffness(self.problem)
-
-    def assemble(self, stiffness: FloatArray | None = None) -> sp.bsr_array:
-        """Stiffness matrix (3n, 3n), N/mm, of the problem or of another stiffness of its cells."""
-        chosen = self.stiffness if stiffness is None else stiffness
-        return assemble(self.problem.mesh, chosen, self.problem.density, self.where)
-
-    def factorise(self, matrix: sp.bsr_array, backend: str = "auto", solves: int = 1) -> Solver:
-        """Factorise a stiffness matrix (3n, 3n) with the supports in place.
-
-        Parameters
-        ----------
-        matrix : bsr_array (3n, 3n), N/mm
-        backend : str, default "auto"
-        solves : int, default 1
-            Right-hand sides to expect.
-        """
-        mesh, nodes = self.problem.mesh, self.held.nodes
-        parents = _parents(mesh, nodes) if mesh.order == 2 else None
-        return factorise(self.held.reduce(matrix), mesh.points[nodes], backend, parents, solves)
-
-    def field(
-        self, case: str, displacement: FloatArray, matrix: sp.bsr_array, record: SolveRecord
-    ) -> StressField:
-        """Stress, reactions and energy of a displacement (n, 3), mm."""
-        problem = self.problem
-        scaled = self.stiffness
-        if problem.density is not None:
-            scaled = problem.density[:, None, None] * scaled
-        internal = (matrix @ displacement.reshape(-1)).reshape(-1, 3)
-        return StressField(
-            problem=problem,
-            case=case,
-            displacement=displacement,
-            stress=cell_stress(problem.mesh, displacement, scaled),
-            nodal=nodal_stress(problem.mesh, displacement, scaled),
-            reactions=np.where(self.held.free, 0.0, internal - self.forces[case]),
-            strain_energy=0.5 * float(np.vdot(displacement, internal)),
-            record=record,
-        )
-
-
-def _parents(mesh: TetMesh, nodes: IntArray) -> IntArray:
-    """Rows of the two corners that each row's node is the middle of; -1 for a held corner."""
-    place = np.full(len(mesh.points), -1)
-    place[nodes] = np.arange(len(nodes))
-    ends = np.repeat(np.arange(len(mesh.points))[:, None], 2, axis=1)
-    ends[mesh.cells[:, 4:]] = mesh.cells[:, mesh.edges]
-    return place[ends[nodes]]
-
-
-def prepare(problem: Problem) -> System:
-    """Check a problem and collect what its solves share.
-
-    Raises
-    ------
-    InputError
-        For an invalid mesh, support or load.
-    """
-    if not np.isfinite(problem.mesh.points).all():
-        raise InputError("the mesh has points that are NaN or infinite: correct its coordinates")
-    if not problem.mesh.volumes.min() > 0.0:
-        raise InputError(
-            f"cell {problem.mesh.volumes.argmin()} of the mesh has volume "
-            f"{problem.mesh.volumes.min():.3g} mm^3: repair flat and inverted cells first"
-        )
-    forces = load_cases(problem)
-    return System(problem, pattern(problem.mesh), held(problem), forces)
+_ENERGY = 1e-4
+"""Energy of the error, over that of the displacement, above which a solution is no good: a
+hundredth of what the cells themselves leave of it."""
 
 
 def solve(
@@ -136,32 +37,67 @@ def solve(
     Parameters
     ----------
     problem : Problem
+        With ``order = "auto"`` a mesh of linear cells is solved on quadratic ones where linear
+        ones lock or leave too large an error: see `ccfem.elasticity.order`. The nodes of the mesh
+        stay the first ones, the cells stay in their order, and the problem of each field is the
+        one that was solved.
     backend : str, default "auto"
         One of `ccfem.elasticity.BACKENDS`; "auto" chooses by size and by what is installed, and
-        where an iterative backend misses the tolerance goes on with a direct one. The record
-        names the one that solved.
+        where an iterative backend fails goes on with a direct one. The record names the one that
+        solved.
     tolerance : float, default 1e-8
-        Largest relative residual that is accepted.
+        Relative residual at which iterations end. A solution is accepted when its residual is
+        below it or its backward error is rounding (`ccfem.elasticity.solution`), and the energy
+        of its error is below 1e-4 of that of the displacement.
 
     Returns
     -------
     dict of load case name to StressField
-        The time of the factorisation counts in the record of the first load case.
+        Combinations of load cases come last. The time of the factorisation counts in the record
+        of the first load case.
 
     Raises
     ------
     InputError
         For an invalid mesh, support, load or backend.
     SolveError
-        When a relative residual stays above the tolerance; very flat cells are named.
+        When a solution is not accepted; what makes the equations ill-conditioned is named.
     """
+    if problem.order != "auto" or problem.mesh.order == 2:
+        wanted = on_quadratic(problem) if problem.order == 2 else problem
+        return _solved_as_it_is(wanted, backend, tolerance, "")
+    if len(problem.mesh.cells) > MOST_CELLS:
+        why = f"more than {MOST_CELLS:,} cells"
+        return _solved_as_it_is(replace(problem, order=1), backend, tolerance, why)
+    if linear_locks(problem):
+        why = "the material hardly changes its volume, where linear cells lock"
+        return _solved_as_it_is(on_quadratic(problem), backend, tolerance, why)
+    why = f"estimated error at most {LARGEST_ERROR:.0%}"
+    fields = _solved_as_it_is(replace(problem, order=1), backend, tolerance, why)
+    worst = max(field.record.error for field in fields.values())
+    if worst <= LARGEST_ERROR:
+        return fields
+    why = f"linear ones leave an estimated error of {worst:.0%}"
+    return _solved_as_it_is(on_quadratic(problem), backend, tolerance, why)
+
+
+def _solved_as_it_is(
+    problem: Problem, backend: str, tolerance: float, why: str
+) -> dict[str, StressField]:
+    """Solve a problem on its own cells."""
     try:
-        return solve_system(partial(prepare, problem), backend, tolerance)
+        fields = solve_system(partial(prepare, problem), backend, tolerance)
     except SolveError as error:
-        slivers = about_slivers(problem.mesh)
-        if not slivers:
-            raise
-        raise SolveError(f"{error}; {slivers}") from error
+        raise SolveError(f"{error}; {about_conditioning(problem)}") from error
+    return {case: _with_error(field, why) for case, field in fields.items()}
+
+
+def _with_error(field: StressField, why: str) -> StressField:
+    """Field with its estimated error in the record."""
+    record = replace(field.record, error=field.error.relative, order_because=why)
+    result = replace(field, record=record)
+    result.__dict__["error"] = field.error
+    return result
 
 
 class _Equations(Protocol[FieldT]):
@@ -172,6 +108,11 @@ class _Equations(Protocol[FieldT]):
 
     @property
     def forces(self) -> dict[str, FloatArray]: ...
+
+    @property
+    def combinations(self) -> Mapping[str, Mapping[str, float]]: ...
+
+    def held_in(self, case: str) -> Held: ...
 
     def assemble(self) -> sp.bsr_array: ...
 
@@ -191,28 +132,45 @@ def solve_system(
     matrix = system.assemble()
     assembled = perf_counter()
     solver = system.factorise(matrix, backend, len(system.forces))
-    record = SolveRecord(solver.backend, 0, 0.0, assembled - started, 0.0, 0)
-    record = replace(record, unknowns=int(system.held.free.sum()))
-    fields = {}
+    record = SolveRecord(solver.backend, 0, 0.0, assembled - started, 0.0, system.held.unknowns)
+    fields, found = {}, {}
     started = assembled
     for case, forces in system.forces.items():
-        rhs = system.held.right_hand_side(matrix, forces)
+        held = system.held_in(case)
+        rhs = held.right_hand_side(matrix, forces)
         try:
-            solution = solver.solve(rhs, tolerance=tolerance)
+            solution, energy = _solved(solver, rhs, tolerance)
         except SolveError:
             if backend != "auto" or solver.exact or record.unknowns > LARGEST_DIRECT:
                 raise
             solver = system.factorise(matrix, direct_backend())
-            solution = solver.solve(rhs, tolerance=tolerance)
-        displacement = system.held.expand(solution.values)
+            solution, energy = _solved(solver, rhs, tolerance)
+        found[case] = held.expand(solution.values)
         now = perf_counter()
         record = replace(
             record,
             backend=solver.backend,
             iterations=solution.iterations,
             residual=solution.residual,
+            backward_error=solution.backward_error,
+            energy_error=energy,
             solve_seconds=now - started,
         )
-        fields[case] = system.field(case, displacement, matrix, record)
+        fields[case] = system.field(case, found[case], matrix, record)
         started = perf_counter()
+    for name, factors in system.combinations.items():
+        total = sum((k * found[case] for case, k in factors.items()), np.zeros_like(found[case]))
+        fields[name] = system.field(name, total, matrix, replace(record, iterations=0))
     return fields
+
+
+def _solved(solver: Solver, rhs: FloatArray, tolerance: float) -> tuple[Solution, float]:
+    """Solution of a right-hand side, and the bound of the energy of its error."""
+    solution = solver.solve(rhs, tolerance=tolerance)
+    energy = solver.energy_error(rhs, solution)
+    if not energy <= _ENERGY:
+        raise SolveError(
+            f"{solver.backend}: the energy of the error may be {energy:.1e} of that of the "
+            f"displacement, above {_ENERGY:.0e}, at a relative residual of {solution.residual:.1e}"
+        )
+    return solution, energy

@@ -2,9 +2,8 @@
 
 from collections.abc import Callable
 from dataclasses import dataclass, replace
-from functools import partial
+from functools import cached_property, partial
 from importlib.util import find_spec
-from typing import NamedTuple
 
 import numpy as np
 import scipy.sparse as sp
@@ -14,19 +13,19 @@ from ccfem.checks import check_known
 from ccfem.elasticity import direct, multigrid
 from ccfem.elasticity.conjugate_gradient import conjugate_gradient
 from ccfem.elasticity.skyline import skyline, skyline_operations
-from ccfem.errors import InputError, SolveError
+from ccfem.elasticity.solution import Solution, checked, judged, product, reached
+from ccfem.errors import InputError
 
 __all__ = ["BACKENDS", "DIRECT", "Solution", "Solver", "factorise", "preconditioned_cg"]
 
 DIRECT = ("pypardiso", "cholmod", "superlu", "skyline")
-BACKENDS = (*DIRECT, "amg", "two-level", "petsc")
+BACKENDS = (*DIRECT, "amg", "two-level")
 
 _CURES = {
     "pypardiso": 'pip install "ccfem[mkl]"',
     "cholmod": 'pip install "scikit-sparse<0.5"',
-    "petsc": "install petsc4py",
 }
-_MODULES = {"pypardiso": "pypardiso", "cholmod": "sksparse", "petsc": "petsc4py"}
+_MODULES = {"pypardiso": "pypardiso", "cholmod": "sksparse"}
 
 _SMALL = 6_000
 """Unknowns up to which SuperLU is quicker than setting up a multigrid (measured)."""
@@ -34,7 +33,15 @@ _SMALL = 6_000
 _MANY = 4
 """Right-hand sides from which a sparse Cholesky is quicker than a multigrid (measured)."""
 
-_RESTARTS = 2
+_SEVERAL = 3
+"""Right-hand sides from which a multigrid that takes longer to make is worth it (measured)."""
+
+_THIN = 12.4
+"""Neighbours of a node of linear cells, itself among them, below which a part is so thin that
+PARDISO is quicker than a multigrid for one right-hand side already (measured): two cells high."""
+
+_REFINEMENTS = 2
+"""Times that a solution is improved by solving for what its residual leaves."""
 
 _SKYLINE = 1e9
 """Operations up to which the skyline is quicker than the sparse factorisations (measured)."""
@@ -44,23 +51,6 @@ _SKYLINE_RENEWED = 1e7
 
 LARGEST_DIRECT = 100_000
 """Unknowns up to which a direct backend is worth its memory."""
-
-
-class Solution(NamedTuple):
-    """What a solve found.
-
-    Attributes
-    ----------
-    values : (n,) array
-    iterations : int
-        0 for a direct solve.
-    residual : float
-        ``|rhs - matrix values| / |rhs|``, computed from the matrix.
-    """
-
-    values: FloatArray
-    iterations: int
-    residual: float
 
 
 @dataclass(frozen=True)
@@ -132,38 +122,41 @@ class Solver:
         Raises
         ------
         SolveError
-            When the relative residual stays above the tolerance.
+            When the relative residual stays above the tolerance, and the backward error above
+            rounding.
         """
         if not self.exact:
             return preconditioned_cg(self.matrix, rhs, self, x0, tolerance)
-        x = self.apply(rhs)
-        if _residual(self.matrix, x, rhs) > tolerance:
-            x = x + self.apply(rhs - self.matrix @ x)
-        return _checked(self.matrix, x, rhs, 0, tolerance, self.backend)
+        found = judged(self.matrix, self.apply(rhs), rhs, self.size)
+        for _ in range(_REFINEMENTS):
+            if found.residual <= tolerance:
+                break
+            x = found.values + self.apply(rhs - self.matrix @ found.values)
+            better = judged(self.matrix, x, rhs, self.size)
+            if not better.residual < found.residual:
+                break
+            found = better
+        return checked(found, tolerance, self.backend)
 
+    @cached_property
+    def size(self) -> float:
+        """Largest diagonal entry of the matrix, which its norm does not fall below."""
+        return float(self.matrix.diagonal().max(initial=0.0))
 
-def _residual(matrix: sp.bsr_array, x: FloatArray, rhs: FloatArray) -> float:
-    # Sums of squares without the threads of a BLAS, which cost more than they save here.
-    rest = rhs - matrix @ x
-    size = float(np.sqrt(np.einsum("i,i->", rhs, rhs)))
-    return float(np.sqrt(np.einsum("i,i->", rest, rest))) / (size or 1.0)
+    def energy_error(self, rhs: FloatArray, solution: Solution) -> float:
+        """Bound of the energy of a solution's error, ``|x - x*|_A / |x|_A``.
 
-
-def _checked(
-    matrix: sp.bsr_array,
-    x: FloatArray,
-    rhs: FloatArray,
-    iterations: int,
-    tolerance: float,
-    backend: str,
-) -> Solution:
-    residual = _residual(matrix, x, rhs)
-    if not residual <= tolerance:
-        raise SolveError(
-            f"{backend}: relative residual {residual:.1e} after {iterations} iterations, above "
-            f"the tolerance {tolerance:.1e}"
-        )
-    return Solution(x, iterations, residual)
+        The preconditioner M gives ``|e|_A^2 = r^T A^-1 r <= r^T M^-1 r / lowest``, lowest being
+        that eigenvalue of ``M^-1 A`` (Axelsson, Iterative Solution Methods, 1994, section 13.4); a
+        factorisation is its own preconditioner. Half of what conjugate gradients saw of it stands
+        for the lowest, since they approach it from above.
+        """
+        x = solution.values
+        image = self.matrix @ x
+        rest, size = rhs - image, product(x, image)
+        lowest = 1.0 if self.exact else 0.5 * solution.lowest
+        error = max(product(rest, self.apply(rest)), 0.0) / lowest
+        return float(np.sqrt(error / size)) if size > 0.0 else 0.0
 
 
 def preconditioned_cg(
@@ -191,13 +184,19 @@ def preconditioned_cg(
     """
     # The residual of the recursion drifts from the true one: aim lower, and start again from what
     # was found where the true one is still too large.
-    x, iterations = conjugate_gradient(matrix, rhs, solver.apply, x0, 0.5 * tolerance)
-    for _ in range(_RESTARTS):
-        if _residual(matrix, x, rhs) <= tolerance:
+    found, total = None, 0
+    for _ in range(1 + _REFINEMENTS):
+        x, more, lowest = conjugate_gradient(matrix, rhs, solver.apply, x0, 0.5 * tolerance)
+        total += more
+        lowest = min(lowest, found.lowest) if found is not None and more else lowest
+        better = judged(matrix, x, rhs, solver.size, total, lowest)
+        if found is not None and not better.residual < 0.5 * found.residual:
             break
-        x, more = conjugate_gradient(matrix, rhs, solver.apply, x, 0.5 * tolerance)
-        iterations += more
-    return _checked(matrix, x, rhs, iterations, tolerance, solver.backend)
+        found, x0 = better, x
+        if reached(found, tolerance):
+            break
+    assert found is not None
+    return checked(found, tolerance, solver.backend)
 
 
 def direct_backend() -> str:
@@ -222,7 +221,7 @@ def choose_direct(matrix: sp.bsr_array, renewed: bool = False) -> str:
     return "skyline" if skyline_operations(matrix) <= limit else best
 
 
-def choose(unknowns: int, order: int, solves: int = 1) -> str:
+def choose(unknowns: int, order: int, solves: int = 1, neighbours: float = np.inf) -> str:
     """Name the backend that suits a system and what is installed.
 
     Parameters
@@ -232,21 +231,25 @@ def choose(unknowns: int, order: int, solves: int = 1) -> str:
         Of the displacement: 1 or 2.
     solves : int
         Right-hand sides to expect.
+    neighbours : float
+        Of a node, itself among them, in the mean.
     """
     if unknowns <= _SMALL:
         return "superlu"
-    if order == 1 and solves >= _MANY and unknowns <= LARGEST_DIRECT:
-        backend = direct_backend()
-        if backend != "superlu":
-            return backend
-    return "amg" if order == 1 else "two-level"
+    if order == 2:
+        return "two-level"
+    best = direct_backend()
+    thin = best == "pypardiso" and neighbours < _THIN
+    if unknowns <= LARGEST_DIRECT and best != "superlu" and (solves >= _MANY or thin):
+        return best
+    return "amg"
 
 
 def factorise(
     matrix: sp.bsr_array,
     points: FloatArray,
     backend: str = "auto",
-    parents: IntArray | None = None,
+    parents: IntArray | multigrid.Coarse | None = None,
     solves: int = 1,
 ) -> Solver:
     """Factorise a stiffness matrix, or set up a preconditioner for it.
@@ -257,12 +260,14 @@ def factorise(
         Symmetric positive definite, columns sorted; (2n, 2n) with 2x2 blocks in the plane, for
         a direct backend.
     points : (n, 3) array, mm
-        Of the nodes that the rows stand for.
+        Of the nodes that the rows stand for; or (3n, 6) their motions as a rigid body, where
+        rows stand for something else.
     backend : str, default "auto"
         One of `BACKENDS`; "auto" chooses by size and by what is installed.
     parents : (n, 2) int array, optional
         On quadratic meshes: the two rows of the corners whose middle each node is (twice its own
-        row for a corner, -1 for a corner without a row). "two-level" needs it.
+        row for a corner, -1 for a corner without a row), or the linear displacements, where that
+        does not tell them. "two-level" needs it.
     solves : int, default 1
         Right-hand sides to expect: with many, "auto" prefers a direct backend.
 
@@ -274,16 +279,21 @@ def factorise(
         When the factorisation fails.
     """
     if backend == "auto":
-        backend = choose(matrix.shape[0], 1 if parents is None else 2, solves)
+        neighbours = len(matrix.indices) / max(1, len(matrix.indptr) - 1)
+        backend = choose(matrix.shape[0], 1 if parents is None else 2, solves, neighbours)
     check_known("backend", backend, ["auto", *BACKENDS])
     if backend in _MODULES and find_spec(_MODULES[backend]) is None:
         raise InputError(f"backend '{backend}' is not installed: {_CURES[backend]}")
-    make = _maker(backend, matrix, points, parents)
+    make = _maker(backend, matrix, points, parents, solves)
     return Solver(backend, matrix, make(matrix), backend in DIRECT, make)
 
 
 def _maker(
-    backend: str, matrix: sp.bsr_array, points: FloatArray, parents: IntArray | None
+    backend: str,
+    matrix: sp.bsr_array,
+    points: FloatArray,
+    parents: IntArray | multigrid.Coarse | None,
+    solves: int,
 ) -> Callable[[sp.bsr_array], Callable[[FloatArray], FloatArray]]:
     """Choose what makes `Solver.apply` of this matrix, and of others of its pattern."""
     if backend == "pypardiso":
@@ -293,7 +303,6 @@ def _maker(
             raise InputError("backend 'two-level' is for quadratic meshes: use mesh.quadratic()")
         return partial(multigrid.two_level, points=points, parents=parents)
     if backend == "amg":
-        return partial(multigrid.smoothed_aggregation, points=points)
-    if backend == "petsc":
-        return partial(multigrid.petsc_gamg, points=points)
+        frugal = solves < _SEVERAL
+        return partial(multigrid.smoothed_aggregation, points=points, frugal=frugal)
     return {"cholmod": direct.cholmod, "superlu": direct.superlu, "skyline": skyline}[backend]

@@ -1,17 +1,26 @@
 """The result of a solve: displacement, stress, reactions, and the record of the solve."""
 
+from collections.abc import Sequence
 from dataclasses import dataclass
+from functools import cached_property
 
 import numpy as np
 
-from ccfem.arrays import FloatArray, freeze
+from ccfem.arrays import FloatArray, freeze, read_only
+from ccfem.checks import check_number
+from ccfem.elasticity.error_estimate import ErrorEstimate, estimate_error
+from ccfem.elasticity.nodes import patch_nodes
+from ccfem.elasticity.order import about_error
 from ccfem.elasticity.part_stress import PartStress
+from ccfem.elasticity.probe import Probe, displacement_at, located, support_forces
 from ccfem.elasticity.problem import Problem, patches_in_use
+from ccfem.elasticity.recovery import cell_strain, nodal_stress
+from ccfem.elasticity.volume_loads import free_strain
 from ccfem.errors import InputError
-from ccfem.geometry.locate import locate
 from ccfem.mesh.tet_mesh import TetMesh
+from ccfem.tensor import strain_from_voigt, to_voigt
 
-__all__ = ["SolveRecord", "StressField", "solved"]
+__all__ = ["SolveRecord", "StressField", "about_cells", "solved"]
 
 
 @dataclass(frozen=True)
@@ -28,6 +37,16 @@ class SolveRecord:
     assembly_seconds, solve_seconds : float
     unknowns : int
         Free components of the displacement.
+    backward_error : float
+        ``|f - K u| / (|K| |u| + |f|)``: how far equations that u solves exactly are from these.
+    energy_error : float
+        Bound of the energy norm of the error that the solve leaves, over that of u; NaN where it
+        was not looked for.
+    error : float
+        Estimated energy norm of the error that the cells leave, over that of the exact solution;
+        NaN where it was not looked for.
+    order_because : str
+        Which order of the displacement was chosen and why, where it was left open.
     """
 
     backend: str
@@ -36,6 +55,10 @@ class SolveRecord:
     assembly_seconds: float
     solve_seconds: float
     unknowns: int
+    backward_error: float = np.nan
+    energy_error: float = np.nan
+    error: float = np.nan
+    order_because: str = ""
 
 
 @dataclass(frozen=True)
@@ -82,6 +105,22 @@ class StressField:
         """Mesh of the problem."""
         return self.problem.mesh
 
+    @cached_property
+    def error(self) -> ErrorEstimate:
+        """Estimated error of the stress of each cell."""
+        problem = self.problem
+        stiffness = problem.cell_stiffness
+        if problem.density is not None:
+            stiffness = problem.density[:, None, None] * stiffness
+        free = free_strain(problem, self.case)
+        return estimate_error(self.mesh, self.displacement, stiffness, free)
+
+    @property
+    def findings(self) -> tuple[str, ...]:
+        """One line for each thing worth knowing about the solution."""
+        found = about_error(self.record.error, self.problem)
+        return (found,) if found else ()
+
     @property
     def held_or_loaded(self) -> tuple[str, ...]:
         """Names of the patches that carry a support or a load."""
@@ -111,14 +150,73 @@ class StressField:
         InputError
             When a point lies further outside.
         """
-        cell, weights = locate(self.mesh.points, self.mesh.corners, points, tolerance)
-        if (cell < 0).any():
-            first = int(np.flatnonzero(cell < 0)[0])
-            raise InputError(
-                f"stress is known in the part only; {int((cell < 0).sum())} of {len(cell)} points "
-                f"lie outside, the first at {np.round(points[first], 6).tolist()}: check the frame"
-            )
+        cell, weights = located(self.mesh, points, tolerance)
         return np.einsum("qk,qkij->qij", weights, self.nodal[self.mesh.corners[cell]])
+
+    @cached_property
+    def strain(self) -> FloatArray:
+        """Strain of each cell (P2: at the centroid), (m, 3, 3); shear halved, as a tensor's is."""
+        return read_only(strain_from_voigt(cell_strain(self.mesh, self.displacement)))
+
+    @cached_property
+    def nodal_strain(self) -> FloatArray:
+        """Strain at the nodes, (n, 3, 3), averaged as the stress is."""
+        engineering = nodal_stress(self.mesh, self.displacement, np.eye(6))
+        return read_only(strain_from_voigt(to_voigt(engineering)))
+
+    def probe(self, points: FloatArray, tolerance: float = 1e-3) -> Probe:
+        """Displacement, and recovered strain and stress, at points.
+
+        Parameters
+        ----------
+        points : (k, 3) array, mm
+        tolerance : float, mm
+            As in `at`.
+
+        Raises
+        ------
+        InputError
+            When a point lies further outside.
+        """
+        points = np.asarray(points, dtype=np.float64)
+        mesh = self.mesh
+        cell, weights = located(mesh, points, tolerance)
+        corner = mesh.corners[cell]
+        return Probe(
+            points,
+            displacement_at(mesh, self.displacement, cell, weights),
+            np.einsum("qk,qkij->qij", weights, self.nodal_strain[corner]),
+            np.einsum("qk,qkij->qij", weights, self.nodal[corner]),
+        )
+
+    def along(self, start: Sequence[float], end: Sequence[float], count: int = 101) -> Probe:
+        """`probe` at `count` >= 2 points of the straight line between two points, mm, of the part.
+
+        Its `distance` is that from the start.
+        """
+        check_number("number of points of a line", count, at_least=2)
+        first, last = np.asarray(start, dtype=np.float64), np.asarray(end, dtype=np.float64)
+        return self.probe(first + np.linspace(0.0, 1.0, count)[:, None] * (last - first))
+
+    def on(self, patch: str) -> Probe:
+        """Return what `probe` finds, at the nodes of a patch."""
+        nodes = patch_nodes(self.mesh, patch)
+        strain, stress = self.nodal_strain[nodes], self.nodal[nodes]
+        return Probe(self.mesh.points[nodes], self.displacement[nodes], strain, stress)
+
+    @property
+    def support_forces(self) -> dict[str, FloatArray]:
+        """Force (3,), N, of each support on the part: see `ccfem.elasticity.probe`."""
+        return support_forces(self.problem, self.reactions)
+
+
+def about_cells(field: StressField) -> str:
+    """Say in one line on what cells a solution stands, why, and what error they leave."""
+    record, mesh = field.record, field.mesh
+    why = f" ({record.order_because})" if record.order_because else ""
+    kind = "linear" if mesh.order == 1 else "quadratic"
+    error = "not estimated" if np.isnan(record.error) else f"{record.error:.1%} in energy norm"
+    return f"{len(mesh.cells):,} {kind} cells{why}; error {error}"
 
 
 def solved(stress: PartStress, purpose: str) -> StressField:

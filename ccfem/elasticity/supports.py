@@ -1,79 +1,43 @@
-"""Held components of the displacement, and whether they hold the part at all."""
+"""Supports to held components, axes of nodes and rigid bodies, for each load case."""
 
-from collections.abc import Iterator
-from dataclasses import dataclass
+from collections.abc import Callable, Mapping, Sequence
+from dataclasses import dataclass, field
 
 import numpy as np
-import scipy.sparse as sp
 
 from ccfem.arrays import BoolArray, FloatArray, IntArray, read_only
-from ccfem.elasticity.body import SupportedProblem
+from ccfem.elasticity.body import LoadedBody, SupportedProblem
+from ccfem.elasticity.held import Held
+from ccfem.elasticity.load_kinds import Displacement
+from ccfem.elasticity.nodes import (
+    edge_nodes,
+    nearest_node,
+    patch_facets,
+    patch_nodes,
+    patch_normals,
+)
+from ccfem.elasticity.rigid_motion import Holds, check_motion
+from ccfem.elasticity.springs import soft_holds
+from ccfem.elasticity.support_kinds import (
+    AnySupport,
+    EdgeSupport,
+    Foundation,
+    Pin,
+    PointSpring,
+    PointSupport,
+    RigidPatch,
+    SlidingSupport,
+    Spring,
+    Support,
+)
+from ccfem.elasticity.ties import Body, Ties
 from ccfem.errors import InputError
 from ccfem.mesh.cell_mesh import CellMesh
-from ccfem.mesh.measures import connected
 
-__all__ = ["Held", "check_support", "held", "rigid_modes"]
+__all__ = ["check_support", "held", "held_in"]
 
-
-@dataclass(frozen=True)
-class Held:
-    """Which components are held, and where; in the plane two a node instead of three.
-
-    Attributes
-    ----------
-    free : (n, 3) bool array
-        Components that the solve finds.
-    value : (n, 3) array, mm
-        What held components are held at; zero elsewhere.
-    nodes : (k,) int array
-        Nodes with at least one free component: the rows of the reduced matrix.
-    """
-
-    free: BoolArray
-    value: FloatArray
-    nodes: IntArray
-
-    def reduce(self, matrix: sp.bsr_array) -> sp.bsr_array:
-        """Return the matrix (3k, 3k) of the nodes that can move.
-
-        Held components of such nodes keep a row with nothing but a diagonal entry, as large as
-        the mean one.
-        """
-        (n, d), k = self.free.shape, len(self.nodes)
-        place = np.full(n, -1, dtype=np.int32)
-        place[self.nodes] = np.arange(k, dtype=np.int32)
-        row = np.repeat(place, np.diff(matrix.indptr))
-        column = place[matrix.indices]
-        kept = (row >= 0) & (column >= 0)
-        row, column, data = row[kept], column[kept], matrix.data[kept]
-        free = self.free[self.nodes]
-        partly = np.logical_not(free.all(axis=1))
-        if partly.any():
-            cut = np.flatnonzero(partly[row] | partly[column])
-            data[cut] *= free[row[cut], :, None] & free[column[cut], None, :]
-            diagonal = cut[row[cut] == column[cut]]
-            size = float(np.abs(matrix.diagonal()).mean())
-            data[diagonal] += size * np.eye(d) * np.logical_not(free[row[diagonal]])[:, :, None]
-        indptr = np.concatenate([[0], np.cumsum(np.bincount(row, minlength=k))]).astype(np.int32)
-        return sp.bsr_array((data, column, indptr), shape=(d * k, d * k))
-
-    def right_hand_side(self, matrix: sp.bsr_array, forces: FloatArray) -> FloatArray:
-        """Right-hand side (3k,), N, of the reduced matrix, for nodal forces (n, 3)."""
-        rest = forces
-        if self.value.any():
-            rest = forces - (matrix @ self.value.reshape(-1)).reshape(forces.shape)
-        return np.where(self.free, rest, 0.0)[self.nodes].reshape(-1)
-
-    def expand(self, solution: FloatArray) -> FloatArray:
-        """Displacement (n, 3) of a solution (3k,) of the reduced system, mm."""
-        result = self.value.copy()
-        free = self.free[self.nodes]
-        result[self.nodes] += np.where(free, solution.reshape(free.shape), 0.0)
-        return result
-
-    def restrict(self, displacement: FloatArray) -> FloatArray:
-        """Solution (3k,) of the reduced system that stands for a displacement (n, 3)."""
-        return np.where(self.free, displacement, 0.0)[self.nodes].reshape(-1)
+_PARALLEL = 1e-6
+"""Sine of the angle below which directions that are held count as one."""
 
 
 def held(problem: SupportedProblem) -> Held:
@@ -87,54 +51,46 @@ def held(problem: SupportedProblem) -> Held:
         For no support, an empty or unknown patch, values that contradict each other or are not
         finite, and a part that is free to move; the message names the motion.
     """
-    mesh = problem.mesh
     if not problem.supports:
         raise InputError("the part has no support: hold at least one patch")
-    free = np.ones(mesh.points.shape, dtype=bool)
-    value = np.zeros(mesh.points.shape)
-    known = "xyz"[: mesh.points.shape[1]]
-    for support in problem.supports:
-        if not np.isfinite(support.value).all():
-            raise InputError(f"a support must be held at finite values; got {support}")
-        facets = mesh.patch(support.patch)
-        if not len(facets):
-            raise InputError(f"patch '{support.patch}' is empty: no boundary facet meets its rule")
-        nodes = np.unique(mesh.facet_nodes(facets))
-        for component in sorted(set(support.components) & set(known)):
-            k = "xyz".index(component)
-            before = nodes[~free[nodes, k]]
-            if (np.abs(value[before, k] - support.value[k]) > 1e-12).any():
-                raise InputError(
-                    f"supports contradict each other: nodes of patch '{support.patch}' are held "
-                    f"in {component} at {support.value[k]} mm and at another value"
-                )
-            free[nodes, k] = False
-            value[nodes, k] = support.value[k]
-    check_support(mesh, ~free)
-    unused = np.ones(len(mesh.points), dtype=bool)
-    unused[mesh.cells] = False
-    free[unused] = False
-    nodes = np.flatnonzero(free.any(axis=1))
-    return Held(read_only(free, np.bool_), read_only(value), read_only(nodes, np.int64))
+    collected = _collect(problem, {})
+    check_motion(problem.mesh, _in_space(problem.mesh.points), collected.holds())
+    return collected.held()
 
 
-def rigid_modes(points: FloatArray) -> FloatArray:
-    """Displacements (3n, 6) of points (n, 3) in the three translations and three rotations."""
-    x, y, z = points.T
-    modes = np.zeros((len(points), 3, 6))
-    modes[:, [0, 1, 2], [0, 1, 2]] = 1.0
-    modes[:, 1, 3], modes[:, 2, 3] = -z, y
-    modes[:, 2, 4], modes[:, 0, 4] = -x, z
-    modes[:, 0, 5], modes[:, 1, 5] = -y, x
-    return modes.reshape(-1, 6)
+def held_in(problem: SupportedProblem, case: str, at_rest: Held) -> Held:
+    """Return what is held at the values that it takes in one load case.
+
+    Parameters
+    ----------
+    problem : Problem, or PlaneProblem
+    case : str
+    at_rest : Held
+        From `held`.
+
+    Raises
+    ------
+    InputError
+        For a displacement of a patch that nothing holds.
+    """
+    loads = problem.loads[case]
+    moves = {load.patch: load.vector for load in loads if isinstance(load, Displacement)}
+    if not moves:
+        return at_rest
+    for patch, vector in moves.items():
+        holding = [s for s in problem.supports if type(s) in _KINDS and _moves(s) == patch]
+        known = {letter for s in holding for letter in getattr(s, "components", "xyz")}
+        wanted = {letter for letter, size in zip("xyz", vector, strict=True) if size}
+        if not np.isfinite(vector).all() or not wanted <= known:
+            raise InputError(
+                f"load case '{case}' moves patch '{patch}' by {tuple(vector)} mm, and supports on "
+                f"it hold {', '.join(sorted(known)) or 'nothing'}: hold the components to be moved"
+            )
+    return at_rest.at(_collect(problem, moves).held().value)
 
 
 def check_support(mesh: CellMesh, fixed: BoolArray) -> None:
     """Check that no piece of the part can move as a rigid body.
-
-    Bodies are cells joined through faces (edges in the plane); bodies that share only an edge or a
-    node are hinged there. A piece is held when no rigid motion of its bodies respects the hinges
-    and the supports.
 
     Parameters
     ----------
@@ -146,111 +102,233 @@ def check_support(mesh: CellMesh, fixed: BoolArray) -> None:
     InputError
         Names the free motion.
     """
-    body = connected(mesh.neighbours, len(mesh.cells))
-    count = int(body.max()) + 1
-    corner_body = np.repeat(body, mesh.corners.shape[1])
-    points = mesh.points
-    if points.shape[1] == 2:  # the plane z = 0 in space, every node held across it
-        points = np.pad(points, ((0, 0), (0, 1)))
+    check_motion(mesh, _in_space(mesh.points), Holds(*_axis_holds(fixed)))
+
+
+def _in_space(points: FloatArray) -> FloatArray:
+    """Points of the plane as points of the plane z = 0 in space; others as they are."""
+    return points if points.shape[1] == 3 else np.pad(points, ((0, 0), (0, 1)))
+
+
+def _axis_holds(fixed: BoolArray) -> tuple[IntArray, FloatArray]:
+    """Nodes and directions of held components; in the plane every node is held across it."""
+    if fixed.shape[1] == 2:
         fixed = np.pad(fixed, ((0, 0), (0, 1)), constant_values=True)
-    if count == 1:
-        used = np.zeros(len(fixed), dtype=bool)
-        used[mesh.corners] = True
-        node = np.flatnonzero(used)
-        motion = _free_motions(points, fixed, node, np.zeros(len(node), dtype=np.int64))
-        if motion is not None:
-            raise InputError(f"the part is free to {motion}: add a support that holds it")
-        return
-    members = np.unique(mesh.corners.reshape(-1) * count + corner_body)
-    node, owner = members // count, members % count
-    piece = connected(np.stack([owner, count + node], axis=1), count + len(fixed))
-    named = np.unique(piece[:count])
-    for k in named:
-        chosen = piece[owner] == k
-        motion = _free_motions(points, fixed, node[chosen], owner[chosen])
-        if motion is not None:
-            which = f" (one of {len(named)} separate pieces)" if len(named) > 1 else ""
-            raise InputError(f"the part{which} is free to {motion}: add a support that holds it")
+    nodes, components = np.nonzero(fixed)
+    return nodes, np.eye(3)[components]
 
 
-def _free_motions(
-    points: FloatArray, fixed: BoolArray, node: IntArray, owner: IntArray
-) -> str | None:
-    """Words for the rigid motions left to the bodies of one piece; None when it is held."""
-    bodies, owner = np.unique(owner, return_inverse=True)
-    points = points[node]
-    centre = points.mean(axis=0)
-    radius = float(np.linalg.norm(points - centre, axis=1).max())
-    modes = rigid_modes((points - centre) / radius).reshape(-1, 3, 6)
-    gram = np.zeros((len(bodies), 6, len(bodies), 6))
-    rows, sides = np.nonzero(fixed[node])
-    for body in range(len(bodies)):
-        own = modes[rows, sides][owner[rows] == body]
-        gram[body, :, body, :] += own.T @ own
-    for a, b in _hinges(node):
-        difference = np.zeros((3, len(bodies), 6))
-        difference[:, owner[a]], difference[:, owner[b]] = modes[a], -modes[b]
-        gram += np.einsum("kbi,kcj->bicj", difference, difference)
-    size = 6 * len(bodies)
-    values, vectors = np.linalg.eigh(gram.reshape(size, size))
-    null = vectors[:, values <= 1e-10 * max(1.0, values[-1])]
-    if not null.shape[1]:
-        return None
-    null = null.reshape(len(bodies), 6, -1)
-    worst = np.linalg.norm(null, axis=(1, 2)).argmax()
-    return " and to ".join(_words(null[worst], centre, radius))
+@dataclass
+class _Rigid:
+    """A rigid patch: what of its motion along its axes is held, and at what."""
+
+    label: str
+    body: Body
+    held: BoolArray
+    value: FloatArray
 
 
-def _hinges(node: IntArray) -> Iterator[tuple[int, int]]:
-    """Pairs of entries that name the same node."""
-    order = np.argsort(node, kind="stable")
-    for k in np.flatnonzero(node[order[1:]] == node[order[:-1]]):
-        yield int(order[k]), int(order[k + 1])
+@dataclass
+class _Collected:
+    """What the supports of a problem hold."""
+
+    mesh: CellMesh
+    surface: LoadedBody
+    free: BoolArray
+    value: FloatArray
+    oblique: list[tuple[IntArray, FloatArray, FloatArray]] = field(default_factory=list)
+    rigid: list[_Rigid] = field(default_factory=list)
+    soft: list[tuple[IntArray, FloatArray]] = field(default_factory=list)
+
+    def components(
+        self, nodes: IntArray, components: str, value: Sequence[float], what: str
+    ) -> None:
+        """Hold components of nodes."""
+        if not np.isfinite(value).all():
+            raise InputError(f"a support must be held at finite values; got {value} on {what}")
+        known = "xyz"[: self.mesh.points.shape[1]]
+        for component in sorted(set(components) & set(known)):
+            k = "xyz".index(component)
+            before = nodes[~self.free[nodes, k]]
+            if (np.abs(self.value[before, k] - value[k]) > 1e-12).any():
+                raise InputError(
+                    f"supports contradict each other: nodes of {what} are held in {component} at "
+                    f"{value[k]} mm and at another value"
+                )
+            self.free[nodes, k] = False
+            self.value[nodes, k] = value[k]
+
+    def holds(self) -> Holds:
+        """Directions that are held, springs among them."""
+        nodes, directions = _axis_holds(~self.free)
+        more = [(n, d) for n, d, _ in self.oblique] + self.soft
+        moved = [(k, a) for k, r in enumerate(self.rigid) for a in r.body.axes.T[r.held[0]]]
+        turned = [(k, a) for k, r in enumerate(self.rigid) for a in r.body.axes.T[r.held[1]]]
+        which = np.array([k for k, _ in moved], dtype=np.int64)
+        return Holds(
+            nodes=np.concatenate([nodes, *(n for n, _ in more)]),
+            directions=np.concatenate([directions, *(d for _, d in more)]),
+            bodies=tuple(r.body.nodes for r in self.rigid),
+            centres=np.array([r.body.centre for r in self.rigid]).reshape(-1, 3),
+            moved=which,
+            along=np.array([a for _, a in moved]).reshape(-1, 3),
+            turned=np.array([k for k, _ in turned], dtype=np.int64),
+            about=np.array([a for _, a in turned]).reshape(-1, 3),
+            centre_of=which,
+        )
+
+    def held(self) -> Held:
+        """Held components, with the ties that oblique and rigid supports make."""
+        free, value, ties = self.free.copy(), self.value.copy(), None
+        unused = np.ones(len(free), dtype=bool)
+        unused[self.mesh.cells] = False
+        free[unused] = False
+        if self.oblique or self.rigid:
+            turned, frames = self._frames(free, value)
+            ties = Ties(self.mesh.points, turned, frames, tuple(r.body for r in self.rigid))
+            self._check_slaves(ties, free)
+            free[ties.slaves] = False
+            for rigid in self.rigid:
+                free = np.concatenate([free, ~rigid.held])
+                value = np.concatenate([value, np.where(rigid.held, rigid.value, 0.0)])
+        nodes = np.flatnonzero(free.any(axis=1))
+        return Held(read_only(free, np.bool_), read_only(value), read_only(nodes, np.int64), ties)
+
+    def _frames(self, free: BoolArray, value: FloatArray) -> tuple[IntArray, FloatArray]:
+        """Axes of the nodes that are held across them; what is held becomes theirs, in place."""
+        wanted: dict[int, list[tuple[FloatArray, float]]] = {}
+        for nodes, directions, values in self.oblique:
+            for node, direction, at in zip(nodes, directions, values, strict=True):
+                wanted.setdefault(int(node), []).append((direction, float(at)))
+        turned = np.array(sorted(wanted), dtype=np.int64)
+        frames = np.empty((len(turned), 3, 3))
+        for k, node in enumerate(turned):
+            fixed = ~free[node]
+            rows = np.concatenate([np.eye(3)[fixed], [d for d, _ in wanted[int(node)]]])
+            levels = np.concatenate([value[node, fixed], [v for _, v in wanted[int(node)]]])
+            _, sizes, axes = np.linalg.svd(rows)
+            rank = int((sizes > _PARALLEL).sum())
+            at = np.linalg.lstsq(rows @ axes[:rank].T, levels, rcond=None)[0]
+            if np.abs(rows @ axes[:rank].T @ at - levels).max() > 1e-9 * max(1.0, np.abs(at).max()):
+                raise InputError(
+                    f"supports contradict each other at node {node}, which is held along several "
+                    "directions: give them values that agree"
+                )
+            frames[k] = axes.T
+            free[node] = np.arange(3) >= rank
+            value[node] = np.concatenate([at, np.zeros(3 - rank)])
+        return turned, frames
+
+    def _check_slaves(self, ties: Ties, free: BoolArray) -> None:
+        """Raise where a node of a rigid patch is held besides, or belongs to two."""
+        seen = np.zeros(len(self.mesh.points), dtype=bool)
+        for rigid in self.rigid:
+            nodes = rigid.body.nodes
+            if seen[nodes].any():
+                raise InputError(
+                    f"{rigid.label} shares nodes with another rigid patch: make one patch of both, "
+                    "or leave a gap between them"
+                )
+            seen[nodes] = True
+            if not free[nodes].all() or np.isin(nodes, ties.turned).any():
+                raise InputError(
+                    f"{rigid.label} has nodes that another support holds as well: hold the rigid "
+                    "patch itself, or leave a gap between them"
+                )
 
 
-def _words(motions: FloatArray, centre: FloatArray, radius: float) -> list[str]:
-    """Words for the span of rigid motions (6, k): translation, then rotation over `radius`."""
-    values, combination = np.linalg.eigh(motions[3:].T @ motions[3:])
-    moving = values <= 1e-8
-    words = []
-    translations = np.linalg.qr(motions[:3] @ combination[:, moving])[0]
-    if translations.shape[1]:
-        words.append("move along " + " and ".join(_directions(translations)))
-    rotating = motions @ combination[:, ~moving]
-    # Translations that are free anyway say nothing about where an axis of rotation lies.
-    rotating[:3] -= translations @ (translations.T @ rotating[:3])
-    rotations = rotating[3:]
-    for direction in _axes(rotations):
-        weights = np.linalg.lstsq(rotations, direction, rcond=None)[0]
-        shift = rotating[:3] @ weights
-        through = centre + radius * np.cross(direction, shift)
-        pitch = float(direction @ shift)
-        through[np.abs(through) < 1e-9 * radius] = 0.0
-        point = ", ".join(f"{c:.4g}" for c in through)
-        verb = "rotate" if abs(pitch) < 1e-6 else "screw"
-        words.append(f"{verb} about the axis through ({point}) along {_name(direction)}")
-    return words
+def _collect(problem: SupportedProblem, moves: Mapping[str, Sequence[float]]) -> _Collected:
+    """Collect what the supports hold, those on some patches at other values."""
+    mesh = problem.mesh
+    free = np.ones(mesh.points.shape, dtype=bool)
+    collected = _Collected(mesh, problem.body, free, np.zeros(mesh.points.shape))
+    for support in problem.supports:
+        move = moves.get(_moves(support))
+        if isinstance(support, Spring | PointSpring | Foundation):
+            collected.soft += soft_holds(mesh, problem.body, support)
+        else:
+            _KINDS[type(support)](collected, support, move)
+    return collected
 
 
-def _axes(span: FloatArray) -> list[FloatArray]:
-    """Basis of the column span (3, k), of coordinate axes where it can be."""
-    if not span.shape[1]:
-        return []
-    basis = np.linalg.svd(span, full_matrices=False)[0]
-    inside = [axis for axis in np.eye(3) if np.linalg.norm(basis.T @ axis) > 1.0 - 1e-6]
-    rest = basis - sum((np.outer(axis, axis @ basis) for axis in inside), np.zeros_like(basis))
-    more, size, _ = np.linalg.svd(rest, full_matrices=False)
-    return inside + [more[:, k] for k in np.flatnonzero(size > 1e-6)]
+def _moves(support: AnySupport) -> str:
+    """Patch by which a `Displacement` moves a support; empty for none."""
+    return getattr(support, "patch", "")
 
 
-def _directions(span: FloatArray) -> list[str]:
-    return [_name(direction) for direction in _axes(span)]
+def _patch(found: _Collected, support: Support, move: Sequence[float] | None) -> None:
+    nodes = patch_nodes(found.mesh, support.patch)
+    value = support.value if move is None else move
+    found.components(nodes, support.components, value, f"patch '{support.patch}'")
 
 
-def _name(direction: FloatArray) -> str:
-    """Name of a direction: a coordinate axis, or its components."""
-    k = int(np.abs(direction).argmax())
-    if abs(direction[k]) > 1.0 - 1e-6:
-        return "xyz"[k]
-    direction = direction * np.sign(direction[k])
-    return "(" + ", ".join(f"{c:.3g}" for c in direction) + ")"
+def _edge(found: _Collected, support: EdgeSupport, move: Sequence[float] | None) -> None:
+    nodes = edge_nodes(found.mesh, support.patches)
+    found.components(nodes, support.components, support.value, f"the edge of {support.patches}")
+
+
+def _point(found: _Collected, support: PointSupport, move: Sequence[float] | None) -> None:
+    node = np.array([nearest_node(found.mesh, support.point, "a point support")])
+    found.components(node, support.components, support.value, f"the point {support.point}")
+
+
+def _sliding(found: _Collected, support: SlidingSupport, move: Sequence[float] | None) -> None:
+    nodes = patch_nodes(found.mesh, support.patch)
+    if support.normal is None:
+        facets = patch_facets(found.surface, support.patch)
+        normals = patch_normals(found.surface, facets, nodes)
+    else:
+        normal = np.asarray(support.normal, dtype=np.float64)
+        normals = np.tile(normal / np.linalg.norm(normal), (len(nodes), 1))
+    values = np.full(len(nodes), support.value) if move is None else normals @ np.asarray(move)
+    found.oblique.append((nodes, normals, values))
+
+
+def _rigid(found: _Collected, support: RigidPatch, move: Sequence[float] | None) -> None:
+    value = support.value if move is None else move
+    held = np.array([[c in letters for c in "xyz"] for letters in
+                     (support.components, support.rotations)])  # fmt: skip
+    centre = None if support.centre is None else np.array(support.centre)
+    angle = np.radians(support.angle)
+    label = f"rigid patch '{support.patch}'"
+    _add_body(found, label, support.patch, centre, np.eye(3), held, np.array([value, angle]))
+
+
+def _pin(found: _Collected, support: Pin, move: Sequence[float] | None) -> None:
+    axis = np.array(support.axis) / np.linalg.norm(support.axis)
+    axes = np.linalg.svd(axis[None])[2].T
+    axes[:, 0] = axis
+    held = np.array([[not support.slides, True, True], [False, True, True]])
+    value = np.array([axes.T @ np.array(support.value if move is None else move), np.zeros(3)])
+    label = f"the pin in patch '{support.patch}'"
+    _add_body(found, label, support.patch, np.array(support.point), axes, held, value)
+
+
+def _add_body(
+    found: _Collected,
+    label: str,
+    patch: str,
+    centre: FloatArray | None,
+    axes: FloatArray,
+    held: BoolArray,
+    value: FloatArray,
+) -> None:
+    """Make a patch a rigid body; `value` is its translation and its rotation, mm and radians."""
+    facets, nodes = patch_facets(found.mesh, patch), patch_nodes(found.mesh, patch)
+    if centre is None:
+        area, _ = found.surface.facet_areas(facets)
+        centre = area @ found.mesh.points[facets].mean(axis=1) / area.sum()
+    size = float(np.linalg.norm(found.mesh.points[nodes] - centre, axis=1).max())
+    body = Body(nodes, np.asarray(centre, dtype=np.float64), axes, size)
+    found.rigid.append(_Rigid(label, body, held, value * np.array([[1.0], [size]])))
+
+
+_KINDS: dict[type, Callable[..., None]] = {
+    Support: _patch,
+    EdgeSupport: _edge,
+    PointSupport: _point,
+    SlidingSupport: _sliding,
+    RigidPatch: _rigid,
+    Pin: _pin,
+}
+"""What collects a support that does not give."""

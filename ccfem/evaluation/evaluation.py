@@ -279,7 +279,7 @@ def _sample(
         spacing.sample_spacing(paths, width),
         room.sample_room(paths, machine, below, late),
         coverage.sample_coverage(paths, on_layer, width),
-        containment.sample_containment(paths),
+        containment.sample_containment(paths, width),
         links.sample_links(paths),
         crossings.sample_crossings(paths),
         in_space,

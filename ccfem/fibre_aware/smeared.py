@@ -131,7 +131,7 @@ class SmearedPart:
     @cached_property
     def forced(self) -> bool:
         """Whether forces load the part; otherwise supports move."""
-        return not self.specimen.system.held.value.any()
+        return not self.specimen.held.value.any()
 
     def ratio(self, work: float) -> float:
         """Stiffness over that of the part without fibre, where the load does so much work."""
@@ -192,7 +192,7 @@ class SmearedPart:
         SolveError
             When the residual stays above the tolerance.
         """
-        specimen, held = self.specimen, self.specimen.system.held
+        specimen, held = self.specimen, self.specimen.held
         begin = self.unreinforced if start is None else start
         u, strain = begin.displacement, begin.strain
         matrix, solver = specimen.matrix, specimen.solver
@@ -202,7 +202,7 @@ class SmearedPart:
         for _ in range(_UPDATES):
             packed = self.pack(fibre(strain))
             internal = (matrix @ u.reshape(-1)).reshape(-1, 3) + self._force(packed, u)
-            rest = held.restrict(specimen.forces - internal)
+            rest = held.project(specimen.forces - internal)
             residual = float(np.linalg.norm(rest)) / size
             if residual <= tolerance:
                 work = float(np.vdot(u, internal))
@@ -220,7 +220,7 @@ class SmearedPart:
 
     @cached_property
     def _load_size(self) -> float:
-        held = self.specimen.system.held
+        held = self.specimen.held
         rhs = held.right_hand_side(self.specimen.matrix, self.specimen.forces)
         return float(np.linalg.norm(rhs))
 
@@ -233,15 +233,12 @@ class _Operator:
     packed: FloatArray
 
     def expand(self, x: FloatArray) -> FloatArray:
-        held = self.part.specimen.system.held
-        u = np.zeros_like(held.value)
-        u[held.nodes] = np.where(held.free[held.nodes], x.reshape(-1, 3), 0.0)
-        return u
+        return self.part.specimen.held.motion(x)
 
     def __matmul__(self, x: FloatArray) -> FloatArray:
-        held = self.part.specimen.system.held
+        held = self.part.specimen.held
         fibre = self.part._force(self.packed, self.expand(x))
-        return np.asarray(self.part._reduced @ x) + held.restrict(fibre)
+        return np.asarray(self.part._reduced @ x) + held.project(fibre)
 
 
 def on_linear_cells(stress: StressField, backend: str = "auto") -> StressField:
@@ -250,8 +247,11 @@ def on_linear_cells(stress: StressField, backend: str = "auto") -> StressField:
     mesh = problem.mesh
     if mesh.order == 1:
         return stress
-    loads = {stress.case: problem.loads[stress.case]}
-    return solve(replace(problem, mesh=mesh.linear(), loads=loads), backend)[stress.case]
+    case = stress.case
+    loads = {name: problem.loads[name] for name in problem.factors(case)}
+    sums = {case: problem.factors(case)} if case in problem.combinations else {}
+    on_corners = replace(problem, mesh=mesh.linear(), order=1, loads=loads, combinations=sums)
+    return solve(on_corners, backend)[case]
 
 
 @njit(cache=True)

@@ -1,6 +1,7 @@
 """Meshes from and to files, by the file's suffix."""
 
 import os
+import warnings
 from collections.abc import Callable
 from pathlib import Path
 
@@ -46,8 +47,8 @@ def read_mesh(path: str | os.PathLike[str], scale: float = 1.0, check: bool = Tr
     scale : float, default 1
         Factor on the coordinates, to make them mm: 1000 for a file in metres.
     check : bool, default True
-        Normalise and mend the mesh with `ccfem.mesh.check.check_mesh`, which also says what it
-        did; without it the mesh comes as it stands in the file.
+        Normalise and mend the mesh with `ccfem.mesh.check.check_mesh`; a `UserWarning` says, a
+        line each, what it found and mended. Without it the mesh comes as it stands in the file.
 
     Raises
     ------
@@ -71,10 +72,15 @@ def read_mesh(path: str | os.PathLike[str], scale: float = 1.0, check: bool = Tr
         mesh = _READERS[suffix](path)
         if scale != 1.0:
             mesh = TetMesh(mesh.points * scale, mesh.cells, mesh.patches)
-        return check_mesh(mesh)[0] if check else mesh
+        if not check:
+            return mesh
+        mesh, report = check_mesh(mesh)
     except InputError as error:
         message = str(error)
         raise InputError(message if str(path) in message else f"{path}: {message}") from None
+    for line in report.findings:
+        warnings.warn(f"{path}: {line}", UserWarning, stacklevel=2)
+    return mesh
 
 
 def write_mesh(mesh: TetMesh, path: str | os.PathLike[str]) -> None:

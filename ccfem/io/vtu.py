@@ -12,7 +12,7 @@ from ccfem.io.quiet import read_quietly
 from ccfem.mesh.patches import with_groups
 from ccfem.mesh.tet_mesh import TetMesh
 
-__all__ = ["read_vtu", "write_vtu"]
+__all__ = ["grid_of", "read_grid", "read_vtu", "write_vtu"]
 
 _PATCH = "patch:"
 _TYPES = {
@@ -41,15 +41,7 @@ def read_vtu(path: Path) -> TetMesh:
     cells with an integer cell array named patch, gmsh:physical, CellEntityIds or PhysicalIds
     (called by their number).
     """
-    with path.open("rb") as file:
-        start = file.read(4096)
-    if b"<VTKFile" not in start or b"UnstructuredGrid" not in start:
-        raise InputError(
-            f"{path} is not a VTK unstructured grid: it must hold <VTKFile type='UnstructuredGrid'>"
-        )
-    grid = read_quietly(path)
-    if grid is None:
-        raise InputError(f"{path} is not a VTK unstructured grid that can be read: write it again")
+    grid = read_grid(path)
     blocks = {
         _TYPES.get(int(kind), f"VTK cell type {kind}"): (int(kind), np.asarray(nodes))
         for kind, nodes in grid.cells_dict.items()
@@ -63,6 +55,20 @@ def read_vtu(path: Path) -> TetMesh:
     }
     groups = {**_tagged_triangles(grid, blocks), **groups}
     return with_groups(mesh, groups)
+
+
+def read_grid(path: Path) -> Any:
+    """Read an unstructured grid of pyvista."""
+    with path.open("rb") as file:
+        start = file.read(4096)
+    if b"<VTKFile" not in start or b"UnstructuredGrid" not in start:
+        raise InputError(
+            f"{path} is not a VTK unstructured grid: it must hold <VTKFile type='UnstructuredGrid'>"
+        )
+    grid = read_quietly(path)
+    if grid is None:
+        raise InputError(f"{path} is not a VTK unstructured grid that can be read: write it again")
+    return grid
 
 
 def _tagged_triangles(grid: Any, blocks: dict[str, tuple[int, IntArray]]) -> dict[str, IntArray]:
@@ -83,6 +89,11 @@ def _tagged_triangles(grid: Any, blocks: dict[str, tuple[int, IntArray]]) -> dic
 
 def write_vtu(mesh: TetMesh, path: Path) -> None:
     """Write a mesh as VTK unstructured grid, its patches as field data ``patch:NAME``."""
+    grid_of(mesh).save(path)
+
+
+def grid_of(mesh: TetMesh) -> Any:
+    """Unstructured grid of pyvista of a mesh, its patches as field data ``patch:NAME``."""
     import pyvista
 
     code = 10 if mesh.order == 1 else 24
@@ -90,4 +101,4 @@ def write_vtu(mesh: TetMesh, path: Path) -> None:
     for name, facets in mesh.patches.items():
         if len(facets):
             grid.field_data[_PATCH + name] = np.array(facets)
-    grid.save(path)
+    return grid

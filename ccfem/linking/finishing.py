@@ -17,7 +17,7 @@ __all__ = ["close_short_ring", "keep_off_border", "linked_paths", "smooth_strand
 
 _TOO_NEAR = 0.7
 """Distance, in widths, below which strands are not pushed apart: the shorter one is cut."""
-_CHORDS = 0.02
+_CHORDS = 0.03
 """By how much, in widths, the chords of curves along the border may pass inside its distance."""
 
 

@@ -7,8 +7,11 @@ import numpy as np
 
 from ccfem.arrays import BoolArray, FloatArray, IntArray
 from ccfem.errors import InputError
-from ccfem.mesh.facets import are_among
+from ccfem.mesh.facets import are_among, facet_keys
+from ccfem.mesh.flaws import STRAIGHT
+from ccfem.mesh.hanging import hanging_nodes
 from ccfem.mesh.measures import connected, signed_volumes
+from ccfem.mesh.pairing import FREE
 from ccfem.mesh.patches import match_boundary
 from ccfem.mesh.tet_mesh import TetMesh
 
@@ -38,12 +41,17 @@ class MeshReport:
         Nodes that no cell uses: taken out.
     moved : int
         Mid-side nodes that were off the middle of their edge: moved there.
+    farthest : float, mm
+        The longest of these moves.
     dropped : int
         Facets of patches that are not on the boundary: taken out.
     coincident : int
         Nodes that lie on another one: merged where asked for.
     merged : bool
         Whether they were merged.
+    hanging : int
+        Nodes on a facet or a side of another cell without being a node of it: the part is not
+        joined there.
     components : int
         Separate pieces of the mesh: left as they are.
     diagonal : float, mm
@@ -59,9 +67,11 @@ class MeshReport:
     repeated: int = 0
     unused: int = 0
     moved: int = 0
+    farthest: float = 0.0
     dropped: int = 0
     coincident: int = 0
     merged: bool = False
+    hanging: int = 0
     components: int = 1
     diagonal: float = 0.0
     aspect: float = 0.0
@@ -75,9 +85,18 @@ class MeshReport:
             (self.flat, f"{self.flat} cells had no volume: taken out"),
             (self.repeated, f"{self.repeated} cells repeated another: taken out"),
             (self.unused, f"{self.unused} nodes belonged to no cell: taken out"),
-            (self.moved, f"{self.moved} mid-side nodes moved to the middle of their straight edge"),
+            (
+                self.moved,
+                f"{self.moved} mid-side nodes moved to the middle of their straight edge, by up to "
+                f"{self.farthest:.3g} mm: mesh curved walls finer where that is too far",
+            ),
             (self.dropped, f"{self.dropped} patch facets were not on the boundary: left out"),
             (self.coincident, f"{self.coincident} nodes lie on another one: {together}"),
+            (
+                self.hanging,
+                f"{self.hanging} nodes hang on a facet of another cell that they are no corner of: "
+                "the part is not joined there",
+            ),
             (self.components > 1, f"the mesh falls into {self.components} separate pieces"),
             (
                 not 1.0 <= self.diagonal <= 1e4,
@@ -115,8 +134,8 @@ def check_mesh(mesh: TetMesh, merge: bool = False) -> tuple[TetMesh, MeshReport]
     Raises
     ------
     InputError
-        For an invalid mesh: a coordinate of a used node is not finite, all cells are
-        flat, or more than two cells share a face.
+        For an invalid mesh: a coordinate of a used node is not finite, all cells are flat, cells
+        overlap, or pieces to be merged have meshes that do not match.
     """
     used = np.zeros(len(mesh.points), dtype=bool)
     used[mesh.cells] = True
@@ -132,10 +151,18 @@ def check_mesh(mesh: TetMesh, merge: bool = False) -> tuple[TetMesh, MeshReport]
     cells = leader[mesh.cells] if merged else np.array(mesh.cells)
     keep, flat, repeated, turned = _sort_out(mesh.points, cells)
     cells[turned] = cells[turned][:, _TURNED[cells.shape[1]]]
-    points, moved = _straight(mesh.points, cells[keep], diagonal)
+    points, moved, farthest = _straight(mesh.points, cells[keep])
     changed = merged or moved > 0 or bool(turned.any()) or not keep.all()
     mended = TetMesh(points, cells[keep]) if changed else mesh
     _check_faces(mended)
+    hanging = hanging_nodes(mended)
+    if merged and len(hanging):
+        at = ", ".join(f"{x:.4g}" for x in mended.points[hanging[0]])
+        raise InputError(
+            f"the pieces cannot be joined: {len(hanging)} nodes hang on a facet of another cell "
+            f"that they are no corner of, the first at ({at}) mm: mesh the pieces together, or "
+            "leave them apart"
+        )
     groups = {name: leader[f] if merged else f for name, f in _checked_patches(mesh).items()}
     patches, dropped = _patches(mended, groups, cells[~keep][:, :4])
     still = np.zeros(len(points), dtype=bool)
@@ -148,9 +175,11 @@ def check_mesh(mesh: TetMesh, merge: bool = False) -> tuple[TetMesh, MeshReport]
         repeated=repeated,
         unused=int((~used).sum()),
         moved=moved,
+        farthest=farthest,
         dropped=dropped,
         coincident=coincident,
         merged=merged,
+        hanging=len(hanging),
         components=_components(mended.corners, len(points)),
         diagonal=diagonal,
         aspect=float(np.median(mended.aspects)),
@@ -220,32 +249,33 @@ def _sort_out(points: FloatArray, cells: IntArray) -> tuple[BoolArray, int, int,
     return ~flat & ~repeated, int(flat.sum()), int(repeated.sum()), volumes < 0.0
 
 
-def _straight(points: FloatArray, cells: IntArray, diagonal: float) -> tuple[FloatArray, int]:
-    """Points with the mid-side nodes at the middle of their edges, and how many were moved."""
+def _straight(points: FloatArray, cells: IntArray) -> tuple[FloatArray, int, float]:
+    """Points with the mid-side nodes at the middle of their edges; how many moved, and how far."""
     if cells.shape[1] == 4:
-        return points, 0
-    ends = cells[:, TetMesh.edges]
-    middle = points[ends].mean(axis=2)
-    off = np.linalg.norm(points[cells[:, 4:]] - middle, axis=2) > 1e-9 * diagonal
+        return points, 0, 0.0
+    ends = points[cells[:, TetMesh.edges]]
+    middle = ends.mean(axis=2)
+    gap = np.linalg.norm(points[cells[:, 4:]] - middle, axis=2)
+    off = gap > 0.1 * STRAIGHT * np.linalg.norm(ends[:, :, 1] - ends[:, :, 0], axis=2)
     if not off.any():
-        return points, 0
+        return points, 0, 0.0
     points = np.array(points)
     moved = cells[:, 4:][off]
     points[moved] = middle[off]
-    return points, len(np.unique(moved))
+    return points, len(np.unique(moved)), float(gap.max())
 
 
 def _check_faces(mesh: TetMesh) -> None:
-    """Raise when more than two cells share a face."""
-    if len(mesh.boundary) + 2 * len(mesh.neighbours) == 4 * len(mesh.cells):
+    """Raise when more than two cells share a face, or two on one side of it."""
+    crowded = np.flatnonzero(mesh.partners < FREE)
+    if not len(crowded):
         return
-    faces = np.sort(mesh.corners[:, TetMesh.faces].reshape(-1, 3), axis=1)
-    found, counts = np.unique(faces, axis=0, return_counts=True)
-    crowded = found[counts > 2]
-    at = ", ".join(f"{x:.4g}" for x in mesh.points[crowded[0]].mean(axis=0))
+    faces = mesh.corners[crowded[:, None] // 4, TetMesh.faces[crowded % 4]]
+    at = ", ".join(f"{x:.4g}" for x in mesh.points[faces[0]].mean(axis=0))
+    count = len(np.unique(facet_keys(faces)[0]))
     raise InputError(
-        f"{len(crowded)} faces of the mesh belong to more than two cells, the first at ({at}) mm: "
-        "cells overlap, mesh the part again"
+        f"{count} faces of the mesh belong to more than two cells, or "
+        f"to two on one side of them, the first at ({at}) mm: cells overlap, mesh the part again"
     )
 
 

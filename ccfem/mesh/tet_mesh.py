@@ -9,7 +9,9 @@ from ccfem.arrays import FloatArray, IntArray, read_only
 from ccfem.errors import InputError
 from ccfem.mesh.cell_mesh import CellMesh
 from ccfem.mesh.facets import positions, unique_edges
+from ccfem.mesh.flaws import first_flaw
 from ccfem.mesh.measures import signed_volumes
+from ccfem.mesh.pairing import FREE, pair_facets
 
 __all__ = ["TetMesh"]
 
@@ -69,6 +71,24 @@ class TetMesh(CellMesh):
     def facets(self) -> IntArray:
         """Corner nodes of the faces of all cells, (4 m, 3), outward."""
         return self.corners[:, _FACES].reshape(-1, 3)
+
+    @cached_property
+    def partners(self) -> IntArray:
+        """Facet on the other side of each facet, (4 m,): see `ccfem.mesh.pairing.pair_facets`."""
+        return read_only(pair_facets(self.corners, _FACES, len(self.points)), np.int64)
+
+    @cached_property
+    def _pairing(self) -> tuple[IntArray, IntArray]:
+        facet = np.flatnonzero(self.partners > np.arange(len(self.partners)))
+        pairs = np.stack([facet, self.partners[facet]], axis=1)
+        return pairs, np.flatnonzero(self.partners == FREE)
+
+    @cached_property
+    def flaw(self) -> str:
+        """What keeps the mesh from being solved on, with its cure; empty for a sound mesh."""
+        if not np.isfinite(self.points).all():
+            return "the mesh has points that are NaN or infinite: correct its coordinates"
+        return first_flaw(self.points, self.cells, _EDGES, self.volumes, self.partners)
 
     @cached_property
     def across(self) -> IntArray:

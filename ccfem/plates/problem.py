@@ -7,7 +7,8 @@ from functools import cached_property
 import numpy as np
 
 from ccfem.arrays import FloatArray, freeze, in_brief, read_only
-from ccfem.elasticity.problem import Load, Pressure, Support, patches_in_use
+from ccfem.elasticity.load_kinds import Pressure, SurfaceLoad, patches_in_use
+from ccfem.elasticity.support_kinds import Support
 from ccfem.errors import InputError
 from ccfem.plates.mesh import PlaneMesh, Sheet
 
@@ -36,7 +37,7 @@ class PlaneProblem:
     stiffness: FloatArray
     thickness: FloatArray | float
     supports: tuple[Support, ...]
-    loads: Mapping[str, tuple[Load, ...]] = field(default_factory=dict)
+    loads: Mapping[str, tuple[SurfaceLoad, ...]] = field(default_factory=dict)
 
     __repr__ = in_brief
 
@@ -59,6 +60,12 @@ class PlaneProblem:
         broad = np.broadcast_to(stiffness, (m, 3, 3))
         object.__setattr__(self, "stiffness", read_only(broad))
         object.__setattr__(self, "thickness", read_only(np.broadcast_to(thickness, (m,))))
+        for kind in (*self.supports, *(load for case in self.loads.values() for load in case)):
+            if not isinstance(kind, Support | SurfaceLoad):
+                raise InputError(
+                    "a plane problem takes supports of patches and loads on its edges; got "
+                    f"{kind}: model the part in space"
+                )
         for support in self.supports:
             if not set(support.components) & set("xy") or support.value[2] != 0.0:
                 raise InputError(

@@ -7,11 +7,12 @@ import numpy as np
 import scipy.sparse as sp
 
 from ccfem.arrays import FloatArray
+from ccfem.elasticity.held import Held
 from ccfem.elasticity.loads import load_cases
 from ccfem.elasticity.solve import solve_system
 from ccfem.elasticity.solvers import DIRECT, Solver, choose_direct, factorise
 from ccfem.elasticity.stress_field import SolveRecord
-from ccfem.elasticity.supports import Held, held
+from ccfem.elasticity.supports import held
 from ccfem.errors import InputError
 from ccfem.plates.assembly import PlaneElements
 from ccfem.plates.field import PlaneField
@@ -51,6 +52,15 @@ class PlaneSystem:
         """Element matrices (m, 2q, 2q), N/mm, of another stiffness (m, 3, 3), MPa."""
         thickness = np.asarray(self.problem.thickness)[:, None, None]
         return thickness * self.elements.matrices(stiffness)
+
+    @property
+    def combinations(self) -> dict[str, dict[str, float]]:
+        """Combinations of load cases: a plate has none."""
+        return {}
+
+    def held_in(self, case: str) -> Held:
+        """Return what is held in one load case: the same in all."""
+        return self.held
 
     def assemble(self, matrices: FloatArray | None = None) -> sp.bsr_array:
         """Stiffness matrix (2n, 2n), N/mm, of the problem or of other element matrices."""

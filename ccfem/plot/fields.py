@@ -8,7 +8,7 @@ from ccfem.arrays import BoolArray, FloatArray
 from ccfem.layers.layer import Layer
 from ccfem.layers.layer_stress import LayerStress
 from ccfem.plot.canvas import colour_bar, extents_of, new_figure, scale_bar, title
-from ccfem.plot.colours import INK
+from ccfem.plot.colours import INK, scale
 from ccfem.plot.paths import draw_section, draw_stress, tension_limit
 from ccfem.tensor import in_plane, largest_in_plane
 
@@ -16,7 +16,7 @@ if TYPE_CHECKING:
     from matplotlib.axes import Axes
     from matplotlib.figure import Figure
 
-__all__ = ["tension_picture"]
+__all__ = ["error_picture", "tension_picture"]
 
 _STROKES = 45
 """Strokes across the larger extent of a section."""
@@ -40,6 +40,38 @@ def tension_picture(
         axes, layer, np.stack([np.cos(angle), np.sin(angle)], axis=1), largest > 0.02 * end
     )
     colour_bar(axes, colours, (0.0, end), "MPa tension")
+    scale_bar(axes)
+    title(axes, heading, caption)
+    return figure
+
+
+def error_picture(
+    layer: Layer, error: FloatArray, heading: str = "", caption: str = ""
+) -> "Figure":
+    """Picture of the estimated error of the cells that a layer cuts.
+
+    Parameters
+    ----------
+    layer : Layer
+    error : (m,) array
+        Of each cell of the mesh, as `ErrorEstimate.densities` gives it.
+    heading, caption : str
+    """
+    figure, (axes,) = new_figure(extents_of(layer.plane.points))
+    values, colours = error[layer.cell], scale("stress")
+    end = max(float(np.quantile(values, 0.98)), 1e-12) if len(values) else 1.0
+    axes.tripcolor(
+        *layer.plane.points.T,
+        layer.triangles,
+        facecolors=values,
+        cmap=colours,
+        vmin=0.0,
+        vmax=end,
+        rasterized=True,
+        zorder=1.0,
+    )
+    draw_section(axes, layer, filled=False)
+    colour_bar(axes, colours, (0.0, end), "error over mean stress")
     scale_bar(axes)
     title(axes, heading, caption)
     return figure

@@ -53,7 +53,7 @@ _LEAST_WEIGHT = 1e-3
 _ROOM = 1.03
 """Bound on the distance of isocurves, in strand widths: strands that stood just at the width would
 be trimmed wherever the numbers fall short of it."""
-_TRIM = 0.98
+_TRIM = 0.95
 """What is nearer than this to a longer strand, in strand widths, is cut: curves that are led along
 each other at one width differ by their chords."""
 _SPIRAL_LIMIT = 4.0
@@ -164,7 +164,12 @@ class Isocurve:
     inset: float = 0.5
     smooth: bool = True
 
-    amount: ClassVar[Amount] = Amount("density", most=4.0, least=0.05)
+    amount: ClassVar[Amount] = Amount(
+        "density",
+        most=4.0,
+        least=0.05,
+        beyond=(Amount("floor", most=0.0, least=0.4), Amount("cap", most=40.0, least=86.0)),
+    )
     in_plane: ClassVar[bool] = True
     variants: ClassVar[Mapping[str, Mapping[str, Any]]] = {
         "literal": _LITERAL,

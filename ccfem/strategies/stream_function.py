@@ -43,7 +43,7 @@ from ccfem.virtual_testing.strands import cut_strands
 
 __all__ = ["StreamFunction"]
 
-_CLEARANCE = 0.97
+_CLEARANCE = 0.95
 """Least distance of strands in widths: they are pushed apart, and what is cut for a hundredth of a
 width would be lost."""
 
@@ -120,6 +120,13 @@ class StreamFunction:
         check_fields(self, "grid", above=0.0, unit="fibre widths")
         check_fields(self, "cap", above=0.0, at_most=100.0)
         check_fields(self, "groups", "link_limit", "inset", at_least=0)
+
+    def for_length(
+        self, length: float, layers: Sequence[Layer], machine: Machine
+    ) -> "StreamFunction":
+        """Strategy that lays at most a mean length of fibre a layer, mm."""
+        area = float(np.mean([layer.areas.sum() for layer in layers]))
+        return replace(self, coverage=min(length * machine.fibre_width / area, 1.0))
 
     def for_part(
         self, stress: PartStress, layers: Sequence[Layer], machine: Machine

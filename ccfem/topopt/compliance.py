@@ -78,11 +78,12 @@ class Compliance:
         groups: IntArray | None = None,
     ) -> None:
         self.weights = _checked_weights(problem, weights)
-        if any(np.any(support.value) for support in problem.supports):
-            raise InputError("topology optimisation takes supports at rest: hold them at zero")
         self._equations: PlateEquations | TetEquations = (
             PlateEquations(problem) if isinstance(problem, PlaneProblem) else TetEquations(problem)
         )
+        system = self._equations.system
+        if any(system.held_in(case).value.any() for case in system.forces):
+            raise InputError("topology optimisation takes supports at rest: hold them at zero")
         self._backend = self._equations.backend() if backend == "auto" else backend
         self._solver: Solver | None = None
         self._displacement: dict[str, FloatArray] = {}

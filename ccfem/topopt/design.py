@@ -7,7 +7,7 @@ from scipy.spatial import cKDTree
 
 from ccfem.arrays import BoolArray, FloatArray, freeze, in_brief
 from ccfem.checks import check_number
-from ccfem.elasticity.problem import Problem
+from ccfem.elasticity.problem import Order, Problem
 from ccfem.plates.problem import PlaneProblem
 from ccfem.topopt.material_axes import axes_about_z
 
@@ -83,10 +83,11 @@ class Design:
 
     @property
     def problem(self) -> PlaneProblem | Problem:
-        """The problem with the stiffness that the densities give."""
+        """The problem with the stiffness that the densities give, on the cells as they are."""
         if isinstance(self.full, PlaneProblem):
             return replace(self.full, stiffness=self.factor[:, None, None] * self.full.stiffness)
-        return replace(self.full, density=self.factor)
+        order: Order = 1 if self.full.mesh.order == 1 else 2
+        return replace(self.full, density=self.factor, order=order)
 
     def axes_at(self, points: FloatArray) -> FloatArray | None:
         """Material axes (k, 3, 3), as columns, of the cells nearest to points (k, 3), mm.

@@ -4,11 +4,10 @@ import numpy as np
 import scipy.sparse as sp
 
 from ccfem.arrays import FloatArray
-from ccfem.elasticity.assembly import assemble
 from ccfem.elasticity.problem import Problem
 from ccfem.elasticity.recovery import cell_strain
-from ccfem.elasticity.solve import prepare as prepare_tets
 from ccfem.elasticity.solvers import LARGEST_DIRECT, choose_direct, direct_backend
+from ccfem.elasticity.system import prepare as prepare_tets
 from ccfem.errors import InputError
 from ccfem.plates.problem import PlaneProblem
 from ccfem.plates.solve import prepare as prepare_plate
@@ -81,7 +80,7 @@ class TetEquations:
 
     def assemble(self, factor: FloatArray, elements: FloatArray) -> sp.bsr_array:
         """Stiffness matrix (3n, 3n), N/mm, with a factor (m,) on the stiffness of each cell."""
-        return assemble(self.system.problem.mesh, elements, factor, self.system.where)
+        return self.system.assemble(elements, factor)
 
     def energy(self, displacement: FloatArray, elements: FloatArray) -> FloatArray:
         """Energy ``u^T k u`` (m,), N mm, of each cell."""

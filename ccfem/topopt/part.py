@@ -109,4 +109,4 @@ def as_problem(
     _no_plate(thickness=thickness, edge_length=edge_length, domain=domain)
     mesh = part_mesh(design, volume_fraction)
     axes = design.axes_at(mesh.points[mesh.corners].mean(axis=1))
-    return Problem(mesh, material, full.supports, full.loads, axes)
+    return Problem(mesh, material, full.supports, full.loads, axes, order=full.order)

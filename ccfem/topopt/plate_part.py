@@ -108,6 +108,7 @@ def plate_part(
         (*supports, Support(_BOTTOM, "z")),
         loads,
         design.axes_at(mesh.points[mesh.corners].mean(axis=1)),
+        order=1,
     )
 
 

@@ -94,7 +94,7 @@ def equilibrium(
     """
     check_known("mode", mode, MODES)
     check_number("axial stiffness", axial_stiffness, at_least=0.0, unit="N")
-    held = specimen.system.held
+    held = specimen.held
     u = specimen.unreinforced.displacement if start is None else start
     x, total = held.restrict(u), 0
     operator = strain_operator(strands, specimen.system.problem.mesh)

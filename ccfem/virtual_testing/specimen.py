@@ -7,9 +7,11 @@ import numpy as np
 import scipy.sparse as sp
 
 from ccfem.arrays import BoolArray, FloatArray, in_brief
-from ccfem.elasticity.solve import System, prepare
+from ccfem.elasticity.held import Held
+from ccfem.elasticity.load_kinds import Temperature
 from ccfem.elasticity.solvers import Solver
 from ccfem.elasticity.stress_field import StressField
+from ccfem.elasticity.system import System, prepare
 from ccfem.errors import InputError
 
 __all__ = ["Specimen"]
@@ -48,10 +50,23 @@ class Specimen:
             When forces act and supports move too: no single stiffness describes that.
         """
         system = prepare(unreinforced.problem)
-        if system.held.value.any() and system.forces[unreinforced.case].any():
+        case = unreinforced.case
+        if system.held_in(case).value.any() and system.forces_in(case).any():
             raise InputError(
-                f"load case '{unreinforced.case}' has forces and moving supports; a virtual test "
-                "needs one or the other: split it"
+                f"load case '{case}' has forces and moving supports; a virtual test needs one or "
+                "the other: split it"
+            )
+        if any(isinstance(load, Temperature) for load in system.problem.loads_of(case)):
+            raise InputError(
+                f"load case '{case}' heats the part; a virtual test needs forces or moving "
+                "supports: leave the heat out"
+            )
+        if not system.held.value.any() and not np.any(
+            system.held.restrict(system.forces[unreinforced.case])
+        ):
+            raise InputError(
+                f"load case '{unreinforced.case}' acts on nodes only that the supports hold, so "
+                "nothing moves and no stiffness can be told: load another patch"
             )
         return cls(unreinforced, system, system.assemble(), backend)
 
@@ -63,7 +78,12 @@ class Specimen:
     @property
     def forces(self) -> FloatArray:
         """Nodal forces (n, 3), N."""
-        return self.system.forces[self.unreinforced.case]
+        return self.system.forces_in(self.unreinforced.case)
+
+    @cached_property
+    def held(self) -> Held:
+        """The supports, where the load case has them."""
+        return self.system.held_in(self.unreinforced.case)
 
     @property
     def modulus(self) -> float:
@@ -92,7 +112,7 @@ class Specimen:
         supports ``2 U / d^2`` with d the largest of their displacements.
         """
         if self._moving.any():
-            largest = float(np.linalg.norm(self.system.held.value, axis=1).max())
+            largest = float(np.linalg.norm(self._support_motion, axis=1).max())
             return 2.0 * strain_energy / largest**2
         work = 2.0 * float(np.vdot(self.forces, displacement)) - 2.0 * strain_energy
         return self.force(np.zeros_like(displacement)) ** 2 / work
@@ -100,4 +120,10 @@ class Specimen:
     @property
     def _moving(self) -> BoolArray:
         """Nodes (n,) that a support moves."""
-        return (self.system.held.value != 0.0).any(axis=1)
+        return (self._support_motion != 0.0).any(axis=1)
+
+    @cached_property
+    def _support_motion(self) -> FloatArray:
+        """Displacement (n, 3), mm, that the supports ask for; zero elsewhere."""
+        held = self.held
+        return held.value if held.ties is None else held.ties.expand(held.value)

@@ -6,14 +6,17 @@ after the first failure.
 """
 
 from dataclasses import dataclass
+from typing import Any
 
 import numpy as np
 from numba import njit
 from scipy.spatial import cKDTree
 
 from ccfem.arrays import FloatArray, IntArray
-from ccfem.elasticity.problem import PointForce, Support
+from ccfem.elasticity.load_kinds import patches_of, points_of
+from ccfem.elasticity.nodes import edge_nodes
 from ccfem.elasticity.stress_field import StressField
+from ccfem.elasticity.support_kinds import AnySupport, EdgeSupport, Support
 from ccfem.errors import InputError
 from ccfem.mesh.facets import are_among
 from ccfem.mesh.tet_mesh import TetMesh
@@ -154,18 +157,25 @@ def matrix_peak(stress: StressField) -> tuple[float, FloatArray]:
 def _held_and_loaded(stress: StressField) -> FloatArray:
     """Points (k, 3) that cover the patches of the supports and of the load case."""
     problem = stress.problem
-    loads = problem.loads[stress.case]
+    mesh = problem.mesh
+    edges = [each.patches for each in problem.supports if isinstance(each, EdgeSupport)]
+    kinds: list[Any] = [*problem.loads_of(stress.case)]
+    kinds += [
+        each
+        for each in problem.supports
+        if not isinstance(each, EdgeSupport) and not _slides(mesh, each)
+    ]
     points = [np.zeros((0, 3))]
-    points += [np.array([load.point]) for load in loads if isinstance(load, PointForce)]
-    names = {load.patch for load in loads if not isinstance(load, PointForce)}
-    names |= {each.patch for each in problem.supports if not _slides(problem.mesh, each)}
-    points += [_cover(problem.mesh, name) for name in sorted(names)]
+    points += [np.array([point]) for kind in kinds for point in points_of(kind)]
+    points += [mesh.points[edge_nodes(mesh, names)] for names in edges]
+    names = {name for kind in kinds for name in patches_of(kind)}
+    points += [_cover(mesh, name) for name in sorted(names)]
     return np.concatenate(points)
 
 
-def _slides(mesh: TetMesh, support: Support) -> bool:
+def _slides(mesh: TetMesh, support: AnySupport) -> bool:
     """Whether a support holds a whole flat face across its plane and nothing else."""
-    if len(support.components) > 1:
+    if not isinstance(support, Support) or len(support.components) > 1:
         return False
     place = mesh.points[:, "xyz".index(support.components)]
     patch = mesh.patch(support.patch)

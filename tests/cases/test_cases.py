@@ -52,7 +52,7 @@ def test_names():
         create_case("lop")
     with pytest.raises(InputError, match="no parameter 'size'; it has: element_size, order, force"):
         create_case("loop", size=3.0)
-    with pytest.raises(InputError, match="order of the elements must be 1 or 2; got 3"):
+    with pytest.raises(InputError, match="order must be one of 'auto', 1, 2; got 3"):
         create_case("bar", order=3)
     with pytest.raises(InputError, match="edge length must be above 0"):
         create_case("bar", element_size=-1.0)

@@ -4,7 +4,7 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from ccfem.elasticity.assembly import add_blocks, assemble, cell_gradients, pattern
-from ccfem.elasticity.supports import rigid_modes
+from ccfem.elasticity.held import rigid_modes
 from ccfem.materials import isotropic, transversely_isotropic
 from ccfem.mesh import TetMesh
 from ccfem.mesh.box import box_mesh

@@ -41,26 +41,28 @@ def test_sweeps_are_triangular_solves(nodes, seed):
 def test_conjugate_gradients_end_after_as_many_steps_as_unknowns(nodes, seed):
     matrix, dense = random_matrix(nodes, seed)
     rhs = np.random.default_rng(seed).normal(size=3 * nodes)
-    x, iterations = conjugate_gradient(matrix, rhs, lambda r: r, tolerance=1e-10)
+    x, iterations, lowest = conjugate_gradient(matrix, rhs, lambda r: r, tolerance=1e-10)
     np.testing.assert_allclose(x, np.linalg.solve(dense, rhs), rtol=1e-7, atol=1e-12)
     assert iterations <= 3 * nodes
+    assert lowest == pytest.approx(np.linalg.eigvalsh(dense)[0], rel=0.01)
 
 
 def test_conjugate_gradients_stop_at_an_indefinite_matrix():
     matrix = sp.bsr_array(np.diag([1.0, -2.0, 1.0]), blocksize=(3, 3))
-    x, iterations = conjugate_gradient(matrix, np.array([0.0, 1.0, 0.0]), lambda r: r)
+    x, iterations, _ = conjugate_gradient(matrix, np.array([0.0, 1.0, 0.0]), lambda r: r)
     assert iterations == 0
     assert not x.any()
 
 
 def test_conjugate_gradients_give_up_after_the_given_steps():
     matrix, _ = random_matrix(8, 0)
-    _, iterations = conjugate_gradient(matrix, np.ones(24), lambda r: r, tolerance=1e-14, most=2)
+    rhs, close = np.ones(24), 1e-14
+    _, iterations, _ = conjugate_gradient(matrix, rhs, lambda r: r, tolerance=close, most=2)
     assert iterations == 2
 
 
 def test_nothing_to_do_takes_no_steps():
     matrix, _ = random_matrix(3, 0)
-    x, iterations = conjugate_gradient(matrix, np.zeros(9), lambda r: r)
+    x, iterations, _ = conjugate_gradient(matrix, np.zeros(9), lambda r: r)
     assert iterations == 0
     assert x == pytest.approx(0.0)

@@ -1,6 +1,7 @@
 import gc
 import importlib.util
 from concurrent.futures import ThreadPoolExecutor
+from dataclasses import replace
 
 import numpy as np
 import pytest
@@ -9,13 +10,14 @@ import scipy.sparse as sp
 from ccfem.elasticity import solvers
 from ccfem.elasticity.assembly import assemble
 from ccfem.elasticity.problem import Force, Problem, Support
-from ccfem.elasticity.solve import prepare, solve
+from ccfem.elasticity.solve import solve
 from ccfem.elasticity.solvers import BACKENDS, choose, factorise, preconditioned_cg
+from ccfem.elasticity.system import prepare
 from ccfem.errors import InputError, SolveError
 from ccfem.materials import isotropic, transversely_isotropic
 from ccfem.mesh.box import box_mesh
 
-MODULES = {"pypardiso": "pypardiso", "cholmod": "sksparse", "petsc": "petsc4py"}
+MODULES = {"pypardiso": "pypardiso", "cholmod": "sksparse"}
 
 
 def installed(backend):
@@ -137,13 +139,44 @@ def test_the_choice_follows_size_order_and_what_is_installed(monkeypatch):
     monkeypatch.setattr(solvers, "find_spec", lambda name: True)
     assert choose(20_000, 1, solves=10) == "pypardiso"
     assert choose(500_000, 1, solves=10) == "amg"
+    assert choose(20_000, 1, neighbours=14.0) == "amg"
+    assert choose(20_000, 1, neighbours=11.0) == "pypardiso"
+    assert choose(500_000, 1, neighbours=11.0) == "amg"
+    assert choose(20_000, 2, neighbours=11.0) == "two-level"
+
+
+def test_thin_parts_are_told_by_the_neighbours_of_a_node(monkeypatch):
+    monkeypatch.setattr(solvers, "_SMALL", 0)
+    chosen = []
+    monkeypatch.setattr(
+        solvers,
+        "_maker",
+        lambda backend, *_: chosen.append(backend) or (lambda matrix: lambda rhs: rhs),
+    )
+    monkeypatch.setattr(solvers, "find_spec", lambda name: True)
+    for layers in (1, 2, 3, 4):
+        prepared = system(1, (40, 30, layers))
+        prepared.factorise(prepared.assemble())
+    assert chosen == ["pypardiso", "pypardiso", "amg", "amg"]
+
+
+@pytest.mark.parametrize("solves", [1, 5])
+@pytest.mark.parametrize("divisions", [(20, 12, 8), (40, 15, 1)])
+def test_both_multigrids_solve_thick_and_thin_parts(solves, divisions):
+    prepared = system(1, divisions)
+    matrix, rhs, points = equations(prepared)
+    found = factorise(matrix, points, "amg", solves=solves).solve(rhs, tolerance=1e-10)
+    exact = factorise(matrix, points, "superlu").solve(rhs).values
+    np.testing.assert_allclose(found.values, exact, atol=1e-7 * np.abs(exact).max())
+    assert found.iterations <= (60 if divisions[2] > 1 else 150)
 
 
 @pytest.mark.parametrize("backend", ["superlu", "amg"])
 def test_a_missed_tolerance_is_an_error_with_the_residual(backend):
     matrix, rhs, points = equations(system())
-    with pytest.raises(SolveError, match=rf"{backend}: relative residual \d\.\de-\d+ after"):
-        factorise(matrix, points, backend).solve(rhs, tolerance=1e-25)
+    wrong = replace(factorise(matrix, points, backend), apply=lambda rhs: 0.0 * rhs)
+    with pytest.raises(SolveError, match=rf"{backend}: relative residual 1\.0e\+00 after"):
+        wrong.solve(rhs)
 
 
 @pytest.mark.parametrize("backend", [b for b in ("superlu", "pypardiso") if installed(b)])
@@ -159,9 +192,9 @@ def test_automatic_choice_goes_on_with_a_direct_backend(monkeypatch):
     monkeypatch.setattr(solvers, "find_spec", lambda name: None)
     monkeypatch.setattr(
         "ccfem.elasticity.multigrid.smoothed_aggregation",
-        lambda matrix, points: lambda rhs: 0 * rhs,
+        lambda matrix, points, frugal: lambda rhs: 0 * rhs,
     )
-    problem = system().problem
+    problem = replace(system().problem, order=1)
     fields = solve(problem)
     assert {field.record.backend for field in fields.values()} == {"superlu"}
     with pytest.raises(SolveError, match="amg"):
@@ -205,8 +238,11 @@ def test_refactorising_checks_pattern_and_residual(backend):
         with pytest.raises(InputError, match=r"pattern of the one before .* use factorise"):
             solver.refactorise(other)
     solver = solver.refactorise(2.0 * matrix)
-    with pytest.raises(SolveError, match=rf"{backend}: relative residual \d\.\de-\d+ after"):
-        solver.solve(rhs, tolerance=1e-25)
+    exact = np.linalg.solve(2.0 * matrix.toarray(), rhs)
+    np.testing.assert_allclose(solver.solve(rhs).values, exact, atol=1e-9 * np.abs(exact).max())
+    other = replace(solver, matrix=5.0 * matrix)  # a factor of another matrix than it says
+    with pytest.raises(SolveError, match=rf"{backend}: relative residual 1\.5e\+00 after"):
+        other.solve(rhs)
 
 
 needs_pardiso = pytest.mark.skipif(not installed("pypardiso"), reason="pypardiso is not installed")

@@ -4,8 +4,9 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from ccfem.elasticity.assembly import assemble
+from ccfem.elasticity.held import Held, rigid_modes
 from ccfem.elasticity.problem import Problem, Support
-from ccfem.elasticity.supports import Held, check_support, held, rigid_modes
+from ccfem.elasticity.supports import check_support, held
 from ccfem.errors import InputError
 from ccfem.materials import isotropic
 from ccfem.mesh import TetMesh

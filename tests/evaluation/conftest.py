@@ -5,7 +5,7 @@ from collections.abc import Callable, Sequence
 import numpy as np
 import pytest
 
-from ccfem.elasticity.problem import Problem, Support
+from ccfem.elasticity.problem import Problem
 from ccfem.elasticity.stress_field import SolveRecord, StressField
 from ccfem.evaluation.plane_paths import PlanePaths, plane_paths
 from ccfem.layers.layer import Layer
@@ -58,7 +58,7 @@ def make_part(
 ) -> Part:
     """A box (or a given mesh) whose nodal stress is a function (n, 3) -> (n, 3, 3) of the place."""
     mesh = box_mesh(size, divisions) if mesh is None else mesh
-    problem = Problem(mesh, isotropic(1000.0, 0.3), (Support("x_min"),))
+    problem = Problem(mesh, isotropic(1000.0, 0.3), ())
     nothing, record = np.zeros_like(mesh.points), SolveRecord("by hand", 0, 0.0, 0.0, 0.0, 0)
     cell = stress(mesh.points[mesh.corners].mean(axis=1))
     field = StressField(problem, "pull", nothing, cell, stress(mesh.points), nothing, 0.0, record)

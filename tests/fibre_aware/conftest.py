@@ -16,7 +16,7 @@ def pulled_bar():
     mesh = box_mesh((60.0, 20.0, 4.0), (20, 8, 4))
     supports = (Support("x_min", "x"), Support("y_min", "y"), Support("z_min", "z"))
     loads = {"pull": (Traction("x_max", (5.0, 0.0, 0.0)),)}
-    problem = Problem(mesh, isotropic(3500.0, 0.35), supports, loads)
+    problem = Problem(mesh, isotropic(3500.0, 0.35), supports, loads, order=1)
     return solve(problem, tolerance=1e-10)["pull"], Planar(count=4).cut(mesh)
 
 
@@ -24,9 +24,8 @@ def pulled_bar():
 def bent_beam():
     """A beam, 60 x 24 x 4 mm, clamped at one end and pushed sideways at the other; 4 layers."""
     mesh = box_mesh((60.0, 24.0, 4.0), (24, 10, 2))
-    problem = Problem(
-        mesh, isotropic(3500.0, 0.35), (Support("x_min"),), {"tip": (Force("x_max", (0, 50, 0)),)}
-    )
+    loads = {"tip": (Force("x_max", (0, 50, 0)),)}
+    problem = Problem(mesh, isotropic(3500.0, 0.35), (Support("x_min"),), loads, order=1)
     return solve(problem, tolerance=1e-10)["tip"], Planar(count=4).cut(mesh)
 
 

@@ -12,12 +12,21 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from ccfem.elasticity import Bearing, Force, Pressure, Problem, Support, Traction, solve
+from ccfem.elasticity import (
+    Bearing,
+    EdgeSupport,
+    Force,
+    Pressure,
+    Problem,
+    Support,
+    Traction,
+    solve,
+)
 from ccfem.elasticity.assembly import pattern
+from ccfem.elasticity.held import Held
 from ccfem.elasticity.loads import nodal_forces
-from ccfem.elasticity.solve import System
 from ccfem.elasticity.stress_field import SolveRecord
-from ccfem.elasticity.supports import Held
+from ccfem.elasticity.system import System
 from ccfem.materials import isotropic
 from ccfem.mesh.box import box_mesh
 
@@ -93,15 +102,17 @@ def test_nafems_le1():
 def le10(divisions):
     """Stress s_yy at D = (2, 0, 0.6) of the thick plate under 1 MPa on top."""
     mesh = mapped(divisions, ellipses(0.6))
-    free = np.ones(mesh.points.shape, dtype=bool)
-    free[nodes_of(mesh, "y_min"), 1] = False
-    free[nodes_of(mesh, "y_max"), 0] = False
-    outside = nodes_of(mesh, "x_max")
-    free[outside, :2] = False
-    free[outside[np.isclose(mesh.points[outside, 2], 0.3)], 2] = False
-    forces = nodal_forces(mesh, Pressure("z_max", 1.0))
-    field = solve_held(mesh, isotropic(210e3, 0.3), free, np.zeros(free.shape), forces)
-    return field.nodal[at(mesh, [2.0, 0.0, 0.6]), 1, 1]
+    outside = mesh.patch("x_max")
+    lower = mesh.points[outside, 2].mean(axis=1) < 0.3
+    mesh = mesh.with_patches({"lower": outside[lower], "upper": outside[~lower]})
+    supports = (
+        Support("y_min", "y"),
+        Support("y_max", "x"),
+        Support("x_max", "xy"),
+        EdgeSupport(("lower", "upper"), "z"),
+    )
+    problem = Problem(mesh, isotropic(210e3, 0.3), supports, {"top": (Pressure("z_max", 1.0),)})
+    return solve(problem)["top"].nodal[at(mesh, [2.0, 0.0, 0.6]), 1, 1]
 
 
 def test_nafems_le10():

@@ -11,8 +11,8 @@ from scipy.special import roots_jacobi
 from ccfem import tensor
 from ccfem.elasticity import Force, Problem, Support, solve
 from ccfem.elasticity.assembly import pattern
-from ccfem.elasticity.solve import System
-from ccfem.elasticity.supports import Held
+from ccfem.elasticity.held import Held
+from ccfem.elasticity.system import System
 from ccfem.materials import transversely_isotropic
 from ccfem.mesh import TetMesh
 from ccfem.mesh.box import box_mesh

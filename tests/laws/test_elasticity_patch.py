@@ -7,10 +7,10 @@ from hypothesis import strategies as st
 
 from ccfem.elasticity import Problem, SolveRecord, Traction
 from ccfem.elasticity.assembly import assemble, pattern
+from ccfem.elasticity.held import Held
 from ccfem.elasticity.loads import nodal_forces
 from ccfem.elasticity.recovery import cell_stress
-from ccfem.elasticity.solve import System
-from ccfem.elasticity.supports import Held
+from ccfem.elasticity.system import System
 from ccfem.materials import isotropic, transversely_isotropic
 from ccfem.mesh import TetMesh
 from ccfem.mesh.box import box_mesh

@@ -1,6 +1,6 @@
 import numpy as np
 import pytest
-from hypothesis import given
+from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from ccfem.errors import InputError
@@ -10,6 +10,7 @@ divisions = st.tuples(*[st.integers(1, 4)] * 3)
 sizes = st.tuples(*[st.floats(0.1, 50.0)] * 3)
 
 
+@settings(deadline=None)  # the first boundary is compiled
 @given(sizes, divisions, st.booleans())
 def test_box_is_filled_and_closed(size, count, alternating):
     mesh = box_mesh(size, count, (1.0, -2.0, 3.0), alternating)

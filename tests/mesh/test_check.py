@@ -133,7 +133,37 @@ def test_curved_midsides_are_straightened(box):
     points[-3:] += 0.01
     mended, report = check_mesh(TetMesh(points, quadratic.cells, quadratic.patches))
     assert report.moved == 3
+    assert report.farthest == pytest.approx(0.01 * 3**0.5)
+    assert any("by up to 0.0173 mm" in line for line in report.findings)
     assert np.allclose(mended.points, quadratic.points)
+
+
+def two_blocks(divisions):
+    """Two cubes that touch at x = 10, the second divided as given, the first in 2 x 2 x 2."""
+    one = box_mesh((10.0, 10.0, 10.0), (2, 2, 2))
+    other = box_mesh((10.0, 10.0, 10.0), divisions, (10.0, 0.0, 0.0))
+    cells = np.concatenate([one.cells, other.cells + len(one.points)])
+    return TetMesh(np.concatenate([one.points, other.points]), cells)
+
+
+def test_pieces_that_do_not_match_are_not_joined():
+    # Of the 16 nodes of the second cube 4 lie on corners of the first, whose 9 nodes hang there.
+    mesh = two_blocks((3, 3, 3))
+    _, report = check_mesh(mesh)
+    assert report.hanging == 16 - 4 + 9 - 4
+    assert any("17 nodes hang on a facet of another cell" in line for line in report.findings)
+    with pytest.raises(InputError, match="the pieces cannot be joined: 17 nodes hang"):
+        check_mesh(mesh, merge=True)
+    assert check_mesh(two_blocks((2, 2, 2)), merge=True)[1].hanging == 0
+
+
+def test_a_node_in_the_middle_of_a_facet_or_a_side_hangs():
+    corner = np.array([[0.0, 0, 0], [1, 0, 0], [0, 1, 0], [0, 0, 1]])
+    for touching, hangs in (([0.2, 0.3], 1), ([0.5, 0.5], 1), ([0.6, 0.5], 0)):
+        other = np.array([[*touching, 0.0], [0, 0, -2], [1, 0, -2], [0, 1, -2]])
+        cells = [[0, 1, 2, 3], [4, 5, 6, 7]]
+        _, report = check_mesh(TetMesh(np.concatenate([corner, other]), cells))
+        assert report.hanging == hangs
 
 
 def test_wrong_unit_is_pointed_out(box):
@@ -156,6 +186,14 @@ def test_what_nothing_can_follow_from(box):
         check_mesh(TetMesh(third, np.concatenate([box.cells, extra])))
     with pytest.raises(InputError, match="patch 'a' must hold facets"):
         check_mesh(TetMesh(box.points, box.cells, {"a": np.array([[0, 1, 999]])}))
+
+
+def test_cells_on_one_side_of_a_face_overlap():
+    points = np.array([[0.0, 0, 0], [1, 0, 0], [0, 1, 0], [0.3, 0.3, 1.0], [0.3, 0.3, 2.0]])
+    mesh = TetMesh(points, [[0, 1, 2, 3], [0, 1, 2, 4]])
+    with pytest.raises(InputError, match=r"1 faces .* to two on one side of them"):
+        check_mesh(mesh)
+    assert "cells of the mesh overlap or come twice" in mesh.flaw
 
 
 def test_aspects_of_known_tetrahedra():

@@ -221,6 +221,7 @@ def test_solved_bar_is_filled_with_straight_strands() -> None:
 LUG = """
 name = "lug"
 layers = 1
+order = 1
 build = "z"
 material = "pla"
 [planform]

@@ -125,7 +125,8 @@ def cantilever():
         "down": (Force("tip", (0.0, 0.0, -100.0)),),
         "side": (Force("tip", (0.0, 40.0, 0.0)),),
     }
-    problem = Problem(mesh.with_patches({"tip": tip}), PLA, (Support("x_min"),), loads)
+    patched = mesh.with_patches({"tip": tip})
+    problem = Problem(patched, PLA, (Support("x_min"),), loads, order=1)
     return Simp(0.35, radius=2.6, max_iterations=30)(problem)
 
 

@@ -51,6 +51,7 @@ def bar(load, poisson=0.0, divisions=(4, 3, 2)):
         material=isotropic(MODULUS, poisson),
         supports=(Support("x_min", "x"), Support("y_min", "y"), Support("z_min", "z")),
         loads={"load": load},
+        order=1,
     )
 
 
@@ -301,6 +302,9 @@ def test_bad_input_is_refused():
     problem = dataclasses.replace(clamped(PULL), supports=(Support("x_min"), *STRETCH))
     with pytest.raises(InputError, match="one or the other"):
         virtual_test(lines, solve(problem)["load"])
+    held = dataclasses.replace(clamped(), loads={"held": (Force("x_min", (10.0, 0.0, 0.0)),)})
+    with pytest.raises(InputError, match="load case 'held' acts on nodes only that the supports"):
+        virtual_test(lines, solve(held)["held"])
     with pytest.raises(InputError, match="axial stiffness"):
         equilibrium(Specimen.of(field), cut_strands(lines, field.mesh), np.inf)
 

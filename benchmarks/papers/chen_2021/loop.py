@@ -68,6 +68,7 @@ def authors_loop(layers: int = LAYERS_TABLE_2) -> Case:
         material=isotropic(3500.0, 0.35, name="PLA of the Loop benchmark"),
         supports=(Support("support"),),
         loads={"pull": (Force("load", (0.0, 0.0, 1000.0)),)},
+        order=1,
     )
     return Case(
         name="chen_2021_loop",

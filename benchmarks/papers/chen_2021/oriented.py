@@ -16,7 +16,7 @@ import numpy as np
 
 from ccfem.arrays import FloatArray
 from ccfem.elasticity.problem import Problem
-from ccfem.elasticity.solve import cell_stiffness, solve
+from ccfem.elasticity.solve import solve
 from ccfem.elasticity.stress_field import StressField
 from ccfem.errors import InputError
 from ccfem.materials import Material
@@ -150,7 +150,7 @@ def oriented_problem(problem: Problem, strands: Strands, fibre: Material, area: 
     length = np.bincount(strands.cell, strands.length, len(volumes))
     fourth = bar_stiffness(strands, volumes) * volumes[:, None, None]
     held = share > 0.0
-    stiffness = np.array(np.broadcast_to(cell_stiffness(problem), (len(volumes), 6, 6)))
+    stiffness = np.array(np.broadcast_to(problem.cell_stiffness, (len(volumes), 6, 6)))
     smeared = oriented_stiffness(fourth[held] / length[held, None, None], fibre)
     stiffness[held] += share[held, None, None] * (smeared - stiffness[held])
     return replace(problem, stiffness=stiffness)

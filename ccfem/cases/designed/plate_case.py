@@ -5,7 +5,7 @@ from collections.abc import Callable
 from ccfem.cases.case import Case
 from ccfem.cases.designed.plate import DesignPlate
 from ccfem.cases.stored.stored_files import mesh_of_case
-from ccfem.elasticity.problem import Force, Problem, Support
+from ccfem.elasticity.problem import Force, Order, Problem, Support
 from ccfem.layers.slicing.planar import Planar
 from ccfem.machine.machine import Machine
 from ccfem.machine.speed_table import SpeedTable
@@ -41,7 +41,7 @@ def case_of(plate: Callable[..., DesignPlate], title: str) -> Callable[..., Case
     def case(
         optimised: bool = True,
         element_size: float = ELEMENT_SIZE,
-        order: int = 1,
+        order: Order = 1,
         force: float = 100.0,
         thickness: float = THICKNESS,
     ) -> Case:
@@ -55,7 +55,7 @@ def designed_case(
     plate: DesignPlate,
     optimised: bool = True,
     element_size: float = ELEMENT_SIZE,
-    order: int = 1,
+    order: Order = 1,
     thickness: float = THICKNESS,
 ) -> Case:
     """Make the case of one plate.
@@ -87,6 +87,7 @@ def designed_case(
             Support("bottom", "z"),
         ),
         {"down": (Force("load", (0.0, -plate.force, 0.0)),)},
+        order=order,
     )
     what = "optimised" if optimised else "full plate"
     return Case(

@@ -12,6 +12,7 @@ from typing import Any
 import numpy as np
 import shapely
 
+from ccfem.elasticity.problem import Order
 from ccfem.errors import InputError
 from ccfem.io import read_mesh
 from ccfem.mesh.tet_mesh import TetMesh
@@ -94,7 +95,7 @@ def _stored_file(name: str, key: str, value: float) -> Path | None:
 
 
 def mesh_of_case(
-    name: str, element_size: float, order: int, make: Callable[[float], TetMesh]
+    name: str, element_size: float, order: Order, make: Callable[[float], TetMesh]
 ) -> TetMesh:
     """Mesh of a case: the stored one where it is of this element size, else a new one.
 
@@ -102,13 +103,13 @@ def mesh_of_case(
     ----------
     name : str
     element_size : float, mm
-    order : {1, 2}
+    order : 1, 2 or "auto"
         Linear or quadratic.
     make : callable
         Makes the linear mesh with its patches from the element size.
     """
-    if order not in (1, 2):
-        raise InputError(f"order of the elements must be 1 or 2; got {order}: choose one")
+    if order not in (1, 2, "auto"):
+        raise InputError(f"order of the elements must be 1, 2 or 'auto'; got {order!r}: choose one")
     mesh = stored_mesh(name, element_size)
     if mesh is None:
         mesh = make(element_size)

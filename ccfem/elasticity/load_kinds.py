@@ -1,0 +1,133 @@
+"""What can load a part: on its patches, at points, in its volume, and by moving what is held."""
+
+from collections.abc import Mapping
+from dataclasses import dataclass
+from typing import Any
+
+__all__ = [
+    "Bearing",
+    "BodyForce",
+    "Displacement",
+    "Force",
+    "Gravity",
+    "Load",
+    "PointForce",
+    "Pressure",
+    "SurfaceLoad",
+    "Temperature",
+    "Traction",
+    "patches_in_use",
+    "patches_of",
+    "points_of",
+]
+
+Vector = tuple[float, float, float]
+
+
+@dataclass(frozen=True)
+class Force:
+    """A total force, N, spread evenly over the area of a patch."""
+
+    patch: str
+    vector: Vector
+
+
+@dataclass(frozen=True)
+class Traction:
+    """A traction, MPa, on a patch."""
+
+    patch: str
+    vector: Vector
+
+
+@dataclass(frozen=True)
+class Pressure:
+    """A pressure, MPa, on a patch; positive pushes inward."""
+
+    patch: str
+    magnitude: float
+
+
+@dataclass(frozen=True)
+class Bearing:
+    """A total force, N, on a cylindrical patch, as a pin presses it.
+
+    The pressure acts along the facet normals and varies as the cosine of the angle to the force,
+    on the half that the pin touches; it is scaled to the total force.
+    """
+
+    patch: str
+    vector: Vector
+
+
+@dataclass(frozen=True)
+class PointForce:
+    """A force, N, at the mesh node nearest to a point, mm, of the part."""
+
+    point: Vector
+    vector: Vector
+
+
+@dataclass(frozen=True)
+class BodyForce:
+    """A force on every volume of the part, N/mm^3."""
+
+    vector: Vector
+
+
+@dataclass(frozen=True)
+class Gravity:
+    """The part's own weight, or what an acceleration does to its mass.
+
+    Attributes
+    ----------
+    acceleration : tuple of 3 floats, m/s^2, default (0, 0, -9.81)
+        The way in which the weight pulls.
+    mass_density : float, g/cm^3, optional
+        Of the whole part; by default each material's own.
+    """
+
+    acceleration: Vector = (0.0, 0.0, -9.81)
+    mass_density: float | None = None
+
+
+@dataclass(frozen=True)
+class Temperature:
+    """A change of temperature, K, of the whole part; its materials need an expansion."""
+
+    change: float
+
+
+@dataclass(frozen=True)
+class Displacement:
+    """A displacement, mm, that the supports on a patch take in this load case.
+
+    It replaces their own value in the components, or along the directions, that they hold.
+    """
+
+    patch: str
+    vector: Vector
+
+
+SurfaceLoad = Force | Traction | Pressure | Bearing | PointForce
+Load = SurfaceLoad | BodyForce | Gravity | Temperature | Displacement
+
+
+def patches_of(kind: Any) -> tuple[str, ...]:
+    """Names of the patches that a load or a support acts on."""
+    if hasattr(kind, "patches"):
+        return tuple(kind.patches)
+    return (kind.patch,) if hasattr(kind, "patch") else ()
+
+
+def points_of(kind: Any) -> tuple[Vector, ...]:
+    """Points that a load or a support acts at, by their own coordinates."""
+    return (kind.point,) if hasattr(kind, "point") and not patches_of(kind) else ()
+
+
+def patches_in_use(
+    supports: tuple[Any, ...], loads: Mapping[str, tuple[Load, ...]]
+) -> tuple[str, ...]:
+    """Names of the patches that carry a support or a load, sorted."""
+    kinds = [*supports, *(load for case in loads.values() for load in case)]
+    return tuple(sorted({name for kind in kinds for name in patches_of(kind)}))

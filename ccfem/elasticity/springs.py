@@ -1,0 +1,97 @@
+"""Springs and elastic beds: the stiffness that they add, and the directions that they hold."""
+
+import numpy as np
+import scipy.sparse as sp
+
+from ccfem.arrays import FloatArray, IntArray
+from ccfem.elasticity.assembly import add_blocks
+from ccfem.elasticity.body import LoadedBody, SupportedProblem
+from ccfem.elasticity.nodes import nearest_node, patch_facets, patch_nodes
+from ccfem.elasticity.support_kinds import Foundation, PointSpring, Spring
+from ccfem.mesh.cell_mesh import CellMesh
+
+__all__ = ["Soft", "add_springs", "soft_holds", "soft_supports", "spring_forces"]
+
+Soft = Spring | PointSpring | Foundation
+
+_LINEAR = (np.ones((3, 3)) + np.eye(3)) / 12.0
+_QUADRATIC = (
+    np.array(
+        [
+            [6, -1, -1, 0, -4, 0],
+            [-1, 6, -1, 0, 0, -4],
+            [-1, -1, 6, -4, 0, 0],
+            [0, 0, -4, 32, 16, 16],
+            [-4, 0, 0, 16, 32, 16],
+            [0, -4, 0, 16, 16, 32],
+        ]
+    )
+    / 180.0
+)
+"""Integrals of the products of the shape functions over a facet of unit area."""
+
+
+def soft_supports(problem: SupportedProblem) -> tuple[Soft, ...]:
+    """Supports of a problem that give."""
+    return tuple(s for s in problem.supports if isinstance(s, Spring | PointSpring | Foundation))
+
+
+def soft_holds(
+    mesh: CellMesh, surface: LoadedBody, support: Soft
+) -> list[tuple[IntArray, FloatArray]]:
+    """Nodes (k,) and directions (k, 3) that a soft support holds against rigid motions."""
+    if isinstance(support, Foundation):
+        # At the corners of each facet, for on a curved patch they differ.
+        facets = patch_facets(surface, support.patch)
+        across = _across(surface.facet_areas(facets)[1])
+        chosen = [across[:, 0]] if support.normal > 0.0 else []
+        chosen += [across[:, 1], across[:, 2]] if support.tangential > 0.0 else []
+        return [(facets.reshape(-1), np.repeat(held, facets.shape[1], axis=0)) for held in chosen]
+    if isinstance(support, Spring):
+        nodes = patch_nodes(mesh, support.patch)
+    else:
+        nodes = np.array([nearest_node(mesh, support.point, "a spring")])
+    axes = [np.eye(3)[k] for k in range(3) if support.stiffness[k] > 0.0]
+    return [(nodes, np.tile(axis, (len(nodes), 1))) for axis in axes]
+
+
+def add_springs(matrix: sp.bsr_array, mesh: LoadedBody, supports: tuple[Soft, ...]) -> None:
+    """Add the stiffness of springs and beds, N/mm, to a stiffness matrix (3n, 3n), in place."""
+    for support in supports:
+        add_blocks(matrix, *_elements(mesh, support))
+
+
+def spring_forces(
+    mesh: LoadedBody, supports: tuple[Soft, ...], displacement: FloatArray
+) -> FloatArray:
+    """Find the forces (n, 3), N, of springs and beds on the part displaced by (n, 3), mm."""
+    result = np.zeros_like(displacement)
+    for support in supports:
+        nodes, blocks = _elements(mesh, support)
+        own = displacement[nodes].reshape(len(nodes), -1)
+        forces = np.einsum("kij,kj->ki", blocks, own).reshape(*nodes.shape, 3)
+        np.subtract.at(result, nodes, forces)
+    return result
+
+
+def _elements(mesh: LoadedBody, support: Soft) -> tuple[IntArray, FloatArray]:
+    """Nodes (k, q) and element matrices (k, 3q, 3q), N/mm, of a soft support."""
+    if isinstance(support, PointSpring):
+        node = nearest_node(mesh, support.point, "a spring")
+        return np.array([[node]]), np.diag(support.stiffness)[None]
+    facets = patch_facets(mesh, support.patch)
+    area, normal = mesh.facet_areas(facets)
+    if isinstance(support, Spring):
+        bed = np.tile(np.diag(support.stiffness) / area.sum(), (len(facets), 1, 1))
+    else:
+        outer = normal[:, :, None] * normal[:, None]
+        bed = support.normal * outer + support.tangential * (np.eye(3) - outer)
+    nodes = mesh.facet_nodes(facets)
+    shapes = _LINEAR if nodes.shape[1] == 3 else _QUADRATIC
+    blocks = np.einsum("k,ab,kij->kaibj", area, shapes, bed)
+    return nodes, blocks.reshape(len(nodes), 3 * nodes.shape[1], -1)
+
+
+def _across(normal: FloatArray) -> FloatArray:
+    """Orthonormal rows (k, 3, 3), the first along a normal (k, 3)."""
+    return np.asarray(np.linalg.svd(normal[:, None])[2])

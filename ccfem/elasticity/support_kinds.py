@@ -1,0 +1,282 @@
+"""What can hold a part: its patches, edges and points, rigid patches, pins, springs and beds."""
+
+from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
+
+from ccfem.elasticity.load_kinds import Vector
+from ccfem.errors import InputError
+
+__all__ = [
+    "AnySupport",
+    "EdgeSupport",
+    "Foundation",
+    "Pin",
+    "PointSpring",
+    "PointSupport",
+    "RigidPatch",
+    "SlidingSupport",
+    "Spring",
+    "Support",
+]
+
+_ZERO = (0.0, 0.0, 0.0)
+
+
+@dataclass(frozen=True)
+class Support:
+    """Components of the displacement held on a patch.
+
+    Attributes
+    ----------
+    patch : str
+    components : str, default "xyz"
+        Which components are held.
+    value : tuple of 3 floats, mm, default zero
+        Displacement that the held components take.
+    """
+
+    patch: str
+    components: str = "xyz"
+    value: Vector = _ZERO
+
+    def __post_init__(self) -> None:
+        _check_components(self, self.components, f"patch '{self.patch}'")
+
+
+@dataclass(frozen=True)
+class EdgeSupport:
+    """Components held on the edge where two patches meet: at the nodes that both have.
+
+    Attributes
+    ----------
+    patches : tuple of 2 str
+    components : str, default "xyz"
+    value : tuple of 3 floats, mm, default zero
+    """
+
+    patches: tuple[str, str]
+    components: str = "xyz"
+    value: Vector = _ZERO
+
+    def __post_init__(self) -> None:
+        object.__setattr__(self, "patches", tuple(self.patches))
+        if len(self.patches) != 2 or self.patches[0] == self.patches[1]:
+            raise InputError(
+                f"an edge support needs the names of two patches that meet; got {self.patches}: "
+                "name two"
+            )
+        _check_components(self, self.components, f"patches {self.patches}")
+
+
+@dataclass(frozen=True)
+class PointSupport:
+    """Components held at the mesh node nearest to a point, mm, of the part.
+
+    Attributes
+    ----------
+    point : tuple of 3 floats, mm
+    components : str, default "xyz"
+    value : tuple of 3 floats, mm, default zero
+    """
+
+    point: Vector
+    components: str = "xyz"
+    value: Vector = _ZERO
+
+    def __post_init__(self) -> None:
+        _check_components(self, self.components, f"point {self.point}")
+        _check_finite(self, "point")
+
+
+@dataclass(frozen=True)
+class SlidingSupport:
+    """A patch that slides without friction: only what goes across its surface is held.
+
+    Attributes
+    ----------
+    patch : str
+        A plane of any slope; where it is curved each node slides on its own tangent plane.
+    normal : tuple of 3 floats, optional
+        Direction that is held, of any length; by default the outward normal of the patch.
+    value : float, mm, default 0
+        Displacement along that direction.
+    """
+
+    patch: str
+    normal: Vector | None = None
+    value: float = 0.0
+
+    def __post_init__(self) -> None:
+        _check_finite(self, "value")
+        if self.normal is not None and not 0.0 < np.linalg.norm(self.normal) < np.inf:
+            raise InputError(
+                f"normal of the sliding support on patch '{self.patch}' must be 3 finite numbers, "
+                f"not all zero; got {self.normal}: correct it"
+            )
+
+
+@dataclass(frozen=True)
+class RigidPatch:
+    """A patch that moves as a rigid body, as if a stiff plate were glued to it.
+
+    Attributes
+    ----------
+    patch : str
+    components : str, default "xyz"
+        Which components of the displacement of its centre are held; may be empty.
+    rotations : str, default "xyz"
+        About which axes through its centre its rotation is held; may be empty.
+    value : tuple of 3 floats, mm, default zero
+        Displacement that the held components take.
+    angle : tuple of 3 floats, degrees, default zero
+        Rotation that the held rotations take; small.
+    centre : tuple of 3 floats, mm, optional
+        By default the centroid of the patch.
+    """
+
+    patch: str
+    components: str = "xyz"
+    rotations: str = "xyz"
+    value: Vector = _ZERO
+    angle: Vector = _ZERO
+    centre: Vector | None = None
+
+    def __post_init__(self) -> None:
+        for letters in (self.components, self.rotations):
+            if set(letters) - set("xyz"):
+                raise InputError(
+                    "components and rotations of a rigid patch must be letters of 'xyz', or empty; "
+                    f"got '{letters}' on patch '{self.patch}'"
+                )
+        _check_finite(self, "value", "angle", "centre")
+
+
+@dataclass(frozen=True)
+class Pin:
+    """A rigid pin glued into a hole, which turns freely about its own axis.
+
+    Attributes
+    ----------
+    patch : str
+        Wall of the hole.
+    point : tuple of 3 floats, mm
+        On the axis.
+    axis : tuple of 3 floats
+        Direction of the axis, of any length.
+    slides : bool, default False
+        Whether it is free to move along its axis too.
+    value : tuple of 3 floats, mm, default zero
+        Displacement of the pin.
+    """
+
+    patch: str
+    point: Vector
+    axis: Vector
+    slides: bool = False
+    value: Vector = _ZERO
+
+    def __post_init__(self) -> None:
+        _check_finite(self, "point", "value")
+        if not 0.0 < np.linalg.norm(self.axis) < np.inf:
+            raise InputError(
+                f"axis of the pin in patch '{self.patch}' must be 3 finite numbers, not all zero; "
+                f"got {self.axis}: correct it"
+            )
+
+
+@dataclass(frozen=True)
+class Spring:
+    """Springs to the ground, spread evenly over a patch.
+
+    Attributes
+    ----------
+    patch : str
+    stiffness : tuple of 3 floats, N/mm
+        Of all of them together, along x, y and z; zero for none.
+    """
+
+    patch: str
+    stiffness: Vector
+
+    def __post_init__(self) -> None:
+        _check_stiffness(self, self.stiffness, f"the spring on patch '{self.patch}'", "N/mm")
+
+
+@dataclass(frozen=True)
+class PointSpring:
+    """A spring to the ground at the mesh node nearest to a point, mm, of the part.
+
+    Attributes
+    ----------
+    point : tuple of 3 floats, mm
+    stiffness : tuple of 3 floats, N/mm
+        Along x, y and z; zero for none.
+    """
+
+    point: Vector
+    stiffness: Vector
+
+    def __post_init__(self) -> None:
+        _check_finite(self, "point")
+        _check_stiffness(self, self.stiffness, f"the spring at {self.point}", "N/mm")
+
+
+@dataclass(frozen=True)
+class Foundation:
+    """An elastic bed under a patch (Winkler): traction in proportion to displacement.
+
+    It pulls as it presses: where it should only press, look at the sign of the reaction.
+
+    Attributes
+    ----------
+    patch : str
+    normal : float, MPa/mm
+        Traction across the surface over the displacement across it.
+    tangential : float, MPa/mm, default 0
+        The same along the surface.
+    """
+
+    patch: str
+    normal: float
+    tangential: float = 0.0
+
+    def __post_init__(self) -> None:
+        both = (self.normal, self.tangential)
+        _check_stiffness(self, both, f"the foundation under patch '{self.patch}'", "MPa/mm")
+
+
+AnySupport = (
+    Support
+    | EdgeSupport
+    | PointSupport
+    | SlidingSupport
+    | RigidPatch
+    | Pin
+    | Spring
+    | PointSpring
+    | Foundation
+)
+
+
+def _check_components(support: Any, components: str, where: str) -> None:
+    if not components or set(components) - set("xyz"):
+        raise InputError(
+            f"support components must be letters of 'xyz'; got '{components}' on {where}"
+        )
+
+
+def _check_finite(support: Any, *names: str) -> None:
+    for name in names:
+        value = getattr(support, name)
+        if value is not None and not np.isfinite(value).all():
+            raise InputError(f"a support must be held at finite values; got {support}: correct it")
+
+
+def _check_stiffness(support: Any, stiffness: tuple[float, ...], what: str, unit: str) -> None:
+    if not np.isfinite(stiffness).all() or min(stiffness) < 0.0 or not any(stiffness):
+        raise InputError(
+            f"stiffness of {what} must be numbers of at least 0 {unit}, not all zero; got "
+            f"{stiffness}: correct it"
+        )

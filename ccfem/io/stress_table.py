@@ -1,0 +1,70 @@
+"""Stress of each element or node from tables (CSV)."""
+
+import csv
+import re
+from pathlib import Path
+
+import numpy as np
+
+from ccfem.errors import InputError
+from ccfem.io.stress_data import StressData, component_of, component_order
+
+__all__ = ["table_stress"]
+
+
+def table_stress(path: Path) -> StressData:
+    """Read a table of stress with one line for each element, or for each node.
+
+    The first line names the columns: ``element`` or ``node``, the number in the mesh, from 0 or
+    from 1, every one once in any order; and the six components as ``Sxx [MPa]``, ``S12`` or ``xy``,
+    all with the same unit or none. Other columns are left out. Columns are separated by commas,
+    semicolons or tabs; lines that start with ``#`` are left out.
+
+    Raises
+    ------
+    InputError
+        When the file cannot be read, a column or a line is missing, or a value is no number.
+    """
+    try:
+        text = path.read_text(encoding="utf-8-sig")
+    except (OSError, UnicodeDecodeError) as error:
+        raise InputError(f"expected a CSV file at {path}; it cannot be read: {error}") from None
+    lines = [line for line in text.splitlines() if line.strip() and not line.startswith("#")]
+    if len(lines) < 2:
+        raise InputError(f"{path}: expected a line of column names and lines of numbers; got none")
+    rows = list(csv.reader(lines, delimiter=max(";\t,", key=lines[0].count)))
+    names, units = zip(*(_name_and_unit(cell) for cell in rows[0]), strict=True)
+    kinds = [name.lower() for name in names if name.lower() in ("element", "node")]
+    if len(kinds) != 1:
+        raise InputError(f"{path}: expected one column named element or node; got {rows[0]}")
+    stressed = [k for k, name in enumerate(names) if component_of(name) >= 0]
+    order = component_order([names[k] for k in stressed], f"{path}: the columns")
+    given = sorted({units[k] for k in stressed})
+    if len(given) > 1:
+        raise InputError(f"{path}: the components have units {', '.join(given)}: give them one")
+    at = [name.lower() for name in names].index(kinds[0])
+    try:
+        values = np.array([[float(row[stressed[k]]) for k in order] for row in rows[1:]])
+        numbers = np.array([int(row[at]) for row in rows[1:]])
+    except (ValueError, IndexError):
+        raise InputError(
+            f"{path}: expected a whole number and six numbers on each line: correct or delete the "
+            "others"
+        ) from None
+    first = int(numbers.min())
+    if first not in (0, 1) or not np.array_equal(np.sort(numbers), first + np.arange(len(numbers))):
+        raise InputError(
+            f"{path}: expected every {kinds[0]} from 0 or from 1 on, each once; got "
+            f"{len(numbers)} lines from {first} to {numbers.max()}: number them as the mesh does"
+        )
+    values = values[np.argsort(numbers)]
+    on_nodes = kinds[0] == "node"
+    return StressData(None, None, values if on_nodes else None, None if on_nodes else values,
+                      given[0])  # fmt: skip
+
+
+def _name_and_unit(cell: str) -> tuple[str, str]:
+    """Name of a column, and the unit in brackets behind it."""
+    found = re.fullmatch(r"\s*(.*?)\s*(?:\[\s*(.*?)\s*\])?\s*", cell)
+    assert found is not None
+    return found[1], found[2] or ""

@@ -1,0 +1,70 @@
+"""Stress tensors in VTK unstructured grids, with names of their components and their unit."""
+
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+from ccfem.arrays import FloatArray
+from ccfem.errors import InputError
+from ccfem.io.stress_data import COMPONENTS, StressData, component_order
+from ccfem.io.vtu import read_grid
+from ccfem.tensor import to_voigt
+
+__all__ = ["UNIT", "set_tensors", "vtu_stress"]
+
+UNIT = "unit of stress"
+"""Field data that holds the unit."""
+_VTK = ("xx", "yy", "zz", "xy", "yz", "xz")
+"""Components of VTK's symmetric tensors in their order."""
+
+
+def set_tensors(data: Any, name: str, tensors: FloatArray) -> None:
+    """Store symmetric tensors (k, 3, 3) in the point or cell data of a grid, components named."""
+    order = [COMPONENTS.index(component) for component in _VTK]
+    data[name] = np.ascontiguousarray(to_voigt(tensors)[:, order])
+    array = data.VTKObject.GetArray(name)
+    for k, component in enumerate(_VTK):
+        array.SetComponentName(k, component)
+
+
+def vtu_stress(path: Path, array: str) -> StressData:
+    """Stress at the nodes and in the cells of a grid, as far as it has an array of that name.
+
+    Arrays of nine components are full tensors, row by row; those of six must name their components
+    (xx, yy, zz, yz, xz, xy in any order, as xx, Sxx or S11).
+    """
+    grid = read_grid(path)
+    nodal, cell = (_tensors(data, array, path) for data in (grid.point_data, grid.cell_data))
+    if nodal is None and cell is None:
+        known = sorted({*grid.point_data.keys(), *grid.cell_data.keys()})
+        raise InputError(
+            f"{path} has no array '{array}'; there are: {', '.join(known) or 'none'}: name the "
+            "one that holds the stress"
+        )
+    tetrahedra = [nodes for kind, nodes in grid.cells_dict.items() if int(kind) in (10, 24)]
+    if len(tetrahedra) != 1 or len(tetrahedra[0]) != grid.n_cells:
+        raise InputError(f"{path}: expected tetrahedra of one kind only; mesh the part with those")
+    unit = str(grid.field_data[UNIT][0]) if UNIT in grid.field_data else ""
+    points = np.asarray(grid.points, dtype=np.float64)
+    corners = np.asarray(tetrahedra[0], dtype=np.int64)[:, :4]
+    return StressData(points, corners, nodal, cell, unit)
+
+
+def _tensors(data: Any, name: str, path: Path) -> FloatArray | None:
+    """Voigt components (k, 6) of an array; None where there is no such array."""
+    if name not in data.keys():  # noqa: SIM118 - pyvista's mapping is one by its keys only
+        return None
+    values = np.asarray(data[name], dtype=np.float64)
+    if values.ndim == 3 and values.shape[1:] == (3, 3):
+        values = values.reshape(-1, 9)
+    if values.ndim != 2 or values.shape[1] not in (6, 9):
+        raise InputError(
+            f"{path}: array '{name}' must have six or nine components; got shape {values.shape}"
+        )
+    if values.shape[1] == 9:
+        full = values.reshape(-1, 3, 3)
+        return to_voigt(0.5 * (full + full.swapaxes(1, 2)))
+    array = data.VTKObject.GetArray(name)
+    names = [array.GetComponentName(k) or "" for k in range(6)]
+    return values[:, component_order(names, f"{path}: array '{name}'")]

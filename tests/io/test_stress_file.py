@@ -1,0 +1,241 @@
+"""Stress of other programs: what comes in is what was written, and nothing else is taken for it."""
+
+import shutil
+import subprocess
+from dataclasses import replace
+from pathlib import Path
+
+import numpy as np
+import pytest
+import pyvista
+
+from ccfem.cases.case import Case
+from ccfem.comparison import compare
+from ccfem.comparison.compare import ForeignStress
+from ccfem.elasticity import Force, Problem, Support, solve
+from ccfem.elasticity.loads import nodal_forces
+from ccfem.errors import InputError
+from ccfem.export.vtu_result import write_result
+from ccfem.io import read_mesh, read_stress
+from ccfem.layers.slicing.planar import Planar
+from ccfem.machine import Machine
+from ccfem.materials import isotropic
+from ccfem.mesh import TetMesh
+from ccfem.mesh.box import box_mesh
+from ccfem.planning import plan
+from ccfem.strategies import create
+
+LOADS = {"pull": (Force("x_max", (300.0, 40.0, 20.0)),)}
+
+
+def part(order=1, size=(60.0, 24.0, 4.0), divisions=(20, 8, 2)):
+    held = (Support("x_min"),)
+    return Problem(box_mesh(size, divisions), isotropic(3500.0, 0.35), held, LOADS, order=order)
+
+
+@pytest.fixture(scope="module", params=[1, 2])
+def field(request):
+    return solve(part(request.param))["pull"]
+
+
+@pytest.fixture
+def written(field, tmp_path):
+    write_result(field, tmp_path / "result.vtu")
+    return tmp_path / "result.vtu"
+
+
+def test_paths_on_what_was_written_and_read_are_the_same(field, written):
+    given = read_stress(written, field.mesh, held_or_loaded=field.held_or_loaded)
+    np.testing.assert_array_equal(given.stress, field.stress)
+    np.testing.assert_array_equal(given.nodal, field.nodal)
+    machine = Machine(minimum_length=20.0)
+    for name in ("isocurve", "zigzag"):
+        one, other = (
+            plan(create(name), Planar(count=2).cut(field.mesh), stress, machine)
+            for stress in (field, given)
+        )
+        assert len(one)
+        np.testing.assert_array_equal(one.points, other.points)
+        np.testing.assert_array_equal(one.offsets, other.offsets)
+
+
+def test_a_result_holds_all_that_it_promises(field, written):
+    grid = pyvista.read(written)
+    np.testing.assert_array_equal(grid.point_data["displacement"], field.displacement)
+    np.testing.assert_array_equal(grid.point_data["reaction"], field.reactions)
+    np.testing.assert_array_equal(
+        grid.cell_data["error"], field.error.densities(field.mesh.volumes)
+    )
+    strain = grid.cell_data["strain"]  # tensors: xx, yy, zz, xy, yz, xz
+    np.testing.assert_array_equal(strain[:, 3], field.strain[:, 0, 1])
+    np.testing.assert_array_equal(grid.cell_data["stress"][:, 4], field.stress[:, 1, 2])
+    values = grid.cell_data["principal_stress"]
+    axes = np.stack([grid.cell_data[f"principal_direction_{k}"] for k in (1, 2, 3)], axis=2)
+    again = np.einsum("mik,mk,mjk->mij", axes, values, axes)
+    np.testing.assert_allclose(again, field.stress, atol=1e-9 * np.abs(field.stress).max())
+    assert grid.field_data["unit of stress"][0] == "MPa"
+    mesh = read_mesh(written)
+    assert set(mesh.patches) == set(field.mesh.patches)
+    assert mesh.order == field.mesh.order
+
+
+def test_other_numbers_of_nodes_and_cells_are_mapped(field, tmp_path):
+    mesh, random = field.mesh, np.random.default_rng(4)
+    order, cells = random.permutation(len(mesh.points)), random.permutation(len(mesh.cells))
+    number = np.argsort(order)
+    points = np.array(mesh.points[order])
+    shuffled = TetMesh(points, number[mesh.cells][cells])
+    write_result(
+        replace(
+            field,
+            problem=replace(
+                field.problem,
+                mesh=shuffled.with_patches(
+                    {name: number[facets] for name, facets in mesh.patches.items()}
+                ),
+            ),
+            displacement=field.displacement[order],
+            stress=field.stress[cells],
+            nodal=field.nodal[order],
+            reactions=field.reactions[order],
+        ),
+        tmp_path / "shuffled.vtu",
+    )
+    given = read_stress(tmp_path / "shuffled.vtu", mesh)
+    np.testing.assert_array_equal(given.stress, field.stress)
+    np.testing.assert_array_equal(given.nodal, field.nodal)
+
+
+def test_arrays_of_other_programs(field, tmp_path):
+    mesh = field.mesh
+    grid = pyvista.UnstructuredGrid(
+        {10 if mesh.order == 1 else 24: mesh.cells}, np.array(mesh.points)
+    )
+    grid.cell_data["S"] = 1e6 * field.stress.reshape(-1, 9)
+    grid.save(tmp_path / "full.vtu")
+    given = read_stress(tmp_path / "full.vtu", mesh, "Pa", "S")
+    np.testing.assert_allclose(given.stress, field.stress, rtol=1e-12, atol=1e-12)
+    with pytest.raises(InputError, match="does not say the unit of its stress"):
+        read_stress(tmp_path / "full.vtu", mesh, array="S")
+    with pytest.raises(InputError, match=r"has no array 'stress'; there are: S"):
+        read_stress(tmp_path / "full.vtu", mesh, "MPa")
+    with pytest.raises(InputError, match="unit of stress must be"):
+        read_stress(tmp_path / "full.vtu", mesh, "psi", "S")
+    grid.cell_data["S"] = np.ones((len(mesh.cells), 6))
+    grid.save(tmp_path / "unnamed.vtu")
+    with pytest.raises(InputError, match="must name the components xx, yy"):
+        read_stress(tmp_path / "unnamed.vtu", mesh, "MPa", "S")
+
+
+def test_stress_on_another_mesh_is_refused(written, field):
+    size = (60.0, 24.0, 4.0)
+    other = box_mesh(size, (10, 4, 1))
+    with pytest.raises(InputError, match="has other cells than the part"):
+        read_stress(written, other)
+    with pytest.raises(InputError, match=r"has no node where .* corners of the part lie"):
+        read_stress(written, box_mesh((61.0, 24.0, 4.0), (20, 8, 2)))
+    with pytest.raises(InputError, match="holds stress in MPa; got the unit Pa"):
+        read_stress(written, field.mesh, "Pa")
+    with pytest.raises(InputError, match=r"read from \.vtu, \.frd or \.csv"):
+        read_stress(written.rename(written.with_suffix(".odb")), field.mesh)
+
+
+def table(kind, stress, first=1, unit=" [MPa]", order=None):
+    """CSV of a table of stress (k, 3, 3)."""
+    lines = [f"{kind};S11{unit};S22{unit};S33{unit};S12{unit};S13{unit};S23{unit};note"]
+    for k in range(len(stress)) if order is None else order:
+        s = stress[k]
+        parts = (s[0, 0], s[1, 1], s[2, 2], s[0, 1], s[0, 2], s[1, 2])
+        lines.append(";".join([str(k + first), *map(repr, map(float, parts)), "-"]))
+    return "\n".join(lines)
+
+
+def test_tables_by_element_and_by_node(field, tmp_path):
+    path, mesh = tmp_path / "stress.csv", field.mesh
+    order = np.random.default_rng(1).permutation(len(mesh.cells))
+    path.write_text(table("Element", field.stress, 1, order=order))
+    given = read_stress(path, mesh)
+    np.testing.assert_array_equal(given.stress, field.stress)
+    if mesh.order == 1:  # averaged as the solve does
+        np.testing.assert_allclose(given.nodal, field.nodal, atol=1e-9)
+    path.write_text(table("node", 1e6 * field.nodal, 0, " [Pa]"))
+    given = read_stress(path, mesh)
+    np.testing.assert_allclose(given.nodal, field.nodal, rtol=1e-12, atol=1e-12)
+    means = field.nodal[mesh.corners].mean(axis=1)
+    np.testing.assert_allclose(given.stress, means, rtol=1e-9, atol=1e-9)
+    path.write_text(table("node", field.nodal[:-3]))
+    with pytest.raises(InputError, match="and the part"):
+        read_stress(path, mesh)
+    path.write_text(table("element", field.stress, 7))
+    with pytest.raises(InputError, match="expected every element from 0 or from 1 on"):
+        read_stress(path, mesh)
+    path.write_text(table("element", field.stress).replace("S13", "S14"))
+    with pytest.raises(InputError, match="must name the components"):
+        read_stress(path, mesh)
+    path.write_text(table("element", field.stress, unit=""))
+    with pytest.raises(InputError, match="does not say the unit"):
+        read_stress(path, mesh)
+    path.write_text(table("element", field.stress).replace("S13 [MPa]", "S13 [Pa]"))
+    with pytest.raises(InputError, match="give them one"):
+        read_stress(path, mesh)
+    path.write_text(table("element", np.full_like(field.stress, np.nan)))
+    with pytest.raises(InputError, match="stress must be finite"):
+        read_stress(path, mesh)
+
+
+def calculix(problem: Problem, folder: Path) -> Path:
+    """Solve a problem with CalculiX on the same mesh; the result file."""
+    mesh = problem.mesh
+    forces = sum(nodal_forces(mesh, load) for load in problem.loads["pull"])
+    held = np.unique(mesh.facet_nodes(mesh.patch("x_min"))) + 1
+    modulus, poisson = 3500.0, 0.35
+    lines = ["*NODE, NSET=ALL"]
+    lines += [f"{k}, {x:.12e}, {y:.12e}, {z:.12e}" for k, (x, y, z) in enumerate(mesh.points, 1)]
+    lines.append(f"*ELEMENT, TYPE=C3D{4 if mesh.order == 1 else 10}, ELSET=E")
+    lines += [f"{k}, {', '.join(map(str, c + 1))}" for k, c in enumerate(mesh.cells, 1)]
+    lines += ["*MATERIAL, NAME=M", "*ELASTIC", f"{modulus}, {poisson}"]
+    lines += ["*SOLID SECTION, ELSET=E, MATERIAL=M", "*BOUNDARY"]
+    lines += [f"{k}, 1, 3" for k in held]
+    lines += ["*STEP", "*STATIC", "*CLOAD"]
+    lines += [
+        f"{node + 1}, {i + 1}, {forces[node, i]:.12e}"
+        for node, i in zip(*np.nonzero(forces), strict=True)
+    ]
+    lines += ["*NODE FILE", "U", "*EL FILE", "S", "*END STEP", ""]
+    (folder / "part.inp").write_text("\n".join(lines))
+    subprocess.run(["ccx", "part"], cwd=folder, check=True, capture_output=True, timeout=300)
+    return folder / "part.frd"
+
+
+@pytest.mark.skipif(shutil.which("ccx") is None, reason="CalculiX is not installed")
+def test_a_comparison_on_stress_of_calculix_is_that_on_ours(tmp_path):
+    # Quadratic cells of one volume, so that both programs average alike at the nodes; the file has
+    # six digits. Ours goes the same way, through the nodes alone.
+    problem = part(2, divisions=(10, 4, 1))
+    field = solve(problem)["pull"]
+    given = read_stress(calculix(field.problem, tmp_path), field.mesh, "MPa")
+    size = np.abs(field.nodal).max()
+    np.testing.assert_allclose(given.nodal, field.nodal, atol=2e-5 * size)
+    (tmp_path / "ours.csv").write_text(table("node", field.nodal))
+    case = Case("strip", "", problem, slicing=Planar(count=2), machine=Machine(minimum_length=20.0))
+    files = (ForeignStress(tmp_path / "part.frd", "MPa"), ForeignStress(tmp_path / "ours.csv"))
+    theirs, ours = (
+        compare(case, ("isocurve", "zigzag"), fibre_per_layer=120.0, stress=file) for file in files
+    )
+    for one, other in zip(theirs.runs, ours.runs, strict=True):
+        assert not one.failure
+        assert one.length_per_layer == pytest.approx(other.length_per_layer, rel=1e-4)
+        for name in ("efficiency", "aligned_stress_10"):
+            found = one.evaluation.total[name], other.evaluation.total[name]
+            assert found[0] == pytest.approx(found[1], rel=1e-4)
+        tested = one.tested.bracket.tension.ratio, other.tested.bracket.tension.ratio
+        assert tested[0] == pytest.approx(tested[1], rel=1e-4)
+
+
+def test_a_result_file_must_be_one(tmp_path):
+    mesh = box_mesh((1.0, 1.0, 1.0), (1, 1, 1))
+    (tmp_path / "empty.frd").write_text("    1C\n 9999\n")
+    with pytest.raises(InputError, match="has no mesh of tetrahedra"):
+        read_stress(tmp_path / "empty.frd", mesh, "MPa")
+    with pytest.raises(InputError, match="stress file"):
+        read_stress(tmp_path / "none.frd", mesh, "MPa")
