@@ -1,4 +1,4 @@
-"""Array types, and how the frozen values of ccfem hold arrays and mappings that nobody changes."""
+"""Array types, and read-only arrays and mappings for frozen dataclasses."""
 
 import dataclasses
 from collections.abc import Mapping
@@ -16,19 +16,9 @@ BoolArray = NDArray[np.bool_]
 
 
 def read_only(values: ArrayLike, dtype: DTypeLike = float) -> NDArray[Any]:
-    """Return `values` as a contiguous array that nobody can write to.
+    """Return `values` as a C-contiguous array that nobody can write to.
 
-    Parameters
-    ----------
-    values : array_like
-        Anything numpy understands; copied unless it is already read-only and of the right type.
-    dtype : data type, default float64
-        The type of the result.
-
-    Returns
-    -------
-    array
-        C-contiguous, with ``flags.writeable`` false.
+    They are copied unless they are such an array of the right type already.
     """
     array = np.asarray(values)
     if array.dtype == dtype and array.flags.c_contiguous and not array.flags.writeable:

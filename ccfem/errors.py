@@ -1,4 +1,4 @@
-"""The two ways in which ccfem refuses to go on."""
+"""The two errors that ccfem raises."""
 
 import difflib
 from collections.abc import Iterable
@@ -7,7 +7,7 @@ __all__ = ["InputError", "SolveError", "known_names"]
 
 
 class InputError(ValueError):
-    """Input that nothing sensible can follow from.
+    """Invalid input.
 
     The message is one line that says what was expected, what came and the cure; the command line
     prints it and exits with code 2.

@@ -6,7 +6,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from ccfem.arrays import FloatArray, freeze
-from ccfem.checks import check_known, check_number
+from ccfem.checks import check_fields, check_known, check_number
 from ccfem.errors import InputError
 
 __all__ = [
@@ -52,6 +52,7 @@ class Material:
 
     def __post_init__(self) -> None:
         freeze(self, stiffness=float)
+        check_fields(self, "tensile_strength", "compressive_strength", above=0.0, unit="MPa")
         stiffness = self.stiffness
         if stiffness.shape != (6, 6) or not np.allclose(stiffness, stiffness.T, rtol=1e-9):
             raise InputError(

@@ -5,15 +5,16 @@ One module is one member: it holds a class of its own name in capitals (``contou
 by an entry point. Nothing is registered anywhere.
 """
 
-import dataclasses
 import importlib
 import importlib.util
+import inspect
 import pkgutil
 import re
 from collections.abc import Mapping
 from importlib.metadata import entry_points
 from typing import Any
 
+from ccfem.checks import check_known
 from ccfem.errors import InputError, known_names
 from ccfem.io.toml import from_table
 
@@ -37,7 +38,11 @@ def found(package: str, group: str) -> dict[str, Any]:
 
 
 def create(
-    kind: str, known: Mapping[str, Any], name: str, parameters: Mapping[str, Any] | None
+    kind: str,
+    known: Mapping[str, Any],
+    name: str,
+    parameters: Mapping[str, Any] | None,
+    cure: str = "",
 ) -> Any:
     """Make a member from its name and parameters.
 
@@ -45,28 +50,27 @@ def create(
     ----------
     kind : str
         What a member is called in messages, as "strategy".
-    known : mapping of name to class
+    known : mapping of name to class or function
     name : str
     parameters : mapping of name to value, optional
+    cure : str, optional
+        What else might have been meant by an unknown name.
 
     Raises
     ------
     InputError
         For an unknown member or parameter, the known ones listed; for a value of a wrong type.
     """
-    if name not in known:
-        raise InputError(f"no {kind} named '{name}'; there are: {known_names(name, sorted(known))}")
-    fields = {f.name for f in dataclasses.fields(known[name])}
-    for parameter in parameters or {}:
-        if parameter not in fields:
+    check_known(kind, name, sorted(known), cure)
+    taken = inspect.signature(known[name]).parameters
+    table = {}
+    for parameter, value in (parameters or {}).items():
+        if parameter not in taken:
             raise InputError(
                 f"{kind} '{name}' has no parameter '{parameter}'; it has: "
-                f"{known_names(parameter, sorted(fields))}"
+                f"{known_names(parameter, taken)}"
             )
-    table = {
-        key: list(value) if isinstance(value, tuple) else value
-        for key, value in (parameters or {}).items()
-    }
+        table[parameter] = list(value) if isinstance(value, tuple) else value
     return from_table(known[name], table, f"{kind} {name}")
 
 

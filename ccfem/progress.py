@@ -1,4 +1,4 @@
-"""How long work tells its caller where it stands."""
+"""How long tasks report their progress."""
 
 from collections.abc import Callable, Iterator
 from contextlib import contextmanager
@@ -6,16 +6,16 @@ from contextlib import contextmanager
 __all__ = ["Progress", "progress_bar", "silent"]
 
 Progress = Callable[[str, float], None]
-"""Called with what is being done now and the share, in [0, 1], of all work that is done."""
+"""Called with the name of the current step and the share of all work, in [0, 1], that is done."""
 
 
 def silent(what: str, share: float) -> None:
-    """Tell nobody."""
+    """Report nothing."""
 
 
 @contextmanager
 def progress_bar() -> Iterator[Progress]:
-    """Progress bar on the terminal's stderr or in a notebook, or silence where nobody watches.
+    """Progress bar on the terminal's stderr or in a notebook; nothing anywhere else.
 
     Examples
     --------

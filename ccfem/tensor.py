@@ -1,4 +1,4 @@
-"""Symmetric tensors: component order, rotations, principal values. Known here only.
+"""Symmetric tensors: component order, rotations, principal values.
 
 Voigt order is 11, 22, 33, 23, 13, 12; strains in Voigt form carry engineering shear (twice the
 tensor component).
@@ -11,6 +11,7 @@ from ccfem.arrays import BoolArray, FloatArray
 __all__ = [
     "bond_matrix",
     "from_voigt",
+    "in_axes",
     "in_plane",
     "largest_in_plane",
     "principal",
@@ -30,7 +31,7 @@ _ENGINEERING = np.array([1.0, 1.0, 1.0, 2.0, 2.0, 2.0])
 
 _EQUAL = 0.02
 """Principal values whose sizes differ by no more than this share of the larger size have no
-strongest direction: in pure shear two directions at right angles are as strong."""
+strongest direction: in pure shear two directions at right angles are equally strong."""
 
 
 def to_voigt(stress: FloatArray) -> FloatArray:
@@ -133,6 +134,11 @@ def in_plane(stress: FloatArray, frame: FloatArray) -> FloatArray:
     return np.stack([first @ e1, second @ e2, first @ e2], axis=-1)
 
 
+def in_axes(tensor: FloatArray, axes: FloatArray) -> FloatArray:
+    """Components of tensors (..., 3, 3) along other axes (..., 3, 3), whose rows they are."""
+    return np.asarray(axes @ tensor @ np.swapaxes(axes, -1, -2))
+
+
 def largest_in_plane(plane_stress: FloatArray) -> tuple[FloatArray, FloatArray, FloatArray]:
     """Principal values of plane stress and the angle of the larger one.
 
@@ -155,7 +161,7 @@ def largest_in_plane(plane_stress: FloatArray) -> tuple[FloatArray, FloatArray, 
 
 
 def strongest(largest: FloatArray, smallest: FloatArray) -> tuple[BoolArray, BoolArray]:
-    """Tell which of two principal values in a plane is the larger in size.
+    """Find which of two principal values in a plane is the larger in size.
 
     Parameters
     ----------
@@ -165,8 +171,8 @@ def strongest(largest: FloatArray, smallest: FloatArray) -> tuple[BoolArray, Boo
     Returns
     -------
     across : (...,) bool array
-        True where ``|smallest| > |largest|``: the strongest direction is square to that of
-        `largest`.
+        True where ``|smallest| > |largest|``: the strongest direction is perpendicular to
+        that of `largest`.
     defined : (...,) bool array
         True where the sizes differ by more than 2 % of the larger one.
     """

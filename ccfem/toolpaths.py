@@ -2,7 +2,6 @@
 
 from collections.abc import Iterable, Iterator, Sequence
 from dataclasses import dataclass, replace
-from typing import Any
 
 import numpy as np
 
@@ -34,8 +33,9 @@ class Toolpaths:
     closed : (K,) bool array
         Whether the path is a closed curve.
     link : (P,) bool array, optional
-        Whether the step from each point to the next one of its path is a link: fibre that is there
-        to join two strands, not to carry load. False at the last point of a path. Default: none is.
+        Whether the step from each point to the next one of its path is a link: fibre that only
+        joins two strands and is not there to carry load. False at the last point of a path.
+        Default: none is.
         A strategy marks what may leave the section or cross a void, as `svt` does, for that is
         measured apart; short links within the section that follow the border or the field, as those
         of `isocurve` and `zigzag`, are fibre like any other and not marked.
@@ -87,10 +87,9 @@ class Toolpaths:
         lines: Sequence[FloatArray],
         layer: Layer,
         closed: Sequence[bool] | None = None,
-        kind: int = FIBRE,
         link: Sequence[BoolArray] | None = None,
     ) -> "Toolpaths":
-        """Paths on one flat layer from polylines in its plane coordinates.
+        """Fibre paths on one flat layer from polylines in its plane coordinates.
 
         Parameters
         ----------
@@ -100,7 +99,6 @@ class Toolpaths:
             A flat layer.
         closed : sequence of bool, optional
             By default a line is closed when its last point equals its first.
-        kind : int, default FIBRE
         link : sequence of (n_i,) bool arrays, optional
             Which steps of each line are links; by default none.
         """
@@ -116,11 +114,43 @@ class Toolpaths:
             normals=np.broadcast_to(layer.plane.frame[2], points.shape),
             offsets=np.concatenate([[0], np.cumsum(sizes)]),
             layer=np.full(len(keep), layer.index),
-            kind=np.full(len(keep), kind),
+            kind=np.full(len(keep), FIBRE),
             closed=np.array([closed[k] for k in keep]),
             link=np.zeros(len(points), dtype=bool)
             if link is None
             else np.concatenate([link[k] for k in keep]),
+        )
+
+    @classmethod
+    def in_space(
+        cls,
+        lines: Sequence[FloatArray],
+        normals: Sequence[FloatArray],
+        layer: Layer,
+        kind: int = FIBRE,
+    ) -> "Toolpaths":
+        """Paths on one layer, flat or curved, from polylines in space.
+
+        Parameters
+        ----------
+        lines : sequence of (n_i, 3) arrays, mm
+            Polylines with at least two points; others are dropped. A line is closed when its last
+            point equals its first.
+        normals : sequence of (n_i, 3) arrays
+            Unit normal of the layer at each of their points.
+        layer : Layer
+        kind : int, default FIBRE
+        """
+        keep = [k for k, line in enumerate(lines) if len(line) >= 2]
+        if not keep:
+            return cls.empty()
+        return cls(
+            points=np.concatenate([lines[k] for k in keep]),
+            normals=np.concatenate([normals[k] for k in keep]),
+            offsets=np.concatenate([[0], np.cumsum([len(lines[k]) for k in keep])]),
+            layer=np.full(len(keep), layer.index),
+            kind=np.full(len(keep), kind),
+            closed=np.array([np.array_equal(lines[k][0], lines[k][-1]) for k in keep]),
         )
 
     @classmethod
@@ -130,19 +160,11 @@ class Toolpaths:
         if not found:
             return cls.empty()
         sizes = np.concatenate([np.diff(part.offsets) for part in found])
-
-        def joined(name: str) -> Any:
-            return np.concatenate([getattr(part, name) for part in found])
-
-        return cls(
-            joined("points"),
-            joined("normals"),
-            np.concatenate([[0], np.cumsum(sizes)]),
-            joined("layer"),
-            joined("kind"),
-            joined("closed"),
-            joined("link"),
-        )
+        joined = {
+            name: np.concatenate([getattr(part, name) for part in found])
+            for name in ("points", "normals", "layer", "kind", "closed", "link")
+        }
+        return cls(offsets=np.concatenate([[0], np.cumsum(sizes)]), **joined)
 
     def __len__(self) -> int:
         return len(self.layer)

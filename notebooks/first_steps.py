@@ -23,9 +23,6 @@ from ccfem.cases import create_case
 from ccfem.comparison.compare import compare
 from ccfem.elasticity import solve
 from ccfem.evaluation import evaluate
-from ccfem.comparison.headline import headline_values
-from ccfem.comparison.remarks import verdict
-from ccfem.comparison.ranking import ranking
 from ccfem.layers.slicing.planar import Planar
 from ccfem.planning import plan
 from ccfem.strategies import create
@@ -81,23 +78,16 @@ assert evaluation.total["outside_length"] == 0.0
 
 # %%
 comparison = compare(case, layers=3)
-for run in ranking(comparison):
-    values = headline_values(run)
-    print(
-        f"{run.name:15} {run.length_per_layer:6.0f} mm a layer, "
-        f"stiffness x {values['stiffness_ratio_tension']:.2f}, "
-        f"efficiency {values['efficiency']:.2f}"
-    )
-print(verdict(comparison))
+print(comparison)
 
 # %% [markdown]
 # The headline: fibre along the tension makes the stiffest part, by a wide margin.
 
 # %%
-best, second = ranking(comparison)[:2]
+best, second = comparison.ranking[:2]
 assert best.name == "isocurve"
 gain = best.tested.bracket.tension.stiffness / second.tested.bracket.tension.stiffness
 assert gain > 1.2
 # Nobody laid more than the common length, and the bonded test agrees on the order.
 assert all(run.length_per_layer <= 1.01 * comparison.fibre_per_layer for run in comparison.runs)
-assert verdict(comparison).startswith("isocurve makes the stiffest part")
+assert comparison.verdict.startswith("isocurve makes the stiffest part")

@@ -70,7 +70,7 @@ patterns = {
     "mps": create("mps"),
 }
 machine = Machine(
-    fibre_width=plate.bead, deposited_width=plate.bead, minimum_length=0.0, minimum_radius=0.0
+    fibre_width=plate.bead, minimum_length=0.0, minimum_radius=0.0
 )
 layers, stress = plate.planned_on(2)
 results = {}

@@ -44,7 +44,7 @@ assert abs(2.0 * full.strain_energy - 9.13) < 0.05
 # %% [markdown]
 # ## What the optimisation does to the stress
 #
-# The optimised part is stored (`plate.design()` finds it anew, in some seconds). In the full plate
+# The optimised part is stored (`plate.design()` finds it again, in some seconds). In the full plate
 # most places are pulled one way and pressed the other; in the members of the part one principal
 # stress prevails.
 

@@ -1,5 +1,6 @@
 """The public face: what ``import ccfem`` gives, and how values show themselves."""
 
+import dataclasses
 import subprocess
 import sys
 
@@ -75,6 +76,56 @@ def test_a_case_by_its_name_and_strategies_themselves(flow):
         found.runs[0].length_per_layer,
         found.runs[2].length_per_layer,
     ]
+
+
+@pytest.fixture(scope="module")
+def compared(flow):
+    """Two strategies on two layers."""
+    strategies = {name: ccfem.strategies.create(name) for name in ("concentric", "zigzag")}
+    return ccfem.compare(flow[0], strategies, layers=2)
+
+
+def test_a_comparison_prints_as_a_short_table(compared):
+    lines = str(compared).splitlines()
+    assert lines[0].split("  ")[0] == "strategy"
+    for title in ("stiffness, N/mm", "first failure, N", "fibre, mm a layer"):
+        assert title in lines[0]
+    assert [line.split()[0] for line in lines[1:3]] == [run.name for run in compared.ranking]
+    for line, run in zip(lines[1:3], compared.ranking, strict=True):
+        test = run.tested.bracket.tension
+        assert f" {test.stiffness:.4g} " in line
+        assert f" {run.tested.failure.load:.0f} {run.tested.failure.what} " in line
+        assert f" {run.length_per_layer:.0f} " in line
+        assert len(line) <= len(lines[0])
+    assert lines[3:] == [compared.verdict]
+    assert all(len(line) < 120 for line in lines[:3])
+
+
+def test_a_comparison_and_its_runs_are_one_line_each(compared):
+    assert repr(compared) == "Comparison of 2 strategies on 'bar': 2 layers, 768 cells"
+    for run in compared.runs:
+        assert repr(run).startswith(f"Run '{run.name}': {len(run.toolpaths)} paths, ")
+        assert f"{run.tested.bracket.tension.ratio:.2f} times as stiff" in repr(run)
+    for value in (compared, *compared.runs):
+        assert "\n" not in repr(value)
+
+
+def test_a_failed_strategy_keeps_its_row(compared):
+    first, second = compared.runs
+    broken = dataclasses.replace(second, evaluation=None, tested=None, failure="no <such> field")
+    left = dataclasses.replace(compared, runs=(broken, first))
+    assert str(left).splitlines()[2].split("  ")[0] == second.name
+    assert str(left).splitlines()[2].endswith("failed: no <such> field")
+    assert "failed: no &lt;such&gt; field" in left._repr_html_()
+    assert repr(left).endswith("768 cells, 1 failed")
+    assert repr(broken) == f"Run '{second.name}': failed: no <such> field"
+
+
+def test_a_comparison_is_a_table_in_a_notebook(compared):
+    page = compared._repr_html_()
+    assert page.count("<tr>") == 3
+    assert f"<td>{compared.ranking[0].tested.bracket.tension.stiffness:.4g}</td>" in page
+    assert compared.verdict in page
 
 
 def test_wrong_names_are_one_line():

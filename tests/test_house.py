@@ -11,8 +11,6 @@ PACKAGE = ROOT / "ccfem"
 
 TWICE = {
     "assembly": "of tetrahedra and of plates",
-    "guides": "as curves and as pixels",
-    "hatch": "of lines and of pixels",
     "problem": "in space and in the plane",
     "solve": "in space and in the plane",
 }

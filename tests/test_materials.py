@@ -101,3 +101,10 @@ def test_unknown_material_lists_the_known():
 def test_impossible_constants_are_refused(make):
     with pytest.raises(InputError):
         make()
+
+
+@pytest.mark.parametrize("field", ["tensile_strength", "compressive_strength"])
+def test_strengths_are_above_zero(field):
+    for value in (-50.0, 0.0, np.nan):
+        with pytest.raises(InputError, match=rf"material\.{field} must be .*above 0 MPa; got"):
+            isotropic(3000.0, 0.3, **{field: value})

@@ -26,7 +26,7 @@ from ccfem.virtual_testing.strength import first_failure
 from ccfem.virtual_testing.virtual_test import virtual_test
 
 FIBRE_PER_LAYER = {"loop": 2600.0, "bar": 380.0, "open_hole": 4500.0}
-"""Fibre, mm a layer: somewhat less than the defaults lay of their own accord."""
+"""Fibre, mm a layer: somewhat less than the natural length of the defaults."""
 
 SWEEP: dict[str, tuple[Any, ...]] = {
     "cap": (80.0, 92.0),

@@ -2,11 +2,10 @@
 
 import shapely
 
-from ccfem.cases.case import Case
+from ccfem.cases.case import Case, pulled
 from ccfem.cases.stored import mesh_of_case
-from ccfem.elasticity.problem import Force, Order, Problem, Support
+from ccfem.elasticity.problem import Order
 from ccfem.layers.slicing.planar import Planar
-from ccfem.materials import printed_pla
 from ccfem.mesh.patches import Plane, patches_from_rules
 from ccfem.mesh.tet_mesh import TetMesh
 from ccfem.meshing import extrude
@@ -14,36 +13,19 @@ from ccfem.meshing import extrude
 __all__ = ["bar", "bar_mesh", "bar_outline"]
 
 ELEMENT_SIZE = 1.5
-LENGTH = 125.0
-THICKNESS = 5.0
+LENGTH, WIDTH, THICKNESS = 125.0, 25.0, 5.0
+GAUGE_LENGTH, GAUGE_WIDTH = 40.0, 8.0
+SHOULDER = 8.0
+"""Radius of the quarter circles from the gauge to the grips, mm."""
 
 
-def bar_outline(
-    width: float = 25.0,
-    gauge_length: float = 40.0,
-    gauge_width: float = 8.0,
-    shoulder: float = 8.0,
-) -> shapely.Polygon:
-    """Planform of the bar: 125 mm long, 25 mm wide, 8 mm wide in the gauge.
-
-    Parameters
-    ----------
-    width : float, mm
-        Of the grips.
-    gauge_length, gauge_width : float, mm
-        The parallel part.
-    shoulder : float, mm
-        Radius of the quarter circles from gauge to grips; at most half the step in width.
-
-    Returns
-    -------
-    shapely Polygon
-    """
-    end, half, slim = 0.5 * LENGTH, 0.5 * width, 0.5 * gauge_width
-    start = 0.5 * gauge_length + shoulder
+def bar_outline() -> shapely.Polygon:
+    """Planform of the bar: 125 mm long, 25 mm wide, 8 mm wide in the gauge."""
+    end, half, slim = 0.5 * LENGTH, 0.5 * WIDTH, 0.5 * GAUGE_WIDTH
+    start = 0.5 * GAUGE_LENGTH + SHOULDER
     grips = [shapely.box(-end, -half, -start, half), shapely.box(start, -half, end, half)]
     body = shapely.union_all([shapely.box(-end, -slim, end, slim), *grips])
-    body = body.buffer(shoulder, join_style="mitre").buffer(-shoulder, quad_segs=32)
+    body = body.buffer(SHOULDER, join_style="mitre").buffer(-SHOULDER, quad_segs=32)
     return shapely.remove_repeated_points(body, 1e-3)
 
 
@@ -64,17 +46,11 @@ def bar(element_size: float = ELEMENT_SIZE, order: Order = 1, force: float = 100
         Linear or quadratic cells, or what their estimated error calls for.
     force : float, N
     """
-    problem = Problem(
-        mesh_of_case("bar", element_size, order, bar_mesh),
-        printed_pla(),
-        (Support("support"),),
-        {"pull": (Force("load", (force, 0.0, 0.0)),)},
-        order=order,
-    )
+    mesh = mesh_of_case("bar", element_size, order, bar_mesh)
     return Case(
         name="bar",
         title="Tensile bar, 125 x 25 x 5 mm, pulled at its ends",
-        problem=problem,
+        problem=pulled(mesh, (force, 0.0, 0.0), order),
         slicing=Planar(count=10),
         source="size of the tensile bar of Chen et al. 2021 (Additive Manufacturing 49, 102470); "
         "own outline of lines and quarter circles",

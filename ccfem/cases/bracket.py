@@ -16,14 +16,7 @@ from ccfem.meshing import extrude
 from ccfem.progress import Progress, silent
 from ccfem.topopt import Design, Simp, as_problem
 
-__all__ = [
-    "bracket",
-    "bracket_design",
-    "bracket_domain",
-    "bracket_mesh",
-    "bracket_outline",
-    "bracket_problem",
-]
+__all__ = ["bracket", "bracket_design", "bracket_domain", "bracket_mesh", "bracket_outline"]
 
 ELEMENT_SIZE = 1.75
 HOLES = {
@@ -38,6 +31,8 @@ RIM = 2.0
 """Width of the rings about the holes that stay solid, mm."""
 SIDE, LEG, HEIGHT = 52.0, 21.0, 27.0
 VOLUME_FRACTION = 0.3
+FORCE = 500.0
+"""Of the load case "down", on both loaded holes together, N."""
 
 
 def bracket_outline() -> shapely.Polygon:
@@ -66,11 +61,6 @@ def _problem(mesh: TetMesh, force: float) -> Problem:
     )
 
 
-def bracket_problem(element_size: float = ELEMENT_SIZE, force: float = 500.0) -> Problem:
-    """Full design domain with supports and loads; force in N."""
-    return _problem(bracket_domain(element_size), force)
-
-
 def _rims(mesh: TetMesh) -> BoolArray:
     """Cells (m,) in the rings about the holes."""
     centre = mesh.points[mesh.cells].mean(axis=1)[:, None, :2]
@@ -83,14 +73,9 @@ def bracket_design(
 ) -> Design:
     """Densities of least compliance of both load cases together, 30 % of the domain filled.
 
-    Parameters
-    ----------
-    element_size : float, mm
-    max_iterations : int
-        It stops before when the compliance stands still.
-    progress : callable, optional
+    The iterations stop earlier when the compliance no longer changes.
     """
-    problem = bracket_problem(element_size)
+    problem = _problem(bracket_domain(element_size), FORCE)
     method = Simp(
         VOLUME_FRACTION,
         radius=max(3.0, 1.6 * element_size),
@@ -110,7 +95,7 @@ def bracket(
     optimised: bool = True,
     element_size: float = ELEMENT_SIZE,
     order: Order = 1,
-    force: float = 500.0,
+    force: float = FORCE,
 ) -> Case:
     """Bracket of 52 x 52 x 27 mm with four bolt holes: optimised, or the full L.
 

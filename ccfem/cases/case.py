@@ -5,12 +5,20 @@ from dataclasses import dataclass, field
 from typing import Any
 
 from ccfem.arrays import freeze
-from ccfem.elasticity.problem import Problem
+from ccfem.elasticity.problem import Force, Order, Problem, Support
 from ccfem.layers.slicer import Slicer
 from ccfem.layers.slicing.planar import Planar
 from ccfem.machine.machine import Machine
+from ccfem.materials import printed_pla
+from ccfem.mesh.tet_mesh import TetMesh
 
-__all__ = ["Case"]
+__all__ = ["Case", "pulled"]
+
+
+def pulled(mesh: TetMesh, force: tuple[float, float, float], order: Order) -> Problem:
+    """Make a part of printed PLA, held at patch ``support`` and pulled at patch ``load``, N."""
+    loads = {"pull": (Force("load", force),)}
+    return Problem(mesh, printed_pla(), (Support("support"),), loads, order=order)
 
 
 @dataclass(frozen=True)
@@ -33,7 +41,7 @@ class Case:
     source : str
         Paper or person that the case comes from.
     findings : tuple of str
-        What was found and mended in a mesh from a file, one line each.
+        What was found and repaired in a mesh from a file, one line each.
     """
 
     name: str

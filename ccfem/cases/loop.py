@@ -4,10 +4,9 @@ import numpy as np
 import shapely
 
 from ccfem.arrays import FloatArray
-from ccfem.cases.case import Case
+from ccfem.cases.case import Case, pulled
 from ccfem.cases.stored import mesh_of_case
-from ccfem.elasticity.problem import Force, Order, Problem, Support
-from ccfem.materials import printed_pla
+from ccfem.elasticity.problem import Order
 from ccfem.mesh.patches import Cylinder, patches_from_rules
 from ccfem.mesh.tet_mesh import TetMesh
 from ccfem.meshing import extrude
@@ -18,44 +17,33 @@ ELEMENT_SIZE = 2.4
 HOLE = 50.0
 """Distance of the holes' centres from the middle of the ring, mm."""
 HOLE_RADIUS = 5.0
+RING_RADIUS, RING_WIDTH, LUG_RADIUS = 50.0, 20.0, 20.0
+"""Outer radius and width of the ring, and radius of the lugs round the holes, mm."""
 THICKNESS = 10.0
 
 
-def loop_outline(
-    ring_radius: float = 50.0,
-    ring_width: float = 20.0,
-    lug_radius: float = 20.0,
-    fillet: float = 10.0,
-) -> shapely.Polygon:
-    """Planform of the loop: 100 mm wide and 140 mm long with the defaults.
+def loop_outline(fillet: float = 10.0) -> shapely.Polygon:
+    """Planform of the loop, 100 mm wide and 140 mm long.
 
     Parameters
     ----------
-    ring_radius, ring_width : float, mm
-        Outer radius of the ring, and its width.
-    lug_radius : float, mm
-        Of the lugs round the holes, which lie at (0, 50) and (0, -50).
     fillet : float, mm
         Radius where a lug meets the ring.
-
-    Returns
-    -------
-    shapely Polygon
     """
     # The fillet's circle touches the ring's and the lug's from outside.
-    y = ((ring_radius + fillet) ** 2 - (lug_radius + fillet) ** 2 + HOLE**2) / (2.0 * HOLE)
-    x = np.sqrt((ring_radius + fillet) ** 2 - y**2)
+    y = ((RING_RADIUS + fillet) ** 2 - (LUG_RADIUS + fillet) ** 2 + HOLE**2) / (2.0 * HOLE)
+    x = np.sqrt((RING_RADIUS + fillet) ** 2 - y**2)
     low, high = np.arctan2(y, x), np.arctan2(HOLE - y, x)
     quarter = np.concatenate(
         [
-            _arc(0.0, 0.0, ring_radius, 0.0, low),
+            _arc(0.0, 0.0, RING_RADIUS, 0.0, low),
             _arc(x, y, fillet, low + np.pi, np.pi - high)[1:],
-            _arc(0.0, HOLE, lug_radius, -high, 0.5 * np.pi)[1:],
+            _arc(0.0, HOLE, LUG_RADIUS, -high, 0.5 * np.pi)[1:],
         ]
     )
     half = np.concatenate([quarter, quarter[-2::-1] * [-1.0, 1.0]])
     outline = np.concatenate([half, half[-2:0:-1] * [1.0, -1.0]])
-    openings = [shapely.Point(0.0, 0.0).buffer(ring_radius - ring_width, quad_segs=32)]
+    openings = [shapely.Point(0.0, 0.0).buffer(RING_RADIUS - RING_WIDTH, quad_segs=32)]
     openings += [shapely.Point(0.0, y).buffer(HOLE_RADIUS, quad_segs=32) for y in (-HOLE, HOLE)]
     return shapely.Polygon(outline, [ring.exterior.coords for ring in openings])
 
@@ -83,25 +71,13 @@ def loop(element_size: float = ELEMENT_SIZE, order: Order = 1, force: float = 10
 
     The outer half of the bottom hole is fixed, the outer half of the top hole pulled along y.
 
-    Parameters
-    ----------
-    element_size : float, mm
-        Edge length of the cells aimed at.
-    order : 1, 2 or "auto"
-        Linear or quadratic cells, or what their estimated error calls for.
-    force : float, N
+    Parameters as in `ccfem.cases.bar`.
     """
-    problem = Problem(
-        mesh_of_case("loop", element_size, order, loop_mesh),
-        printed_pla(),
-        (Support("support"),),
-        {"pull": (Force("load", (0.0, force, 0.0)),)},
-        order=order,
-    )
+    mesh = mesh_of_case("loop", element_size, order, loop_mesh)
     return Case(
         name="loop",
         title="Ring with two lugs, 140 x 100 x 10 mm, pulled at its two holes",
-        problem=problem,
+        problem=pulled(mesh, (0.0, force, 0.0), order),
         source="size and loading of the Loop of Chen et al. 2021 (Additive Manufacturing 49, "
         "102470); own outline of circles",
     )

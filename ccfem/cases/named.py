@@ -1,16 +1,13 @@
 """How cases are found by name."""
 
 import importlib
-import inspect
 import pkgutil
 from collections.abc import Callable, Mapping
 from importlib.metadata import entry_points
 from typing import Any, get_type_hints
 
+from ccfem import plugins
 from ccfem.cases.case import Case
-from ccfem.checks import check_known
-from ccfem.errors import InputError, known_names
-from ccfem.io.toml import from_table
 
 __all__ = ["create_case", "named_cases"]
 
@@ -42,13 +39,5 @@ def create_case(name: str, **parameters: Any) -> Case:
     InputError
         For an unknown case or parameter, the known ones listed; for a value of a wrong type.
     """
-    known = named_cases()
-    check_known("case", name, sorted(known), "or name a part file, .toml")
-    fields = inspect.signature(known[name]).parameters
-    for parameter in parameters:
-        if parameter not in fields:
-            raise InputError(
-                f"case '{name}' has no parameter '{parameter}'; it has: "
-                f"{known_names(parameter, fields)}"
-            )
-    return from_table(known[name], parameters, f"case {name}")
+    cure = "or name a part file, .toml"
+    return plugins.create("case", named_cases(), name, parameters, cure)

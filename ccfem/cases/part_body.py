@@ -115,7 +115,7 @@ def _filled(body: Body, folder: Path) -> TetMesh:
 
 
 def _polygon(outline: tuple[tuple[float, float], ...], where: str) -> shapely.Polygon:
-    """Make a polygon of an outline that does not cut itself."""
+    """Make a polygon of an outline that does not cross itself."""
     if len(outline) < 3:
         raise InputError(f"{where}.outline needs at least 3 points; got {len(outline)}: add some")
     polygon = shapely.Polygon(outline)

@@ -102,6 +102,8 @@ them with a minus ("-z"), or three numbers.
     length = [15, 25]
     angle = [90, 135]
 
+    [machine.limits]                  # what differs from ccfem.machine.limits.Limits
+    on_fibre = 0.05
     [machine.gcode]                   # what differs from ccfem.machine.gcode_profile.GcodeProfile
     cut = ["M42 P4 S255", "G4 P{wait}", "M42 P4 S0"]
     bed = [250, 210, 200]             # mm
@@ -197,7 +199,7 @@ def read_part(path: str | os.PathLike[str]) -> Case:
     Returns
     -------
     Case
-        `Case.findings` says what was mended in the mesh.
+        `Case.findings` says what was repaired in the mesh.
 
     Raises
     ------
@@ -257,9 +259,7 @@ def _slicing(part: _Part) -> Slicer:
             "one"
         )
     if part.slicing is not None:
-        known = slicers.named()
-        name, parameters = _named(part.slicing, "method", known, "slicing")
-        return slicers.create(name, parameters)
+        return slicers.create(*_named(part.slicing, "method", slicers.named(), "slicing"))
     return Planar(count=part.layers, heights=part.heights)
 
 

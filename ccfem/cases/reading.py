@@ -22,10 +22,6 @@ def read(part: str | os.PathLike[str] | Case, **parameters: Any) -> Case:
     **parameters
         Parameters of a case by name, as ``element_size=3.0``.
 
-    Returns
-    -------
-    Case
-
     Raises
     ------
     InputError
@@ -34,16 +30,12 @@ def read(part: str | os.PathLike[str] | Case, **parameters: Any) -> Case:
     Examples
     --------
     >>> read("bar", element_size=4.0)
-    Case bar: Tensile bar, 250 x 25 x 5 mm, gripped at both ends
+    Case bar: Tensile bar, 125 x 25 x 5 mm, pulled at its ends
     """
-    if not (isinstance(part, str) and _is_name(part)):
-        if parameters:
-            raise InputError(
-                f"parameters are for cases by name; '{part}' is a part file: change the file"
-            )
-        return part if isinstance(part, Case) else read_part(Path(part))
-    return create_case(part, **parameters)
-
-
-def _is_name(text: str) -> bool:
-    return not (text.endswith(".toml") or "/" in text or "\\" in text)
+    if isinstance(part, str) and not part.endswith(".toml") and not {"/", "\\"} & set(part):
+        return create_case(part, **parameters)
+    if parameters:
+        raise InputError(
+            f"parameters are for cases by name; '{part}' is a part file: change the file"
+        )
+    return part if isinstance(part, Case) else read_part(Path(part))

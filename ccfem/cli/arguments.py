@@ -1,4 +1,7 @@
-"""Texts of the command line turned into names, numbers and parameters."""
+"""Texts of the command line turned into names, numbers and parameters.
+
+A text that cannot be read raises `InputError`.
+"""
 
 import tomllib
 from collections.abc import Sequence
@@ -14,22 +17,21 @@ __all__ = [
     "names_of",
     "numbers_of",
     "parameters_by_strategy",
-    "parameters_of",
     "slicer_of",
 ]
 
 
 def names_of(text: str) -> tuple[str, ...]:
-    """Split names with commas between."""
+    """Split names separated by commas."""
     return tuple(name.strip() for name in text.split(",") if name.strip())
 
 
 def numbers_of(text: str) -> tuple[float, ...]:
-    """Split numbers with commas between."""
+    """Split numbers separated by commas."""
     try:
         return tuple(float(number) for number in names_of(text))
     except ValueError:
-        raise InputError(f"expected numbers with commas between; got '{text}'") from None
+        raise InputError(f"expected numbers separated by commas; got '{text}'") from None
 
 
 def assignment(text: str) -> tuple[str, Any]:
@@ -43,53 +45,35 @@ def assignment(text: str) -> tuple[str, Any]:
         return name, value
 
 
-def parameters_by_strategy(texts: Sequence[str]) -> dict[str, dict[str, Any]]:
-    """Parameters of several strategies, each as ``strategy.name=value``.
+def parameters_by_strategy(
+    texts: Sequence[str], only: str | None = None
+) -> dict[str, dict[str, Any]]:
+    """Parameters of strategies, each as ``strategy.name=value``; of one alone, also ``name=value``.
 
-    Raises
-    ------
-    InputError
-        When a text names no strategy, or has no ``=``.
+    Parameters
+    ----------
+    texts : sequence of str
+    only : str, optional
+        The one strategy that there is.
     """
-    found: dict[str, dict[str, Any]] = {}
+    found: dict[str, dict[str, Any]] = {} if only is None else {only: {}}
     for text in texts:
         path, value = assignment(text)
-        strategy, dot, name = path.partition(".")
-        if not dot:
+        owner, _, name = path.rpartition(".")
+        owner = owner or only or ""
+        if not owner:
             raise InputError(f"--set expects STRATEGY.NAME=VALUE; got '{text}'")
-        found.setdefault(strategy, {})[name] = value
-    return found
-
-
-def parameters_of(strategy: str, texts: Sequence[str]) -> dict[str, Any]:
-    """Parameters of one strategy, each as ``name=value`` or ``strategy.name=value``.
-
-    Raises
-    ------
-    InputError
-        When a text names another strategy, or has no ``=``.
-    """
-    found = {}
-    for text in texts:
-        path, value = assignment(text)
-        owner, dot, name = path.rpartition(".")
-        if dot and owner != strategy:
+        if only not in (None, owner):
             raise InputError(
-                f"--set expects a parameter of {strategy}, the one strategy here; got '{text}': "
-                f"write {name}=VALUE or {strategy}.{name}=VALUE"
+                f"--set expects a parameter of {only}, the one strategy here; got '{text}': "
+                f"write {name}=VALUE or {only}.{name}=VALUE"
             )
-        found[name] = value
+        found.setdefault(owner, {})[name] = value
     return found
 
 
 def slicer_of(text: str) -> "Slicer":
-    """Slicer with its parameters, written ``method:name=value,name=value``.
-
-    Raises
-    ------
-    InputError
-        For an unknown slicer, parameter or value.
-    """
+    """Slicer with its parameters, written ``method:name=value,name=value``."""
     from ccfem.layers.slicing import create
 
     method, _, rest = text.partition(":")

@@ -10,7 +10,7 @@ from typing import Annotated, Any
 
 import typer
 
-from ccfem.cli.arguments import names_of, parameters_by_strategy, parameters_of
+from ccfem.cli.arguments import names_of, parameters_by_strategy
 from ccfem.cli.options import (
     Backend,
     Calibration,
@@ -111,6 +111,22 @@ def compare(
         list[str] | None,
         typer.Option("--set", metavar="STRATEGY.NAME=VALUE", help="Set a parameter; repeatable."),
     ] = None,
+    paths: Annotated[
+        str | None,
+        typer.Option(
+            metavar="FILE,..",
+            help="Paths of other programs, judged beside the strategies: waypoints, or CSV with "
+            "x,y,z,path,layer.",
+        ),
+    ] = None,
+    paths_frame: Annotated[
+        str | None,
+        typer.Option(
+            metavar="mesh|tool",
+            help="What their coordinates are in; default mesh for CSV, the printer's tool for "
+            "waypoints.",
+        ),
+    ] = None,
     virtual_test: VirtualTest = True,
     load_case: LoadCase = None,
     calibration: Calibration = None,
@@ -128,7 +144,18 @@ def compare(
     options = options_of(chosen, fibre_per_layer, virtual_test, load_case, backend)
     options["natural"] = natural
     options["stress"] = foreign_stress(stress, stress_unit)
-    run(case, set_case, names, parameters, options, calibration, out)
+    files = names_of(paths) if paths is not None else ()
+    run(
+        case,
+        set_case,
+        names,
+        parameters,
+        options,
+        calibration,
+        out,
+        paths=files,
+        frame=paths_frame,
+    )
 
 
 @app.command()
@@ -156,8 +183,8 @@ def plan(
     stress_unit: StressUnit = None,
     out: Out = None,
 ) -> None:
-    """Plan a part by one strategy, by default with as much fibre as it lays of its own accord."""
-    parameters = {strategy: parameters_of(strategy, set_ or ())}
+    """Plan a part by one strategy, by default with its natural amount of fibre."""
+    parameters = parameters_by_strategy(set_ or (), strategy)
     chosen = layers_of(layers, heights, slicing)
     options = options_of(chosen, fibre_per_layer, virtual_test, load_case, backend)
     options["natural"] = fibre_per_layer is None
@@ -248,7 +275,7 @@ def calibrate(
         raise InputError("--reinforced and --strategy belong together; got only one of them")
     loaded, paths = load(case, set_case), None
     if strategy is not None:
-        chosen = create_all(loaded, (strategy,), {strategy: parameters_of(strategy, set_ or ())})
+        chosen = create_all(loaded, (strategy,), parameters_by_strategy(set_ or (), strategy))
         options = options_of(layers, fibre_per_layer, False, load_case, "auto")
         (planned,) = compare(loaded, chosen, natural=fibre_per_layer is None, **options).runs
         if not len(planned.toolpaths):
@@ -258,7 +285,7 @@ def calibrate(
     found.write(out)
     rho = "" if found.rho is None else f", rho {found.rho:.3g} mm^2"
     print(
-        f"{out}: modulus {found.modulus:.4g} MPa, matrix strength {found.matrix_strength:.3g} MPa"
+        f"{out}: modulus {found.modulus:.4g} MPa, matrix strength {found.tensile_strength:.3g} MPa"
         f"{rho}; use it with --calibration {out}"
     )
 

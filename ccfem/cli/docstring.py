@@ -1,8 +1,7 @@
-"""What a class says of itself: the numpydoc docstring, read for people who see no code."""
+"""What a class says about itself: its numpydoc docstring, for people who do not read code."""
 
 import inspect
 import re
-from collections.abc import Iterator
 from typing import NamedTuple
 
 __all__ = ["Attribute", "about", "attributes"]
@@ -37,22 +36,10 @@ def attributes(what: type) -> dict[str, Attribute]:
     parts = _SECTION.split(inspect.getdoc(what) or "")
     sections = dict(zip(parts[1::2], parts[2::2], strict=True))
     found = {}
-    for head, body in _entries(sections.get("Attributes", "")):
+    # An entry begins at the left margin; the lines below it are indented.
+    for text in re.split(r"\n(?=\S)", sections.get("Attributes", "")):
+        head, _, body = text.partition("\n")
         names, _, kind = head.partition(" : ")
-        entry = Attribute(re.sub(r",? *(default .*|optional)$", "", kind), " ".join(body))
+        entry = Attribute(re.sub(r",? *(default .*|optional)$", "", kind), " ".join(body.split()))
         found.update(dict.fromkeys((name.strip() for name in names.split(",")), entry))
     return found
-
-
-def _entries(section: str) -> Iterator[tuple[str, list[str]]]:
-    """Heads of the entries of a section, each with the lines below it."""
-    head, body = "", list[str]()
-    for line in section.splitlines():
-        if line[:1].strip():
-            if head:
-                yield head, body
-            head, body = line, []
-        elif line.strip():
-            body.append(line.strip())
-    if head:
-        yield head, body

@@ -60,8 +60,7 @@ Fibre = Annotated[
         "--fibre-per-layer",
         metavar="MM",
         help="Fibre length that each strategy is held to, mean over the layers. By default compare "
-        "takes the smallest that any of them lays of its own accord, and one strategy alone lays "
-        "its own.",
+        "takes the shortest natural length of any of them; plan takes the natural length.",
     ),
 ]
 VirtualTest = Annotated[

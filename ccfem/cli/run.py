@@ -89,6 +89,8 @@ def run(
     calibration: Path | None,
     out: Path | None,
     suffix: str = "",
+    paths: Sequence[str] = (),
+    frame: str | None = None,
 ) -> None:
     """Compare strategies, write the results and print the table; a failure leaves nothing behind.
 
@@ -107,6 +109,10 @@ def run(
     out : Path, optional
         Folder; default ``results/`` and the name of the case with `suffix`.
     suffix : str
+    paths : sequence of str
+        Files with paths of other programs, to be judged beside the strategies.
+    frame : {"mesh", "tool"}, optional
+        What the coordinates of these files are in.
     """
     from ccfem.cli.screen import print_comparison
     from ccfem.comparison.compare import compare, create_all
@@ -117,7 +123,8 @@ def run(
     seconds = {"start": imported - _STARTED, "mesh": time.perf_counter() - imported}
     if calibration is not None:
         case, options = _calibrated(case, options, calibration)
-    chosen = create_all(case, strategies, parameters)
+    chosen = create_all(case, strategies, parameters) if strategies else {}
+    chosen |= _given(case, paths, frame, chosen)
     where = out if out is not None else Path("results") / f"{case.name}{suffix}"
     with staged(where) as folder, progress_bar() as progress:
         comparison = compare(case, chosen, progress=_part(progress, 0.0, _SOLVED), **options)
@@ -125,6 +132,30 @@ def run(
         command = shlex.join(["ccfem", *sys.argv[1:]])
         write_results(comparison, folder, command, seconds, _part(progress, _SOLVED, 1.0))
     print_comparison(comparison, where, time.perf_counter() - _STARTED)
+
+
+def _given(
+    case: "Case", files: Sequence[str], frame: str | None, taken: Mapping[str, Any]
+) -> dict[str, Any]:
+    """Paths of other programs, by the names of their files."""
+    if not files:
+        if frame is not None:
+            raise InputError("--paths-frame says what the files of --paths are in; got no --paths")
+        return {}
+    from ccfem.export.path_table import read_paths
+    from ccfem.layers.plane import plane_frame
+    from ccfem.planning.given_paths import GivenPaths
+
+    found: dict[str, Any] = {}
+    for file in files:
+        name = Path(file).stem
+        if name in taken or name in found:
+            raise InputError(f"'{name}' is the name of two runs: rename the file {file}")
+        toolpaths = read_paths(file, plane_frame(case.build), frame)
+        if not len(toolpaths):
+            raise InputError(f"{file} holds no paths: check its name")
+        found[name] = GivenPaths(toolpaths, file)
+    return found
 
 
 def _calibrated(

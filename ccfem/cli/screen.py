@@ -17,9 +17,9 @@ from rich.table import Table
 from ccfem.checks import check_known
 from ccfem.cli.docstring import about, attributes
 from ccfem.comparison.headline import HEADLINE, cell_text, headline_values
-from ccfem.comparison.ranking import best_values, ranking
-from ccfem.comparison.remarks import remarks, verdict
-from ccfem.comparison.result import Comparison, Run
+from ccfem.comparison.ranking import best_values
+from ccfem.comparison.result import Comparison
+from ccfem.comparison.runs import Run
 from ccfem.elasticity.stress_field import StressField, about_cells
 from ccfem.tensor import von_mises
 from ccfem.virtual_testing.stiffer import HONEST_PROMISE
@@ -130,17 +130,17 @@ def _first_line(what: object) -> str:
 def print_comparison(comparison: Comparison, where: Path, seconds: float) -> None:
     """Print the headline table, the best of each row in bold, and where the results are."""
     console = Console(highlight=False)
-    runs = [run for run in ranking(comparison) if run.evaluation is not None]
+    runs = [run for run in comparison.ranking if run.evaluation is not None]
     if not console.is_terminal and "COLUMNS" not in os.environ:
         console.width = max(console.width, _TITLES + _NUMBERS * len(runs))
     console.print(comparison.case.title, style="bold", markup=False)
-    console.print(_headline_table(runs, best_values(comparison)))
+    console.print(_headline_table(runs, best_values(comparison.runs, comparison.fibre_per_layer)))
     for line in (*comparison.case.findings, *comparison.stress.findings):
         console.print(f"mesh: {line}", style="dim", markup=False)
     console.print(about_cells(comparison.stress), style="dim", markup=False)
-    for line in remarks(comparison):
+    for line in comparison.remarks:
         console.print(line, style="dim", markup=False)
-    said = verdict(comparison)
+    said = comparison.verdict
     if said:
         console.print(said, style="bold", markup=False)
     if any(run.tested is not None for run in runs):
@@ -189,7 +189,7 @@ def _headline_table(runs: Sequence[Run], best: Mapping[str, float]) -> Table:
         cells = []
         for run, found in zip(runs, values, strict=True):
             text, extra = cell_text(run, head)
-            if found.get(head.column) == best.get(head.column, np.nan):
+            if run.printable and found.get(head.column) == best.get(head.column, np.nan):
                 text = f"[bold green]{text}[/]"
             cells.append(f"{text} [dim]({extra})[/]" if extra else text)
         table.add_row(head.title, *cells)

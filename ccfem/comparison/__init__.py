@@ -1,7 +1,7 @@
 """Comparison of strategies on one part: runs, ranking, pictures, report and files."""
 
 from ccfem.comparison.compare import compare
-from ccfem.comparison.remarks import verdict
-from ccfem.comparison.result import Comparison, Run
+from ccfem.comparison.result import Comparison
+from ccfem.comparison.runs import Run
 
-__all__ = ["Comparison", "Run", "compare", "verdict"]
+__all__ = ["Comparison", "Run", "compare"]

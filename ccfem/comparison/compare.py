@@ -13,7 +13,8 @@ from typing import Any
 from ccfem.cases.case import Case
 from ccfem.cases.reading import read
 from ccfem.checks import check_known, member_name
-from ccfem.comparison.result import Comparison, Run
+from ccfem.comparison.result import Comparison
+from ccfem.comparison.runs import Run
 from ccfem.comparison.stages import (
     Part,
     Tell,
@@ -32,9 +33,11 @@ from ccfem.export.print_plan import check_machine
 from ccfem.fibre_aware.upper_bound import upper_bound
 from ccfem.io.stress_file import read_stress
 from ccfem.layers import Layer
+from ccfem.layers.plane import plane_frame
 from ccfem.layers.slicer import Slicer
 from ccfem.layers.slicing import as_slicer
 from ccfem.planning.equal_fibre import check_wanted
+from ccfem.planning.given_paths import GivenPaths
 from ccfem.planning.strategy import Strategy
 from ccfem.progress import Progress, silent
 from ccfem.strategies import create
@@ -180,9 +183,11 @@ def compare(
     """Solve a case once, and plan and evaluate each strategy on it.
 
     Strategies are compared at equal length of fibre: more fibre wins almost any comparison. When no
-    length is given, it is the smallest that any of them lays of its own accord, so that nobody has
-    to lay more than it would, and all others are thinned to it by the parameter that each names for
-    the purpose. A strategy that fails stays in the result, with the reason.
+    length is given, it is the shortest natural length of any of them, and all others are thinned to
+    it, each by its own parameter (`LayerStrategy.amount`). Paths of another program (`GivenPaths`)
+    stay as they are: the least of their lengths is then the one for all, and their heights are
+    those of the layers where no others are given. A strategy that fails stays in the result, with
+    the reason.
 
     Parameters
     ----------
@@ -233,11 +238,17 @@ def compare(
     if not isinstance(strategies, Mapping):
         strategies = create_all(case, strategies)
 
+    foreign = [one for one in strategies.values() if isinstance(one, GivenPaths)]
+    if foreign and layers is None:
+        layers = tuple(foreign[0].heights(plane_frame(case.build)[2]).tolist())
     progress(f"solving {case.name}", 0.0)
     field, given, stack, seconds = solve_and_slice(case, layers, load_case, backend, stress)
     part = Part(field if given is None else given, stack, case.machine)
     tell = _counted(progress, 0.1, (5 if print_plans else 4) * len(strategies) + 1)
-    runs = [Run(name, one, Toolpaths.empty(), None) for name, one in strategies.items()]
+    runs = [
+        Run(name, one.on(stack) if isinstance(one, GivenPaths) else one, Toolpaths.empty(), None)
+        for name, one in strategies.items()
+    ]
     runs = [planned(run, part, fibre_per_layer, tell) for run in runs]
     wanted = fibre_per_layer
     if wanted is None and not natural:
@@ -246,10 +257,11 @@ def compare(
     if print_plans:
         runs = [with_print(run, part, tell) for run in runs]
     if strand is not None:
-        runs = all_tested(runs, field, strand, backend, tell)
+        runs = all_tested(runs, field, case.machine, strand, backend, tell)
     lengths = [float(run.toolpaths.lengths.sum()) for run in runs if run.tested is not None]
     bound = None
-    if lengths:
+    # The bound is one for flat layers.
+    if lengths and all(layer.flat is not None for layer in stack):
         tell("bounding what any paths could reach")
         with timed(seconds, "bound"):
             bound = upper_bound(

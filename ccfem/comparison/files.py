@@ -99,8 +99,10 @@ def write_results(
 ) -> None:
     """Write ``results.csv``, ``results.json``, ``report.html``, pictures and paths.
 
-    Runs with a print plan get ``STRATEGY.gcode`` too. In ``paths.vtp`` the cell array "strategy"
-    numbers the strategies that did not fail, in the order of ``results.json``.
+    Where layers are curved, also ``STRATEGY_space.png`` and a page that turns,
+    ``STRATEGY_space.html``. Runs with a print plan get ``STRATEGY.gcode`` too. In ``paths.vtp`` the
+    cell array "strategy" numbers the strategies that did not fail, in the order of
+    ``results.json``.
 
     Parameters
     ----------
@@ -123,6 +125,8 @@ def write_results(
     _write_pictures(pictures, folder)
     results_frame(comparison).to_csv(folder / "results.csv", index=False)
     _write_paths(comparison, folder)
+    if any(layer.flat is None for layer in comparison.layers):
+        _write_in_space(comparison, folder)
     about = record(comparison, command, spent)
     page = report_html(comparison, about, pictures)
     (folder / "report.html").write_text(page, encoding="utf-8")
@@ -141,15 +145,35 @@ def _write_pictures(pictures: "Pictures", folder: Path) -> None:
     (folder / "overview.png").write_bytes(pictures.overview)
 
 
+def _write_in_space(comparison: Comparison, folder: Path) -> None:
+    """Write a picture of the strands of every strategy in space, and a page on which they turn."""
+    from ccfem.plot.canvas import png
+    from ccfem.plot.stack_page import space_picture, turning_page
+
+    layers, build = comparison.layers, comparison.case.build
+    for run in comparison.succeeded:
+        title = f"{comparison.case.name}, {run.name}"
+        picture = space_picture(layers, run.toolpaths, title, build)
+        (folder / f"{run.name}_space.png").write_bytes(png(picture))
+        page = turning_page(layers, run.toolpaths, title, build)
+        (folder / f"{run.name}_space.html").write_text(page, encoding="utf-8")
+
+
 def _write_paths(comparison: Comparison, folder: Path) -> None:
     """Write the paths of every strategy in the formats of other programs."""
     from ccfem.export.gcode import write_gcode
+    from ccfem.export.robot_waypoints import write_robot_waypoints
     from ccfem.export.vtk import write_paths
     from ccfem.export.waypoints import write_waypoints
 
     runs = comparison.succeeded
     for run in runs:
-        write_waypoints(folder / f"{run.name}_waypoints.txt", run.toolpaths, comparison.layers)
+        layers, paths = comparison.layers, run.toolpaths
+        if all(layer.flat is not None for layer in layers):
+            write_waypoints(folder / f"{run.name}_waypoints.txt", paths, layers)
+        else:
+            file = folder / f"{run.name}_waypoints.csv"
+            write_robot_waypoints(file, paths, layers, comparison.case.machine)
         if run.print_plan is not None:
             write_gcode(folder / f"{run.name}.gcode", run.print_plan, comparison.case.machine)
     every = Toolpaths.concatenate(run.toolpaths for run in runs)

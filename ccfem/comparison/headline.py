@@ -5,7 +5,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from ccfem.comparison.result import Run
+from ccfem.comparison.runs import Run
 from ccfem.evaluation.column import Column
 
 __all__ = ["HEADLINE", "TEST_COLUMNS", "Headline", "cell_text", "headline_values"]
@@ -45,6 +45,12 @@ TEST_COLUMNS = (
         "> 0, higher is better",
     ),
     Column(
+        "displacement",
+        "mm",
+        "Size of the load over the stiffness: how far the load moves along itself.",
+        "> 0, lower is better under forces",
+    ),
+    Column(
         "gain_per_metre",
         "1/m",
         "(stiffness_ratio_tension - 1) over the length of fibre inside the part.",
@@ -55,6 +61,19 @@ TEST_COLUMNS = (
         "N mm",
         "Strain energy of matrix and fibres under the load, fibres carrying tension only.",
         "> 0, lower is better under forces",
+    ),
+    Column(
+        "matrix_stress_change",
+        "1",
+        "Peak of the matrix's von Mises stress, averaged as for first_failure_load, over that of "
+        "the part without fibre under the same load, less 1.",
+        ">= -1, lower is better; missing where first_failure_load is",
+    ),
+    Column(
+        "printed_volume",
+        "1",
+        "Volume of matrix and fibre of the planned print over the volume of the part.",
+        "about 1 is right; missing where no print was planned",
     ),
     Column(
         "first_failure_load",
@@ -91,17 +110,22 @@ class Headline:
 
 
 HEADLINE = (
+    Headline("printable", "printable", "", "{}"),
+    Headline("stiffness", "stiffness, N/mm", "high", "{:.4g}"),
     Headline("stiffness_ratio_tension", "stiffness ×, tension only", "high", "{:.2f}"),
     Headline("stiffness_ratio_bonded", "stiffness ×, bonded", "high", "{:.2f}"),
+    Headline("displacement", "displacement, mm", "low", "{:.3g}"),
     Headline("first_failure_load", "first failure, N", "high", "{:.0f}"),
     Headline("fibre_per_layer", "fibre, mm a layer", "", "{:.0f}"),
+    Headline("fibre_mass", "fibre, g", "", "{:.3g}"),
+    Headline("print_time_nearest", "print time, min", "low", "{:.0f}"),
     Headline("efficiency", "efficiency", "high", "{:.3f}"),
     Headline("aligned_stress_10", "within 10°, by stress", "high", "{:.1%}"),
     Headline("coverage_top_20", "coverage of top 20 % stress", "high", "{:.1%}"),
     Headline("curvature_95", "curvature 95 %, 1/mm", "low", "{:.3f}"),
     Headline("paths_per_layer", "paths a layer", "low", "{:.1f}"),
-    Headline("spacing_below", "nearer than W", "low", "{:.1%}"),
-    Headline("outside_length", "outside, mm", "low", "{:.2f}"),
+    Headline("on_fibre", "on other fibre", "low", "{:.1%}"),
+    Headline("outside_width", "outside, by width", "low", "{:.1%}"),
     Headline("all_crossings", "crossings", "low", "{:.0f}"),
 )
 """The columns of the headline table; those that no run has are left out."""
@@ -118,6 +142,8 @@ def headline_values(run: Run) -> Mapping[str, float]:
         "fibre_per_layer": total["fibre_length"] / layers,
         "paths_per_layer": total["paths"] / layers,
         "all_crossings": total["crossings"] + total["self_crossings"],
+        "printable": float(run.printable),
+        **({} if run.print_plan is None else {"printed_volume": run.printed_volume}),
     }
 
 
@@ -129,6 +155,7 @@ def _test_values(run: Run) -> dict[str, float]:
         "stiffness_ratio_tension": tension.ratio,
         "stiffness_ratio_bonded": bonded.ratio,
         "stiffness": tension.stiffness,
+        "displacement": tension.force / tension.stiffness,
         "gain_per_metre": tension.gain_per_metre,
         "strain_energy": tension.solution.strain_energy,
     }
@@ -138,6 +165,9 @@ def _test_values(run: Run) -> dict[str, float]:
         values["stiffness_ratio_high"] = max(ratios)
     if run.tested.failure is not None:
         values["first_failure_load"] = run.tested.failure.load
+        values["matrix_stress_change"] = (
+            run.tested.failure.matrix_index / run.tested.matrix_before - 1.0
+        )
     return values
 
 
@@ -147,6 +177,10 @@ def cell_text(run: Run, head: Headline) -> tuple[str, str]:
     value, extra = values.get(head.column, np.nan), ""
     if not np.isfinite(value):
         return "–", ""
+    if head.column == "printable":
+        return ("yes" if run.printable else "no"), ""
+    if head.column == "print_time_nearest":
+        value /= 60.0
     if head.column == "stiffness_ratio_tension" and "stiffness_ratio_low" in values:
         extra = f"{values['stiffness_ratio_low']:.2f}–{values['stiffness_ratio_high']:.2f}"
     if head.column == "first_failure_load" and run.tested is not None and run.tested.failure:

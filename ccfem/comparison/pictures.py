@@ -7,18 +7,26 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from ccfem.arrays import FloatArray
-from ccfem.comparison.result import Comparison, Run
+from ccfem.comparison.result import Comparison
+from ccfem.comparison.runs import Run
 from ccfem.elasticity.stress_field import StressField
 from ccfem.evaluation.matching import THRESHOLDS, along_fibre, matching_curve
 from ccfem.evaluation.plane_paths import pool
+from ccfem.fields.chart import chart_of, flat_view, in_charts
 from ccfem.layers import Layer
 from ccfem.layers.layer_stress import LayerStress, stress_on
 from ccfem.plot.canvas import png
 from ccfem.plot.colours import palette
 from ccfem.plot.curves import curvature_curves, matching_curves
 from ccfem.plot.fields import error_picture, tension_picture
-from ccfem.plot.forces import force_on_paths
-from ccfem.plot.paths import Coloured, compare_layer, layer_picture, mark_failure, tension_limit
+from ccfem.plot.paths import (
+    Coloured,
+    compare_layer,
+    force_on_paths,
+    layer_picture,
+    mark_failure,
+    tension_limit,
+)
 from ccfem.progress import Progress, silent
 
 if TYPE_CHECKING:
@@ -60,16 +68,22 @@ class Pictures:
 
 def draw_pictures(comparison: Comparison, progress: Progress = silent) -> Pictures:
     """Draw every layer of every strategy that did not fail, all on one colour scale."""
-    runs, machine = comparison.succeeded, comparison.case.machine
-    stresses = [stress_on(layer, comparison.planned_on) for layer in comparison.layers]
+    machine = comparison.case.machine
+    runs = [
+        replace(run, toolpaths=in_charts(run.toolpaths, comparison.layers))
+        for run in comparison.succeeded
+    ]
+    layers = [flat_view(layer) for layer in _drawn(comparison)]
+    stresses = [stress_on(layer, comparison.planned_on) for layer in layers]
     limit = max(tension_limit(stress) for stress in stresses)
     colours = palette(run.name for run in comparison.runs)
     middle = stresses[len(stresses) // 2]
+    centre = _drawn(comparison)[len(stresses) // 2]
     rates, bends = _curves(runs)
     heading = f"tension in layer {middle.layer.index}, load case {comparison.stress.case}"
     return Pictures(
         _layers(runs, stresses, machine.fibre_width, limit, colours, progress),
-        _forces(runs, middle.layer, machine.fibre_width, colours),
+        _forces(runs, centre, machine.fibre_width, colours),
         png(tension_picture(middle, heading, "size and direction", limit)),
         png(_error(comparison.stress, middle.layer)),
         png(_overview(runs, middle, machine.fibre_width, limit)),
@@ -77,6 +91,13 @@ def draw_pictures(comparison: Comparison, progress: Progress = silent) -> Pictur
         png(curvature_curves(bends, machine.minimum_radius, "curvature", colours)),
         middle.layer.index,
     )
+
+
+def _drawn(comparison: Comparison) -> list[Layer]:
+    """Layers that are drawn: all flat ones, and of curved ones those that have fibre."""
+    laid = {int(k) for run in comparison.succeeded for k in np.unique(run.toolpaths.layer)}
+    chosen = [k for k in comparison.layers if k.flat is not None or k.index in laid]
+    return chosen or list(comparison.layers)
 
 
 def _layers(
@@ -153,14 +174,19 @@ def _forces(
         if run.tested is not None:
             test = run.tested.bracket.tension
             s = test.strands
-            coloured[run.name] = force_on_paths(
-                s.middle, s.tangent, s.length, test.axial_force, layer
-            )
+            middle, tangent, force = s.middle, s.tangent, test.axial_force
+            length = s.length
+            if layer.flat is None:
+                middle, tangent, near = chart_of(layer).pieces(middle, tangent)
+                length, force = length[near], force[near]
+            view = flat_view(layer)
+            coloured[run.name] = force_on_paths(middle, tangent, length, force, view)
+    flat = flat_view(layer)
     end = max((one.limits[1] for one in coloured.values()), default=0.0)
     return {
         run.name: _force(
             run,
-            layer,
+            flat,
             width,
             replace(coloured[run.name], limits=(0.0, end)),
             colours[run.name],
@@ -178,6 +204,6 @@ def _force(run: Run, layer: Layer, width: float, coloured: Coloured, colour: str
     figure = layer_picture(
         layer, None, run.toolpaths, width, heading, about, coloured=coloured, colour=colour
     )
-    if failure is not None:
+    if failure is not None and layer.turns is None:
         mark_failure(figure.axes[0], layer.plane.project(np.asarray(failure.where)), failure.what)
     return png(figure)

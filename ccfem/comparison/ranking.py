@@ -1,51 +1,83 @@
 """The order of the runs of a comparison, and where an order cannot be told."""
 
+from collections.abc import Sequence
+
 import numpy as np
 
 from ccfem.comparison.headline import HEADLINE, headline_values
-from ccfem.comparison.result import Comparison, Run
+from ccfem.comparison.runs import Run
 from ccfem.planning.equal_fibre import TOLERANCE
-from ccfem.virtual_testing.stiffer import UNDECIDED, stiffer
+from ccfem.virtual_testing.stiffer import FIRST, RESOLUTION, SAME, UNDECIDED, stiffer
 
-__all__ = ["best_values", "ranking", "stiffness_ratio", "stiffness_ratios", "too_long", "undecided"]
+__all__ = ["best_values", "order_of", "ranking", "stiffness_ratio", "stiffness_ratios", "too_long"]
+
+_STIFFNESSES = (
+    "stiffness",
+    "stiffness_ratio_tension",
+    "stiffness_ratio_bonded",
+    "displacement",
+)
+"""Columns of which the best is that of the stiffest run, where one is."""
 
 
-def ranking(comparison: Comparison) -> tuple[Run, ...]:
+def ranking(runs: Sequence[Run], wanted: float | None) -> tuple[Run, ...]:
     """Return the runs from the best to the worst, failed ones last.
 
     By the predicted stiffness with fibres that carry tension only; those without a virtual test
-    come after, by efficiency. A run that lays more than the wanted fibre comes after all that do
-    not.
+    come after, by efficiency. Runs that cannot be printed as they are stand below all that can,
+    and among these a run that lays more than the wanted fibre below all that do not.
+
+    Parameters
+    ----------
+    runs : sequence of Run
+    wanted : float, mm, or None
+        Length of fibre per layer that all were held to; None where each laid its own.
     """
 
-    def score(run: Run) -> tuple[bool, bool, float, bool, float]:
+    def score(run: Run) -> tuple[bool, bool, bool, bool, float, float]:
         ratio, efficiency = stiffness_ratio(run), headline_values(run).get("efficiency", np.nan)
         return (
-            too_long(run, comparison),
+            run.evaluation is None,
+            not run.printable,
+            too_long(run, wanted),
             not np.isfinite(ratio),
             -np.nan_to_num(ratio),
-            run.evaluation is None,
             -np.nan_to_num(efficiency),
         )
 
-    return tuple(sorted(comparison.runs, key=score))
+    return tuple(sorted(runs, key=score))
 
 
-def best_values(comparison: Comparison) -> dict[str, float]:
-    """Best value of each headline column where the runs differ; too much fibre does not count."""
+def best_values(runs: Sequence[Run], wanted: float | None) -> dict[str, float]:
+    """Best value of each headline column where a run is really better than another.
+
+    Runs that cannot be printed, lay too much fibre or leave layers empty have no best value. A
+    stiffness is best only where its run is stiffer than every other, by more than the test
+    resolves and whatever fibres in compression do; a load at first failure where it is the largest
+    by more than that.
+    """
+    equal = [
+        run for run in runs if run.printable and not too_long(run, wanted) and not run.empty_layers
+    ]
+    order = ranking(equal, wanted)
+    stiffest = len(order) > 1 and all(order_of(order[0], other) == FIRST for other in order[1:])
     best = {}
-    equal = [run for run in comparison.succeeded if not too_long(run, comparison)]
     for head in HEADLINE:
         values = [headline_values(run).get(head.column, np.nan) for run in equal]
-        known = [value for value in values if np.isfinite(value)]
-        if head.better and len(known) > 1 and min(known) < max(known):
-            best[head.column] = max(known) if head.better == "high" else min(known)
+        known = sorted(value for value in values if np.isfinite(value))
+        if not head.better or len(known) < 2 or known[0] == known[-1]:
+            continue
+        if head.column in _STIFFNESSES and not stiffest:
+            continue
+        found = known[-1] if head.better == "high" else known[0]
+        if head.column == "first_failure_load" and found < (1.0 + RESOLUTION) * known[-2]:
+            continue
+        best[head.column] = found
     return best
 
 
-def too_long(run: Run, comparison: Comparison) -> bool:
+def too_long(run: Run, wanted: float | None) -> bool:
     """Whether a run lays more fibre than all were held to."""
-    wanted = comparison.fibre_per_layer
     return wanted is not None and run.length_per_layer > (1.0 + TOLERANCE) * wanted
 
 
@@ -62,8 +94,18 @@ def stiffness_ratios(one: Run, other: Run) -> tuple[float, float]:
     )
 
 
-def undecided(one: Run, other: Run) -> bool:
-    """Whether tension-only and bonded fibres disagree on the order of two runs."""
-    if one.tested is None or other.tested is None:
-        return False
-    return stiffer(one.tested.bracket, other.tested.bracket) == UNDECIDED
+def order_of(better: Run, other: Run) -> str:
+    """Say whether a run is stiffer than one that is placed below it.
+
+    Returns
+    -------
+    str
+        FIRST, SAME or UNDECIDED of `ccfem.virtual_testing.stiffer`: undecided also where only
+        bonded fibres tell them apart. SAME where one is untested.
+    """
+    if better.tested is None or other.tested is None:
+        return SAME
+    found = stiffer(better.tested.bracket, other.tested.bracket)
+    if found == FIRST and stiffness_ratios(better, other)[0] <= 1.0 + RESOLUTION:
+        return UNDECIDED
+    return found if found in (FIRST, SAME) else UNDECIDED

@@ -10,7 +10,8 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from ccfem.comparison.headline import TEST_COLUMNS, headline_values
-from ccfem.comparison.result import Comparison, Run
+from ccfem.comparison.result import Comparison
+from ccfem.comparison.runs import Run
 from ccfem.elasticity.stress_field import StressField
 
 if TYPE_CHECKING:
@@ -85,7 +86,9 @@ def record(comparison: Comparison, command: str, seconds: Mapping[str, float]) -
                 "material": case.problem.material.name,
                 "build": case.build,
                 "layers": len(comparison.layers),
-                "heights": [layer.plane.height for layer in comparison.layers],
+                "heights": [
+                    None if layer.flat is None else layer.flat.height for layer in comparison.layers
+                ],
                 "nodes": len(mesh.points),
                 "cells": len(mesh.cells),
                 "order": mesh.order,
@@ -118,6 +121,8 @@ def _run_record(run: Run) -> dict[str, Any]:
         "length_per_layer": run.length_per_layer,
         "note": run.note,
         "failure": run.failure,
+        "printable": run.printable,
+        "why_not": run.why_not,
         "seconds": run.seconds,
         "untested": run.untested,
         "total": headline_values(run),

@@ -1,35 +1,42 @@
-"""What is said of a comparison: remarks beside the table, and the verdict in one sentence."""
+"""What is said of a comparison: remarks that stand beside the table."""
 
 from collections.abc import Mapping, Sequence
 
 import numpy as np
 
-from ccfem.comparison.headline import headline_values
-from ccfem.comparison.ranking import ranking, stiffness_ratio, too_long, undecided
-from ccfem.comparison.result import Comparison, Run
+from ccfem.comparison.ranking import order_of, ranking, stiffness_ratio, too_long
+from ccfem.comparison.runs import Run
 from ccfem.evaluation.evaluation import Evaluation
+from ccfem.fibre_aware.upper_bound import UpperBound
+from ccfem.virtual_testing.stiffer import RESOLUTION, SAME, UNDECIDED
 
-__all__ = ["bound_remark", "remarks", "verdict"]
-
-
-_EQUAL = 0.02
-"""Difference in length up to which two runs count as laying equally much."""
+__all__ = ["bound_remark", "remarks"]
 
 
-def remarks(comparison: Comparison) -> list[str]:
-    """Say what has to stand next to the numbers, a line each."""
+def remarks(
+    runs: Sequence[Run], wanted: float | None, bound: UpperBound | None = None
+) -> list[str]:
+    """Say what has to stand next to the numbers, a line each.
+
+    Parameters
+    ----------
+    runs : sequence of Run
+    wanted : float, mm, or None
+        Length of fibre per layer that all were held to; None where each laid its own.
+    bound : UpperBound, optional
+    """
+    order = ranking(runs, wanted)
     lines: dict[str, list[str]] = {}
-    for run in ranking(comparison):
-        for line in _about(run, comparison):
+    for run in order:
+        for line in _about(run, wanted, bound is not None):
             lines.setdefault(line, []).append(run.name)
     found = [f"{', '.join(names)}: {line}" for line, names in lines.items()]
-    if comparison.given is not None:
-        found.append("paths are planned and evaluated on the stress of another program")
-    found += _about_orders([run for run in ranking(comparison) if run.tested is not None])
-    return [*found, bound_remark(comparison)] if comparison.bound is not None else found
+    tested = [run for run in order if run.tested is not None]
+    found += _about_orders(tested)
+    return [*found, bound_remark(tested, bound)] if bound is not None and tested else found
 
 
-def _about(run: Run, comparison: Comparison) -> list[str]:
+def _about(run: Run, wanted: float | None, bounded: bool) -> list[str]:
     """Say what has to stand next to the numbers of one run."""
     reasons = {
         "failed": run.failure,
@@ -41,23 +48,30 @@ def _about(run: Run, comparison: Comparison) -> list[str]:
     if run.evaluation is not None:
         lines += _about_links(run.evaluation.total)
         if getattr(run.strategy, "crosses", False):
-            lines += _about_crossings(run.evaluation, comparison.bound is not None)
+            lines += _about_crossings(run.evaluation, bounded)
+    if run.why_not:
+        lines.append(f"not printable as planned: {run.why_not}")
+    if run.empty_layers and run.evaluation is not None:
+        lines.append(f"no fibre on {run.empty_layers} of {len(run.evaluation.layers)} layers")
     if run.note:
-        placed = ", so it is placed last" if too_long(run, comparison) else ""
+        placed = ", so it is placed last" if too_long(run, wanted) else ""
         lines.append(f"{run.note}{placed}")
     return lines
 
 
 def _about_orders(tested: Sequence[Run]) -> list[str]:
     """Say which runs, best first, cannot be put in an order."""
+    reasons = {
+        UNDECIDED: "undecided against {}, for tension-only and bonded fibres do not agree on an "
+        "order",
+        SAME: f"no difference to {{}}: less than {RESOLUTION:.0%}, the resolution of the test",
+    }
     lines = []
     for k, run in enumerate(tested):
-        unclear = [other.name for other in tested[k + 1 :] if undecided(run, other)]
-        if unclear:
-            lines.append(
-                f"{run.name}: undecided against {', '.join(unclear)}, for tension-only and bonded "
-                "fibres do not agree on an order"
-            )
+        for found, reason in reasons.items():
+            others = [other.name for other in tested[k + 1 :] if order_of(run, other) == found]
+            if others:
+                lines.append(f"{run.name}: {reason.format(', '.join(others))}")
     return lines
 
 
@@ -87,67 +101,29 @@ def _about_crossings(evaluation: Evaluation, bounded: bool) -> list[str]:
     return [line + bound if bounded else line]
 
 
-def bound_remark(comparison: Comparison) -> str:
-    """Say how far the best run is from what any paths could reach; empty without a bound.
+def bound_remark(tested: Sequence[Run], bound: UpperBound) -> str:
+    """Say how far the best run is from what any paths could reach.
 
     The bound is for strands beside each other that carry tension only: strands that overlap may
     exceed it, and so may bonded ones.
+
+    Parameters
+    ----------
+    tested : sequence of Run
+        With a virtual test, the best first; at least one.
+    bound : UpperBound
     """
-    tested = [run for run in ranking(comparison) if run.tested is not None]
-    if comparison.bound is None or not tested:
-        return ""
-    length = max(run.length_per_layer for run in tested)
-    name, share = tested[0].name, comparison.bound.share(stiffness_ratio(tested[0]))
+    best = tested[0]
+    length, name = max(run.length_per_layer for run in tested), best.name
+    layers = 0 if best.evaluation is None else len(best.evaluation.layers)
+    share = bound.share(stiffness_ratio(best))
     bonded = max(stiffness_ratio(run, "bonded") for run in tested)
-    free = "; bonded fibres are not bounded" if bonded > comparison.bound.ratio else ""
+    free = "; bonded fibres are not bounded" if bonded > bound.ratio else ""
     most = (
-        f"paths of {length:.0f} mm a layer in {len(comparison.layers)} layers can make the part "
-        f"more than {comparison.bound.ratio:.2f} times as stiff (fibres carrying tension only"
+        f"paths of {length:.0f} mm a layer in {layers} layers can make the part "
+        f"more than {bound.ratio:.2f} times as stiff (fibres carrying tension only"
         f"{free})"
     )
     if share > 1.0:
         return f"only where strands overlap, as those of {name} do, {most}"
     return f"no {most}: {name} reaches {share:.0%} of that gain"
-
-
-def verdict(comparison: Comparison) -> str:
-    """One sentence that says which strategy is best, by what, and at how much fibre.
-
-    Empty where fewer than two strategies kept to the wanted length.
-    """
-    order = [run for run in ranking(comparison) if run.evaluation is not None]
-    order = [run for run in order if not too_long(run, comparison)]
-    if len(order) < 2:
-        return ""
-    first, second = order[0], order[1]
-    amount = _amounts(first, second, comparison.fibre_per_layer)
-    if first.tested is None or second.tested is None:
-        best, following = (headline_values(run)["efficiency"] for run in (first, second))
-        return (
-            f"By efficiency alone (no virtual test): {first.name} with {best:.3f}, then "
-            f"{second.name} with {following:.3f}, {amount}."
-        )
-    if undecided(first, second):
-        return (
-            f"Undecided between {first.name} and {second.name}, {amount}: "
-            f"{stiffness_ratio(first):.2f} and {stiffness_ratio(second):.2f} times the "
-            f"unreinforced stiffness where fibres carry tension only, "
-            f"{stiffness_ratio(first, 'bonded'):.2f} and "
-            f"{stiffness_ratio(second, 'bonded'):.2f} where they are bonded."
-        )
-    return (
-        f"{first.name} makes the stiffest part, {amount}: {stiffness_ratio(first):.2f} times the "
-        f"unreinforced one, and {stiffness_ratio(first) / stiffness_ratio(second):.2f} times "
-        f"{second.name} (predicted, fibres carrying tension only; bonded fibres agree on the "
-        "order)."
-    )
-
-
-def _amounts(first: Run, second: Run, wanted: float | None) -> str:
-    """Say how much fibre two runs lay, mm per layer, where they were held to a length."""
-    more = first.length_per_layer / second.length_per_layer - 1.0
-    if wanted is None:
-        return "each with its own amount of fibre"
-    if abs(more) <= _EQUAL:
-        return f"at {wanted:.0f} mm of fibre per layer"
-    return f"with {abs(more):.0%} {'more' if more > 0.0 else 'less'} fibre than {second.name}"

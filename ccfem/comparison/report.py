@@ -9,11 +9,12 @@ import numpy as np
 
 from ccfem.comparison.headline import HEADLINE, TEST_COLUMNS, cell_text, headline_values
 from ccfem.comparison.pictures import Pictures
-from ccfem.comparison.ranking import best_values, ranking, stiffness_ratios
-from ccfem.comparison.remarks import remarks, verdict
-from ccfem.comparison.result import Comparison, Run
+from ccfem.comparison.ranking import best_values, stiffness_ratios
+from ccfem.comparison.result import Comparison
+from ccfem.comparison.runs import Run
 from ccfem.elasticity.stress_field import about_cells
 from ccfem.evaluation import COLUMNS, Column
+from ccfem.layers.layer import Layer
 from ccfem.virtual_testing.stiffer import HONEST_PROMISE
 
 __all__ = ["report_html"]
@@ -123,7 +124,7 @@ def _header(comparison: Comparison, record: Mapping[str, Any]) -> str:
 
 
 def _headline(comparison: Comparison) -> str:
-    best, runs = best_values(comparison), ranking(comparison)
+    best, runs = best_values(comparison.runs, comparison.fibre_per_layer), comparison.ranking
     values = {run.name: headline_values(run) for run in runs}
     heads = [h for h in HEADLINE if any(h.column in found for found in values.values())]
     rows = []
@@ -133,23 +134,27 @@ def _headline(comparison: Comparison) -> str:
             rows.append(f"<tr><td>{escape(run.name)}</td>{reason}</tr>")
             continue
         cells = "".join(
-            _cell(*cell_text(run, h), values[run.name].get(h.column) == best.get(h.column, np.nan))
+            _cell(
+                *cell_text(run, h),
+                run.printable and values[run.name].get(h.column) == best.get(h.column, np.nan),
+            )
             for h in heads
         )
         first = ' class="first"' if not rows else ""
         rows.append(f"<tr{first}><td>{escape(run.name)}</td>{cells}</tr>")
     titles = "".join(f"<th>{escape(h.title)}</th>" for h in heads)
-    notes = "".join(f"<li>{escape(line)}.</li>" for line in remarks(comparison))
+    notes = "".join(f"<li>{escape(line)}.</li>" for line in comparison.remarks)
     notes = f'<ul class="note">{notes}</ul>' if notes else ""
     if any(run.tested is not None for run in runs):
         notes += f'<p class="note"><b>{escape(HONEST_PROMISE)}</b></p>'
-    said = verdict(comparison)
+    said = comparison.verdict
     return (
         (f'<p class="verdict">{escape(said)}</p>\n' if said else "")
         + f'<div class="scroll"><table><tr><th>strategy</th>{titles}</tr>\n'
         + "\n".join(rows)
         + f"</table></div>\n{notes}"
-        '<p class="note">Best values are marked. Alignment and efficiency are measured on the '
+        '<p class="note">Best values are marked where they really are: of runs that can be '
+        "printed, of stiffnesses that the test tells apart. Alignment and efficiency are of the "
         "stress that a strategy may itself have followed: they say how well the paths do what they "
         "set out to do, not how strong the printed part is.</p>\n"
     )
@@ -163,7 +168,7 @@ def _cell(text: str, extra: str, best: bool) -> str:
 
 def _against_each_other(comparison: Comparison) -> str:
     """Return the table of stiffness of each strategy over that of each other."""
-    runs = [run for run in ranking(comparison) if run.tested is not None]
+    runs = [run for run in comparison.ranking if run.tested is not None]
     if len(runs) < 2:
         return ""
     head = "".join(f"<th>over {escape(run.name)}</th>" for run in runs)
@@ -184,27 +189,35 @@ def _against_each_other(comparison: Comparison) -> str:
 
 
 def _pictures(comparison: Comparison, pictures: Pictures) -> str:
-    runs = [run for run in ranking(comparison) if run.evaluation is not None]
-    heights = {layer.index: layer.plane.height for layer in comparison.layers}
-    rows = [_layer(index, height, runs, pictures) for index, height in heights.items()]
+    runs = [run for run in comparison.ranking if run.evaluation is not None]
+    drawn = {index for _, index in pictures.paths}
+    places = {layer.index: _place(layer) for layer in comparison.layers if layer.index in drawn}
+    rows = [_layer(index, place, runs, pictures) for index, place in places.items()]
     every = ""
     if len(rows) > 1:
         every = f"<details><summary>All {len(rows)} layers</summary>\n{''.join(rows)}</details>\n"
     tension = _figure(pictures.tension, "tension in the middle layer")
     error = _figure(pictures.error, "estimated error of the cells in the middle layer")
     return (
-        f"<h2>Paths</h2>\n{_layer(pictures.middle, heights[pictures.middle], runs, pictures)}"
+        f"<h2>Paths</h2>\n{_layer(pictures.middle, places[pictures.middle], runs, pictures)}"
         f"{every}{_forces(runs, pictures)}{_curves(pictures)}"
         f"<h2>Tension without fibres</h2>\n{_grid([tension, error, '', ''])}\n"
     )
 
 
-def _layer(index: int, height: float, runs: Sequence[Run], pictures: Pictures) -> str:
+def _place(layer: Layer) -> str:
+    """Where a layer is, in words."""
+    if layer.flat is None:
+        return "curved, laid flat"
+    return f"at {layer.flat.height:.2f} mm along the build direction"
+
+
+def _layer(index: int, place: str, runs: Sequence[Run], pictures: Pictures) -> str:
     """One layer of every run side by side."""
     figures = [
         _figure(pictures.paths[run.name, index], f"{run.name}, layer {index}") for run in runs
     ]
-    title = f"<h3>Layer {index}, at {height:.2f} mm along the build direction</h3>"
+    title = f"<h3>Layer {index}, {place}</h3>"
     return f"{title}{_grid(figures)}\n"
 
 
@@ -252,7 +265,7 @@ def _figure(image: bytes, about: str) -> str:
 
 
 def _all_indices(comparison: Comparison) -> str:
-    runs = [run for run in ranking(comparison) if run.evaluation is not None]
+    runs = [run for run in comparison.ranking if run.evaluation is not None]
     head = "".join(f"<th>{escape(run.name)}</th>" for run in runs)
     rows = []
     values = [headline_values(run) for run in runs]

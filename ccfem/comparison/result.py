@@ -1,95 +1,26 @@
 """The result of a comparison: what each strategy did on the same part."""
 
-import dataclasses
 from collections.abc import Mapping
-from dataclasses import dataclass, field
-from typing import Any
+from dataclasses import dataclass
+from typing import TYPE_CHECKING
 
 from ccfem.arrays import freeze
 from ccfem.cases.case import Case
+from ccfem.comparison.ranking import ranking
+from ccfem.comparison.remarks import remarks
+from ccfem.comparison.runs import Run
+from ccfem.comparison.summary import summary_html, summary_text
+from ccfem.comparison.table import frame
+from ccfem.comparison.verdict import verdict
 from ccfem.elasticity.part_stress import GivenStress, PartStress
 from ccfem.elasticity.stress_field import StressField
-from ccfem.evaluation import Evaluation
-from ccfem.export.print_plan import PrintPlan
 from ccfem.fibre_aware.upper_bound import UpperBound
 from ccfem.layers import Layer
-from ccfem.planning.strategy import Strategy
-from ccfem.toolpaths import Toolpaths
-from ccfem.virtual_testing.strength import FirstFailure
-from ccfem.virtual_testing.virtual_test import Bracket
 
-__all__ = ["Comparison", "Run", "Tested"]
+if TYPE_CHECKING:
+    import pandas as pd
 
-
-@dataclass(frozen=True)
-class Tested:
-    """The virtual test of one strategy's paths.
-
-    Attributes
-    ----------
-    bracket : Bracket
-        Fibres that carry tension only, and bonded fibres.
-    failure : FirstFailure or None
-        Of the tension-only test; None where a strength is unknown.
-    note : str
-        Why there is no first-failure load; else empty.
-    """
-
-    bracket: Bracket
-    failure: FirstFailure | None
-    note: str = ""
-
-
-@dataclass(frozen=True)
-class Run:
-    """What one strategy did on the part.
-
-    Attributes
-    ----------
-    name : str
-    strategy : Strategy
-        With the parameters that it ran with.
-    toolpaths : Toolpaths
-    evaluation : Evaluation or None
-        None where the strategy failed.
-    tested : Tested or None
-        None where the strategy failed, and where no virtual test was asked for or possible.
-    print_plan : PrintPlan or None
-        The whole part, matrix and fibre; None where the strategy failed, and where no print was
-        asked for or possible.
-    length_per_layer : float, mm
-    note : str
-        Why the length is not the wanted one, or that it sets it; else empty.
-    failure : str
-        One line that says why there are no paths, or why they could not be evaluated; else empty.
-    untested : str
-        Why there is no virtual test though one was asked for; else empty.
-    unprinted : str
-        Why the part cannot be printed as planned though a print was asked for; else empty.
-    seconds : mapping of stage to float
-    """
-
-    name: str
-    strategy: Strategy
-    toolpaths: Toolpaths
-    evaluation: Evaluation | None
-    tested: Tested | None = None
-    print_plan: PrintPlan | None = None
-    length_per_layer: float = 0.0
-    note: str = ""
-    failure: str = ""
-    untested: str = ""
-    unprinted: str = ""
-    seconds: Mapping[str, float] = field(default_factory=dict)
-
-    def __post_init__(self) -> None:
-        freeze(self, seconds=dict)
-
-    @property
-    def parameters(self) -> dict[str, Any]:
-        """Parameters of the strategy by name."""
-        fields = dataclasses.fields(self.strategy)  # type: ignore[arg-type]
-        return {f.name: getattr(self.strategy, f.name) for f in fields}
+__all__ = ["Comparison"]
 
 
 @dataclass(frozen=True)
@@ -131,7 +62,44 @@ class Comparison:
     def __post_init__(self) -> None:
         freeze(self, seconds=dict)
 
+    def __repr__(self) -> str:
+        failed = len(self.runs) - len(self.succeeded)
+        return (
+            f"Comparison of {len(self.runs)} strategies on {self.case.name!r}: "
+            f"{len(self.layers)} layers, {len(self.stress.mesh.cells)} cells"
+            + (f", {failed} failed" if failed else "")
+        )
+
+    def __str__(self) -> str:
+        return summary_text(self.ranking, self.verdict)
+
+    def _repr_html_(self) -> str:
+        return summary_html(self.ranking, self.verdict)
+
     @property
     def succeeded(self) -> tuple[Run, ...]:
         """Runs that did not fail."""
         return tuple(run for run in self.runs if run.evaluation is not None)
+
+    @property
+    def ranking(self) -> tuple[Run, ...]:
+        """Runs from the best to the worst, failed ones last."""
+        return ranking(self.runs, self.fibre_per_layer)
+
+    @property
+    def verdict(self) -> str:
+        """One sentence on which strategy is best; empty where there is none to compare."""
+        return verdict(self.runs, self.fibre_per_layer)
+
+    @property
+    def remarks(self) -> list[str]:
+        """What has to stand next to the numbers, a line each."""
+        found = remarks(self.runs, self.fibre_per_layer, self.bound)
+        if self.given is not None:
+            found.append("paths are planned and evaluated on the stress of another program")
+        return found
+
+    @property
+    def frame(self) -> "pd.DataFrame":
+        """One row a strategy in order of rank: rank, printable, why_not and every index."""
+        return frame(self.ranking)

@@ -6,22 +6,24 @@ from contextlib import contextmanager
 from dataclasses import dataclass, replace
 from typing import Any
 
-from ccfem.comparison.result import Run, Tested
+from ccfem.comparison.runs import Run, Tested
 from ccfem.elasticity.part_stress import PartStress
 from ccfem.elasticity.stress_field import StressField
 from ccfem.errors import InputError, SolveError
 from ccfem.evaluation import evaluate
-from ccfem.export.print_plan import plan_print
+from ccfem.evaluation.printable import why_not
+from ccfem.export.print_plan import PrintPlan, plan_print
 from ccfem.layers import Layer
 from ccfem.machine.machine import Machine
-from ccfem.planning.equal_fibre import Planned, length_per_layer, plan_to_length
+from ccfem.planning.equal_fibre import TOLERANCE, Planned, length_per_layer, plan_to_length
+from ccfem.planning.given_paths import GivenPaths
 from ccfem.planning.plan import plan
-from ccfem.toolpaths import Toolpaths
+from ccfem.toolpaths import FIBRE, MATRIX, Toolpaths
 from ccfem.virtual_testing.equilibrium import BONDED, TENSION
 from ccfem.virtual_testing.specimen import Specimen
 from ccfem.virtual_testing.strand import Strand
 from ccfem.virtual_testing.strands import cut_strands
-from ccfem.virtual_testing.strength import first_failure
+from ccfem.virtual_testing.strength import first_failure, matrix_peak
 from ccfem.virtual_testing.virtual_test import Bracket, virtual_test
 
 __all__ = ["Part", "Tell", "all_tested", "evaluated", "levelled", "planned", "timed", "with_print"]
@@ -49,7 +51,11 @@ def planned(
 
     def work() -> Run:
         layers, stress, machine = part.layers, part.stress, part.machine
-        if wanted is None:
+        if isinstance(run.strategy, GivenPaths):
+            paths = run.strategy.toolpaths
+            laid = length_per_layer(paths, layers)
+            found = Planned(run.strategy, paths, laid, _as_given(laid, wanted))
+        elif wanted is None:
             paths = plan(run.strategy, layers, stress, machine)
             found = Planned(run.strategy, paths, length_per_layer(paths, layers))
         else:
@@ -66,6 +72,13 @@ def planned(
     return _stage(bare, "plan", work)
 
 
+def _as_given(laid: float, wanted: float | None) -> str:
+    """Note on paths that stay as they are, where they miss the wanted length, mm per layer."""
+    if wanted is None or abs(laid / wanted - 1.0) <= TOLERANCE:
+        return ""
+    return f"given paths stay as they are: lays {laid:.0f} of {wanted:.0f} mm per layer"
+
+
 def levelled(runs: Sequence[Run], part: Part, tell: Tell) -> tuple[list[Run], float | None]:
     """Bring runs with their natural amounts to the smallest of them.
 
@@ -78,11 +91,13 @@ def levelled(runs: Sequence[Run], part: Part, tell: Tell) -> tuple[list[Run], fl
     laid = [run for run in runs if len(run.toolpaths)]
     if not laid:
         return list(runs), None
-    setter = min(laid, key=lambda run: run.length_per_layer)
+    given = [run for run in laid if isinstance(run.strategy, GivenPaths)]
+    setter = min(given or laid, key=lambda run: run.length_per_layer)
 
     def level(run: Run) -> Run:
         if run is setter:
-            return replace(run, note="lays the least of its own accord: sets the length")
+            how = "given" if given else "has the shortest natural length"
+            return replace(run, note=f"{how}: sets the length")
         own = Planned(run.strategy, run.toolpaths, run.length_per_layer)
         return planned(run, part, setter.length_per_layer, tell, own)
 
@@ -104,7 +119,8 @@ def evaluated(run: Run, part: Part, tell: Tell) -> Run:
 
     def work() -> Run:
         found = evaluate(run.toolpaths, part.layers, part.stress, part.machine)
-        return replace(run, evaluation=found)
+        broken = why_not(found.total, part.machine)
+        return replace(run, evaluation=found, why_not="; ".join(broken))
 
     return _stage(run, "evaluate", work)
 
@@ -118,32 +134,53 @@ def with_print(run: Run, part: Part, tell: Tell) -> Run:
         found = plan_print(run.toolpaths, part.layers, part.stress.mesh, part.machine)
     except InputError as error:
         return replace(run, unprinted=str(error))
-    return replace(run, print_plan=found)
+    share = _volume(found, part.machine) / float(part.stress.mesh.volumes.sum())
+    return replace(run, print_plan=found, printed_volume=share)
+
+
+def _volume(print_plan: PrintPlan, machine: Machine) -> float:
+    """Volume that a print lays, mm^3: lines of matrix as high as their layer, and strands."""
+    paths = print_plan.paths
+    matrix = (paths.lengths * print_plan.thickness[paths.layer])[paths.kind == MATRIX].sum()
+    fibre = paths.of_kind(FIBRE).lengths.sum()
+    return float(machine.matrix_width * matrix + machine.filament_area * fibre)
 
 
 def all_tested(
-    runs: Sequence[Run], stress: StressField, strand: Strand, backend: str, tell: Tell
+    runs: Sequence[Run],
+    stress: StressField,
+    machine: Machine,
+    strand: Strand,
+    backend: str,
+    tell: Tell,
 ) -> list[Run]:
     """Test every run that did not fail virtually, all on one factorisation."""
     try:
         specimen = Specimen.of(stress, backend)
     except InputError as error:
         return [replace(run, untested=str(error)) for run in runs]
-    return [_tested(run, specimen, strand, tell) for run in runs]
+    try:
+        before, _ = matrix_peak(stress)
+    except InputError:
+        before = float("nan")
+    return [_tested(run, specimen, strand, machine, before, tell) for run in runs]
 
 
-def _tested(run: Run, specimen: Specimen, strand: Strand, tell: Tell) -> Run:
+def _tested(
+    run: Run, specimen: Specimen, strand: Strand, machine: Machine, before: float, tell: Tell
+) -> Run:
     """Test a run virtually, or say why it cannot be tested."""
     tell(f"testing {run.name}")
     if run.evaluation is None:
         return run
 
     def work() -> Run:
-        strands = cut_strands(run.toolpaths, specimen.unreinforced.mesh)
+        mesh = specimen.unreinforced.mesh
+        strands = cut_strands(run.toolpaths, mesh, machine=machine)
         tension = virtual_test(strands, specimen, strand, TENSION)
         bracket = Bracket(tension, virtual_test(strands, specimen, strand, BONDED, span=()))
         try:
-            test = Tested(bracket, first_failure(tension, strand))
+            test = Tested(bracket, first_failure(tension, strand), matrix_before=before)
         except InputError as error:
             test = Tested(bracket, None, str(error))
         return replace(run, tested=test)

@@ -89,7 +89,7 @@ class Pardiso:
             limit(before)
 
     def factorise(self, matrix: sp.bsr_array) -> Apply:
-        """Factorise a matrix of the pattern; the factor before it, if any, is spent."""
+        """Factorise a matrix of the pattern; an earlier factor is invalidated."""
         with self._lock:
             self._latest += 1
             own = self._latest

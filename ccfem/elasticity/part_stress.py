@@ -33,6 +33,11 @@ class PartStress(Protocol):
         """Names of the patches that carry a support or a load."""
         ...
 
+    @property
+    def loaded(self) -> tuple[str, ...]:
+        """Those of them that carry a load."""
+        ...
+
 
 @dataclass(frozen=True)
 class GivenStress:
@@ -47,12 +52,15 @@ class GivenStress:
         At the nodes.
     held_or_loaded : tuple of str, default none
         Names of the patches that carry a support or a load.
+    loaded : tuple of str, default none
+        Those of them that carry a load.
     """
 
     mesh: TetMesh
     stress: FloatArray
     nodal: FloatArray
     held_or_loaded: tuple[str, ...] = ()
+    loaded: tuple[str, ...] = ()
 
     def __repr__(self) -> str:
         return f"GivenStress on {self.mesh!r}"

@@ -15,7 +15,7 @@ from ccfem.elasticity.support_kinds import (
     RigidPatch,
 )
 from ccfem.errors import InputError
-from ccfem.geometry.locate import locate_tets
+from ccfem.geometry.locate import locate
 from ccfem.mesh.tet_mesh import TetMesh
 
 __all__ = ["Probe", "displacement_at", "located", "support_forces"]
@@ -62,7 +62,7 @@ def located(mesh: TetMesh, points: FloatArray, tolerance: float) -> tuple[IntArr
     points = np.asarray(points, dtype=np.float64)
     if points.ndim != 2 or points.shape[1] != 3 or not np.isfinite(points).all():
         raise InputError(f"points must be finite and of shape (k, 3), mm; got {points.shape}")
-    cell, weights = locate_tets(mesh.points, mesh.corners, points, tolerance)
+    cell, weights = locate(mesh.points, mesh.corners, points, tolerance)
     if (cell < 0).any():
         first = int(np.flatnonzero(cell < 0)[0])
         raise InputError(

@@ -1,6 +1,6 @@
 """Cholesky factorisation within the skyline of a matrix: quick where its band is narrow.
 
-One compiled loop and no library behind it, so that its time does not hang on threads. On a raster
+One compiled loop and no library behind it, so that its time does not depend on threads. On a raster
 of h rows of cells it does about ``(2 h)^2`` operations an unknown.
 """
 

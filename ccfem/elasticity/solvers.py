@@ -78,7 +78,7 @@ class Solver:
     def refactorise(self, matrix: sp.bsr_array) -> "Solver":
         """Factorise another matrix of the same pattern, such as another stiffness on the mesh.
 
-        "pypardiso" keeps its ordering, and this solver is spent; the others begin anew.
+        "pypardiso" keeps its ordering, and this solver is invalidated; the others refactorise.
 
         Parameters
         ----------

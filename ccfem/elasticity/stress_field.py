@@ -13,7 +13,7 @@ from ccfem.elasticity.nodes import patch_nodes
 from ccfem.elasticity.order import about_error
 from ccfem.elasticity.part_stress import PartStress
 from ccfem.elasticity.probe import Probe, displacement_at, located, support_forces
-from ccfem.elasticity.problem import Problem
+from ccfem.elasticity.problem import Problem, patches_in_use
 from ccfem.elasticity.recovery import cell_strain, nodal_stress
 from ccfem.elasticity.volume_loads import free_strain
 from ccfem.errors import InputError
@@ -125,6 +125,11 @@ class StressField:
     def held_or_loaded(self) -> tuple[str, ...]:
         """Names of the patches that carry a support or a load."""
         return self.problem.held_or_loaded
+
+    @property
+    def loaded(self) -> tuple[str, ...]:
+        """Names of the patches that carry a load in its load case."""
+        return patches_in_use((), {self.case: self.problem.loads[self.case]})
 
     def at(self, points: FloatArray, tolerance: float = 1e-3) -> FloatArray:
         """Recovered stress at any points of the part.

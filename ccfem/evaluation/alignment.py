@@ -34,6 +34,13 @@ COLUMNS = (
         "sample does not count.",
         f"0 to 90, 0 is best, 45 is chance; {_NONE}",
     ),
+    Column(
+        "angle_mean_top_20",
+        "degrees",
+        "As angle_mean, over the fifth of the fibre's length that meets the highest S1+; length of "
+        "equal stress at the limit counts in full.",
+        f"0 to 90, 0 is best; {_NO_TENSION}",
+    ),
     *(
         Column(
             f"aligned_{a}",
@@ -73,6 +80,9 @@ COLUMNS = (
 _ISOTROPIC = 1e-6
 """Principal values that differ by no more than this share of the larger one count as equal."""
 
+
+_CRITICAL = 0.8
+"""Quantile of the tension, by length, from which on a sample counts as critical."""
 
 _ROUNDING = 1e-3
 """Samples no further than this, mm, outside the section take the stress of its edge."""
@@ -140,12 +150,24 @@ def alignment_indices(samples: AlignmentSamples) -> dict[str, float]:
     known = ~np.isnan(angle)
     by_length, by_stress = length * known, tension * known
     values = {"angle_mean": _ratio(float((by_length[known] * angle[known]).sum()), by_length)}
+    critical = _critical(tension, length) * by_length
+    values["angle_mean_top_20"] = _ratio(float((critical[known] * angle[known]).sum()), critical)
     for name, weight in (("aligned", by_length), ("aligned_stress", by_stress)):
         for limit in _ANGLES:
             values[f"{name}_{limit}"] = _ratio(float(weight[known & (angle < limit)].sum()), weight)
     values["efficiency"] = _ratio(float((length * samples.along).sum()), tension)
     values["no_tension"] = _ratio(float(length[samples.largest <= 0.0].sum()), length)
     return values
+
+
+def _critical(tension: FloatArray, length: FloatArray) -> FloatArray:
+    """1 at the samples with the highest tension, S1+ times length, that make up a fifth; else 0."""
+    stress = tension / np.maximum(length, 1e-300)
+    if not len(stress) or not stress.max() > 0.0:
+        return np.zeros(len(stress))
+    # What ends exactly at the quantile lies below it.
+    limit = np.quantile(stress, _CRITICAL + 1e-9, weights=length, method="inverted_cdf")
+    return np.where((stress >= limit * (1.0 - 1e-6)) & (stress > 0.0), 1.0, 0.0)
 
 
 def _ratio(part: float, whole: FloatArray) -> float:

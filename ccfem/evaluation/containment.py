@@ -8,7 +8,8 @@ import shapely
 from ccfem.arrays import FloatArray
 from ccfem.evaluation.column import Column
 from ccfem.evaluation.plane_paths import PlanePaths
-from ccfem.geometry.places import TOLERANCE
+from ccfem.geometry.places import INSIDE, TOLERANCE, section_places
+from ccfem.geometry.polylines import sample_midpoints
 from ccfem.geometry.shapes import Region, Shapes
 
 __all__ = ["COLUMNS", "ContainmentSamples", "containment_indices", "sample_containment"]
@@ -28,23 +29,51 @@ COLUMNS = (
         "layer, to 0.0001 mm; 0 where outside_length is 0.",
         ">= 0, 0 is best",
     ),
+    *(
+        Column(
+            f"border_{share}",
+            "mm",
+            f"Distance from the border of the section that {100 - share} % of the length of the "
+            "fibre's axis in the section, links included, exceeds (sampled every fibre width).",
+            ">= 0; NaN without fibre",
+        )
+        for share in (1, 50)
+    ),
 )
 
 
 @dataclass(frozen=True)
 class ContainmentSamples:
-    """Length outside (1,) and largest distance outside (1,) a layer, mm."""
+    """Fibre about the border of a layer, mm.
+
+    Attributes
+    ----------
+    length, depth : (1,) arrays
+        Length outside, and largest distance outside.
+    border, step : (s,) arrays
+        Distance of samples in the section from its border, and the length that each stands for.
+    """
 
     length: FloatArray
     depth: FloatArray
+    border: FloatArray
+    step: FloatArray
 
 
-def sample_containment(paths: PlanePaths) -> ContainmentSamples:
-    """Fibre of a layer, but links, that lies outside its polygon (the axis, without its width)."""
+def sample_containment(paths: PlanePaths, step: float = 1.0) -> ContainmentSamples:
+    """Fibre of a layer, but links, about the border of its polygon (the axis, without its width).
+
+    Parameters
+    ----------
+    paths : PlanePaths
+    step : float, mm
+        Distance of the samples along the fibre.
+    """
+    section = paths.layer.plane.polygon
+    border = _border(paths.in_part, section, step)
     paths = paths.strands
     if not len(paths):
-        return ContainmentSamples(np.zeros(1), np.zeros(1))
-    section = paths.layer.plane.polygon
+        return ContainmentSamples(np.zeros(1), np.zeros(1), *border)
     grown = section.buffer(TOLERANCE, quad_segs=2)
     shapely.prepare(grown)
     index = np.repeat(np.arange(len(paths)), np.diff(paths.offsets))
@@ -54,7 +83,20 @@ def sample_containment(paths: PlanePaths) -> ContainmentSamples:
     pieces = shapely.linestrings(segments) if len(segments) else np.zeros(0, dtype=object)
     outside = shapely.difference(pieces[~shapely.covers(grown, pieces)], grown)
     length = float(shapely.length(outside).sum())
-    return ContainmentSamples(np.array([length]), np.array([_depth(outside, section)]))
+    return ContainmentSamples(np.array([length]), np.array([_depth(outside, section)]), *border)
+
+
+def _border(paths: PlanePaths, section: Region, step: float) -> tuple[FloatArray, FloatArray]:
+    """Distance of samples in the section from its border, and their lengths, mm."""
+    points, _, length, _ = sample_midpoints(paths.points, paths.offsets, step)
+    inside = section_places(points, section) == INSIDE
+    points, length = points[inside], length[inside]
+    if not len(points):
+        return np.zeros(0), np.zeros(0)
+    start, end = _segments(shapely.boundary(section))
+    tree = shapely.STRtree(shapely.linestrings(np.stack([start, end], axis=1)))
+    edge = tree.nearest(shapely.points(points))
+    return _to_edges(points, start[edge], end[edge]), length
 
 
 def _depth(lines: Shapes, section: Region) -> float:
@@ -105,4 +147,14 @@ def containment_indices(samples: ContainmentSamples) -> dict[str, float]:
     return {
         "outside_length": float(samples.length.sum()),
         "outside_depth": float(samples.depth.max()) if len(samples.depth) else 0.0,
+        **_border_indices(samples),
     }
+
+
+def _border_indices(samples: ContainmentSamples) -> dict[str, float]:
+    if not samples.step.sum() > 0.0:
+        return dict.fromkeys(("border_1", "border_50"), float("nan"))
+    quantiles = np.quantile(
+        samples.border, [0.01, 0.5], weights=samples.step, method="inverted_cdf"
+    )
+    return dict(zip(("border_1", "border_50"), quantiles.tolist(), strict=True))

@@ -4,6 +4,7 @@ from dataclasses import dataclass
 
 import numpy as np
 from numba import njit
+from scipy.ndimage import binary_opening
 
 from ccfem.arrays import BoolArray, FloatArray, IntArray
 from ccfem.evaluation.column import Column
@@ -30,6 +31,13 @@ COLUMNS = (
         "width, over the area of the section: what coverage would be, did no strands overlap or "
         "lie over the border.",
         ">= 0; NaN for an empty section",
+    ),
+    Column(
+        "gap_area",
+        "mm^2",
+        "Area of the section (on the grid of coverage) that no strand covers and none could: it "
+        "lies in no disc one fibre width wide that is free of fibre and in the section.",
+        ">= 0; 0 is best",
     ),
     Column(
         "coverage_stress",
@@ -62,6 +70,9 @@ COLUMNS = (
 _TIE = 1e-6
 """Stresses that differ by no more than this share of the largest one are equal."""
 
+_HALF = 2
+"""Half a fibre width, in steps of the grid, rounded down."""
+
 _SHIFT = (0.381966, 0.276393)
 """Offset of the grid in cells: irrational, so that strands at round places do not end on it."""
 
@@ -77,14 +88,15 @@ class CoverageSamples:
     covered : (s,) bool array
     laid : (1,) array, mm^2
         Length of the fibre times its width.
-    area : (1,) array, mm^2
-        Of the section.
+    area, gap : (1,) arrays, mm^2
+        Of the section, and of what is too narrow for a strand.
     """
 
     tension: FloatArray
     covered: BoolArray
     laid: FloatArray
     area: FloatArray
+    gap: FloatArray
 
 
 def sample_coverage(paths: PlanePaths, stress: LayerStress, width: float) -> CoverageSamples:
@@ -119,7 +131,15 @@ def sample_coverage(paths: PlanePaths, stress: LayerStress, width: float) -> Cov
         covered[inside],
         np.array([width * paths.lengths.sum()]),
         np.array([layer.areas.sum()]),
+        np.array([step * step * _gaps(inside & ~covered)]),
     )
+
+
+def _gaps(free: BoolArray) -> float:
+    """Count the grid points that lie in no free disc one fibre width wide."""
+    across = np.hypot(*np.meshgrid(np.arange(-_HALF, _HALF + 1), np.arange(-_HALF, _HALF + 1)))
+    opened = binary_opening(free, across <= _HALF + 0.5)
+    return float(np.count_nonzero(free & ~opened))
 
 
 @njit(cache=True)
@@ -199,6 +219,7 @@ def coverage_indices(samples: CoverageSamples) -> dict[str, float]:
     values = {
         "coverage": float(covered.mean()),
         "overfill": float(samples.laid.sum() / samples.area.sum()),
+        "gap_area": float(samples.gap.sum()),
         "coverage_stress": float(tension[covered].sum()) / total if total > 0.0 else float("nan"),
     }
     quartiles = [*limits[:4], limits[-1]]

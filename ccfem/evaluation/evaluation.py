@@ -1,7 +1,7 @@
 """The evaluator: every index of a set of paths, for each layer and in total."""
 
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import TYPE_CHECKING, NamedTuple
 
 import numpy as np
@@ -18,7 +18,9 @@ from ccfem.evaluation import (
     links,
     manufacture,
     matching,
+    room,
     sinuosity,
+    space,
     spacing,
     stiffness_alignment,
 )
@@ -30,13 +32,17 @@ from ccfem.evaluation.crossings import CrossingSamples
 from ccfem.evaluation.curvature import CurvatureSamples
 from ccfem.evaluation.links import LinkSamples
 from ccfem.evaluation.manufacture import ManufactureSamples
-from ccfem.evaluation.plane_paths import plane_paths, pool
+from ccfem.evaluation.plane_paths import PlanePaths, plane_paths, pool
+from ccfem.evaluation.room import RoomSamples
 from ccfem.evaluation.sinuosity import SinuositySamples
+from ccfem.evaluation.space import SpaceSamples
 from ccfem.evaluation.spacing import SpacingSamples
+from ccfem.fields.chart import chart_of
+from ccfem.geometry.nearest_on_triangles import nearest_on_triangles
 from ccfem.layers.layer import Layer
 from ccfem.layers.layer_stress import stress_on
 from ccfem.machine.machine import Machine
-from ccfem.toolpaths import Toolpaths
+from ccfem.toolpaths import FIBRE, Toolpaths
 
 if TYPE_CHECKING:
     import pandas as pd
@@ -51,10 +57,12 @@ COLUMNS: tuple[Column, ...] = (
     *matching.COLUMNS,
     *stiffness_alignment.COLUMNS,
     *spacing.COLUMNS,
+    *room.COLUMNS,
     *coverage.COLUMNS,
     *containment.COLUMNS,
     *links.COLUMNS,
     *crossings.COLUMNS,
+    *space.COLUMNS,
 )
 """Every index in the order of the tables."""
 
@@ -152,7 +160,9 @@ def evaluate(
     toolpaths : Toolpaths
         Paths of other kinds than fibre count in the print time only.
     layers : sequence of Layer
-        Flat layers, among them every layer that has a path.
+        Flat or curved, among them every layer that has a path. What is measured in the plane of
+        a flat layer is measured in the chart of a curved one (`ccfem.fields.chart`), with the
+        lengths of the paths in space.
     stress : PartStress
     machine : Machine
 
@@ -169,7 +179,19 @@ def evaluate(
     if not layers:
         raise InputError("expected at least one layer to evaluate; got none: slice the part")
     _check_layers(toolpaths, layers)
-    samples = [_sample(toolpaths.on_layer(k.index), k, stress, machine) for k in layers]
+    fibre = toolpaths.of_kind(FIBRE).layer
+    late = fibre[fibre < np.maximum.accumulate(fibre)]
+    samples = [
+        _sample(
+            toolpaths.on_layer(k.index),
+            k,
+            stress,
+            machine,
+            _below(k, layers),
+            int(np.count_nonzero(late == k.index)),
+        )
+        for k in layers
+    ]
     rows = [_indices(each, machine) for each in samples]
     rows.append(_indices(_pooled(samples), machine))
     return Evaluation(
@@ -188,15 +210,26 @@ def _check_layers(toolpaths: Toolpaths, layers: Sequence[Layer]) -> None:
                 f"a path lies on layer {index}, but only layers {sorted(known)} were given: give "
                 "the layers that the paths were planned on"
             )
-        layer = known[index]
-        apart = np.abs(
-            toolpaths.on_layer(index).points @ layer.plane.frame[2] - layer.plane.height
-        ).max()
+        layer, points = known[index], toolpaths.on_layer(index).points
+        if layer.flat is None:
+            away = nearest_on_triangles(layer.points, layer.triangles, points).distance
+        else:
+            away = np.abs(points @ layer.flat.frame[2] - layer.flat.height)
+        apart = float(away.max())
         if apart > 0.5 * layer.thickness + _ROUNDING:
             raise InputError(
                 f"a path of layer {index} lies {apart:.3g} mm above or below it: give the layers "
                 "that the paths were planned on"
             )
+
+
+def _below(layer: Layer, layers: Sequence[Layer]) -> Layer | None:
+    """Find the flat layer under a flat one; None where it is the lowest, and for curved layers."""
+    if layer.flat is None:
+        return None
+    height = layer.flat.height
+    flat = [each for each in layers if each.flat is not None and each.plane.height < height]
+    return max(flat, key=lambda each: each.plane.height, default=None)
 
 
 class _Samples(NamedTuple):
@@ -207,28 +240,56 @@ class _Samples(NamedTuple):
     curvature: CurvatureSamples
     alignment: AlignmentSamples
     spacing: SpacingSamples
+    room: RoomSamples
     coverage: CoverageSamples
     containment: ContainmentSamples
     links: LinkSamples
     crossings: CrossingSamples
+    space: SpaceSamples
 
 
-def _sample(toolpaths: Toolpaths, layer: Layer, stress: PartStress, machine: Machine) -> _Samples:
+def _sample(
+    toolpaths: Toolpaths,
+    layer: Layer,
+    stress: PartStress,
+    machine: Machine,
+    below: Layer | None,
+    late: int,
+) -> _Samples:
     """Take the samples of one layer."""
     width = machine.fibre_width
-    paths = plane_paths(toolpaths, layer)
-    on_layer = stress_on(layer, stress)
+    seen, view = toolpaths, layer
+    if layer.flat is None:
+        chart = chart_of(layer)
+        seen, view = chart.flattened(toolpaths), chart.flat
+    paths = plane_paths(seen, view)
+    on_layer = stress_on(view, stress)
+    made = manufacture.sample_manufacture(paths, toolpaths, machine)
+    fibre = toolpaths.select(toolpaths.kind == FIBRE)
+    if layer.flat is None:
+        made = replace(made, length=fibre.lengths[fibre.lengths > 0.0])
+    else:
+        fibre = _in_space(paths.in_part)
+    in_space = space.sample_space(fibre, layer, stress, width)
     return _Samples(
-        manufacture.sample_manufacture(paths, toolpaths, machine),
+        made,
         sinuosity.sample_sinuosity(paths, width),
         curvature.sample_curvature(paths, width),
         alignment.sample_alignment(paths, on_layer, width),
         spacing.sample_spacing(paths, width),
+        room.sample_room(paths, machine, below, late),
         coverage.sample_coverage(paths, on_layer, width),
-        containment.sample_containment(paths),
+        containment.sample_containment(paths, width),
         links.sample_links(paths),
         crossings.sample_crossings(paths),
+        in_space,
     )
+
+
+def _in_space(paths: PlanePaths) -> Toolpaths:
+    """Paths of a flat layer as toolpaths."""
+    lines = np.split(paths.points, paths.offsets[1:-1]) if len(paths) else []
+    return Toolpaths.from_plane(lines, paths.layer, paths.closed.tolist())
 
 
 def _pooled(samples: Sequence[_Samples]) -> _Samples:
@@ -246,8 +307,10 @@ def _indices(samples: _Samples, machine: Machine) -> dict[str, float]:
         **matching.matching_indices(samples.alignment),
         **stiffness_alignment.stiffness_alignment_indices(samples.alignment),
         **spacing.spacing_indices(samples.spacing, machine),
+        **room.room_indices(samples.room),
         **coverage.coverage_indices(samples.coverage),
         **containment.containment_indices(samples.containment),
         **links.link_indices(samples.links),
         **crossings.crossing_indices(samples.crossings),
+        **space.space_indices(samples.space),
     }

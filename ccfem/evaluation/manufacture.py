@@ -8,6 +8,7 @@ from ccfem.arrays import FloatArray
 from ccfem.evaluation.column import Column
 from ccfem.evaluation.plane_paths import PlanePaths
 from ccfem.geometry.polylines import arc_lengths
+from ccfem.linking.print_order import nearest_end_order
 from ccfem.linking.print_speed import step_speeds
 from ccfem.machine.machine import Machine
 from ccfem.toolpaths import FIBRE, TRAVEL, Toolpaths
@@ -46,6 +47,32 @@ COLUMNS = (
         ">= 0",
     ),
     Column(
+        "print_time_nearest",
+        "s",
+        "As print_time, with the paths of a layer in another order and walked from either end: "
+        "from the end of each on to the nearest end of another one.",
+        ">= 0",
+    ),
+    Column(
+        "fibre_mass",
+        "g",
+        "Length of the fibre times filament area and density.",
+        ">= 0",
+    ),
+    Column(
+        "matrix_length",
+        "mm",
+        "Length of a line of matrix, matrix width times matrix height, that fills what the fibre "
+        "leaves of the part.",
+        ">= 0; infinite where the machine gives the line no area",
+    ),
+    Column(
+        "matrix_mass",
+        "g",
+        "Volume that the fibre leaves of the part times the density of the matrix.",
+        ">= 0",
+    ),
+    Column(
         "mean_speed",
         "mm/s",
         "Length of the fibre paths over the time that they take, ways between them left out.",
@@ -59,11 +86,13 @@ _ROUNDING = 1e-6
 
 @dataclass(frozen=True)
 class ManufactureSamples:
-    """Lengths (k,), mm, of the fibre paths; time (1,), s, of all and of the fibre, a layer."""
+    """Lengths (k,), mm, of the fibre paths; and of a layer (1,) times, s, and its volume, mm^3."""
 
     length: FloatArray
     seconds: FloatArray
     fibre_seconds: FloatArray
+    nearest_seconds: FloatArray
+    volume: FloatArray
 
 
 def sample_manufacture(
@@ -87,7 +116,16 @@ def sample_manufacture(
     fibre, others = (drawn.select(wanted) for wanted in (drawn.kind == FIBRE, drawn.kind != FIBRE))
     along = _duration(*_steps(fibre, machine))
     seconds = along + _duration(*_steps(others, machine)) + _duration(ways, machine.travel_speed)
-    return ManufactureSamples(paths.lengths, np.array([seconds]), np.array([along]))
+    _, _, jumps = nearest_end_order(starts, ends)
+    nearest = along + _duration(*_steps(others, machine)) + _duration(jumps, machine.travel_speed)
+    layer = paths.layer
+    return ManufactureSamples(
+        paths.lengths,
+        np.array([seconds]),
+        np.array([along]),
+        np.array([nearest]),
+        np.array([float(layer.areas.sum()) * layer.thickness]),
+    )
 
 
 def _steps(toolpaths: Toolpaths, machine: Machine) -> tuple[FloatArray, FloatArray]:
@@ -113,6 +151,8 @@ def manufacture_indices(samples: ManufactureSamples, machine: Machine) -> dict[s
     total = float(length.sum())
     quantiles = np.quantile(length, [0.0, 0.5, 1.0]) if len(length) else np.full(3, np.nan)
     enough = length >= machine.minimum_length * (1.0 - _ROUNDING)
+    matrix = max(float(samples.volume.sum()) - machine.filament_area * total, 0.0)
+    line = machine.matrix_width * machine.matrix_height
     return {
         "fibre_length": total,
         "paths": float(len(length)),
@@ -123,5 +163,9 @@ def manufacture_indices(samples: ManufactureSamples, machine: Machine) -> dict[s
         "long_enough_count": float(enough.mean()) if len(length) else np.nan,
         "long_enough_length": float(length[enough].sum()) / total if len(length) else np.nan,
         "print_time": float(samples.seconds.sum()),
+        "print_time_nearest": float(samples.nearest_seconds.sum()),
+        "fibre_mass": 1e-3 * machine.fibre_density * machine.filament_area * total,
+        "matrix_length": matrix / line if line > 0.0 else float("inf"),
+        "matrix_mass": 1e-3 * machine.matrix_density * matrix,
         "mean_speed": total / float(samples.fibre_seconds.sum()) if total else np.nan,
     }

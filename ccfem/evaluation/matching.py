@@ -53,7 +53,7 @@ _ANGLES = (10, 30)
 _ROUNDING = 1e-6
 """Angles above a threshold by no more than this, degrees, are at it."""
 _WEAK, _STRONG = 0.01, 0.99
-"""Stresses below this share of this quantile by area have no say in the readings by stress."""
+"""Stresses below this share of this quantile by area are left out of the readings by stress."""
 
 _PATH = (
     "between it and the direction of the in-plane principal stress of the larger size, tension or "

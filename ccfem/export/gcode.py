@@ -2,10 +2,10 @@
 
 Conventions of the file: mm and mm/min; X, Y, Z absolute, E relative (M83). G1 lays material, G0
 only travels. E of the matrix is length of filament, so that a line has the volume of its length,
-its width and the height of its layer. E of the fibre is length of fibre: before a path, as much as
-reaches from the cutter to the nozzle (G1 with E alone), then as much as the nozzle moves. The cut
-comes that length before the end of the path; the rest is dragged out and laid by G1 without E. In
-all, a path is fed exactly its own length.
+its width and the height of its layer. E of the fibre is length of fibre: before a path, the
+distance from the cutter to the nozzle (G1 with E alone), then the distance that the nozzle moves.
+The cut comes that first distance before the end of the path; the rest is dragged out and laid by G1
+without E. In all, exactly the length of the path is fed.
 """
 
 from importlib.metadata import version
@@ -30,7 +30,7 @@ _FEED_DIGITS = 5
 """Decimals of E, mm."""
 
 _SAME = 1e-3
-"""A path is cut at one of its points where that lies so near, mm, to where it should be cut."""
+"""A path is cut at one of its points where that is within this distance, mm, of the right place."""
 
 
 def write_gcode(path: str | Path, plan: PrintPlan, machine: Machine) -> None:
@@ -40,7 +40,6 @@ def write_gcode(path: str | Path, plan: PrintPlan, machine: Machine) -> None:
     ----------
     path : str or Path
     plan : PrintPlan
-        From `plan_print`.
     machine : Machine
         The one that the plan was made for.
 
@@ -101,7 +100,7 @@ class _Program:
         self._retracted = False
 
     def begin_layer(self, number: int, top: float, thickness: float, kind: int) -> None:
-        """Rise above the layer, and take up the tool that lays it."""
+        """Rise above the layer, and select the tool that lays it."""
         self._top = float(top)
         self.lines += [
             f";LAYER:{number}",
@@ -180,7 +179,7 @@ class _Program:
             self._height = height
 
     def _at(self, speed: float) -> str:
-        """Feed rate of a move, where it is another than that of the move before."""
+        """Feed rate of a move, where it differs from that of the move before."""
         feed = f" F{60.0 * speed:.6g}"
         said, self._feed = self._feed, feed
         return "" if feed == said else feed

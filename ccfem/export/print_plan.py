@@ -1,6 +1,6 @@
 """A whole part as it is printed: layers of matrix below, between and above the layers of fibre."""
 
-from collections.abc import Iterator, Sequence
+from collections.abc import Sequence
 from dataclasses import dataclass
 from itertools import pairwise
 
@@ -24,14 +24,14 @@ COORDINATE_DIGITS = 3
 """Decimals of coordinates, mm."""
 
 _SAME = 1e-6
-"""Heights nearer than this, mm, are one."""
+"""Heights closer than this, mm, are the same."""
 
 _OVERLAP = 0.25
-"""How far the ends of the zigzag reach into the contour, in line widths. Our choice: the lines
-then hold the volume of a section to 3 % (`tests/export/test_gcode.py`)."""
+"""Overlap of the ends of the zigzag with the contour, in line widths. Our choice: the lines then
+have the volume of the section to 3 % (`tests/export/test_gcode.py`)."""
 
 _SHORT = 1e-6
-"""A path short of the cutter's distance by no more than this share of it is long enough."""
+"""Share of the cutter's distance by which a path may be too short through rounding."""
 
 
 @dataclass(frozen=True)
@@ -60,7 +60,7 @@ class PrintPlan:
 
 @dataclass(frozen=True)
 class _Slab:
-    """A layer to print: its extent along the build direction, and the fibre layer that it is."""
+    """A layer to print: its extent along the build direction, and its fibre layer if it is one."""
 
     lower: float
     upper: float
@@ -91,12 +91,12 @@ def plan_print(
 ) -> PrintPlan:
     """Plan the print of a whole part.
 
-    Fibre layers lie at the heights that they were planned at, with `Machine.fibre_height`. What is
-    below, between and above them is filled with matrix layers of equal height, as few as
+    Fibre layers lie at the heights that they were planned at, with `Machine.fibre_height`. The
+    space below, between and above them is filled with matrix layers of equal height, as few as
     `Machine.matrix_height` allows, so that the part gets its full height. A matrix layer is a
     contour and a zigzag of the section at its middle, which turns from one matrix layer to the
-    next. Beside the fibre of a layer nothing is laid; a layer without fibre is none. Paths of a
-    layer follow each other by their nearest ends. The part stands in the middle of the bed.
+    next. A fibre layer holds fibre alone, and a layer without fibre is left out. Within a layer the
+    next path is always the one with the nearest end. The part stands in the middle of the bed.
 
     Parameters
     ----------
@@ -107,10 +107,6 @@ def plan_print(
     mesh : TetMesh
         The part.
     machine : Machine
-
-    Returns
-    -------
-    PrintPlan
 
     Raises
     ------
@@ -126,7 +122,8 @@ def plan_print(
     lowest, highest = corners.min(axis=0), corners.max(axis=0)
     laid = [layer for layer in layers if layer.index in fibre.layer]
     slabs = _slabs(laid, float(lowest[2]), float(highest[2]), machine)
-    matrix = _matrix_lines([slab for slab in slabs if slab.fibre is None], mesh, frame, machine)
+    matrix_slabs = [slab for slab in slabs if slab.fibre is None]
+    matrix = iter(_matrix_lines(matrix_slabs, mesh, frame, machine))
     origin = 0.5 * (lowest[:2] + highest[:2] - machine.gcode.bed[:2])
     printed = []
     for number, slab in enumerate(slabs):
@@ -146,7 +143,7 @@ def plan_print(
 
 
 def _check_fibre(fibre: Toolpaths, layers: Sequence[Layer], machine: Machine) -> None:
-    """Every path lies on a layer given and is long enough for the cutter."""
+    """Check that every path lies on a given layer and is long enough for the cutter."""
     if not layers:
         raise InputError("a print needs at least one layer; got none: give those of the plan")
     missing = set(fibre.layer.tolist()) - {layer.index for layer in layers}
@@ -194,22 +191,19 @@ def _matrix_slabs(lower: float, upper: float, machine: Machine) -> list[_Slab]:
 
 def _matrix_lines(
     slabs: Sequence[_Slab], mesh: TetMesh, frame: FloatArray, machine: Machine
-) -> Iterator[list[FloatArray]]:
+) -> list[list[FloatArray]]:
     """Lines (n, 2) of each matrix layer in the plane of `frame`: a contour, a zigzag inside it."""
     width, profile = machine.matrix_width, machine.gcode
-    middles = [0.5 * (slab.lower + slab.upper) for slab in slabs]
-    found = Planar(heights=tuple(middles)).cut(mesh, frame[2]) if middles else ()
-    sections = {layer.index: layer for layer in found}
-    for number in range(len(slabs)):
-        if number not in sections:
-            yield []
-            continue
-        section = sections[number]
-        angle = np.radians(profile.matrix_angle + profile.matrix_turn * number)
-        contours = offset_rings(section.plane.polygon, 0.5 * width, width, width, 1)
-        inside = zigzag(section.plane.polygon, (1.5 - _OVERLAP) * width, width, width, float(angle))
-        lines = [ring for level in contours for ring in level] + inside
-        yield [section.plane.to_space(line) @ frame[:2].T for line in lines]
+    lines: list[list[FloatArray]] = [[] for _ in slabs]
+    middles = tuple(0.5 * (slab.lower + slab.upper) for slab in slabs)
+    for layer in Planar(heights=middles).cut(mesh, frame[2]) if middles else ():
+        plane = layer.plane
+        angle = np.radians(profile.matrix_angle + profile.matrix_turn * layer.index)
+        contours = offset_rings(plane.polygon, 0.5 * width, width, width, 1)
+        inside = zigzag(plane.polygon, (1.5 - _OVERLAP) * width, width, width, float(angle))
+        found = [ring for level in contours for ring in level] + inside
+        lines[layer.index] = [plane.to_space(line) @ frame[:2].T for line in found]
+    return lines
 
 
 def _printed(lines: list[FloatArray], height: float, number: int, kind: int) -> Toolpaths:
@@ -241,7 +235,7 @@ def _printed(lines: list[FloatArray], height: float, number: int, kind: int) -> 
 
 
 def _check_bed(plan: PrintPlan, machine: Machine) -> None:
-    """Everything lies in the space that the printer reaches."""
+    """Check that everything lies in the space that the printer reaches."""
     points, bed = plan.paths.points, np.array(machine.gcode.bed)
     if not len(points):
         raise InputError("there is nothing to print: the part is thinner than a line of matrix")

@@ -5,6 +5,7 @@ import zlib
 from collections.abc import Iterator, Mapping
 from pathlib import Path
 from typing import Any
+from xml.sax.saxutils import quoteattr
 
 import numpy as np
 from numpy.typing import NDArray
@@ -17,9 +18,10 @@ from ccfem.toolpaths import Toolpaths
 __all__ = ["write_paths"]
 
 _EFFORT = 4
-"""Of zlib, 1 to 9; above it the files of the loop get no smaller."""
+"""Compression level of zlib, 1 to 9; higher ones make the files of the loop no smaller."""
 
-_TYPES = {"f8": "Float64", "i8": "Int64", "u1": "UInt8"}
+_TYPES = {"f": ("f8", "Float64"), "b": ("u1", "UInt8")}
+"""Of arrays by the kind of their data type; Int64 for all others."""
 
 
 def write_paths(
@@ -38,28 +40,25 @@ def write_paths(
     toolpaths : Toolpaths
     path : str or Path
     path_data : mapping of name to (K,) array, optional
-        More values of the paths.
+        Further values, one per path.
 
     Raises
     ------
     InputError
         When the file cannot be written, or an array has the wrong length.
     """
-    points: dict[str, NDArray[Any]] = {
-        "normals": toolpaths.normals,
-        "link": toolpaths.link.astype(np.uint8),
-    }
+    points: dict[str, NDArray[Any]] = {"normals": toolpaths.normals, "link": toolpaths.link}
     paths: dict[str, NDArray[Any]] = {
         "layer": toolpaths.layer,
         "kind": toolpaths.kind,
-        "closed": toolpaths.closed.astype(np.uint8),
+        "closed": toolpaths.closed,
         "length": toolpaths.lengths,
         **(path_data or {}),
     }
     for name, values in paths.items():
         if len(values) != len(toolpaths):
             raise InputError(
-                f"'{name}' must have one value a path, {len(toolpaths)} in all; got {len(values)}"
+                f"'{name}' must have one value per path, {len(toolpaths)} in all; got {len(values)}"
             )
     with whole_file(path) as temporary, open(temporary, "w", encoding="ascii") as file:
         file.writelines(_lines(toolpaths, points, paths))
@@ -91,10 +90,8 @@ def _lines(
 def _array(name: str, values: NDArray[Any]) -> str:
     """One DataArray, inline in base64: one block of zlib with its sizes in bytes before it."""
     values = np.asarray(values)
-    if values.dtype == np.bool_:
-        values = values.astype(np.uint8)
-    kind = "u1" if values.dtype == np.uint8 else "f8" if values.dtype.kind == "f" else "i8"
-    data = np.ascontiguousarray(values, dtype=f"<{kind}").tobytes()
+    size, name_of_type = _TYPES.get(values.dtype.kind, ("i8", "Int64"))
+    data = np.ascontiguousarray(values, dtype=f"<{size}").tobytes()
     packed = zlib.compress(data, _EFFORT) if data else b""
     # Number of blocks, size of a block, of a last one that is shorter, and of each when packed.
     sizes = [1, len(data), 0, len(packed)] if data else [0, 0, 0]
@@ -102,12 +99,6 @@ def _array(name: str, values: NDArray[Any]) -> str:
     text = (base64.b64encode(header) + base64.b64encode(packed)).decode("ascii")
     components = values.shape[1] if values.ndim == 2 else 1
     return (
-        f'<DataArray type="{_TYPES[kind]}" Name="{_escaped(name)}" '
+        f'<DataArray type="{name_of_type}" Name={quoteattr(name)} '
         f'NumberOfComponents="{components}" format="binary">{text}</DataArray>\n'
     )
-
-
-def _escaped(name: str) -> str:
-    from xml.sax.saxutils import escape
-
-    return escape(name, {'"': "&quot;"})

@@ -2,8 +2,8 @@
 
 A line ``;Layer_CCF: i`` starts layer i. Coordinates are those of the tool: X and Y along the two
 in-plane axes of a layer's frame, Z along the build direction. (For the authors' meshes, built along
-y, the tool's X, Y, Z are x, -z, y of the mesh.) The format has no place for which steps are links
-(`Toolpaths.link`): paths that are read back have none.
+y, the tool's X, Y, Z are x, -z, y of the mesh.) The format cannot mark links (`Toolpaths.link`):
+paths that are read back have none.
 """
 
 from collections.abc import Sequence
@@ -50,7 +50,7 @@ def read_waypoints(path: str | Path, frame: FloatArray) -> Toolpaths:
     try:
         text = file.read_text(encoding="utf-8")
     except UnicodeDecodeError:
-        raise InputError(f"{path} is no waypoint file: it holds no text: check its name") from None
+        raise InputError(f"{path} is not a waypoint file: it is not text: check its name") from None
     lines, layers = _parse(text, str(path))
     if not lines:
         return Toolpaths.empty()
@@ -114,9 +114,7 @@ def _coordinates(word: str) -> list[float]:
 
 
 def write_waypoints(path: str | Path, toolpaths: Toolpaths, layers: Sequence[Layer]) -> None:
-    """Write fibre paths to a waypoint file, coordinates rounded to 0.0001 mm.
-
-    The file is written whole or not at all.
+    """Write fibre paths to a waypoint file, whole or not at all, rounded to 0.0001 mm.
 
     Parameters
     ----------

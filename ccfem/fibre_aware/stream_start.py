@@ -11,8 +11,9 @@ from ccfem.fibre_aware.smeared import SmearedPart
 from ccfem.fibre_aware.stream_design import DENSEST, StreamProblem
 from ccfem.fields.fill import fill_screened
 from ccfem.fields.layer_elements import Surface, positive_definite
-from ccfem.fields.layer_tension import SampledTension, layer_tension
+from ccfem.fields.layer_tension import layer_tension
 from ccfem.fields.orientation import orient
+from ccfem.fields.tensile import Tension
 from ccfem.layers.layer import Layer
 from ccfem.layers.layer_stress import stress_on
 
@@ -93,7 +94,7 @@ def start_field(
     return _to_budget(problem, field)
 
 
-def _fit(problem: StreamProblem, layer: Layer, tension: SampledTension, top: float) -> FloatArray:
+def _fit(problem: StreamProblem, layer: Layer, tension: Tension, top: float) -> FloatArray:
     """Coefficients (k,) of the field along the tension of one layer."""
     grid = problem.grid
     if not tension.defined.any():

@@ -33,7 +33,7 @@ __all__ = ["UpperBound", "certificate", "upper_bound"]
 _ANGLES = 12
 _LEAST_PROGRESS = 2e-4
 _PATIENCE = 3
-"""It ends when so many iterations have not lowered the bound by this share."""
+"""The iterations stop when this many of them have not lowered the bound by this share."""
 
 _BISECTIONS = 60
 
@@ -99,12 +99,8 @@ def upper_bound(
     mode : str, default "tension"
         "tension": fibres in compression carry nothing; "bonded": all fibres carry.
     iterations : int, default 30
-        Most iterations of the optimality criterion, a solve each; at least 1. About 10 are needed:
-        it ends where the bound falls no more.
-
-    Returns
-    -------
-    UpperBound
+        Maximum number of iterations of the optimality criterion, a solve each; at least 1. About 10
+        are needed: they stop where the bound no longer falls.
 
     Raises
     ------
@@ -206,5 +202,5 @@ def _criterion(
         laid = float(volume @ np.minimum(most, total / middle))
         low, high = (middle, high) if laid > length else (low, middle)
     scale = np.minimum(most, total / high) / np.maximum(total, 1e-300)
-    # What is gone does not come back: keep a trace.
+    # A density of 0 would stay 0: keep a trace.
     return np.maximum(weight * scale[:, None], 1e-9 * most[:, None])

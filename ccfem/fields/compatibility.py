@@ -22,7 +22,7 @@ def incompatible(
     defined: BoolArray,
     rule: Incompatible = "any",
 ) -> BoolArray:
-    """Mark the cells whose vector disagrees with those of the cells round them.
+    """Mark, (m,), the cells whose vector disagrees with those of the cells round them.
 
     Two cells are neighbours when they share a node; they disagree when ``v . v* <= 0.5``, the
     paper's eta.
@@ -34,14 +34,10 @@ def incompatible(
     cells : (m, 4) int array
         Corner nodes.
     defined : (m,) bool array
-        Cells without a vector are neither marked nor asked.
+        Cells without a vector are neither marked nor compared.
     rule : {"any", "majority", "all", "none"}, default "any"
         Which share of the neighbours has to disagree. The paper prints "for all", which marks next
         to nothing; "any" gives its figures.
-
-    Returns
-    -------
-    (m,) bool array
     """
     if rule == "none":
         return np.zeros(len(cells), dtype=bool)
@@ -49,7 +45,7 @@ def incompatible(
     nodes = cells.ravel()
     order = np.argsort(nodes, kind="stable")
     start = np.searchsorted(nodes[order], np.arange(int(nodes.max()) + 2))
-    against, asked = _disagreeing(direction, cells, defined, order // 4, start, _LIMIT)
+    against, asked = _disagreeing(direction, cells, defined, order // 4, start)
     if rule == "any":
         return defined & (against > 0)
     if rule == "majority":
@@ -58,7 +54,7 @@ def incompatible(
 
 
 @njit(cache=True)
-def _disagreeing(direction, cells, defined, cell_of, start, limit):  # type: ignore[no-untyped-def]
+def _disagreeing(direction, cells, defined, cell_of, start):  # type: ignore[no-untyped-def]
     count = len(cells)
     against = np.zeros(count, np.int64)
     asked = np.zeros(count, np.int64)
@@ -77,5 +73,5 @@ def _disagreeing(direction, cells, defined, cell_of, start, limit):  # type: ign
                 product = 0.0
                 for axis in range(3):
                     product += direction[e, axis] * direction[other, axis]
-                against[e] += product <= limit
+                against[e] += product <= _LIMIT
     return against, asked

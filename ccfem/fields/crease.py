@@ -4,7 +4,7 @@ Round a pin that pulls a lug the lines of tension come from the far end, turn ro
 back: once round the hole, a vector that follows them has changed its sign. Somewhere there has to
 be a cut across which neighbours oppose each other. Where the cut runs along the lines, the scalar
 field has a crease there and its isocurves stay parallel to it; where it crosses them, the isocurves
-turn aside. A spanning tree of neighbours does not know the difference.
+turn aside. A spanning tree of neighbours cannot tell the two apart.
 """
 
 import numpy as np
@@ -17,8 +17,8 @@ from ccfem.fields.orientation import orient
 __all__ = ["orient_along"]
 
 _ACROSS = 3e-3
-"""Penalty of a change across the lines, in that of one along them. A part wants the cut along its
-lines while this is below (breadth / twice the length)^2 of the strip that they fill."""
+"""Penalty of a change across the lines over that of one along them. The cut runs along the lines
+while this is below (breadth / twice the length)^2 of the strip that they fill."""
 _LEAST_WEIGHT = 1e-3
 _POWER = 0.5
 _ITERATIONS = 20
@@ -40,7 +40,7 @@ def orient_along(surface: Surface, direction: FloatArray, confidence: FloatArray
     direction : (t, 2) array
         Unit vectors on the triangles, of any sign.
     confidence : (t,) array in [0, 1]
-        w: a cut costs the less the smaller it is.
+        w: the smaller it is, the less a cut costs.
 
     Returns
     -------
@@ -81,8 +81,4 @@ def _at_points(surface: Surface, direction: FloatArray) -> FloatArray:
 def _turned_energy(surface: Surface, metric: FloatArray, sign: FloatArray) -> sparse.csc_array:
     """As `Surface.energy`, the value at each corner of each triangle times a sign (t, 3)."""
     slopes = surface.gradients * sign[:, :, None]
-    blocks = np.einsum("tid,tde,tje->tij", slopes, metric, slopes)
-    rows = np.repeat(surface.triangles, 3, axis=1).ravel()
-    columns = np.tile(surface.triangles, (1, 3)).ravel()
-    n = len(surface.points)
-    return sparse.coo_array((blocks.ravel(), (rows, columns)), shape=(n, n)).tocsc()
+    return surface.matrix(np.einsum("tid,tde,tje->tij", slopes, metric, slopes))

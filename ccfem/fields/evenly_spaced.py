@@ -13,12 +13,7 @@ from numba import njit
 from ccfem.arrays import FloatArray, IntArray
 from ccfem.checks import check_number
 from ccfem.errors import InputError
-from ccfem.fields.streamlines import (
-    direction_at,
-    mean_and_shear,
-    streamline_step,
-    triangle_neighbours,
-)
+from ccfem.fields.streamlines import direction_at, line_field, streamline_step
 from ccfem.geometry.section_grid import SectionGrid, contains, section_grid
 from ccfem.geometry.shapes import Region
 from ccfem.tensor import strongest_in_plane
@@ -30,7 +25,7 @@ _STEP = 0.1
 _LEAST = 0.02
 """As `least` of `streamlines`."""
 _SLACK = 1e-3
-"""By how much less than the separation a new line may be off, for rounding and finite steps."""
+"""Share of the separation by which a new line may be too near: rounding and finite steps."""
 _MOST_POINTS = 20_000_000
 
 
@@ -41,6 +36,7 @@ def evenly_spaced_streamlines(
     region: Region,
     separation: float,
     closest: float = 0.5,
+    least_length: float = 0.0,
 ) -> list[FloatArray]:
     """Lines along the principal stress of the largest size, a distance apart.
 
@@ -53,16 +49,16 @@ def evenly_spaced_streamlines(
 
     Parameters
     ----------
-    points : (n, 2) array, mm
-    triangles : (t, 3) int array
-    plane_stress : (n, 3) array, MPa
-        s11, s22, s12 at the points.
+    points, triangles, plane_stress
+        As in `streamlines`.
     region : shapely (Multi)Polygon, mm
         Lines stay in it.
     separation : float, mm
         Distance at which lines begin beside each other (d_sep), > 0.
     closest : float in (0, 1), default 0.5
-        Least distance of lines in separations (d_test / d_sep).
+        Minimum distance of lines in separations (d_test / d_sep).
+    least_length : float, mm, default 0
+        Shorter lines are not laid and block no other line; never below one separation.
 
     Returns
     -------
@@ -74,8 +70,8 @@ def evenly_spaced_streamlines(
     check_number("closest", closest, above=0.0, below=1.0)
     if shapely.is_empty(region) or not len(triangles):
         return []
-    field, sizes = mean_and_shear(plane_stress), np.abs(strongest_in_plane(plane_stress)[0])
     middles = points[triangles].mean(axis=1)
+    sizes = np.abs(strongest_in_plane(plane_stress)[0])
     seeds = np.argsort(-sizes[triangles].mean(axis=1), kind="stable")
     seeds = seeds[shapely.contains_xy(region, middles[seeds])]
     step = _STEP * separation
@@ -87,12 +83,7 @@ def evenly_spaced_streamlines(
         )
     grid = section_grid(region, 2.0 * separation)
     found, spans, closed = _lay(
-        _Field(
-            np.ascontiguousarray(points[triangles]),
-            np.ascontiguousarray(field[triangles]),
-            triangle_neighbours(triangles),
-            _LEAST * float(sizes.max()),
-        ),
+        line_field(points, triangles, plane_stress, _LEAST),
         grid,
         _empty(grid, separation, int(room)),
         middles[seeds],
@@ -100,21 +91,13 @@ def evenly_spaced_streamlines(
         separation,
         closest * separation,
         step,
+        max(least_length, separation),
     )
     lines = []
     for (start, turn, end), ring in zip(spans, closed, strict=True):
         ahead, back = found[start:turn], found[turn:end]
         lines.append(np.concatenate([ahead, ahead[:1]] if ring else [back[::-1], ahead]))
     return lines
-
-
-class _Field(NamedTuple):
-    """Corners (t, 3, 2), values there, neighbours of the triangles, and the least stress."""
-
-    corners: FloatArray
-    values: FloatArray
-    beside: IntArray
-    least: float
 
 
 class _Laid(NamedTuple):
@@ -152,7 +135,7 @@ def _empty(grid: SectionGrid, cell: float, room: int) -> _Laid:
 
 
 @njit(cache=True, nogil=True)
-def _lay(field, grid, laid, seeds, homes, apart, test, step):  # type: ignore[no-untyped-def]
+def _lay(field, grid, laid, seeds, homes, apart, test, step, least):  # type: ignore[no-untyped-def]
     """Points of all lines, (start, turn, end) of each among them, and whether it is closed.
 
     From start to turn the points run ahead from the seed, from turn to end back from it.
@@ -176,7 +159,7 @@ def _lay(field, grid, laid, seeds, homes, apart, test, step):  # type: ignore[no
         if taken or not contains(grid, x, y):
             continue
         turn, end, ring = _trace(field, grid, laid, count, lines, x, y, home, test, step)
-        if end - count < apart / step:
+        if (end - count) * step < least:
             _take_back(laid, count, end)
             continue
         spans[lines, 0], spans[lines, 1], spans[lines, 2] = count, turn, end
@@ -192,9 +175,8 @@ def _trace(field, grid, laid, first, number, x0, y0, home, test, step):  # type:
 
     The numbers of the points start at `first`.
     """
-    corners, values, beside, least = field
     way = np.zeros(2)
-    dx, dy, home, fine = direction_at(corners, values, beside, home, x0, y0, True, least, way)
+    dx, dy, home, fine = direction_at(field, home, x0, y0, True, way)
     count = first
     if not fine:
         return count, count, False
@@ -205,9 +187,7 @@ def _trace(field, grid, laid, first, number, x0, y0, home, test, step):  # type:
         x, y, cell, along = x0, y0, home, 0.0
         way[0], way[1] = sense * dx, sense * dy
         while count < len(laid.line):
-            x, y, cell, fine = streamline_step(
-                corners, values, beside, cell, x, y, step, least, way
-            )
+            x, y, cell, fine = streamline_step(field, cell, x, y, step, way)
             along += sense * step
             if not fine or not contains(grid, x, y):
                 break
@@ -244,7 +224,7 @@ def _add(laid, p, x, y, dx, dy, home, along, number):  # type: ignore[no-untyped
 
 @njit(cache=True, nogil=True)
 def _take_back(laid, first, end):  # type: ignore[no-untyped-def]
-    """Forget points, the last ones that were added."""
+    """Remove points, the last ones that were added."""
     for p in range(end - 1, first - 1, -1):
         i, j = _cell(laid, laid.spot[p, 0], laid.spot[p, 1])
         laid.head[i, j] = laid.following[p]

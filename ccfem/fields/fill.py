@@ -19,8 +19,8 @@ def fill_laplacian(
 ) -> tuple[FloatArray, FloatArray]:
     """Fill by averaging over neighbouring triangles, 50 times [Chen et al. 2021, Eq. 3-4].
 
-    The face of the largest stress is held. The energy that this descends has a constant minimiser,
-    so more iterations keep degrading the field: `fill_screened` does not.
+    The triangle of the largest stress is held. The energy that this descends has a constant
+    minimiser, so more iterations keep degrading the field: `fill_screened` does not.
 
     Parameters
     ----------

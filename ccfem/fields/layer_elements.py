@@ -23,17 +23,22 @@ def positive_definite(matrix: Any) -> Any:
     return splu(sparse.csc_array(matrix), permc_spec="MMD_AT_PLUS_A", options=options)
 
 
+_STEEP = 0.9
+"""Cosine to a triangle's normal above which an axis is nearly square to the triangle."""
 _THIN = 1e-9
 """Triangles with less than this share of the mean area have no usable gradient: they get none."""
 
 
 @dataclass(frozen=True)
 class Surface:
-    """Triangles in the plane, with the operators that the fields need.
+    """Triangles in the plane or in space, with the operators that the fields need.
+
+    Gradients and metrics have two components: those in the plane, or in space those along the
+    `frames` of each triangle.
 
     Attributes
     ----------
-    points : (n, 2) array, mm
+    points : (n, 2) or (n, 3) array, mm
     triangles : (t, 3) int array
     """
 
@@ -46,14 +51,41 @@ class Surface:
         return cls(layer.plane.points, layer.triangles)
 
     @cached_property
+    def frames(self) -> FloatArray:
+        """Two unit vectors along each triangle in space, (t, 2, 3), the second left of the first.
+
+        The first is the direction, along the triangle, of the axis in which the surface is longest
+        of those that are not nearly square to it.
+        """
+        a, b, c = np.moveaxis(self.points[self.triangles], 1, 0)
+        normal = np.cross(b - a, c - a)
+        normal = normal / np.maximum(np.linalg.norm(normal, axis=1), 1e-300)[:, None]
+        longest, second = np.argsort(-np.ptp(self.points, axis=0), kind="stable")[:2]
+        steep = np.abs(normal[:, longest]) > _STEEP
+        axis = np.where(steep[:, None], np.eye(3)[second], np.eye(3)[longest])
+        first = axis - np.einsum("td,td->t", axis, normal)[:, None] * normal
+        first = first / np.maximum(np.linalg.norm(first, axis=1), 1e-300)[:, None]
+        return read_only(np.stack([first, np.cross(normal, first)], axis=1))
+
+    @cached_property
+    def _corners(self) -> FloatArray:
+        """Corners of each triangle in its own plane, (t, 3, 2)."""
+        corners = self.points[self.triangles]
+        if self.points.shape[1] == 2:
+            return corners
+        away = corners - corners[:, :1]
+        return np.asarray(np.einsum("tid,tkd->tik", away, self.frames))
+
+    @cached_property
     def areas(self) -> FloatArray:
         """Area of each triangle, (t,), mm^2."""
-        return read_only(signed_areas(self.points, self.triangles))
+        own = np.arange(3 * len(self.triangles)).reshape(-1, 3)
+        return read_only(signed_areas(self._corners.reshape(-1, 2), own))
 
     @cached_property
     def gradients(self) -> FloatArray:
         """Gradients of the three shape functions on each triangle, (t, 3, 2), 1/mm."""
-        p = self.points[self.triangles]
+        p = self._corners
         opposite = p[:, [2, 0, 1]] - p[:, [1, 2, 0]]
         turned = np.stack([-opposite[..., 1], opposite[..., 0]], axis=-1)
         thick = self.areas > _THIN * self.areas.mean()
@@ -88,7 +120,10 @@ class Surface:
         gx, gy = self.gradients[:, :, 0], self.gradients[:, :, 1]
         fx = metric[:, 0, 0, None] * gx + metric[:, 0, 1, None] * gy
         fy = metric[:, 1, 0, None] * gx + metric[:, 1, 1, None] * gy
-        blocks = gx[:, :, None] * fx[:, None, :] + gy[:, :, None] * fy[:, None, :]
+        return self.matrix(gx[:, :, None] * fx[:, None, :] + gy[:, :, None] * fy[:, None, :])
+
+    def matrix(self, blocks: FloatArray) -> sparse.csc_array:
+        """Sum matrices (t, 3, 3) of the triangles to one (n, n) of the points."""
         rows = np.repeat(self.triangles, 3, axis=1).ravel()
         columns = np.tile(self.triangles, (1, 3)).ravel()
         n = len(self.points)

@@ -2,16 +2,11 @@
 
 import numpy as np
 import scipy.sparse as sparse
-from scipy.sparse.csgraph import connected_components, dijkstra
+from scipy.sparse.csgraph import dijkstra
 
 from ccfem.arrays import FloatArray
 from ccfem.fields.layer_elements import Surface
-from ccfem.geometry.isocontours import (
-    Isocontours,
-    isocontours,
-    least_distance,
-    steepest_spacing,
-)
+from ccfem.geometry.isocontours import Isocontours, isocontours, least_distance
 
 __all__ = ["extract_levels", "levels_at", "start_count", "unit_levels"]
 
@@ -57,46 +52,42 @@ def extract_levels(surface: Surface, values: FloatArray, width: float) -> Isocon
     """
     if not np.ptp(values) > 0.0:
         return levels_at(surface, np.zeros(len(values)), 1)
-    gradient = surface.gradient(values)
-    count = start_count(surface, values, width)
+    steepness = np.hypot(*surface.gradient(values).T)
+    usable = (surface.areas > 0.0) & (steepness > 0.0)
+    corners, steepness = values[surface.triangles[usable]], steepness[usable]
+    low, high = corners.min(axis=1), corners.max(axis=1)
 
-    def apart(count: int, enough: float) -> float:
+    def apart(count: int) -> float:
         first, step = _levels(values, count)
-        least = steepest_spacing(surface.areas, gradient, surface.triangles, values, first, step)
-        if least <= enough:
-            return float(least)
-        curves = isocontours(surface.points, surface.triangles, values, first, step, surface.edges)
-        return float(
-            least_distance(curves.points, curves.offsets, curves.level, 2.0 * width, enough)
-        )
+        twice = np.floor((high - first) / step) > np.ceil((low - first) / step)
+        least = float((step / steepness[twice]).min(initial=np.inf))
+        if least <= width:
+            return least
+        return least_distance(levels_at(surface, values, count), 2.0 * width, width)
 
-    distance = apart(count, width)
+    count = start_count(surface, values, width)
+    distance = apart(count)
     while distance > width:
         count = int(np.ceil(count * distance / width))
-        distance = apart(count, width)
+        distance = apart(count)
     while count > 1 and not distance > width:
         count -= 1
-        distance = apart(count, width)
+        distance = apart(count)
     return levels_at(surface, values, count)
 
 
 def start_count(surface: Surface, values: FloatArray, width: float) -> int:
-    """Distance along mesh edges from the smallest to the largest value, in widths.
+    """Distance along mesh edges from the smallest to the largest value, in widths (Dijkstra).
 
-    For each connected part of the surface by Dijkstra; the largest counts.
+    Where the surface is in several parts: to the farthest point of the part of the smallest value.
     """
-    t = surface.triangles
-    edges = np.concatenate([t[:, [0, 1]], t[:, [1, 2]], t[:, [2, 0]]])
+    edges, n = surface.edges[0], len(surface.points)
     length = np.linalg.norm(surface.points[edges[:, 0]] - surface.points[edges[:, 1]], axis=1)
-    n = len(surface.points)
-    graph = sparse.coo_array((length, (edges[:, 0], edges[:, 1])), shape=(n, n)).tocsr()
-    graph = graph.maximum(graph.T)
-    lowest = int(np.argmin(values))
-    distance = dijkstra(graph, directed=False, indices=lowest)
+    graph = sparse.coo_array((length, edges.T), shape=(n, n)).tocsr()
+    distance = dijkstra(graph, directed=False, indices=int(np.argmin(values)))
     highest = distance[int(np.argmax(values))]
     if not np.isfinite(highest):
-        _, part = connected_components(graph, directed=False)
-        highest = distance[(part == part[lowest]) & np.isfinite(distance)].max()
+        highest = distance[np.isfinite(distance)].max()
     return max(int(np.ceil(highest / width)), 1)
 
 

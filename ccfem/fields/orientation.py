@@ -35,12 +35,10 @@ def orient(
         of its first element.
     """
     product = np.einsum("ij,ij->i", direction[pairs[:, 0]], direction[pairs[:, 1]])
-    weight = 1.0 - np.abs(product)
+    alike = np.abs(product)
     if confidence is not None:
-        weight = 1.0 - np.minimum(confidence[pairs[:, 0]], confidence[pairs[:, 1]]) * np.abs(
-            product
-        )
-    order = np.argsort(weight, kind="stable")
+        alike = np.minimum(confidence[pairs[:, 0]], confidence[pairs[:, 1]]) * alike
+    order = np.argsort(1.0 - alike, kind="stable")
     return direction * _signs(len(direction), pairs[order], product[order] < 0.0)[:, None]
 
 

@@ -48,7 +48,7 @@ def fit_weighted(
     weight: FloatArray,
     spacing_weight: float = 0.1,
 ) -> FloatArray:
-    """Field that runs along the tension first and keeps the wanted density second.
+    """Field, (n,) at the points, along the tension first, and of the wanted density second.
 
     Minimises ``sum_f w_f A_f [(t . grad s)^2 + spacing_weight (n . grad s - m)^2]`` with t the
     direction, n its normal and m the wanted density of isocurves.
@@ -63,10 +63,6 @@ def fit_weighted(
     weight : (t,) array
     spacing_weight : float, default 0.1
         The smaller, the better the alignment and the less even the spacing.
-
-    Returns
-    -------
-    (n,) array
     """
     metric, flux = _weighted_form(surface, direction, density, weight, spacing_weight)
     return _solve(surface, metric, flux)
@@ -87,8 +83,8 @@ def fit_constrained(
     convex problem is solved by the alternating direction method of multipliers (Boyd et al.,
     Foundations and Trends in Machine Learning 3 (2011) 1, section 3): one factorisation, and a
     back-substitution and a projection an iteration. After 20 iterations the objective is within
-    1 % of the optimum and single triangles exceed the bound by some per cent, so that strands are
-    still to be trimmed.
+    1 % of the optimum and single triangles exceed the bound by some per cent, so that strands
+    still have to be trimmed.
 
     Parameters
     ----------
@@ -97,10 +93,6 @@ def fit_constrained(
     density : (t,) array, 1/mm
         Wanted number of isocurves per mm; capped at ``1 / width``.
     width : float, mm
-
-    Returns
-    -------
-    (n,) array
     """
     target = np.minimum(density * width, 1.0)
     metric, flux = _weighted_form(surface, direction, target, weight, spacing_weight)
@@ -140,10 +132,6 @@ def fit_cone(
     surface, direction, density, weight, width, spacing_weight
         As in `fit_constrained`.
 
-    Returns
-    -------
-    (n,) array
-
     Raises
     ------
     SolveError
@@ -151,25 +139,19 @@ def fit_cone(
     """
     import cvxpy
 
-    count = len(surface.points)
     # In widths, so that the bound is 1: the solver judges its accuracy by sizes near 1.
     target = np.minimum(density * width, 1.0)
     normal = np.column_stack([-direction[:, 1], direction[:, 0]])
-    rows = np.repeat(np.arange(len(surface.triangles)), 3)
-    shape = (len(surface.triangles), count)
+    gx, gy = surface.gradient_matrix[0::2], surface.gradient_matrix[1::2]
 
     def along(vectors: FloatArray) -> sparse.csr_array:
-        values = np.einsum("tid,td->ti", surface.gradients, vectors).ravel()
-        return sparse.csr_array((values, (rows, surface.triangles.ravel())), shape=shape)
+        return sparse.diags_array(vectors[:, 0]) @ gx + sparse.diags_array(vectors[:, 1]) @ gy
 
     root = np.sqrt(surface.areas * weight / (surface.areas * weight).mean())
-    field = cvxpy.Variable(count)
-    ones = np.ones((len(root), 1))
+    field = cvxpy.Variable(len(surface.points))
     misaligned = cvxpy.multiply(root, along(direction) @ field)
     uneven = cvxpy.multiply(np.sqrt(spacing_weight) * root, along(normal) @ field - target)
-    gradient = cvxpy.vstack(
-        [along(ones * np.array([1.0, 0.0])) @ field, along(ones * np.array([0.0, 1.0])) @ field]
-    )
+    gradient = cvxpy.vstack([gx @ field, gy @ field])
     usable = np.flatnonzero(np.abs(surface.gradients).max(axis=(1, 2)) > 0.0)
     problem = cvxpy.Problem(
         cvxpy.Minimize(cvxpy.sum_squares(misaligned) + cvxpy.sum_squares(uneven)),

@@ -1,5 +1,7 @@
 """Streamlines of the principal stress in the plane: lines along the stress of the largest size."""
 
+from typing import NamedTuple
+
 import numpy as np
 from numba import njit
 
@@ -9,20 +11,14 @@ from ccfem.geometry.locate import locate
 from ccfem.mesh.facets import paired
 from ccfem.tensor import strongest_in_plane
 
-__all__ = [
-    "direction_at",
-    "mean_and_shear",
-    "streamline_step",
-    "streamlines",
-    "triangle_neighbours",
-]
+__all__ = ["LineField", "direction_at", "line_field", "streamline_step", "streamlines"]
 
 _LONGEST = 10.0
 """Length at which a line stops in either sense, in diagonals of the points."""
 
 _SHARPEST = 0.5
-"""Cosine of the largest turn of the direction within one step: beyond 60 degrees two families of
-principal directions take turns."""
+"""Cosine of the largest turn of the direction within one step: a line that turns by more than 60
+degrees has changed to the other family of principal directions."""
 
 
 def streamlines(
@@ -37,8 +33,8 @@ def streamlines(
 
     Runge-Kutta of fourth order in both senses from each start; the sign follows the step before.
     The direction is that of the linearly interpolated stress, in double-angle form: no eigenvector
-    is ever averaged, and where tension and compression take turns the direction jumps within a
-    triangle.
+    is ever averaged, and where tension and compression change places the direction jumps within
+    a triangle.
 
     Parameters
     ----------
@@ -65,50 +61,72 @@ def streamlines(
     starts = np.asarray(starts, dtype=np.float64).reshape(-1, 2)
     if not len(starts) or not len(triangles):
         return [np.zeros((0, 2)) for _ in starts]
-    field, size = mean_and_shear(plane_stress), np.abs(strongest_in_plane(plane_stress)[0]).max()
-    corners = np.ascontiguousarray(points[triangles])
-    beside = triangle_neighbours(triangles)
+    field = line_field(points, triangles, plane_stress, least)
     diagonal = float(np.linalg.norm(points.max(axis=0) - points.min(axis=0)))
     steps = int(np.ceil(_LONGEST * diagonal / step))
     home, _ = locate(points, triangles, starts, 1e-6)
-    values = np.ascontiguousarray(field[triangles])
     lines = []
     for start, cell in zip(starts, home, strict=True):
         if cell < 0:
             lines.append(np.zeros((0, 2)))
             continue
-        ahead, closed = _follow(corners, values, beside, start, cell, step, least * size, steps, 1)
+        ahead, closed = _follow(field, start, cell, step, steps, 1)
         if closed:
             lines.append(np.concatenate([ahead, ahead[:1]]))
             continue
-        back, _ = _follow(corners, values, beside, start, cell, step, least * size, steps, -1)
+        back, _ = _follow(field, start, cell, step, steps, -1)
         line = np.concatenate([back[:0:-1], ahead])
         lines.append(line if len(line) > 1 else line[:0])
     return lines
 
 
-def mean_and_shear(plane_stress: FloatArray) -> FloatArray:
-    """Mean, half the difference and shear of plane stress (n, 3), MPa: linear in the stress."""
+class LineField(NamedTuple):
+    """Plane stress on triangles, as the compiled loops read it.
+
+    Attributes
+    ----------
+    corners : (t, 3, 2) array, mm
+    values : (t, 3, 3) array, MPa
+        Mean, half the difference and shear of the stress at the corners: linear in the stress.
+    beside : (t, 3) int array
+        Triangle beyond the side opposite to each corner, -1 at the border.
+    least : float, MPa
+        There is no direction where the difference of the two principal stresses, or the larger of
+        their sizes, is below this.
+    """
+
+    corners: FloatArray
+    values: FloatArray
+    beside: IntArray
+    least: float
+
+
+def line_field(
+    points: FloatArray, triangles: IntArray, plane_stress: FloatArray, least: float
+) -> LineField:
+    """Prepare the stress at the points of triangles; parameters as in `streamlines`."""
     s11, s22, s12 = plane_stress.T
-    return np.stack([0.5 * (s11 + s22), 0.5 * (s11 - s22), s12], axis=1)
-
-
-def triangle_neighbours(triangles: IntArray) -> IntArray:
-    """Triangle beyond the side opposite to each corner, (t, 3), -1 at the border."""
+    values = np.stack([0.5 * (s11 + s22), 0.5 * (s11 - s22), s12], axis=1)
     sides = triangles[:, [[1, 2], [2, 0], [0, 1]]].reshape(-1, 2)
     one, other = paired(sides)[0].T
     beside = np.full(len(sides), -1, dtype=np.int64)
     beside[one], beside[other] = other // 3, one // 3
-    return beside.reshape(-1, 3)
+    return LineField(
+        np.ascontiguousarray(points[triangles]),
+        np.ascontiguousarray(values[triangles]),
+        beside.reshape(-1, 3),
+        least * float(np.abs(strongest_in_plane(plane_stress)[0]).max()),
+    )
 
 
 @njit(cache=True, nogil=True)
-def direction_at(corners, values, beside, cell, x, y, either, least, way):  # type: ignore[no-untyped-def]
+def direction_at(field, cell, x, y, either, way):  # type: ignore[no-untyped-def]
     """Return the unit direction at (x, y), the triangle there, and whether there is one.
 
     The triangle is found by walking from `cell`; `way` is where the line came from, so that the
     sign can follow; `either` at the start, where there is none.
     """
+    corners, values, beside, least = field
     for _ in range(len(corners)):
         a, b, c = corners[cell, 0], corners[cell, 1], corners[cell, 2]
         det = (b[0] - a[0]) * (c[1] - a[1]) - (b[1] - a[1]) * (c[0] - a[0])
@@ -144,26 +162,20 @@ def direction_at(corners, values, beside, cell, x, y, either, least, way):  # ty
 
 
 @njit(cache=True, nogil=True)
-def streamline_step(corners, values, beside, cell, x, y, step, least, way):  # type: ignore[no-untyped-def]
+def streamline_step(field, cell, x, y, step, way):  # type: ignore[no-untyped-def]
     """Point one step on, the triangle there, and whether there is one; turns `way`."""
     h = 0.5 * step
-    ax, ay, cell, fine = direction_at(corners, values, beside, cell, x, y, False, least, way)
+    ax, ay, cell, fine = direction_at(field, cell, x, y, False, way)
     if not fine:
         return x, y, cell, False
     way[0], way[1] = ax, ay
-    bx, by, near, fine = direction_at(
-        corners, values, beside, cell, x + h * ax, y + h * ay, False, least, way
-    )
+    bx, by, near, fine = direction_at(field, cell, x + h * ax, y + h * ay, False, way)
     if not fine:
         return x, y, cell, False
-    cx, cy, near, fine = direction_at(
-        corners, values, beside, near, x + h * bx, y + h * by, False, least, way
-    )
+    cx, cy, near, fine = direction_at(field, near, x + h * bx, y + h * by, False, way)
     if not fine:
         return x, y, cell, False
-    ex, ey, near, fine = direction_at(
-        corners, values, beside, near, x + step * cx, y + step * cy, False, least, way
-    )
+    ex, ey, near, fine = direction_at(field, near, x + step * cx, y + step * cy, False, way)
     if not fine:
         return x, y, cell, False
     x += step * (ax + 2.0 * bx + 2.0 * cx + ex) / 6.0
@@ -172,21 +184,19 @@ def streamline_step(corners, values, beside, cell, x, y, step, least, way):  # t
 
 
 @njit(cache=True, nogil=True)
-def _follow(corners, values, beside, start, cell, step, least, most, sense):  # type: ignore[no-untyped-def]
+def _follow(field, start, cell, step, most, sense):  # type: ignore[no-untyped-def]
     """Points (m, 2) from `start` in one sense, and whether they come back to it."""
     line = np.empty((most + 1, 2))
     line[0] = start
     way = np.zeros(2)
-    dx, dy, cell, fine = direction_at(
-        corners, values, beside, cell, start[0], start[1], True, least, way
-    )
+    dx, dy, cell, fine = direction_at(field, cell, start[0], start[1], True, way)
     if not fine:
         return line[:1].copy(), False
     way[0], way[1] = sense * dx, sense * dy
     x, y = start
     count = 1
     while count <= most:
-        x, y, cell, fine = streamline_step(corners, values, beside, cell, x, y, step, least, way)
+        x, y, cell, fine = streamline_step(field, cell, x, y, step, way)
         if not fine:
             break
         line[count, 0], line[count, 1] = x, y

@@ -5,6 +5,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from ccfem.arrays import BoolArray, FloatArray
+from ccfem.layers.layer import Layer
 from ccfem.tensor import largest_in_plane, principal, strongest
 
 __all__ = ["Tension", "plane_tension", "spatial_tension"]
@@ -12,22 +13,38 @@ __all__ = ["Tension", "plane_tension", "spatial_tension"]
 
 @dataclass(frozen=True)
 class Tension:
-    """Tension at k places.
+    """Tension at k places, such as the triangles of a layer or the tetrahedra of a part.
 
     Attributes
     ----------
-    direction : (k, 2) or (k, 3) array
-        Unit vectors; lines, so the sign means nothing.
+    direction : (k, 2) array in a plane, (k, 3) in space
+        Unit vectors; arbitrary where undefined.
     stress : (k,) array, MPa
         Tensile stress along the direction, 0 where there is none: 1e-5 MPa in the paper, which
         would weigh more, the smaller the load.
     defined : (k,) bool array
         Whether there is a tensile direction.
+    oriented : bool
+        Whether neighbouring vectors point the same way. Otherwise they are lines, and their sign
+        means nothing.
     """
 
     direction: FloatArray
     stress: FloatArray
     defined: BoolArray
+    oriented: bool = False
+
+    def on(self, layer: Layer) -> "Tension":
+        """Project from tetrahedra to a flat layer: each triangle takes the values of its own."""
+        direction = self.direction[layer.cell]
+        if layer.turns is not None:
+            direction = np.einsum("tij,tj->ti", layer.turns, direction)
+        plane = direction @ layer.plane.frame[:2].T
+        length = np.linalg.norm(plane, axis=1)
+        defined = self.defined[layer.cell] & (length > 1e-6)
+        unit = plane / np.maximum(length, 1e-300)[:, None]
+        unit = np.where(defined[:, None], unit, [1.0, 0.0])
+        return Tension(unit, self.stress[layer.cell], defined, self.oriented)
 
 
 def spatial_tension(stress: FloatArray, compression_limit: float = 3.0) -> Tension:
@@ -42,11 +59,6 @@ def spatial_tension(stress: FloatArray, compression_limit: float = 3.0) -> Tensi
     stress : (k, 3, 3) array, MPa
     compression_limit : float, default 3.0
         The paper's mu.
-
-    Returns
-    -------
-    Tension
-        With directions in space.
     """
     values, directions = principal(stress)
     order = np.argsort(-np.abs(values), axis=1, kind="stable")
@@ -66,19 +78,7 @@ def plane_tension(plane_stress: FloatArray, compression_limit: float = 3.0) -> T
 
     A fibre that lies in a flat layer carries the stress in that plane only, so this is what the
     planning uses by default; for stress in the plane it equals the projection of
-    `spatial_tension`.
-
-    Parameters
-    ----------
-    plane_stress : (k, 3) array, MPa
-        s11, s22, s12 in the plane.
-    compression_limit : float, default 3.0
-        The paper's mu.
-
-    Returns
-    -------
-    Tension
-        With directions in the plane.
+    `spatial_tension`. The plane stress (k, 3), MPa, is s11, s22, s12; the limit is the paper's mu.
     """
     largest, smallest, angle = largest_in_plane(plane_stress)
     defined = (largest > 0.0) & (-smallest < compression_limit * largest)

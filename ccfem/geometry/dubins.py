@@ -13,7 +13,7 @@ from numba import njit
 
 from ccfem.arrays import FloatArray, IntArray
 
-__all__ = ["WORDS", "advance", "curve_points", "word_sizes"]
+__all__ = ["WORDS", "advance", "curve_points", "shortest_curve", "word_sizes"]
 
 WORDS: IntArray = np.array(
     [[1, 0, 1], [-1, 0, -1], [1, 0, -1], [-1, 0, 1], [1, -1, 1], [-1, 1, -1]], dtype=np.int64
@@ -63,6 +63,14 @@ def curve_points(
     return line
 
 
+def shortest_curve(start: FloatArray, end: FloatArray, radius: float, step: float) -> FloatArray:
+    """Points (k, 2), mm, of the shortest curve of a radius from one pose (3,) to another."""
+    sizes = np.empty((6, 3))
+    word_sizes(start, end, radius, sizes)
+    best = int(np.argmin(np.abs(sizes).sum(axis=1)))
+    return curve_points(start, end, WORDS[best], np.maximum(sizes[best], 0.0), radius, step)
+
+
 @njit(cache=True, nogil=True)
 def _sample(pose, turns, sizes, parts, radius):  # type: ignore[no-untyped-def]
     line = np.empty((parts.sum() + 1, 2))
@@ -101,7 +109,7 @@ def _round(angle):  # type: ignore[no-untyped-def]
 
 @njit(cache=True, nogil=True)
 def word_sizes(start, end, radius, sizes):  # type: ignore[no-untyped-def]
-    """Fill `sizes` (6, 3), mm, with the pieces of each of `WORDS`; inf where it cannot be.
+    """Fill `sizes` (6, 3), mm, with the pieces of each of `WORDS`; inf where there is no curve.
 
     An arc that would turn almost all the way round is a tiny negative one instead.
     """

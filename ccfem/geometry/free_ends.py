@@ -1,4 +1,4 @@
-"""Strands that end in the open led on, straight, to the strand or the border ahead of them."""
+"""Free ends of strands, extended straight to the strand or the border ahead of them."""
 
 from collections.abc import Sequence
 from dataclasses import dataclass
@@ -11,13 +11,13 @@ from ccfem.geometry.offsets import rings
 from ccfem.geometry.polylines import is_closed, line_length, straight_pieces
 from ccfem.geometry.shapes import Region
 
-__all__ = ["lead_on", "strips"]
+__all__ = ["extend_free_ends", "strips"]
 
 _STEEPEST = 25.0
-"""Least angle, degrees, at which a strand led on may meet what is ahead: a strip between strands
-that run side by side takes another strand along its middle instead."""
+"""Minimum angle, degrees, at which an extended strand may meet what is ahead: a strip between
+strands that run side by side takes another strand along its middle instead."""
 _LEAST = 0.3
-"""Shortest way, in pitches, by which an end is led on."""
+"""Minimum length, in pitches, by which an end is extended."""
 
 
 def strips(lines: Sequence[FloatArray], pitch: float) -> Region:
@@ -31,12 +31,12 @@ def strips(lines: Sequence[FloatArray], pitch: float) -> Region:
     )
 
 
-def lead_on(
+def extend_free_ends(
     lines: Sequence[FloatArray], region: Region, pitch: float, closest: float, reach: float
 ) -> tuple[list[FloatArray], Region]:
-    """Lead the free ends of strands on, straight, to what lies ahead where that is near.
+    """Extend the free ends of strands straight to what lies ahead, where that is near.
 
-    The longer of two strands goes first where both would take the same place.
+    Where two strands would take the same place the longer one goes first.
 
     Parameters
     ----------
@@ -47,9 +47,9 @@ def lead_on(
     pitch : float, mm
         Width that each strand takes.
     closest : float
-        Least distance of the sides of strands, in pitches.
+        Minimum distance of the sides of strands, in pitches.
     reach : float, mm
-        Longest way by which an end is led on.
+        Maximum length by which an end is extended.
 
     Returns
     -------
@@ -67,14 +67,14 @@ def lead_on(
     along = here - np.array([lines[number][1 if end == 0 else -2] for number, end in ends])
     along /= np.linalg.norm(along, axis=1)[:, None]
     slack = (closest - 0.5) * pitch
-    open_parts = _Parts(rest)
-    rooms = _Parts(shapely.buffer(rest, -slack, join_style="mitre"))
+    room = shapely.buffer(rest, -slack, join_style="mitre")
     start = here + 1.01 * slack * along
     rays = shapely.linestrings(np.stack([start, here + reach * along], axis=1))
     ahead = _Obstacles.of(lines, region, pitch)
     ways: list[shapely.LineString] = []
-    for k, space in rooms.round(start).items():
-        free = open_parts.round(start[k : k + 1]).get(0, shapely.Polygon())
+    whole = _parts_round(rest, start)
+    for k, space in _parts_round(room, start).items():
+        free = whole.get(k, shapely.Polygon())
         rivals = [way for way in ways if way.distance(rays[k]) < (closest + 0.5) * pitch]
         if rivals:
             taken = shapely.buffer(shapely.union_all(rivals), 0.5 * pitch, cap_style="flat")
@@ -102,16 +102,11 @@ def _free_ends(lines: Sequence[FloatArray], pitch: float) -> list[tuple[int, int
     return [(int(k), end) for k in order if not is_closed(lines[k]) for end in (0, -1)]
 
 
-class _Parts:
-    """Parts of an area, found by a point inside."""
-
-    def __init__(self, area: Region) -> None:
-        self._tree = shapely.STRtree(shapely.get_parts(area))
-
-    def round(self, points: FloatArray) -> dict[int, shapely.Polygon]:
-        """Part round each of several points (k, 2) that has one."""
-        point, part = self._tree.query(shapely.points(points), predicate="within")
-        return dict(zip(point.tolist(), self._tree.geometries[part], strict=True))
+def _parts_round(area: Region, points: FloatArray) -> dict[int, shapely.Polygon]:
+    """Part of an area round each of several points (k, 2) that has one."""
+    parts = shapely.get_parts(area)
+    point, part = shapely.STRtree(parts).query(shapely.points(points), predicate="within")
+    return dict(zip(point.tolist(), parts[part], strict=True))
 
 
 def _first_exit(ray: shapely.LineString, space: Region) -> FloatArray | None:

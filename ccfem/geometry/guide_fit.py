@@ -1,8 +1,8 @@
-"""Guides moved aside by a part of a pitch, so that whole strands fit beside them.
+"""Guides: curves that parallel strands start from, apart from each other, with room for strands.
 
 Strands lie at whole multiples of the pitch from their guide. What is left between the last of them
 and the border, or the strands of the next guide, is a gap or an overlap of up to half a pitch along
-its whole length; where the guide lies decides how much of it there is.
+its whole length; where the guide lies decides how much of it there is. So guides move sideways.
 """
 
 from collections.abc import Sequence
@@ -13,12 +13,12 @@ import shapely
 from ccfem.arrays import BoolArray, FloatArray
 from ccfem.geometry.offsets import rings
 from ccfem.geometry.polylines import pack, sample_midpoints, straight_pieces
-from ccfem.geometry.shapes import Region
+from ccfem.geometry.shapes import Region, open_lines
 
-__all__ = ["fitted_guides"]
+__all__ = ["fitted_guides", "spaced_guides"]
 
 _SHIFTS = np.array([0.0, 0.5, 0.25, -0.25, 0.125, -0.125, 0.375, -0.375])
-"""Ways aside that are tried, in pitches, the preferred ones first."""
+"""Shifts sideways that are tried, in pitches, the preferred ones first."""
 _BETTER = 0.01
 """Mean misfit a side, in pitches, by which a shift must be better than one before it."""
 _STEP = 1.0
@@ -28,8 +28,49 @@ _ROUNDS = 3
 """A guide is fitted between its neighbours, and these move too: times that all are fitted."""
 
 
+def spaced_guides(
+    curves: Sequence[FloatArray],
+    seeds: FloatArray,
+    region: Region,
+    distance: float,
+    least_length: float,
+) -> list[FloatArray]:
+    """Clip curves to a region and cut each where it comes near to one before it.
+
+    Of each curve at most one piece, a (m, 2) array in mm, is left.
+
+    Parameters
+    ----------
+    curves : sequence of (m, 2) arrays, mm
+        In the order of their importance; empty ones are left out.
+    seeds : (k, 2) array, mm
+        Point of each curve that its guide has to hold.
+    region : shapely (Multi)Polygon, mm
+    distance : float, mm
+        Minimum distance between guides.
+    least_length : float, mm
+        Shorter guides are dropped.
+    """
+    guides: list[FloatArray] = []
+    free = region
+    for curve, seed in zip(curves, seeds, strict=True):
+        point = shapely.Point(seed)
+        if len(curve) < 2 or not shapely.intersects(free, point):
+            continue
+        pieces = open_lines(shapely.intersection(free, shapely.LineString(curve)))
+        if not pieces:
+            continue
+        strings = [shapely.LineString(piece) for piece in pieces]
+        nearest = int(np.argmin(shapely.distance(strings, point)))
+        if strings[nearest].length < least_length:
+            continue
+        guides.append(pieces[nearest])
+        free = shapely.difference(free, shapely.buffer(strings[nearest], distance))
+    return guides
+
+
 def fitted_guides(guides: Sequence[FloatArray], region: Region, pitch: float) -> list[FloatArray]:
-    """Guides moved aside by at most half a pitch, so that gaps and overlaps become least.
+    """Guides moved sideways by at most half a pitch, so that gaps and overlaps are smallest.
 
     Parameters
     ----------
@@ -56,13 +97,13 @@ def fitted_guides(guides: Sequence[FloatArray], region: Region, pitch: float) ->
             others = straight_pieces([other for j, other in enumerate(moved) if j != k])
             gap, parallel, to_guide = _nearer(fixed[k], _first_hits(start, normal, others, pitch))
             shifts[k] = _best_shift(gap / pitch - np.where(to_guide, 0.0, 0.5), parallel)
-            moved[k] = _aside(guides[k], shifts[k] * pitch)
+            moved[k] = _shifted(guides[k], shifts[k] * pitch)
         if (shifts == before).all():
             break
     found = []
     for guide, shift in zip(guides, shifts, strict=True):
         ways = (-0.5, 0.5) if shift == 0.5 else (shift,)
-        found += [_aside(guide, way * pitch) for way in ways]
+        found += [_shifted(guide, way * pitch) for way in ways]
     return found
 
 
@@ -131,7 +172,7 @@ def _nearer(
     return np.where(np.isfinite(gap), gap, 0.0), np.where(np.isfinite(gap), parallel, 0.0), second
 
 
-def _aside(guide: FloatArray, way: float) -> FloatArray:
+def _shifted(guide: FloatArray, way: float) -> FloatArray:
     """Curve parallel to a guide, to its left by `way`, mm."""
     if way == 0.0:
         return guide

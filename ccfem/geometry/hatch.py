@@ -86,8 +86,7 @@ def hatch(section: Region, angle: float, pitch: float) -> Hatch:
         return Hatch(np.zeros((0, 2)), none, pitch, angle, (), none, np.zeros(0))
     a = np.concatenate([ring[:-1] for ring in border])
     b = np.concatenate([ring[1:] for ring in border])
-    ring = np.repeat(np.arange(len(border)), [len(ring) - 1 for ring in border])
-    number = np.concatenate([np.arange(len(ring) - 1) for ring in border])
+    ring, number = repeated(np.array([len(ring) - 1 for ring in border]))
     lowest = float(a[:, 1].min()) + 0.5 * pitch
     # Rows that an edge crosses: those from `first` up to, not including, `end`.
     level_a, level_b = np.ceil((a[:, 1] - lowest) / pitch), np.ceil((b[:, 1] - lowest) / pitch)
@@ -119,18 +118,7 @@ def link_hatch(lines: Hatch, section: Region, width: float) -> list[FloatArray]:
     that the link does not lie on it. Ends of one row (at both sides of a hole or notch) are linked
     only where the link keeps `width` from the next row.
 
-    Parameters
-    ----------
-    lines : Hatch
-    section : shapely (Multi)Polygon, mm
-        The section that was hatched.
-    width : float, mm
-        Least distance between strands.
-
-    Returns
-    -------
-    list of (k, 2) arrays, mm
-        Paths in the coordinates of the section.
+    Paths are (k, 2) arrays, mm, in the coordinates of the section.
     """
     if not len(lines.row):
         return []
@@ -143,7 +131,7 @@ def link_hatch(lines: Hatch, section: Region, width: float) -> list[FloatArray]:
 def zigzag(
     section: Region, distance: float, width: float, pitch: float, angle: float
 ) -> list[FloatArray]:
-    """Linked hatch lines at least `distance` inside a section.
+    """Linked hatch lines, (k, 2) arrays in mm, at least `distance` inside a section.
 
     Parameters
     ----------
@@ -151,15 +139,11 @@ def zigzag(
     distance : float, mm
         From the border to the nearest line or link.
     width : float, mm
-        Least distance between strands; parts narrower than it stay empty.
+        Minimum distance between strands; parts narrower than it stay empty.
     pitch : float, mm
         Distance of the lines.
     angle : float, radians
         Direction of the lines to the first axis.
-
-    Returns
-    -------
-    list of (k, 2) arrays, mm
     """
     inner = inset(section, distance, width)
     return link_hatch(hatch(inner, angle, pitch), inner, width)
@@ -231,12 +215,8 @@ def _along(lines: Hatch, e: int, f: int) -> FloatArray:
 def _sweep(lines: Hatch, links: Links, direction: int, side: int) -> list[list[int]]:
     """Chains of ends (entry, exit, entry, ...): follow links, to the rows ahead first.
 
-    Parameters
-    ----------
-    direction : 1 or -1
-        Whether the sweep goes up or down.
-    side : 0 or 1
-        At which end, left or right, a chain starts.
+    The sweep goes up (direction 1) or down (-1); a chain starts at the left end (side 0) or the
+    right one (1) of a line.
     """
     row = (direction * lines.row).tolist()
     used = [False] * len(row)

@@ -77,8 +77,7 @@ def _near(
                     continue
                 if found == len(pairs):
                     longer = np.empty((2 * found, 2), np.int64)
-                    for k in range(found):
-                        longer[k, 0], longer[k, 1] = pairs[k, 0], pairs[k, 1]
+                    longer[:found] = pairs
                     pairs = longer
                 pairs[found, 0], pairs[found, 1] = min(i, j), max(i, j)
                 found += 1
@@ -87,7 +86,19 @@ def _near(
 
 def _crosses(i: IntArray, j: IntArray, points: FloatArray, following: IntArray) -> BoolArray:
     """Whether the segments from points i and j cross, at their inside or at their last point."""
-    side = _Sides(points)
+
+    def side(a: IntArray, b: IntArray, p: IntArray) -> IntArray:
+        """1 where point p lies left of the line from a to b, -1 right of it, 0 on it."""
+        x, y = (points[b] - points[a]).T
+        u, v = (points[p] - points[a]).T
+        across = x * v - y * u
+        return np.where(np.abs(across) <= _TOUCH * np.hypot(x, y), 0, np.sign(across)).astype(int)
+
+    def side_of_bend(a: IntArray, b: IntArray, c: IntArray, p: IntArray) -> IntArray:
+        """1 where point p lies left of the bend a-b-c (seen from b), -1 right of it, 0 on it."""
+        into, out = side(a, b, p), side(b, c, p)
+        return np.where(side(a, b, c) >= 0, np.minimum(into, out), np.maximum(into, out))
+
     a, b, c, d = i, i + 1, j, j + 1
     after_b, after_d = following[b], following[d]
     goes_on_b, goes_on_d = after_b >= 0, after_d >= 0
@@ -97,25 +108,6 @@ def _crosses(i: IntArray, j: IntArray, points: FloatArray, following: IntArray) 
     through_b = (side_b == 0) & straddles_i & goes_on_b & (side_a * side(c, d, after_b) < 0)
     through_d = (side_d == 0) & straddles_j & goes_on_d & (side_c * side(a, b, after_d) < 0)
     meet = np.hypot(*(points[b] - points[d]).T) <= _TOUCH
-    turns = side.of_bend(a, b, after_b, c) * side.of_bend(a, b, after_b, after_d) < 0
+    turns = side_of_bend(a, b, after_b, c) * side_of_bend(a, b, after_b, after_d) < 0
     through_both = meet & goes_on_b & goes_on_d & turns
     return (straddles_i & straddles_j) | (~meet & (through_b | through_d)) | through_both
-
-
-class _Sides:
-    """On which side of lines through given points other given points lie."""
-
-    def __init__(self, points: FloatArray) -> None:
-        self.points = points
-
-    def __call__(self, a: IntArray, b: IntArray, p: IntArray) -> IntArray:
-        """1 where point p lies left of the line from a to b, -1 right of it, 0 on it."""
-        x, y = (self.points[b] - self.points[a]).T
-        u, v = (self.points[p] - self.points[a]).T
-        across = x * v - y * u
-        return np.where(np.abs(across) <= _TOUCH * np.hypot(x, y), 0, np.sign(across)).astype(int)
-
-    def of_bend(self, a: IntArray, b: IntArray, c: IntArray, p: IntArray) -> IntArray:
-        """1 where point p lies left of the bend a-b-c (seen from b), -1 right of it, 0 on it."""
-        into, out = self(a, b, p), self(b, c, p)
-        return np.where(self(a, b, c) >= 0, np.minimum(into, out), np.maximum(into, out))

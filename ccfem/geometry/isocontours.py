@@ -1,4 +1,4 @@
-"""Isocurves of a piecewise linear field on triangles, and the search for their number."""
+"""Isocurves of a piecewise linear field on triangles, and the least distance between them."""
 
 from dataclasses import dataclass
 
@@ -6,9 +6,11 @@ import numpy as np
 from numba import njit
 
 from ccfem.arrays import FloatArray, IntArray, repeated
+from ccfem.geometry.buckets import bucket
+from ccfem.geometry.polylines import starts_segment
 from ccfem.mesh.facets import unique_edges
 
-__all__ = ["Isocontours", "isocontours", "least_distance", "steepest_spacing", "triangle_edges"]
+__all__ = ["Isocontours", "isocontours", "least_distance", "triangle_edges"]
 
 
 @dataclass(frozen=True)
@@ -157,106 +159,44 @@ def _chain(of_triangle, low, high, start):  # type: ignore[no-untyped-def]
     return line[:size], offsets[: found + 1]
 
 
-@njit(cache=True, nogil=True)
-def steepest_spacing(areas, gradient, triangles, values, first, step):  # type: ignore[no-untyped-def]
-    """Smallest distance of two neighbouring isocurves that cross the same triangle, mm.
-
-    Infinity where no triangle holds two levels. Cheap, so that a search may reject a number of
-    levels before it measures all distances.
-
-    Parameters
-    ----------
-    areas : (t,) array, mm^2
-        Triangles of zero area are passed over.
-    gradient : (t, 2) array
-        Gradient of the field.
-    triangles : (t, 3) int array
-    values : (n,) array
-    first, step : float
-        As in `isocontours`.
-    """
-    least = np.inf
-    for t in range(len(triangles)):
-        a, b, c = values[triangles[t, 0]], values[triangles[t, 1]], values[triangles[t, 2]]
-        low = np.ceil((min(a, b, c) - first) / step)
-        high = np.floor((max(a, b, c) - first) / step)
-        if high > low and areas[t] > 0.0:
-            steep = np.hypot(gradient[t, 0], gradient[t, 1])
-            if steep > 0.0:
-                least = min(least, step / steep)
-    return least
-
-
-@njit(cache=True, nogil=True)
-def least_distance(points, offsets, level, reach, enough):  # type: ignore[no-untyped-def]
+def least_distance(curves: Isocontours, reach: float, enough: float) -> float:
     """Smallest distance between isocurves of neighbouring levels, mm, as far as `reach`.
 
     Parameters
     ----------
-    points, offsets, level
-        As in `Isocontours`.
+    curves : Isocontours
     reach : float, mm
-        Distances above this are not looked at; the result is at most `reach`.
+        Larger distances are not looked for; the result is at most `reach`.
     enough : float, mm
-        Stop as soon as a distance below this is found.
-
-    Returns
-    -------
-    float, mm
+        The search stops at the first distance below this.
     """
-    count = len(points)
-    if count == 0:
+    start = np.flatnonzero(starts_segment(curves.offsets))
+    if not len(start):
         return reach
-    x0, y0 = points[:, 0].min(), points[:, 1].min()
-    nx = int((points[:, 0].max() - x0) / reach) + 1
-    ny = int((points[:, 1].max() - y0) / reach) + 1
-    # Each piece goes into every grid cell that its bounding box touches.
-    of_piece = np.full(count, -1)
-    for k in range(len(level)):
-        of_piece[offsets[k] : offsets[k + 1] - 1] = level[k]
-    start = np.zeros(nx * ny + 1, np.int64)
-    members = np.zeros(0, np.int64)
-    for fill in range(2):
-        if fill == 1:
-            start[1:] = np.cumsum(start[1:])
-            members = np.empty(start[-1], np.int64)
-            position = start[:-1].copy()
-        for s in range(count - 1):
-            if of_piece[s] < 0:
-                continue
-            i0 = int((min(points[s, 0], points[s + 1, 0]) - x0) / reach)
-            i1 = int((max(points[s, 0], points[s + 1, 0]) - x0) / reach)
-            j0 = int((min(points[s, 1], points[s + 1, 1]) - y0) / reach)
-            j1 = int((max(points[s, 1], points[s + 1, 1]) - y0) / reach)
-            for i in range(i0, i1 + 1):
-                for j in range(j0, j1 + 1):
-                    if fill == 0:
-                        start[i * ny + j + 1] += 1
-                    else:
-                        members[position[i * ny + j]] = s
-                        position[i * ny + j] += 1
+    a, b = curves.points[start], curves.points[start + 1]
+    # So that a point has all pieces within reach in its own cell.
+    grid = bucket(np.minimum(a, b) - reach, np.maximum(a, b) + reach, reach)
+    level = np.repeat(curves.level, np.diff(curves.offsets))
+    return float(_least_distance(*grid, start, curves.points, level, reach, enough))
+
+
+@njit(cache=True, nogil=True)
+def _least_distance(origin, cell, shape, starts, items, start, points, level, reach, enough):  # type: ignore[no-untyped-def]
     least = reach * reach
-    for k in range(len(level)):
-        for p in range(offsets[k], offsets[k + 1]):
-            i0 = int((points[p, 0] - x0) / reach)
-            j0 = int((points[p, 1] - y0) / reach)
-            for i in range(max(i0 - 1, 0), min(i0 + 2, nx)):
-                for j in range(max(j0 - 1, 0), min(j0 + 2, ny)):
-                    for m in range(start[i * ny + j], start[i * ny + j + 1]):
-                        s = members[m]
-                        if abs(of_piece[s] - level[k]) != 1:
-                            continue
-                        dx = points[s + 1, 0] - points[s, 0]
-                        dy = points[s + 1, 1] - points[s, 1]
-                        px = points[p, 0] - points[s, 0]
-                        py = points[p, 1] - points[s, 1]
-                        length = dx * dx + dy * dy
-                        w = 0.0
-                        if length > 0.0:
-                            w = min(max((px * dx + py * dy) / length, 0.0), 1.0)
-                        distance = (px - w * dx) ** 2 + (py - w * dy) ** 2
-                        if distance < least:
-                            least = distance
-                            if least < enough * enough:
-                                return np.sqrt(least)
+    for p in range(len(points)):
+        i = int((points[p, 0] - origin[0]) / cell)
+        j = int((points[p, 1] - origin[1]) / cell)
+        for item in range(starts[i * shape[1] + j], starts[i * shape[1] + j + 1]):
+            s = start[items[item]]
+            if abs(level[s] - level[p]) != 1:
+                continue
+            dx, dy = points[s + 1, 0] - points[s, 0], points[s + 1, 1] - points[s, 1]
+            px, py = points[p, 0] - points[s, 0], points[p, 1] - points[s, 1]
+            length = dx * dx + dy * dy
+            w = 0.0
+            if length > 0.0:
+                w = min(max((px * dx + py * dy) / length, 0.0), 1.0)
+            least = min(least, (px - w * dx) ** 2 + (py - w * dy) ** 2)
+        if least < enough * enough:
+            break
     return np.sqrt(least)

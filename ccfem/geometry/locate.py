@@ -8,45 +8,33 @@ from numba import njit
 from ccfem.arrays import FloatArray, IntArray
 from ccfem.geometry.buckets import bucket
 
-__all__ = ["locate", "locate_tets"]
+__all__ = ["locate"]
 
 
 def locate(
-    points: FloatArray, triangles: IntArray, queries: FloatArray, reach: float = 0.0
+    points: FloatArray, simplices: IntArray, queries: FloatArray, reach: float = 0.0
 ) -> tuple[IntArray, FloatArray]:
-    """Triangle of the plane that holds each query point.
+    """Triangle of the plane, or tetrahedron in space, that holds each query point.
 
     Parameters
     ----------
-    points : (n, 2) array, mm
-    triangles : (t, 3) int array
+    points : (n, d) array, mm
+        In d = 2 or 3 dimensions.
+    simplices : (m, d + 1) int array
         Of either orientation; flat ones are never found.
-    queries : (q, 2) array, mm
+    queries : (q, d) array, mm
     reach : float, mm, default 0
-        A query outside every triangle takes the triangle whose edges it oversteps least, if by no
-        more than this.
+        A query outside every simplex takes the one whose sides it oversteps least, if by no more
+        than this.
 
     Returns
     -------
-    triangle : (q,) int array
-        Index into `triangles`, or -1.
-    barycentric : (q, 3) array in [0, 1]
-        Weights of the corners, summing to 1; for a query outside, those of a point of the triangle
-        close to it; 0 where `triangle` is -1.
+    simplex : (q,) int array
+        Index into `simplices`, or -1.
+    barycentric : (q, d + 1) array in [0, 1]
+        Weights of the corners, summing to 1; for a query outside, those of a point of the simplex
+        close to it; 0 where `simplex` is -1.
     """
-    return _locate_simplices(points, triangles, queries, reach)
-
-
-def locate_tets(
-    points: FloatArray, tets: IntArray, queries: FloatArray, reach: float = 0.0
-) -> tuple[IntArray, FloatArray]:
-    """Tetrahedron that holds each query point: as `locate`, with (n, 3), (m, 4) and (q, 3)."""
-    return _locate_simplices(points, tets, queries, reach)
-
-
-def _locate_simplices(
-    points: FloatArray, simplices: IntArray, queries: FloatArray, reach: float
-) -> tuple[IntArray, FloatArray]:
     queries = np.ascontiguousarray(queries, dtype=np.float64)
     found = np.full(len(queries), -1, dtype=np.int64)
     weights = np.zeros((len(queries), simplices.shape[1]))

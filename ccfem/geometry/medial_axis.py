@@ -1,11 +1,12 @@
 """Medial axis of a section: the centres of its largest inscribed discs, as a graph of curves.
 
 Voronoi diagram of points along the border (Brandt, Convergence and continuity criteria for
-discrete approximations of the continuous planar skeleton, CVGIP 59, 1994); spurs are told from
-limbs by the angle under which the border is seen from the axis, or by the way along the border
+discrete approximations of the continuous planar skeleton, CVGIP 59, 1994); spurs are told apart
+from limbs by the angle under which the border is seen from the axis, or by the way along the border
 against its chord.
 """
 
+from collections import Counter
 from dataclasses import dataclass
 from itertools import pairwise
 
@@ -104,13 +105,14 @@ def medial_axis(
         ends of every straight side are among them, the rest at equal distances, so that a
         symmetric section has symmetric samples.
     object_angle : float, degrees, optional
-        Ends of the axis are taken off as long as they see their two nearest points of the border
-        under less than this; 105 takes off the spurs of corners of 90 degrees. None: no such rule.
+        Ends of the axis are removed as long as they see their two nearest points of the border
+        under less than this; 105 removes the spurs of corners of 90 degrees. None: no such rule.
     arc_chord : float, optional
-        Ends are taken off as long as the border between their two nearest points is no longer than
-        so many chords, or than 6 steps; a square corner has 1.41.
+        Ends are removed as long as the border between their two nearest points is no longer than
+        this many chords, or than 6 steps; a square corner has 1.41.
     prune : float, default 1
-        Branches with a free end shorter than so many radii of the disc at their junction go.
+        Branches with a free end that are shorter than this many radii of the disc at their
+        junction are removed.
 
     Returns
     -------
@@ -268,7 +270,7 @@ def _equidistant(
 
 
 def _without_soft_ends(edges: IntArray, firm: BoolArray, count: int) -> BoolArray:
-    """Edges that stay when free ends that are not firm are taken off until there are none."""
+    """Edges that stay when free ends that are not firm are removed until there are none."""
     kept = np.ones(len(edges), dtype=bool)
     while True:
         degree = np.bincount(edges[kept].ravel(), minlength=count)
@@ -305,10 +307,7 @@ def _chains(edges: IntArray, kept: BoolArray, count: int) -> list[list[int]]:
 def _pruned(graph: _Graph, chains: list[list[int]], prune: float, step: float) -> list[list[int]]:
     """Chains without short branches at free ends, shortest first, and without specks."""
     while True:
-        degree: dict[int, int] = {}
-        for chain in chains:
-            for end in (chain[0], chain[-1]):
-                degree[end] = degree.get(end, 0) + 1
+        degree = Counter(end for chain in chains for end in (chain[0], chain[-1]))
         short = []
         for number, chain in enumerate(chains):
             free = [degree[end] == 1 for end in (chain[0], chain[-1])]
@@ -347,8 +346,7 @@ def _as_axis(section: Region, graph: _Graph, chains: list[list[int]]) -> MedialA
                 ends.add(int(members[np.argmax(graph.radius[members])]))
     nodes = sorted(ends)
     index = {node: k for k, node in enumerate(nodes)}
-    a, b = graph.edges.T
-    edge_of = dict(zip(zip(a.tolist(), b.tolist(), strict=True), range(len(a)), strict=True))
+    edge_of = {(a, b): k for k, (a, b) in enumerate(graph.edges.tolist())}
     segments = []
     for chain in chains:
         if chain[0] == chain[-1] and chain[0] not in index:

@@ -11,27 +11,21 @@ from ccfem.geometry.shells import concentric
 __all__ = ["medial_fill"]
 
 _SHORTEST = 4.0
-"""Segments of the medial axis shorter than so many pitches are left out."""
+"""Segments of the medial axis shorter than this many pitches are left out."""
 
 
 def medial_fill(section: Region, pitch: float, closest: float) -> list[FloatArray]:
     """Strands along the medial axis and parallel to it, and concentric ones in what they leave.
 
-    Parallel strands follow until the first of them would touch the border. A section without a
-    medial axis (a disc) is filled by concentric strands alone.
+    Each is a (k, 2) array, mm. Parallel strands follow until the first of them would touch the
+    border. A section without a medial axis (a disc) is filled by concentric strands alone.
 
     Parameters
     ----------
     section : shapely (Multi)Polygon, mm
         Its border is the edge of other strands.
-    pitch : float, mm
-        Distance of neighbouring strands.
-    closest : float
-        As in `geometry.dilation.parallels`.
-
-    Returns
-    -------
-    list of (k, 2) arrays, mm
+    pitch, closest
+        As in `geometry.parallel_strands.grow`.
     """
     axis = medial_axis(section, 0.5 * pitch)
     segments = [s for s in axis.segments if s.length >= _SHORTEST * pitch]

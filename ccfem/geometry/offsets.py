@@ -72,7 +72,8 @@ def offset_rings(
     spacing : float, mm
         Distance of neighbouring rings, > 0.
     width : float, mm
-        Least distance of opposite sides of one ring; where the section is narrower there is a gap.
+        Minimum distance of opposite sides of one ring; there is a gap where the section is
+        narrower.
     count : int, optional
         Number of rings; by default as many as fit.
 

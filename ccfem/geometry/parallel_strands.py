@@ -1,4 +1,4 @@
-"""Strands parallel to given curves, outward from them, and strands in what those leave open."""
+"""Strands parallel to given curves, outward from them, and strands in the rest."""
 
 from collections.abc import Sequence
 from itertools import pairwise
@@ -7,12 +7,12 @@ import numpy as np
 import shapely
 
 from ccfem.arrays import FloatArray, IntArray
-from ccfem.geometry.free_ends import lead_on
+from ccfem.geometry.free_ends import extend_free_ends
 from ccfem.geometry.polylines import is_closed, line_length, straight_pieces
 from ccfem.geometry.shapes import Region, open_lines
 from ccfem.geometry.shells import concentric
 
-__all__ = ["fill_rest", "grow", "lengthened", "parallels"]
+__all__ = ["grow", "lengthened"]
 
 _ARC = 16
 """Segments of a quarter turn round an end or a corner of a curve."""
@@ -24,7 +24,7 @@ _OFF = 0.02
 """Deviation of the distance to the nearest curve, in pitches, up to which a piece of a border
 counts as parallel to that curve."""
 _REACH = 2.0
-"""Longest way, in pitches, by which a strand is led on where it ends in the open."""
+"""Maximum length, in pitches, by which the free end of a strand is extended."""
 _TOLERANCE = 2e-3
 """Deviation, in pitches, up to which points of a curve are left out."""
 
@@ -42,11 +42,18 @@ def grow(
     Parameters
     ----------
     curves : sequence of (k, 2) arrays, mm
-        May stand out of the region.
+        Closed ones repeat their first point; they may reach beyond the region.
     region : shapely (Multi)Polygon, mm
         Its border is the edge of other strands.
-    pitch, closest, count, whole
-        As in `parallels`.
+    pitch : float, mm
+        Distance of neighbouring strands.
+    closest : float
+        Minimum distance of strands, in pitches.
+    count : int, optional
+        Number of parallel strands at each side; by default until the region is full.
+    whole : bool, default False
+        Whether strands go round the free ends of curves and on from one curve to the next. By
+        default each belongs to one curve, and nothing is laid beyond the ends of that.
 
     Returns
     -------
@@ -54,11 +61,12 @@ def grow(
     """
     if shapely.is_empty(region):
         return []
-    smooth = [_smooth(curve, _TOLERANCE * pitch) for curve in curves]
+    strings = [shapely.LineString(curve).simplify(_TOLERANCE * pitch) for curve in curves]
     slack = (closest - 0.5) * pitch
     room = shapely.buffer(region, -slack, join_style="mitre")
-    inner = open_lines(shapely.intersection([shapely.LineString(c) for c in smooth], room))
-    inner += parallels(smooth, room, pitch, closest, count, whole)
+    inner = open_lines(shapely.intersection(strings, room))
+    smooth = [shapely.get_coordinates(string) for string in strings]
+    inner += _parallels(smooth, room, pitch, closest, count, whole)
     # The sides of a strand keep their distance to the border; its ends may reach it.
     lines = [
         line
@@ -70,43 +78,23 @@ def grow(
         )
         if line_length(line) >= pitch
     ]
-    lines, rest = lead_on(lines, region, pitch, closest, _REACH * pitch)
-    return lines + fill_rest(rest, pitch, closest)
+    lines, rest = extend_free_ends(lines, region, pitch, closest, _REACH * pitch)
+    return lines + _fill_rest(rest, pitch, closest)
 
 
-def parallels(
+def _parallels(
     curves: Sequence[FloatArray],
     region: Region,
     pitch: float,
     closest: float,
-    count: int | None = None,
-    whole: bool = False,
+    count: int | None,
+    whole: bool,
 ) -> list[FloatArray]:
-    """Lines at whole multiples of a pitch from the nearest of several curves.
+    """Lines in a region at whole multiples of a pitch from the nearest of several curves.
 
     The borders of the buffers of all curves together, so that lines of different distance never
     come nearer to each other than the pitch; where two fronts of one distance come nearer than
-    `closest` pitches neither is laid.
-
-    Parameters
-    ----------
-    curves : sequence of (k, 2) arrays, mm
-        Closed ones repeat their first point.
-    region : shapely (Multi)Polygon, mm
-        Lines are clipped to it.
-    pitch : float, mm
-    closest : float
-        Least distance of lines, in pitches.
-    count : int, optional
-        Number of lines at each side; by default until the region is full.
-    whole : bool, default False
-        Whether lines go round the free ends of curves and on from one curve to the next. By
-        default each line belongs to one curve, and nothing is laid beyond the ends of that.
-
-    Returns
-    -------
-    list of (k, 2) arrays, mm
-        Without the curves themselves.
+    `closest` pitches neither is laid. Parameters as in `grow`.
     """
     if not len(curves):
         return []
@@ -116,14 +104,13 @@ def parallels(
     if whole:
         strings = np.array([shapely.multilinestrings(strings)])
         owners = np.zeros_like(owners)
-    half = 0.5 * closest * pitch
+    cap, half = "round" if whole else "flat", 0.5 * closest * pitch
     lines: list[FloatArray] = []
     level = idle = 0
     # Where a channel is closed there may be no line at one distance and some at the next.
     while (count is None or level < count) and idle < 3:
         level += 1
         distance = level * pitch
-        cap = "round" if whole else "flat"
         covered = shapely.union_all(
             shapely.buffer(strings, distance, cap_style=cap, quad_segs=_ARC)
         )
@@ -149,9 +136,8 @@ def _own_pieces(
 ) -> list[FloatArray]:
     """Pieces of a ring that lie at a distance from their nearest curve, split where that changes.
 
-    `sides` holds the straight pieces of all curves, `owners` the curve of each.
-
-    Straight ends of buffers and rounded cusps drop out.
+    `sides` holds the straight pieces of all curves, `owners` the curve of each. Straight ends of
+    buffers and rounded cusps drop out.
     """
     middle = shapely.points(0.5 * (ring[1:] + ring[:-1]))
     (_, side), gaps = sides.query_nearest(middle, return_distance=True, all_matches=False)
@@ -173,22 +159,8 @@ def _without_hooks(line: FloatArray, least: float) -> FloatArray:
     return line[long[0] : long[-1] + 2] if len(long) else line
 
 
-def fill_rest(rest: Region, pitch: float, closest: float) -> list[FloatArray]:
-    """Concentric strands in what other strands leave open.
-
-    Parameters
-    ----------
-    rest : shapely (Multi)Polygon, mm
-    pitch : float, mm
-        Width that each strand takes.
-    closest : float
-        As in `geometry.shells.concentric`.
-
-    Returns
-    -------
-    list of (k, 2) arrays, mm
-        Strips narrower than half a pitch and specks stay open.
-    """
+def _fill_rest(rest: Region, pitch: float, closest: float) -> list[FloatArray]:
+    """Concentric strands in what other strands leave, but for narrow strips and specks."""
     rest = shapely.buffer(rest, -_SLIVER * pitch, join_style="mitre")
     rest = shapely.buffer(rest, _SLIVER * pitch, join_style="mitre")
     parts = shapely.get_parts(rest)
@@ -222,7 +194,3 @@ def lengthened(line: FloatArray, region: Region, near: float, length: float) -> 
         way = line[-1] - line[-2]
         parts.append(line[-1:] + length * way / np.linalg.norm(way))
     return np.concatenate(parts)
-
-
-def _smooth(line: FloatArray, tolerance: float) -> FloatArray:
-    return shapely.get_coordinates(shapely.simplify(shapely.LineString(line), tolerance))

@@ -1,4 +1,4 @@
-"""Where points and steps lie about a section: in it, over a void of it, or outside."""
+"""Where points and steps lie: in a section, over a void of it, or outside."""
 
 from typing import NamedTuple
 
@@ -37,18 +37,9 @@ class Pieces(NamedTuple):
 
 
 def section_places(points: FloatArray, section: Region) -> IntArray:
-    """Place of points about a section; those up to `TOLERANCE` from it are inside.
+    """Where points lie relative to a section; those up to `TOLERANCE` from it are inside.
 
-    Parameters
-    ----------
-    points : (n, 2) array, mm
-    section : Polygon or MultiPolygon
-        Such as `Layer.polygon`.
-
-    Returns
-    -------
-    (n,) int array
-        INSIDE, VOID or OUTSIDE.
+    INSIDE, VOID or OUTSIDE for each of the points (n, 2), mm: an (n,) int array.
     """
     return _places(points, shapely.buffer(section, TOLERANCE, quad_segs=2))
 

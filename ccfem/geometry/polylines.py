@@ -20,6 +20,7 @@ __all__ = [
     "lengths",
     "line_length",
     "merge_repeated",
+    "middle_of_longest_run",
     "pack",
     "point_at",
     "points_along",
@@ -56,7 +57,7 @@ def starts_segment(offsets: IntArray) -> BoolArray:
 
 
 def inner_points(offsets: IntArray, closed: BoolArray) -> BoolArray:
-    """Mask (P,) of the points at which polylines go on: of closed ones also the first."""
+    """Mask (P,) of the points with a segment on both sides: of closed ones also the first."""
     mask = starts_segment(offsets)
     held = np.diff(offsets) > 0
     mask[offsets[:-1][held]] &= np.asarray(closed, dtype=bool)[held]
@@ -281,6 +282,13 @@ def runs(mask: BoolArray) -> IntArray:
     """Start and end (k, 2), the end not included, of each run of true values of a mask (n,)."""
     edges = np.diff(np.concatenate([[False], mask, [False]]).astype(np.int8))
     return np.flatnonzero(edges).reshape(-1, 2)
+
+
+def middle_of_longest_run(ring: BoolArray) -> int:
+    """Index of the middle of the longest run of true values of a ring (n,) of values."""
+    starts, ends = runs(np.concatenate([ring, ring])).T
+    longest = int(np.argmax(ends - starts))
+    return int(starts[longest] + ends[longest]) // 2 % len(ring)
 
 
 def point_at(line: FloatArray, position: float) -> FloatArray:

@@ -1,4 +1,4 @@
-"""A section for compiled loops: where a point lies about it, and how much room it has there."""
+"""A section for compiled loops: where a point lies, and how far it is at least from the border."""
 
 from typing import NamedTuple
 
@@ -14,7 +14,7 @@ from ccfem.geometry.shapes import Region
 __all__ = ["SectionGrid", "contains", "place", "place_and_room", "section_grid"]
 
 _CELL = 0.5
-"""Least size of a cell, mm."""
+"""Minimum size of a cell, mm."""
 _MOST_CELLS = 1_000_000
 
 

@@ -11,7 +11,7 @@ __all__ = ["corners_only"]
 _STRAIGHT = 1e-6
 """Turn of the border, radians, below which a point lies on a straight side."""
 _DECIMALS = 11
-"""Of coordinates, mm: above the errors of slicing, below what any rule of a pattern tells apart."""
+"""Of coordinates, mm: above the errors of slicing, below what any rule of a pattern resolves."""
 
 
 def corners_only(section: Region) -> Region:
@@ -27,7 +27,7 @@ def corners_only(section: Region) -> Region:
     Returns
     -------
     shapely (Multi)Polygon, mm
-        Each ring starts at its least corner; coordinates are rounded to 1e-11 mm.
+        Each ring starts at its lowest corner in x, then y; coordinates are rounded to 1e-11 mm.
     """
     parts = []
     for part in shapely.get_parts(section):

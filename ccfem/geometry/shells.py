@@ -10,11 +10,11 @@ from ccfem.geometry.polylines import is_closed, line_length, runs, straight_piec
 from ccfem.geometry.sections import corners_only
 from ccfem.geometry.shapes import Region
 
-__all__ = ["concentric", "middle_lines", "shells"]
+__all__ = ["concentric", "shells"]
 
 _LEAST_GAP = 0.5
-"""Narrowest strip, in pitches, that a strand is laid along, the rest of it on its neighbours: gap
-and overlap together are then least."""
+"""Narrowest strip, in pitches, that a strand is laid along, overlapping its neighbours: the sum of
+gap and overlap is then smallest."""
 _SAME = 1e-4
 """Neighbouring points of a ring nearer than this, in widths, are one."""
 _STRAIGHT = 0.03
@@ -31,11 +31,9 @@ def shells(
     section : shapely (Multi)Polygon, mm
     width : float, mm
         Of a strand; the first ring lies half of it inside the border.
-    pitch : float, mm
-        Distance of neighbouring rings.
     count : int
         Number of rings. Parts thinner than twice as many are filled by them.
-    closest : float
+    pitch, closest
         As in `concentric`.
 
     Returns
@@ -49,7 +47,7 @@ def shells(
     if count == 0:
         return [], section
     interior = inset(section, 0.5 * width + (count - 0.5) * pitch)
-    parts = shapely.get_parts(interior)  # without those of no width but for rounding
+    parts = shapely.get_parts(interior)  # without those that only rounding gives a width
     wide = ~shapely.is_empty(shapely.buffer(parts, -1e-3 * pitch, join_style="mitre"))
     interior = interior if wide.all() else shapely.multipolygons(parts[wide])
     return concentric(section, pitch, closest, 0.5 * width, count), interior
@@ -71,7 +69,7 @@ def concentric(
     pitch : float, mm
         Distance of neighbouring rings.
     closest : float
-        Least distance of opposite sides of a ring, in pitches; where the section is narrower the
+        Minimum distance of opposite sides of a ring, in pitches; where the section is narrower the
         ring is cut short.
     first : float, mm, optional
         Distance of the first ring to the border; default half a pitch.
@@ -84,7 +82,8 @@ def concentric(
     Returns
     -------
     list of (k, 2) arrays, mm
-        Closed rings from the border inward, then `middle_lines` in what they leave.
+        Closed rings from the border inward, then lines along the middle of what they leave; those
+        that go round a hole are closed.
     """
     first = 0.5 * pitch if first is None else first
     section = corners_only(section)
@@ -101,7 +100,7 @@ def concentric(
     if count is not None and not _narrow(section, first, pitch, closest, count):
         return lines
     axis = medial_axis(section, 0.5 * min(pitch, 2.0 * first))
-    return lines + middle_lines(axis, lines, pitch, closest, first, count, walls)
+    return lines + _middle_lines(axis, lines, pitch, closest, first, count, walls)
 
 
 def _opened(section: Region, distance: float, width: float) -> Region:
@@ -121,7 +120,7 @@ def _opened(section: Region, distance: float, width: float) -> Region:
 
 
 def _narrow(section: Region, first: float, pitch: float, closest: float, count: int) -> bool:
-    """Whether some part of the section is too narrow for `count` rings, corners left aside."""
+    """Whether some part of the section is too narrow for `count` rings, apart from its corners."""
     depth = first + (count - 1 + 0.5 * closest) * pitch
     core = shapely.buffer(section, -depth, join_style="mitre")
     reached = shapely.buffer(core, 1.05 * depth + 0.1 * pitch, join_style="mitre")
@@ -129,33 +128,20 @@ def _narrow(section: Region, first: float, pitch: float, closest: float, count: 
     return not shapely.is_empty(rest)
 
 
-def middle_lines(
+def _middle_lines(
     axis: MedialAxis,
     laid: list[FloatArray],
     pitch: float,
     closest: float,
     first: float,
-    count: int | None = None,
-    walls: bool = True,
+    count: int | None,
+    walls: bool,
 ) -> list[FloatArray]:
-    """Lines along the medial axis of a section where its rings leave a strip.
+    """Lines along the medial axis of a section where the rings that are laid leave a strip.
 
     Between the innermost rings at both sides of the axis there is a strip, at most two pitches
-    wide; a strand is laid along its middle where it is at least half a pitch wide.
-
-    Parameters
-    ----------
-    axis : MedialAxis
-        Of the section.
-    laid : list of (k, 2) arrays, mm
-        The rings.
-    pitch, closest, first, count, walls
-        As in `concentric`. With a `count`, only where there is room for fewer rings.
-
-    Returns
-    -------
-    list of (k, 2) arrays, mm
-        A line that goes round a hole is closed.
+    wide; a strand is laid along its middle where it is at least half a pitch wide, and with a
+    `count` only where there is room for fewer rings. Parameters as in `concentric`.
     """
     pieces = []
     degree = np.bincount([end for s in axis.segments for end in s.ends if end >= 0])

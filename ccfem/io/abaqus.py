@@ -1,6 +1,6 @@
 """Abaqus and CalculiX input decks (``.inp``): nodes, tetrahedra and the sets that name patches.
 
-Read are *NODE, *ELEMENT, *NSET, *ELSET and *SURFACE; everything else is left aside. Patches come
+Read are *NODE, *ELEMENT, *NSET, *ELSET and *SURFACE; everything else is ignored. Patches come
 from surfaces (of element faces or of nodes), from sets of triangles (shells, membranes), and from
 node sets: a boundary facet belongs to a node set when its three corners do. Sets whose name begins
 with an underscore are the pre-processor's own and give no patch.
@@ -158,7 +158,7 @@ def _read_block(deck: _Deck, block: _Block) -> None:
 
 
 def _read_elements(deck: _Deck, block: _Block) -> None:
-    """Add the elements of a block; kinds without volume or area are left aside."""
+    """Add the elements of a block; kinds without volume or area are ignored."""
     name = block.parameters.get("TYPE", "").upper()
     known = [entry for entry in _KINDS if re.fullmatch(rf"(?:{entry[0]})[A-Z]*", name)]
     if not known:
@@ -172,7 +172,7 @@ def _read_elements(deck: _Deck, block: _Block) -> None:
 
 
 def _numbers(lines: list[str], columns: int) -> FloatArray:
-    """Comma-separated numbers as rows; a row may go on in the next line."""
+    """Comma-separated numbers as rows; a row may continue on the next line."""
     joined = ",".join(line.rstrip(",") for line in lines)
     values = np.array(joined.split(",") if joined else [], dtype=np.float64)
     if len(values) % columns:
@@ -258,10 +258,7 @@ def _patches(deck: _Deck, mesh: TetMesh, labels: IntArray, path: Path) -> dict[s
         return match_boundary(mesh, np.concatenate(facets)) if facets else np.zeros((0, 3), int)
 
     patches: dict[str, IntArray] = {}
-    for sets, choose in (
-        (deck.node_sets, of_nodes),
-        (deck.element_sets, of_triangles),
-    ):
+    for sets, choose in ((deck.node_sets, of_nodes), (deck.element_sets, of_triangles)):
         for key, members in sets.items():
             patches[key] = choose(members) if not key.startswith("_") else np.zeros((0, 3), int)
     for key, entries in deck.surfaces.items():

@@ -14,7 +14,7 @@ _SOLIDS = ("tetra", "hexahedron", "wedge", "pyramid", "polyhedron", "voxel")
 
 
 def tetrahedra(blocks: Iterable[tuple[str, IntArray]], path: str | PathLike[str]) -> IntArray:
-    """Join the tetrahedra of a file.
+    """Join the tetrahedra of a file, (m, 4) or (m, 10).
 
     Parameters
     ----------
@@ -22,10 +22,6 @@ def tetrahedra(blocks: Iterable[tuple[str, IntArray]], path: str | PathLike[str]
         Type in meshio's words, nodes (m, k).
     path : path
         For the messages.
-
-    Returns
-    -------
-    (m, 4) or (m, 10) int array
 
     Raises
     ------

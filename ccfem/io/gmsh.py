@@ -15,6 +15,8 @@ from ccfem.mesh.tet_mesh import TetMesh
 __all__ = ["read_msh"]
 
 _TAG = "gmsh:physical"
+_BROKEN = (ValueError, LookupError, TypeError, EOFError, AssertionError, MemoryError, OverflowError)
+"""What meshio raises on broken files."""
 
 
 def read_msh(path: Path) -> TetMesh:
@@ -31,18 +33,7 @@ def read_msh(path: Path) -> TetMesh:
         raise InputError(f"{path} is not a Gmsh mesh: it must begin with $MeshFormat")
     try:
         found = meshio.gmsh.read(path)
-    except (
-        meshio.ReadError,
-        ValueError,
-        IndexError,
-        KeyError,
-        TypeError,
-        EOFError,
-        AssertionError,
-        MemoryError,
-        OverflowError,
-        struct.error,
-    ) as error:
+    except (meshio.ReadError, struct.error, *_BROKEN) as error:
         reason = str(error).split("\n")[0] or type(error).__name__
         raise InputError(
             f"{path} is not a Gmsh mesh that can be read ({reason}): save it again as version 4.1"

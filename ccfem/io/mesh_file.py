@@ -50,14 +50,10 @@ def read_mesh(path: str | os.PathLike[str], scale: float = 1.0, check: bool = Tr
         Normalise and mend the mesh with `ccfem.mesh.check.check_mesh`; a `UserWarning` says, a
         line each, what it found and mended. Without it the mesh comes as it stands in the file.
 
-    Returns
-    -------
-    TetMesh
-
     Raises
     ------
     InputError
-        When the file is missing or no tetrahedral mesh, or nothing sensible can follow from it.
+        When the file is missing, or is not a valid tetrahedral mesh.
     """
     path = existing_file(path, "mesh file")
     suffix = path.suffix.lower()

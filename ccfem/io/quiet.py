@@ -1,4 +1,4 @@
-"""VTK's readers without their chatter: a data set, or nothing where they fail."""
+"""VTK's readers without their warnings: a data set, or nothing where they fail."""
 
 import warnings
 from pathlib import Path

@@ -64,14 +64,10 @@ def read_surface(path: str | os.PathLike[str], scale: float = 1.0) -> Surface:
     scale : float, default 1
         Factor on the coordinates, to make them mm.
 
-    Returns
-    -------
-    Surface
-
     Raises
     ------
     InputError
-        When the file is missing, no surface, or the surface is open; the message says how many
+        When the file is missing or holds no surface, or the surface is open; it says how many
         edges are open and where.
     """
     path = existing_file(path, "surface file")
@@ -120,20 +116,21 @@ def _check_closed(points: FloatArray, triangles: IntArray) -> None:
     odd = np.flatnonzero(counts % 2)
     if len(odd):
         middle = points[edges[odd]].mean(axis=1)
-        at = ", ".join(f"{x:.4g}" for x in middle[0])
-        low, high = middle.min(axis=0), middle.max(axis=0)
-        span = " to ".join(
-            "(" + ", ".join(f"{x:.4g}" for x in corner) + ")" for corner in (low, high)
-        )
+        low, high = _place(middle.min(axis=0)), _place(middle.max(axis=0))
         raise InputError(
             f"the surface is open: {len(odd)} edges belong to an odd number of triangles, the "
-            f"first at ({at}), all within {span} mm: close the holes in the program that made it"
+            f"first at {_place(middle[0])}, all within {low} to {high} mm: close the holes in the "
+            "program that made it"
         )
     forward = np.where(directed[:, 0] < directed[:, 1], 1, -1)
     turned = np.flatnonzero(np.bincount(place.reshape(-1), weights=forward))
     if len(turned):
-        at = ", ".join(f"{x:.4g}" for x in points[edges[turned[0]]].mean(axis=0))
+        at = _place(points[edges[turned[0]]].mean(axis=0))
         raise InputError(
-            f"the surface's triangles are not all turned outward: {len(turned)} edges are run "
-            f"along twice in one direction, the first at ({at}) mm: unify the normals"
+            f"the surface's triangles do not all face outward: {len(turned)} edges are traversed "
+            f"twice in one direction, the first at {at} mm: unify the normals"
         )
+
+
+def _place(point: FloatArray) -> str:
+    return "(" + ", ".join(f"{x:.4g}" for x in point) + ")"

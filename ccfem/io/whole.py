@@ -54,7 +54,7 @@ def whole_file(path: str | os.PathLike[str]) -> Iterator[Path]:
 
 
 def check_writable(path: str | os.PathLike[str]) -> Path:
-    """Return `path` when a file of that name can be written: to be asked before long work.
+    """Return `path` when a file of that name can be written: to be checked before long work.
 
     Raises
     ------

@@ -11,6 +11,7 @@ from ccfem.arrays import FloatArray, IntArray, freeze, read_only
 from ccfem.errors import InputError
 from ccfem.geometry.shapes import Region
 from ccfem.layers.plane import Plane
+from ccfem.mesh.measures import connected
 
 __all__ = ["FlatLayer", "Layer"]
 
@@ -27,21 +28,30 @@ class Layer:
         Counter-clockwise seen from above, that is against the normals.
     cell : (t,) int array
         Tetrahedron that each triangle was cut from.
-    nodes : (n, 2) int array
-        Ends of the mesh edge that each point lies on (twice the same node where it is one).
-    weights : (n,) array in [0, 1]
-        ``points = (1 - weights) * mesh.points[nodes[:, 0]] + weights * mesh.points[nodes[:, 1]]``.
+    nodes : (n, 2) or (n, 4) int array
+        Ends of the mesh edge that each point lies on (twice the same node where it is one), or
+        the corners of the cell that it lies in.
+    weights : (n,) array in [0, 1], or (n, 4) array
+        ``points = (1 - weights) * mesh.points[nodes[:, 0]] + weights * mesh.points[nodes[:, 1]]``;
+        with four nodes the share of each.
     loops : tuple of (k,) int arrays
         Boundary loops as point indices, material on the left, first point not repeated.
     index : int
         Position in the stack, 0 at the bottom.
     thickness : float, mm
-        Share of the part's height that this layer stands for.
+        Share of the part's height that this layer stands for; of a curved layer, its mean.
     patches : mapping of name to (k, 2) int arrays
         Boundary edges (point indices) that lie on each named patch of the mesh.
     flat : Plane, optional
         The plane that all points lie in; none where the layer is curved. What works in a plane
         takes the flat view `plane`.
+    local_thickness : (n,) array, mm, optional
+        Thickness at each point; by default `thickness` everywhere.
+    turns : (t, 3, 3) array, optional
+        Of the flat view of a curved layer: rows are the axes, in the frame of the mesh, that each
+        triangle's own x, y and normal stand for. Tensors are turned by it (`stress_on`).
+    point_turns : (n, 3, 3) array, optional
+        The same at the points.
     """
 
     points: FloatArray
@@ -54,9 +64,16 @@ class Layer:
     thickness: float
     patches: Mapping[str, IntArray] = field(default_factory=dict)
     flat: Plane | None = None
+    local_thickness: FloatArray = None  # type: ignore[assignment]
+    turns: FloatArray | None = None
+    point_turns: FloatArray | None = None
 
     def __post_init__(self) -> None:
+        if self.local_thickness is None:
+            everywhere = np.full(len(self.points), float(self.thickness))
+            object.__setattr__(self, "local_thickness", everywhere)
         freeze(self, points=float, triangles=int, cell=int, nodes=int, weights=float, patches=int)
+        freeze(self, local_thickness=float, turns=float, point_turns=float)
         object.__setattr__(self, "loops", tuple(read_only(x, np.int64) for x in self.loops))
 
     def __repr__(self) -> str:
@@ -68,6 +85,8 @@ class Layer:
 
     def interpolate(self, nodal: FloatArray) -> FloatArray:
         """Values at the layer's points, (n, ...), of a field given at the mesh nodes."""
+        if self.weights.ndim == 2:
+            return np.asarray(np.einsum("nk,nk...->n...", self.weights, nodal[self.nodes]))
         w = self.weights.reshape((-1,) + (1,) * (nodal.ndim - 1))
         return (1.0 - w) * nodal[self.nodes[:, 0]] + w * nodal[self.nodes[:, 1]]
 
@@ -86,6 +105,24 @@ class Layer:
     def normals(self) -> FloatArray:
         """Unit normal of each triangle, (t, 3), up; zero where a triangle has no area."""
         return read_only(self._across / np.maximum(2.0 * self.areas, 1e-300)[:, None])
+
+    @cached_property
+    def point_normals(self) -> FloatArray:
+        """Unit normal at each point, (n, 3): mean of the triangles round it, by their areas."""
+        total = np.zeros_like(self.points)
+        for axis in range(3):
+            share = np.repeat(self._across[:, axis], 3)
+            total[:, axis] = np.bincount(self.triangles.ravel(), share, minlength=len(total))
+        size = np.linalg.norm(total, axis=1, keepdims=True)
+        return read_only(total / np.maximum(size, 1e-300))
+
+    @cached_property
+    def component(self) -> IntArray:
+        """Number of the piece that each triangle belongs to, (t,), from 0 on."""
+        t = self.triangles
+        piece = connected(np.concatenate([t[:, :2], t[:, 1:]]), len(self.points))
+        _, number = np.unique(piece[t[:, 0]], return_inverse=True)
+        return read_only(number, int)
 
     @cached_property
     def plane(self) -> "FlatLayer":

@@ -5,6 +5,7 @@ from dataclasses import dataclass
 from ccfem.arrays import FloatArray, freeze
 from ccfem.elasticity.part_stress import PartStress
 from ccfem.layers.layer import Layer
+from ccfem.tensor import in_axes
 
 __all__ = ["LayerStress", "stress_on"]
 
@@ -37,7 +38,8 @@ class LayerStress:
 
 
 def stress_on(layer: Layer, stress: PartStress) -> LayerStress:
-    """Stress of a part on one of its layers."""
-    return LayerStress(
-        layer, stress.stress[layer.cell], layer.interpolate(stress.nodal), stress.held_or_loaded
-    )
+    """Stress of a part on one of its layers, in the axes of the layer's own (`Layer.turns`)."""
+    cell, nodal = stress.stress[layer.cell], layer.interpolate(stress.nodal)
+    if layer.turns is not None and layer.point_turns is not None:
+        cell, nodal = in_axes(cell, layer.turns), in_axes(nodal, layer.point_turns)
+    return LayerStress(layer, cell, nodal, stress.held_or_loaded)

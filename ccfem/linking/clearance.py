@@ -1,4 +1,4 @@
-"""Keeping strands apart: what lies nearer than a strand's width to a longer one is cut away."""
+"""Strands kept apart: what lies closer than a strand's width to a longer one is cut away."""
 
 from collections.abc import Sequence
 
@@ -14,11 +14,10 @@ __all__ = ["trim_to_clearance"]
 def trim_to_clearance(
     lines: Sequence[FloatArray], clearance: float, least_length: float, first: int = 0
 ) -> list[FloatArray]:
-    """Cut strands so that no two are nearer than a clearance, the longest first.
+    """Cut strands so that no two are closer than a clearance, the longest first.
 
-    Strands are laid in the order of their length. Of each, only the stretches that keep the
-    clearance from those laid before, and from earlier parts of itself, remain; stretches shorter
-    than `least_length` are dropped.
+    Of each strand, only the stretches that keep the clearance from those laid before, and from
+    earlier parts of itself, remain; stretches shorter than `least_length` are dropped.
 
     Parameters
     ----------
@@ -27,7 +26,7 @@ def trim_to_clearance(
     clearance : float, mm
     least_length : float, mm
     first : int, default 0
-        So many strands at the start of `lines` are laid before all others.
+        Number of strands at the start of `lines` that are laid before all others.
 
     Returns
     -------
@@ -40,11 +39,9 @@ def trim_to_clearance(
     order = np.lexsort((-length, np.arange(len(lines)) >= first))
     ordered = [lines[k] for k in order]
     points, offsets = pack(ordered)
-    keep = _lay(points, offsets, clearance, least_length)
+    masks = np.split(_lay(points, offsets, clearance, least_length), offsets[1:-1])
     kept: list[FloatArray] = []
-    for k in range(len(ordered)):
-        mask = keep[offsets[k] : offsets[k + 1]]
-        line = ordered[k]
+    for line, mask in zip(ordered, masks, strict=True):
         if mask.all():
             kept.append(line)
             continue

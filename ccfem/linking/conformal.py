@@ -60,10 +60,8 @@ def lead_into(
     pieces: list[FloatArray] = []
     for line in lines:
         string = shapely.linestrings(line)
-        if not shapely.intersects(zone, string):
-            pieces.append(line)
-            continue
-        pieces += open_lines(shapely.difference(string, zone))
+        cut = shapely.intersects(zone, string)
+        pieces += open_lines(shapely.difference(string, zone)) if cut else [line]
     ends = [
         (float(shapely.line_locate_point(ring, shapely.points(point))), 2 * k + side)
         for k, piece in enumerate(pieces)

@@ -1,10 +1,11 @@
 """Order of many clusters by exchanges of stretches of it (2-opt, Or-opt).
 
 Every order is judged by its best terminals, found by dynamic programming along it; only what an
-exchange changes is computed anew. See `ordering` for what a cluster is.
+exchange changes is recomputed. See `ordering` for what a cluster is.
 """
 
 import time
+from typing import NamedTuple
 
 import numpy as np
 from numba import njit
@@ -12,83 +13,78 @@ from numba import njit
 from ccfem.arrays import FloatArray, IntArray
 from ccfem.errors import InputError
 
-__all__ = ["improved_order", "searched_order"]
+__all__ = ["Clusters", "greedy_order", "improved_order", "strands"]
 
 _BLOCK = 3
-"""Most clusters that Or-opt moves at once."""
+"""Maximum number of clusters that Or-opt moves at once."""
 _MANY = 50
-"""Clusters above which fewer rounds are made."""
+"""Number of clusters above which fewer rounds are made."""
+_TIME_LIMIT = 30.0
+"""Time, s, after which no further round begins; about a hundred clusters take less."""
 
 
-def searched_order(
-    links: FloatArray,
-    visit: FloatArray,
-    offsets: IntArray,
-    first: int,
-    last: int,
-    rounds: int,
-    time_limit: float,
-) -> IntArray:
-    """Order of the clusters by exchanges, from a greedy one and from disturbances of the best.
+class Clusters(NamedTuple):
+    """Things with terminals, each to be visited once.
 
-    Parameters are those of `ordering.order_clusters`, with -1 for no first or last terminal.
-
-    Returns
-    -------
-    (p, 2) int array
-        Terminals entered and left, in order.
+    Attributes
+    ----------
+    links : (t, t) array
+        Cost >= 0 from leaving at a terminal to entering at another, of another cluster.
+    visit : (t, t) array
+        Cost >= 0 of entering a cluster at one terminal and leaving it at another; inf where that
+        cannot be.
+    offsets : (p + 1,) int array
+        Cluster c has the terminals ``offsets[c]`` up to ``offsets[c + 1]``.
+    first, last : int
+        Terminal at which the whole way starts, and ends; -1 for any.
     """
-    best = _greedy(links, visit, offsets, first, last)
-    return _improved(best, links, visit, offsets, first, last, rounds, time_limit)
+
+    links: FloatArray
+    visit: FloatArray
+    offsets: IntArray
+    first: int = -1
+    last: int = -1
 
 
-def improved_order(
-    order: IntArray,
-    links: FloatArray,
-    visit: FloatArray,
-    offsets: IntArray,
-    rounds: int,
-    time_limit: float,
-) -> IntArray:
-    """Terminals (p, 2) entered and left in an order that is no worse than a given one (p,)."""
-    return _improved(order.copy(), links, visit, offsets, -1, -1, rounds, time_limit)
+def strands(links: FloatArray, first: int = -1, last: int = -1) -> Clusters:
+    """Strands as clusters: terminals 2k and 2k + 1 are the ends of strand k, its visit is free."""
+    ends = np.arange(len(links))
+    visit = np.full(links.shape, np.inf)
+    visit[ends, ends ^ 1] = 0.0
+    offsets = np.arange(0, len(links) + 1, 2)
+    return Clusters(np.ascontiguousarray(links, dtype=np.float64), visit, offsets, first, last)
 
 
-def _improved(
-    best: IntArray,
-    links: FloatArray,
-    visit: FloatArray,
-    offsets: IntArray,
-    first: int,
-    last: int,
-    rounds: int,
-    time_limit: float,
-) -> IntArray:
-    count = len(offsets) - 1
-    least = _exchange(best, links, visit, offsets, first, last)
+def improved_order(order: IntArray, clusters: Clusters, rounds: int) -> IntArray:
+    """Terminals (p, 2) entered and left in an order that is no worse than a given one (p,).
+
+    Each round disturbs the best order and makes exchanges until none helps. The same input gives
+    the same order.
+    """
+    best, count = order.copy(), len(order)
+    least = _exchange(best, clusters)
     # From here: what went before may have been compiled first.
     begun = time.monotonic()
     random = np.random.default_rng(0)
-    fixed, free = int(first >= 0), count - int(last >= 0)
+    fixed, free = int(clusters.first >= 0), count - int(clusters.last >= 0)
     # A round costs about the cube of the count.
     for _ in range(round(rounds * min(1.0, (_MANY / count) ** 2))):
-        if time.monotonic() - begun > time_limit:
+        if time.monotonic() - begun > _TIME_LIMIT:
             break
         # Two neighbouring stretches change places: what exchanges of one do not undo.
         i, j, k = np.sort(random.integers(fixed, free + 1, 3))
-        order = np.concatenate([best[:i], best[j:k], best[i:j], best[k:]])
-        cost = _exchange(order, links, visit, offsets, first, last)
+        trial = np.concatenate([best[:i], best[j:k], best[i:j], best[k:]])
+        cost = _exchange(trial, clusters)
         if cost < least - 1e-9 * abs(least):
-            best, least = order, cost
+            best, least = trial, cost
     if not np.isfinite(least):
         raise InputError("there is no way through all clusters: some visit must be possible")
-    return _along(best, links, visit, offsets, first, last)
+    return _along(best, clusters)
 
 
-def _greedy(
-    links: FloatArray, visit: FloatArray, offsets: IntArray, first: int, last: int
-) -> IntArray:
-    """Order in which the next cluster is always the one that is cheapest to reach."""
+def greedy_order(clusters: Clusters) -> IntArray:
+    """Order (p,) in which the next cluster is always the one that is cheapest to reach."""
+    links, visit, offsets, first, last = clusters
     cluster = np.repeat(np.arange(len(offsets) - 1), np.diff(offsets))
     free = np.ones(len(links), dtype=bool)
     final = cluster[last] if last >= 0 else -1
@@ -106,8 +102,9 @@ def _greedy(
 
 
 @njit(cache=True, nogil=True)
-def _step(value, c, d, links, visit, offsets, entry, out):  # type: ignore[no-untyped-def]
+def _step(value, c, d, clusters, entry, out):  # type: ignore[no-untyped-def]
     """Costs of leaving cluster d into `out`, from those of leaving c in `value`; the least."""
+    links, visit, offsets, _, _ = clusters
     least = np.inf
     for a in range(offsets[d], offsets[d + 1]):
         entry[a] = np.inf
@@ -123,8 +120,9 @@ def _step(value, c, d, links, visit, offsets, entry, out):  # type: ignore[no-un
 
 
 @njit(cache=True, nogil=True)
-def _begin(c, visit, offsets, first, out):  # type: ignore[no-untyped-def]
+def _begin(c, clusters, out):  # type: ignore[no-untyped-def]
     """Costs of leaving the first cluster c of a way into `out`; the least."""
+    _, visit, offsets, first, _ = clusters
     least = np.inf
     for b in range(offsets[c], offsets[c + 1]):
         out[b] = np.inf
@@ -136,12 +134,13 @@ def _begin(c, visit, offsets, first, out):  # type: ignore[no-untyped-def]
 
 
 @njit(cache=True, nogil=True)
-def _table(order, links, visit, offsets, first, last, ahead, behind):  # type: ignore[no-untyped-def]
+def _table(order, clusters, ahead, behind):  # type: ignore[no-untyped-def]
     """Fill costs of leaving each cluster from the start, and from entering it to the end."""
+    links, visit, offsets, first, last = clusters
     entry = np.empty(len(links))
-    _begin(order[0], visit, offsets, first, ahead)
+    _begin(order[0], clusters, ahead)
     for k in range(1, len(order)):
-        _step(ahead, order[k - 1], order[k], links, visit, offsets, entry, ahead)
+        _step(ahead, order[k - 1], order[k], clusters, entry, ahead)
     for k in range(len(order) - 1, -1, -1):
         c = order[k]
         for b in range(offsets[c], offsets[c + 1]):
@@ -189,13 +188,14 @@ def _rearranged(window, variant, out):  # type: ignore[no-untyped-def]
 
 
 @njit(cache=True, nogil=True)
-def _exchange(order, links, visit, offsets, first, last):  # type: ignore[no-untyped-def]
+def _exchange(order, clusters):  # type: ignore[no-untyped-def]
     """Rearrange windows of `order`, in place, until no rearrangement helps; the cost."""
-    ahead, behind = np.empty(len(links)), np.empty(len(links))
-    value, entry = np.empty(len(links)), np.empty(len(links))
-    least = _table(order, links, visit, offsets, first, last, ahead, behind)
+    count = len(clusters.links)
+    ahead, behind = np.empty(count), np.empty(count)
+    value, entry = np.empty(count), np.empty(count)
+    least = _table(order, clusters, ahead, behind)
     trial = np.empty_like(order)
-    lowest, highest = int(first >= 0), len(order) - int(last >= 0)
+    lowest, highest = int(clusters.first >= 0), len(order) - int(clusters.last >= 0)
     helped = True
     while helped:
         helped = False
@@ -206,31 +206,30 @@ def _exchange(order, links, visit, offsets, first, last):  # type: ignore[no-unt
                     if not _rearranged(order[i:j], variant, part):
                         continue
                     limit = least * (1.0 - 1e-9)
-                    cost = _cost_with(
-                        part, i, order, links, visit, offsets, ahead, behind, value, entry, limit
-                    )
+                    cost = _cost_with(part, i, order, clusters, ahead, behind, value, entry, limit)
                     if cost < limit:
                         order[i:j] = part
-                        least = _table(order, links, visit, offsets, first, last, ahead, behind)
+                        least = _table(order, clusters, ahead, behind)
                         helped = True
     return least
 
 
 @njit(cache=True, nogil=True)
-def _cost_with(part, i, order, links, visit, offsets, ahead, behind, value, entry, limit):  # type: ignore[no-untyped-def]
+def _cost_with(part, i, order, clusters, ahead, behind, value, entry, limit):  # type: ignore[no-untyped-def]
     """Cost of the way with `part` from position i on; inf once it cannot be below the limit."""
+    links, _, offsets, _, _ = clusters
     j = i + len(part)
     rest = 0.0
     if j < len(order):
         rest = behind[offsets[order[j]] : offsets[order[j] + 1]].min()
     if i == 0:
-        cost = _begin(part[0], visit, offsets, -1, value)
+        cost = _begin(part[0], clusters, value)
     else:
-        cost = _step(ahead, order[i - 1], part[0], links, visit, offsets, entry, value)
+        cost = _step(ahead, order[i - 1], part[0], clusters, entry, value)
     for k in range(1, len(part)):
         if cost + rest >= limit:
             return np.inf
-        cost = _step(value, part[k - 1], part[k], links, visit, offsets, entry, value)
+        cost = _step(value, part[k - 1], part[k], clusters, entry, value)
     if j == len(order):
         return cost
     c, d = part[-1], order[j]
@@ -241,17 +240,11 @@ def _cost_with(part, i, order, links, visit, offsets, ahead, behind, value, entr
     return cost
 
 
-def _along(
-    order: IntArray,
-    links: FloatArray,
-    visit: FloatArray,
-    offsets: IntArray,
-    first: int,
-    last: int,
-) -> IntArray:
+def _along(order: IntArray, clusters: Clusters) -> IntArray:
     """Terminals entered and left on the best way through clusters in a given order."""
+    links, visit, offsets, first, last = clusters
     ahead, behind = np.full(len(links), np.inf), np.empty(len(links))
-    _table(order, links, visit, offsets, first, last, ahead, behind)
+    _table(order, clusters, ahead, behind)
     way: list[tuple[int, int]] = []
     value = np.where(np.arange(len(links)) == first, 0.0, np.inf if first >= 0 else 0.0)
     for k, c in enumerate(order):

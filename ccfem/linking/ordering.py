@@ -1,4 +1,4 @@
-"""Order in which things with several ends are visited, so that what joins them costs least.
+"""Order in which things with several ends are visited so that the links between them cost least.
 
 A cluster is visited once: entered at one of its terminals, left at another. A strand is a cluster
 of two terminals; a group of strands that are laid together is one of all their ends. The order of
@@ -13,52 +13,24 @@ from numba import njit
 
 from ccfem.arrays import FloatArray, IntArray
 from ccfem.errors import InputError
-from ccfem.linking.exchanges import searched_order
+from ccfem.linking.exchanges import Clusters, greedy_order, improved_order, strands
 
-__all__ = ["costs_between_ends", "order_clusters", "strand_visits"]
+__all__ = ["costs_between_ends", "order_clusters"]
 
-
-def strand_visits(count: int) -> FloatArray:
-    """Cost of visits for strands that are clusters of their own, (2 count, 2 count).
-
-    Terminals 2k and 2k + 1 are the ends of strand k: a visit from one to the other costs nothing.
-    """
-    visit = np.full((2 * count, 2 * count), np.inf)
-    ends = np.arange(2 * count)
-    visit[ends, ends ^ 1] = 0.0
-    return visit
+_EXACT = 12
+"""Maximum number of clusters for which the order is the best there is."""
 
 
-def order_clusters(
-    links: FloatArray,
-    visit: FloatArray,
-    offsets: IntArray,
-    first: int | None = None,
-    last: int | None = None,
-    exact: int = 12,
-    rounds: int = 30,
-    time_limit: float = 30.0,
-) -> IntArray:
+def order_clusters(clusters: Clusters, exact: int = _EXACT, rounds: int = 30) -> IntArray:
     """Order of clusters, and the terminals at which each is entered and left.
 
     Parameters
     ----------
-    links : (t, t) array
-        Cost >= 0 from leaving at a terminal to entering at another, of other clusters.
-    visit : (t, t) array
-        Cost >= 0 of entering a cluster at one terminal and leaving it at another; inf where that
-        cannot be.
-    offsets : (p + 1,) int array
-        Cluster c has the terminals ``offsets[c]`` up to ``offsets[c + 1]``.
-    first, last : int, optional
-        Terminal at which the whole way starts, and ends.
+    clusters : Clusters
     exact : int, default 12
-        Up to so many clusters the order is the best there is; the work is 2^p t^2.
+        Up to this many clusters the order is the best there is; the work is 2^p t^2.
     rounds : int, default 30
-        Of the search above that: disturbances of the best order, each followed by exchanges until
-        none helps; fewer for more than fifty clusters. The same input gives the same order.
-    time_limit : float, s
-        No further round begins after this; meant for cases that nobody thought of.
+        Of the search above that (`improved_order`); fewer for more than fifty clusters.
 
     Returns
     -------
@@ -70,8 +42,8 @@ def order_clusters(
     InputError
         For arrays that do not fit together, or where there is no way.
     """
-    links, visit = (np.ascontiguousarray(cost, dtype=np.float64) for cost in (links, visit))
-    offsets = np.ascontiguousarray(offsets, dtype=np.int64)
+    links, visit = (np.ascontiguousarray(cost, dtype=np.float64) for cost in clusters[:2])
+    offsets = np.ascontiguousarray(clusters.offsets, dtype=np.int64)
     count = len(offsets) - 1
     size = (int(offsets[-1]), int(offsets[-1]))
     if links.shape != size or visit.shape != size or not (np.diff(offsets) > 0).all():
@@ -81,17 +53,13 @@ def order_clusters(
         )
     if count == 0:
         return np.zeros((0, 2), dtype=np.int64)
-    start = -1 if first is None else first
-    end = -1 if last is None else last
+    clusters = Clusters(links, visit, offsets, clusters.first, clusters.last)
     if count <= exact:
-        best = _costs_of_sets(links, visit, offsets, start)
-        return _traced(best, links, visit, offsets, start, end)
-    return searched_order(links, visit, offsets, start, end, rounds, time_limit)
+        return _traced(_costs_of_sets(clusters), clusters)
+    return improved_order(greedy_order(clusters), clusters, rounds)
 
 
-def costs_between_ends(
-    links: FloatArray, exact: int = 12, rounds: int = 5, time_limit: float = 30.0
-) -> FloatArray:
+def costs_between_ends(links: FloatArray) -> FloatArray:
     """Least cost of laying all strands of a group from one of their ends to another.
 
     Parameters
@@ -99,27 +67,22 @@ def costs_between_ends(
     links : (2k, 2k) array
         Cost of the link between each two ends, the same both ways; strand i has the ends 2i and
         2i + 1.
-    exact : int, default 12
-        Above so many strands only the pairs of ends that a search finds to be good have a cost.
-    rounds, time_limit
-        Of that search, as in `order_clusters`.
 
     Returns
     -------
     (2k, 2k) array
-        inf where the strands cannot be laid so, as from an end to itself.
+        inf where the strands cannot be laid so, as from an end to itself. For more than 12 strands
+        only the pairs of ends that a search finds to be good have a cost.
     """
-    links = np.ascontiguousarray(links, dtype=np.float64)
-    count = len(links) // 2
-    visit, offsets = strand_visits(count), 2 * np.arange(count + 1)
-    if count <= exact:
-        return np.stack([_costs_of_sets(links, visit, offsets, a)[-1] for a in range(2 * count)])
+    if len(links) <= 2 * _EXACT:
+        every = range(len(links))
+        return np.stack([_costs_of_sets(strands(links, first))[-1] for first in every])
     table = np.full(links.shape, np.inf)
-    starts: list[int | None] = [None]
+    starts = [-1]
     while starts:
-        ends = order_clusters(links, visit, offsets, starts.pop(0), None, exact, rounds, time_limit)
-        a, b = int(ends[0, 0]), int(ends[-1, 1])
-        cost = float(links[ends[:-1, 1], ends[1:, 0]].sum())
+        way = order_clusters(strands(links, starts.pop(0)), rounds=5)
+        a, b = int(way[0, 0]), int(way[-1, 1])
+        cost = float(links[way[:-1, 1], way[1:, 0]].sum())
         if not np.isfinite(table).any():
             starts = [a ^ 1, b, b ^ 1]
         table[a, b] = table[b, a] = min(cost, table[a, b])
@@ -127,8 +90,9 @@ def costs_between_ends(
 
 
 @njit(cache=True, nogil=True)
-def _costs_of_sets(links, visit, offsets, first):  # type: ignore[no-untyped-def]
+def _costs_of_sets(clusters):  # type: ignore[no-untyped-def]
     """Least cost of having visited a set of clusters and left at a terminal of it, (2^p, t)."""
+    links, visit, offsets, first, _ = clusters
     count, terminals = len(offsets) - 1, len(links)
     best = np.full((1 << count, terminals), np.inf)
     entry = np.empty(terminals)
@@ -153,15 +117,9 @@ def _costs_of_sets(links, visit, offsets, first):  # type: ignore[no-untyped-def
     return best
 
 
-def _traced(
-    best: FloatArray,
-    links: FloatArray,
-    visit: FloatArray,
-    offsets: IntArray,
-    first: int,
-    last: int,
-) -> IntArray:
-    """Terminals entered and left on the best way, read from the costs of sets backward."""
+def _traced(best: FloatArray, clusters: Clusters) -> IntArray:
+    """Terminals entered and left on the best way, read from the costs of sets backwards."""
+    links, visit, offsets, first, last = clusters
     cluster = np.repeat(np.arange(len(offsets) - 1), np.diff(offsets))
     done = len(best) - 1
     left = last if last >= 0 else int(np.argmin(best[done]))

@@ -1,12 +1,12 @@
 """Links that lead round a part, along a ring outside it."""
 
-from dataclasses import dataclass
+from typing import NamedTuple
 
 import numpy as np
 import shapely
 from numba import njit
 
-from ccfem.arrays import FloatArray, IntArray, freeze
+from ccfem.arrays import FloatArray, IntArray
 from ccfem.geometry.dubins import WORDS, curve_points, word_sizes
 from ccfem.geometry.polylines import between, resample
 from ccfem.geometry.section_grid import SectionGrid
@@ -16,16 +16,15 @@ from ccfem.linking.link_curves import curve_cost
 __all__ = ["RingRoutes", "ring_cost", "ring_curve", "ring_routes"]
 
 _DISTANCE = 5.0
-"""Distance, mm, of the ring to the part; at least the radius."""
+"""Distance, mm, from the ring to the part; at least the radius."""
 _LEADS = (5.0, 10.0, 16.0)
 """How far ahead on the ring, mm, a lead may end; more where turns are wide."""
 
 _NEAR = 0.01
-"""Half the chord, mm, that is taken for a tangent of the ring."""
+"""Half the length, mm, of the chord taken as a tangent of the ring."""
 
 
-@dataclass(frozen=True)
-class RingRoutes:
+class RingRoutes(NamedTuple):
     """A ring round a part, and leads from ends to it.
 
     Attributes
@@ -53,9 +52,6 @@ class RingRoutes:
     cost: FloatArray
     word: IntArray
     radius: float
-
-    def __post_init__(self) -> None:
-        freeze(self, ring=float, starts=float, goal=float, position=float, cost=float)
 
 
 def ring_routes(
@@ -128,6 +124,7 @@ def _leads(starts, goal, radius, grid, weights):  # type: ignore[no-untyped-def]
     return cost, word
 
 
+@njit(cache=True, nogil=True)
 def ring_cost(routes: RingRoutes) -> tuple[FloatArray, IntArray]:
     """Cost of the way along the ring between each two ends, and which it is.
 
@@ -138,11 +135,7 @@ def ring_cost(routes: RingRoutes) -> tuple[FloatArray, IntArray]:
     way : (t, t) int array
         Sense and leads, as a number that `ring_curve` reads.
     """
-    return _ring_cost(routes.position, routes.cost, routes.length)
-
-
-@njit(cache=True, nogil=True)
-def _ring_cost(position, lead, length):  # type: ignore[no-untyped-def]
+    position, lead, length = routes.position, routes.cost, routes.length
     count, _, variants = position.shape
     cost = np.full((count, count), np.inf)
     way = np.zeros((count, count), np.int64)

@@ -1,4 +1,4 @@
-"""All tracks of a section as one continuous path, its turns outside the section as far as can be.
+"""All tracks of a section as one continuous path that turns outside the section where it can.
 
 T. Wang, N. Li, G. Link, J. Jelonnek, J. Fleischer, J. Dittus, D. Kupzik, Load-dependent path
 planning method for 3D printing of continuous fiber reinforced plastics, Composites Part A 140
@@ -10,6 +10,7 @@ the order of the tracks is the one whose links cost least (`ordering`).
 from collections.abc import Sequence
 from dataclasses import dataclass
 from itertools import pairwise
+from typing import NamedTuple
 
 import numpy as np
 import shapely
@@ -22,9 +23,9 @@ from ccfem.geometry.places import INSIDE, VOID, cut_at_section
 from ccfem.geometry.polylines import between, is_closed, line_length, runs
 from ccfem.geometry.section_grid import section_grid
 from ccfem.geometry.shapes import Region
-from ccfem.linking.exchanges import improved_order
+from ccfem.linking.exchanges import Clusters, improved_order, strands
 from ccfem.linking.link_curves import LinkCurves, link_curve, link_curves, stub_points
-from ccfem.linking.ordering import costs_between_ends, order_clusters, strand_visits
+from ccfem.linking.ordering import costs_between_ends, order_clusters
 from ccfem.linking.ring_routes import RingRoutes, ring_cost, ring_curve, ring_routes
 
 __all__ = ["LinkedPath", "link_tracks"]
@@ -32,11 +33,16 @@ __all__ = ["LinkedPath", "link_tracks"]
 _REACH = (1.0, 3.0, 6.0)
 """Straight extensions, mm, of tracks before a link turns."""
 _EXACT_GROUPS = 10
-"""Most groups of which the best order is found for sure."""
+"""Maximum number of groups whose order is the best there is."""
 _ROUNDS = 15
-"""Of the search among single tracks."""
+"""Rounds of the search among single tracks."""
+_WEIGHTS = (8.0, 4.0, 0.0)
+"""Extra cost of each mm of a link inside the section, over its holes, where nothing holds the
+fibre, and outside."""
+_STEP = 0.5
+"""Longest distance, mm, between neighbouring points of a link."""
 _ON_BORDER = 1e-3
-"""Length, mm, of a link that begins on the border, by which it may seem to lie inside."""
+"""Length, mm, of a link on the border that may count as inside through rounding."""
 
 
 @dataclass(frozen=True)
@@ -57,19 +63,14 @@ class LinkedPath:
     def __post_init__(self) -> None:
         freeze(self, points=float, link=bool)
 
-    @property
-    def links(self) -> list[FloatArray]:
-        """The links in their order, as (m, 2) arrays, mm."""
-        return [self.points[a : b + 1] for a, b in self._stretches()]
-
     def without_long_links(
         self, section: Region, inside: float, over_void: float = np.inf
     ) -> "list[LinkedPath]":
-        """Leave out links of which more than so many mm lies inside a section or over its voids.
+        """Leave out links with more than a length, mm, inside a section or over its voids.
 
-        The path falls into one piece more than there are such links.
+        The path falls into one more piece than there are such links.
         """
-        stretches = self._stretches()
+        stretches = runs(self.link)
         steps = np.flatnonzero(self.link)
         cut = cut_at_section(self.points[steps], self.points[steps + 1], section, tolerance=0.0)
         size = np.linalg.norm(self.points[steps + 1] - self.points[steps], axis=1)[cut.step]
@@ -87,35 +88,26 @@ class LinkedPath:
             found.append(LinkedPath(self.points[a : b + 1], link))
         return found
 
-    def _stretches(self) -> IntArray:
-        """Points (k, 2) at which each link begins and ends."""
-        return runs(self.link)
-
 
 def link_tracks(
-    groups: Sequence[Sequence[FloatArray]],
-    section: Region,
-    radius: float,
-    width: float,
-    inside_weight: float = 8.0,
-    void_weight: float = 4.0,
-    step: float = 0.5,
-    time_limit: float = 30.0,
+    groups: Sequence[Sequence[FloatArray]], section: Region, radius: float, width: float
 ) -> LinkedPath:
     """Join the tracks of all groups to one path.
 
-    First each group is laid in one go: the order of the tracks in a group, that of the groups, and
-    the ends at which each is begun and left are those whose links cost least, exactly so for up to
-    12 tracks in a group and 10 groups, else by a search that gives the same answer for the same
-    input. Then stretches of single tracks change places where that makes the links cheaper still,
-    as found by a search too.
+    First each group is laid without a break: the order of the tracks in a group, that of the
+    groups, and the ends at which each is begun and left are those whose links cost least, exactly
+    so for up to 12 tracks in a group and 10 groups, else as found by a search. A second search
+    moves stretches of single tracks where that makes the links cheaper still. The same input gives
+    the same path.
+
     A link is the cheapest of the Dubins curves between the ends, extended straight, and of the ways
-    along a ring round the section.
+    along a ring round the section. It costs its length, plus 8 mm for each mm inside the section
+    and 4 mm for each mm over a hole.
 
     Parameters
     ----------
     groups : sequence of sequences of (n_i, 2) arrays, mm
-        One group for each main path. Tracks with less than two points are left out, and so are
+        One group for each main path. Tracks with fewer than two points are left out, and so are
         repeated points; a track whose last point is its first is closed, and is opened at the same
         place as the others of its group, with a gap for the link to the next. Tracks go on straight
         at their ends for a millimetre at least, so these should lie on the border of the section.
@@ -123,15 +115,7 @@ def link_tracks(
     radius : float, mm
         Tightest turn of a link.
     width : float, mm
-        Distance of neighbouring tracks.
-    inside_weight : float, default 8
-        Extra cost of each mm of a link inside the section.
-    void_weight : float, default 4
-        Extra cost of each mm of a link over a hole of the section, where nothing holds the fibre.
-    step : float, mm, default 0.5
-        Longest distance between neighbouring points of a link.
-    time_limit : float, s, default 30
-        For each of the searches, in which it ends sooner for up to some hundred tracks.
+        Spacing of neighbouring tracks.
 
     Returns
     -------
@@ -157,11 +141,9 @@ def link_tracks(
     opened = _opened(wanted, radius, width)
     closed = [is_closed(track) for group in wanted for track in group]
     tracks = [track for group in opened for track in group]
-    weights = np.array([inside_weight, void_weight, 0.0])
-    network = _Network.between(tracks, np.array(closed), section, radius, weights)
-    sizes = np.array([len(group) for group in opened])
-    visits = _order(network.cost, np.concatenate([[0], np.cumsum(sizes)]), time_limit)
-    return _assembled(tracks, visits, network, step)
+    network = _Network.between(tracks, np.array(closed), section, radius)
+    offsets = np.concatenate([[0], np.cumsum([2 * len(group) for group in opened])])
+    return _assembled(tracks, _order(network.cost, offsets), network)
 
 
 def _clean(track: FloatArray) -> FloatArray:
@@ -175,73 +157,43 @@ def _clean(track: FloatArray) -> FloatArray:
 def _opened(
     groups: Sequence[Sequence[FloatArray]], radius: float, width: float
 ) -> list[list[FloatArray]]:
-    """Open closed tracks side by side, as near to the other groups as can be.
+    """Open closed tracks side by side, as near to the other groups as possible.
 
-    Each is left out for as long as two arcs take to the next track, one `width` aside.
+    The gap in each is as long as two arcs that lead to the next track, one `width` sideways.
     """
     aside = min(width, 2.0 * radius)
     gap = max(width, 1.1 * float(np.sqrt(aside * (4.0 * radius - aside))))
     found: list[list[FloatArray]] = []
-    for k, group in enumerate(groups):
-        others = [
-            track[[0, -1]]
-            for other in (*groups[:k], *groups[k + 1 :], group)
-            for track in other
-            if not (other is group and is_closed(track))
-        ]
-        seam: FloatArray | None = None
-        tracks = []
+    for group in groups:
+        fixed = [track for track in group if not is_closed(track)]
+        others = [*(track for other in groups if other is not group for track in other), *fixed]
+        seam = np.concatenate([track[[0, -1]] for track in others]).mean(axis=0) if others else None
+        found.append([])
         for track in group:
-            if not is_closed(track):
-                tracks.append(track)
-                continue
-            if seam is None:
-                seam = np.concatenate(others).mean(axis=0) if others else track[0]
-            ring = ring_from(track, seam)
-            seam = ring[0]
-            length = line_length(ring)
-            tracks.append(between(ring, 0.0, max(length - gap, 0.5 * length)))
-        found.append(tracks)
+            if is_closed(track):
+                ring = ring_from(track, track[0] if seam is None else seam)
+                seam, length = ring[0], line_length(ring)
+                track = between(ring, 0.0, max(length - gap, 0.5 * length))
+            found[-1].append(track)
     return found
 
 
-@dataclass(frozen=True)
-class _Network:
-    """Links between all ends of tracks.
+class _Network(NamedTuple):
+    """Links between all ends of tracks: ends 2k and 2k + 1 are those of track k."""
 
-    Attributes
-    ----------
-    ends : (t, 3) array
-        Poses at the ends, heading out of the track: 2k and 2k + 1 are those of track k.
-    reach : (t,) array, mm
-        Straight extension of an end before a way round the part.
-    cost : (t, t) array, mm
-    curves : LinkCurves
-    routes : RingRoutes
-    by_ring : (t, t) bool array
-    way : (t, t) int array
-        On the ring.
-    """
-
-    ends: FloatArray
-    reach: FloatArray
-    cost: FloatArray
+    ends: FloatArray  # (t, 3), poses that head out of the track
+    reach: FloatArray  # (t,), mm, straight extension before a way round the part
+    cost: FloatArray  # (t, t), mm
     curves: LinkCurves
     routes: RingRoutes
-    by_ring: BoolArray
-    way: IntArray
+    way: IntArray  # (t, t), on the ring
 
     @classmethod
     def between(
-        cls,
-        tracks: Sequence[FloatArray],
-        closed: BoolArray,
-        section: Region,
-        radius: float,
-        weights: FloatArray,
+        cls, tracks: Sequence[FloatArray], closed: BoolArray, section: Region, radius: float
     ) -> "_Network":
         ends = _end_poses(tracks)
-        grid = section_grid(section, 30.0)
+        grid, weights = section_grid(section, 30.0), np.array(_WEIGHTS)
         reach = np.repeat(np.where(closed, 0.0, 1.0), 2)[:, None] * np.array(_REACH)
         starts = ends.copy()
         starts[:, :2] += reach[:, :1] * np.stack([np.cos(ends[:, 2]), np.sin(ends[:, 2])], axis=1)
@@ -250,73 +202,52 @@ class _Network:
         around = around + reach[:, 0] + reach[:, :1]
         curves = link_curves(ends, reach, radius, grid, weights, around)
         cost = np.minimum(curves.cost, np.minimum(around, around.T))
-        return cls(ends, reach[:, 0], cost, curves, routes, ~np.isfinite(curves.cost), way)
+        return cls(ends, reach[:, 0], cost, curves, routes, way)
 
-    def link(self, a: int, b: int, step: float) -> FloatArray:
+    def link(self, a: int, b: int) -> FloatArray:
         """Points (n, 2), mm, from end a to end b."""
-        if not self.by_ring[a, b]:
-            return link_curve(self.ends, a, b, self.curves, self.routes.radius, step)
-        curve = ring_curve(self.routes, a, b, int(self.way[a, b]), step)
-        before, after = (stub_points(self.ends[k], self.reach[k], step) for k in (a, b))
+        if np.isfinite(self.curves.cost[a, b]):
+            return link_curve(self.ends, a, b, self.curves, self.routes.radius, _STEP)
+        curve = ring_curve(self.routes, a, b, int(self.way[a, b]), _STEP)
+        before, after = (stub_points(self.ends[k], self.reach[k], _STEP) for k in (a, b))
         return np.concatenate([before, curve, after[::-1]])
 
 
 def _end_poses(tracks: Sequence[FloatArray]) -> FloatArray:
-    ends = np.empty((2 * len(tracks), 3))
-    for k, track in enumerate(tracks):
-        for end, (tip, before) in enumerate(((track[0], track[1]), (track[-1], track[-2]))):
-            out = tip - before
-            ends[2 * k + end] = *tip, np.arctan2(out[1], out[0])
-    return ends
+    tips = np.concatenate([track[[0, -1]] for track in tracks])
+    x, y = (tips - np.concatenate([track[[1, -2]] for track in tracks])).T
+    return np.column_stack([tips, np.arctan2(y, x)])
 
 
-def _order(cost: FloatArray, offsets: IntArray, time_limit: float) -> IntArray:
-    """Find the ends (k, 2) at which each track is entered and left, in order."""
-    spans = [slice(2 * a, 2 * b) for a, b in pairwise(offsets)]
+def _order(cost: FloatArray, offsets: IntArray) -> IntArray:
+    """Find the ends (k, 2) at which each track is entered and left, in order.
+
+    Group g has the ends from ``offsets[g]`` up to ``offsets[g + 1]``.
+    """
+    spans = [slice(a, b) for a, b in pairwise(offsets.tolist())]
     if len(spans) == 1:
-        return _within(cost, None, None, time_limit)
+        return order_clusters(strands(cost))
     visit = np.full(cost.shape, np.inf)
     for span in spans:
-        visit[span, span] = costs_between_ends(cost[span, span], time_limit=time_limit)
-    found = []
-    for a, b in order_clusters(
-        cost, visit, 2 * offsets, exact=_EXACT_GROUPS, time_limit=time_limit
-    ):
+        visit[span, span] = costs_between_ends(cost[span, span])
+    order = []
+    for a, b in order_clusters(Clusters(cost, visit, offsets), exact=_EXACT_GROUPS).tolist():
         span = next(span for span in spans if span.start <= a < span.stop)
-        own = _within(cost[span, span], int(a - span.start), int(b - span.start), time_limit)
-        found.append(own[:, 0] + span.start)
-    count = len(cost) // 2
-    return improved_order(
-        np.concatenate(found) // 2,
-        cost,
-        strand_visits(count),
-        2 * np.arange(count + 1),
-        _ROUNDS,
-        time_limit,
-    )
+        own = order_clusters(strands(cost[span, span], a - span.start, b - span.start))
+        order.append((own[:, 0] + span.start) // 2)
+    return improved_order(np.concatenate(order), strands(cost), _ROUNDS)
 
 
-def _within(cost: FloatArray, first: int | None, last: int | None, time_limit: float) -> IntArray:
-    """Order one group: the ends (k, 2) at which each track is entered and left."""
-    count = len(cost) // 2
-    visit, offsets = strand_visits(count), 2 * np.arange(count + 1)
-    return order_clusters(cost, visit, offsets, first, last, time_limit=time_limit)
-
-
-def _assembled(
-    tracks: Sequence[FloatArray], visits: IntArray, network: _Network, step: float
-) -> LinkedPath:
+def _assembled(tracks: Sequence[FloatArray], visits: IntArray, network: _Network) -> LinkedPath:
     parts: list[FloatArray] = []
     marks: list[BoolArray] = []
-    for k, (entered, _) in enumerate(visits):
+    for k, (entered, _) in enumerate(visits.tolist()):
         track = tracks[entered // 2]
-        if entered % 2:
-            track = track[::-1]
         if k:
-            link = network.link(int(visits[k - 1, 1]), int(entered), step)[1:-1]
+            link = network.link(int(visits[k - 1, 1]), entered)[1:-1]
             marks[-1][-1] = True
             parts.append(link)
             marks.append(np.ones(len(link), dtype=bool))
-        parts.append(track)
+        parts.append(track[::-1] if entered % 2 else track)
         marks.append(np.zeros(len(track), dtype=bool))
     return LinkedPath(np.concatenate(parts), np.concatenate(marks))

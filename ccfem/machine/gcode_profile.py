@@ -1,4 +1,4 @@
-"""What a printer's firmware wants to be told: commands as lines to fill in, and its small moves."""
+"""Commands for a printer's firmware, as lines to fill in, and its small moves."""
 
 import re
 from collections.abc import Mapping
@@ -17,8 +17,8 @@ _FIELD = re.compile(r"\{(\w*)\}")
 class GcodeProfile:
     """Commands and small moves of a printer with two tools: T0 lays matrix, T1 fibre.
 
-    The defaults are for Marlin, with a cutter on its first servo. All of them are our choice; the
-    offset between the nozzles is the firmware's affair (M218).
+    The defaults are for Marlin, with a cutter on its first servo. All of them are our choice. The
+    firmware applies the offset between the nozzles (M218).
 
     Attributes
     ----------
@@ -26,7 +26,7 @@ class GcodeProfile:
         Lines at the start and the end of the file. Coordinates must be absolute and extrusion
         relative (G90, M83) after the start.
     tool : tuple of str
-        Lines that take up a tool; {tool} is its number.
+        Lines that select a tool; {tool} is its number.
     cut : tuple of str
         Lines that cut the fibre and wait; {wait} is `Machine.cut_wait` in milliseconds.
     bed : tuple of 3 floats, mm
@@ -37,7 +37,7 @@ class GcodeProfile:
     retract, retract_speed : float, mm and mm/s
         Matrix filament drawn back before travel.
     feed_speed : float, mm/s
-        At which new fibre is pushed from the cutter to the tip of the nozzle.
+        Speed at which new fibre is fed from the cutter to the tip of the nozzle.
     matrix_angle, matrix_turn : float, degrees
         Direction of the zigzag of the lowest matrix layer, and its turn from one matrix layer to
         the next.

@@ -4,6 +4,7 @@ from dataclasses import dataclass, field, fields
 
 from ccfem.checks import check_fields
 from ccfem.machine.gcode_profile import GcodeProfile
+from ccfem.machine.limits import Limits
 from ccfem.machine.speed_table import SpeedTable
 
 __all__ = ["Machine"]
@@ -12,19 +13,21 @@ _CUTTER_DISTANCE = 42.0
 """Chen et al. 2021, section 5.2, mm."""
 
 
+_PARTS = ("speeds", "gcode", "limits")
+"""Fields that are no numbers."""
+
+
 @dataclass(frozen=True)
 class Machine:
     """A printer of continuous fibre.
 
     The defaults are the machine of Chen et al. 2021 (section 5 and table 3). What the
-    paper does not give is marked "our choice".
+    paper does not state is marked "our choice".
 
     Attributes
     ----------
     fibre_width : float, mm
-        W, the least distance between neighbouring strands.
-    deposited_width : float, mm
-        Width of a strand once pressed.
+        W, the minimum distance between neighbouring strands.
     fibre_height : float, mm
         Height of a fibre layer.
     matrix_height : float, mm
@@ -50,14 +53,17 @@ class Machine:
         Width of a line of matrix.
     matrix_diameter : float, mm
         Of the matrix filament.
+    fibre_density, matrix_density : float, g/cm^3
+        Our choice: a data sheet's value for carbon tow in thermoplastic, and that of PLA.
     bed_temperature : float, degrees Celsius
         Our choice, usual for PLA.
     gcode : GcodeProfile
         What its firmware wants to be told.
+    limits : Limits
+        What it tolerates: paths beyond are not printable as they are.
     """
 
     fibre_width: float = 1.0
-    deposited_width: float = 1.2
     fibre_height: float = 0.05
     matrix_height: float = 0.8
     filament_area: float = 0.1075
@@ -73,17 +79,25 @@ class Machine:
     cut_wait: float = 1.0
     matrix_width: float = 0.8
     matrix_diameter: float = 1.75
+    fibre_density: float = 1.4
+    matrix_density: float = 1.24
     bed_temperature: float = 60.0
     gcode: GcodeProfile = field(default_factory=GcodeProfile)
+    limits: Limits = field(default_factory=Limits)
 
     def __post_init__(self) -> None:
         check_fields(self, "fibre_width", "matrix_width", "matrix_diameter", above=0.0, unit="mm")
-        numbers = [one.name for one in fields(self) if one.name not in ("speeds", "gcode")]
+        numbers = [one.name for one in fields(self) if one.name not in _PARTS]
         check_fields(self, *numbers, at_least=0.0)
 
     @property
+    def strand_height(self) -> float:
+        """Least height of a layer of strands a fibre width apart, mm: what their volume needs."""
+        return max(self.fibre_height, self.filament_area / self.fibre_width)
+
+    @property
     def tail(self) -> float:
-        """Fibre that is still to be laid after a cut, mm."""
+        """Length of fibre still to be laid after a cut, mm."""
         if self.cutter_distance is None:
             return min(_CUTTER_DISTANCE, self.minimum_length)
         return self.cutter_distance

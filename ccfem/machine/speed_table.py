@@ -13,9 +13,9 @@ __all__ = ["SpeedTable"]
 
 @dataclass(frozen=True)
 class SpeedTable:
-    """Three speeds of the fibre, and which pieces of a path each is for.
+    """Three speeds of the fibre, and the pieces of a path that each is for.
 
-    The defaults are table 2 of Wang et al. 2021. A piece gets the least of the three speeds that
+    The defaults are table 2 of Wang et al. 2021. A piece gets the lowest of the three speeds that
     its curvature, its length and its angle allow.
 
     Attributes
@@ -23,7 +23,7 @@ class SpeedTable:
     speed : tuple of 3 floats, mm/s
         Slow, middle and fast.
     curvature : tuple of 2 floats, 1/mm
-        Slow above the first, fast below the second, middle from the one to the other.
+        Slow above the first, fast below the second, middle in between.
     length : tuple of 2 floats, mm
         Slow below the first, fast above the second.
     angle : tuple of 2 floats, degrees
@@ -63,7 +63,7 @@ class SpeedTable:
         curvature : array_like, 1/mm
         length : array_like, mm
         angle : array_like, degrees
-            The least angle to a neighbour.
+            Smallest angle to a neighbour.
         """
         length, angle = np.asarray(length), np.asarray(angle)
         by_length = 1 - (length < self.length[0]) + (length > self.length[1])

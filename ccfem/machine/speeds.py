@@ -7,6 +7,7 @@ from ccfem.geometry.polylines import (
     arc_lengths,
     inner_points,
     lengths,
+    merge_repeated,
     sample_at,
     starts_segment,
     turning_angles,
@@ -39,7 +40,7 @@ def table_speeds(
     Returns
     -------
     (P,) array, mm/s
-        Speed of the step from each point to the next. Of no meaning at the last point of a
+        Speed of the step from each point to the next. Meaningless at the last point of a
         polyline and before a repeated one.
 
     Notes
@@ -50,28 +51,15 @@ def table_speeds(
     across corners. On a circle through the points it is that of the circle. A step has the larger
     curvature of its two ends.
     """
-    if not len(points):
-        return np.zeros(0)
-    moved = np.append(True, (np.diff(points, axis=0) != 0.0).any(axis=1))
-    starts = offsets[:-1][np.diff(offsets) > 0]
-    moved[starts] = True
-    place = np.cumsum(moved)
-    found = _speeds(points[moved], np.append(0, place)[offsets], table, shortest)
-    return found[place - 1]
-
-
-def _speeds(
-    points: FloatArray, offsets: IntArray, table: SpeedTable, shortest: float
-) -> FloatArray:
-    """As `table_speeds`, for polylines without repeated points."""
+    count = len(points)
+    points, offsets, kept = merge_repeated(points, offsets)
     open_ended = np.zeros(len(offsets) - 1, dtype=bool)
     turn = np.degrees(turning_angles(points, offsets, open_ended))
     angle = (180.0 - turn).round(_DIGITS)
     corner = angle < table.angle[1]
     start = np.flatnonzero(starts_segment(offsets))
-    speeds = np.full(len(points), table.speed[0])
     if not len(start):
-        return speeds
+        return np.full(count, table.speed[0])
     curvature = _step_curvatures(points, offsets, corner, shortest)
     row = table.row_of(curvature)
     new = corner[start]
@@ -82,8 +70,9 @@ def _speeds(
     last = np.append(first[1:], len(start)) - 1
     length = np.bincount(piece, np.linalg.norm(points[start + 1] - points[start], axis=1))
     least = np.minimum(angle[start[first]], angle[start[last] + 1])
+    speeds = np.full(len(points), table.speed[0])
     speeds[start] = table.at(curvature[first], length, least)[piece]
-    return speeds
+    return np.repeat(speeds, np.diff(np.append(kept, count)))
 
 
 def _step_curvatures(
@@ -115,7 +104,7 @@ def _curvatures(points: FloatArray, offsets: IntArray, shortest: float) -> Float
     with np.errstate(divide="ignore", invalid="ignore"):
         bend = np.linalg.norm(into / reach[:, None] - out / on[:, None], axis=1)
         found = 2.0 * bend / (reach + on)
-    # A loop that closes within `shortest` has no chord: it is as tight as can be.
+    # A loop that closes within `shortest` has no chord: its curvature is infinite.
     curvature = np.zeros(len(points))
     curvature[k] = np.where(np.isnan(found), np.inf, found)
     return curvature.round(_DIGITS)

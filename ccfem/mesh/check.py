@@ -134,8 +134,8 @@ def check_mesh(mesh: TetMesh, merge: bool = False) -> tuple[TetMesh, MeshReport]
     Raises
     ------
     InputError
-        When nothing sensible can follow: a coordinate of a used node is not finite, all cells are
-        flat, cells overlap, or pieces to be merged have meshes that do not match.
+        For an invalid mesh: a coordinate of a used node is not finite, all cells are flat, cells
+        overlap, or pieces to be merged have meshes that do not match.
     """
     used = np.zeros(len(mesh.points), dtype=bool)
     used[mesh.cells] = True

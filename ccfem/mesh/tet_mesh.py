@@ -90,6 +90,14 @@ class TetMesh(CellMesh):
             return "the mesh has points that are NaN or infinite: correct its coordinates"
         return first_flaw(self.points, self.cells, _EDGES, self.volumes, self.partners)
 
+    @cached_property
+    def across(self) -> IntArray:
+        """Cell across the face opposite to each corner, (m, 4); -1 where there is none."""
+        first, second = self._pairing[0].T
+        table = np.full(4 * len(self.cells), -1, dtype=np.int64)
+        table[first], table[second] = second // 4, first // 4
+        return read_only(table.reshape(-1, 4), int)
+
     def facet_areas(self, facets: IntArray) -> tuple[FloatArray, FloatArray]:
         """Areas (k,), mm^2, and unit normals (k, 3) of facets (k, 3)."""
         a, b, c = np.moveaxis(self.points[facets], 1, 0)

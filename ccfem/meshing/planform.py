@@ -1,4 +1,4 @@
-"""Triangulation of a planform: even triangles, shorter ones where the outline turns sharply.
+"""Triangulation of a planform: even triangles, smaller ones where the outline turns sharply.
 
 Boundary points are laid along the outline and stay there; inner points start on a hexagonal grid
 and move to the area-weighted mean of the triangles round them (Chen and Holst, Efficient mesh
@@ -27,15 +27,15 @@ _CORNER = np.radians(25.0)
 _PER_TURN = 24
 """Segments of a full turn of the outline."""
 _FINEST = 0.25
-"""Shortest edge length aimed at, in edge lengths asked for."""
+"""Shortest target edge length, as a share of the one given."""
 _GRADING = 0.25
 """Growth of the edge length with the distance from where the outline turns."""
 _ROUNDS = 30
 """Rounds of smoothing."""
 _SPACING = 0.8
-"""Least distance of points at the start, in edge lengths."""
+"""Minimum distance between points at the start, in edge lengths."""
 _MOST = 2e6
-"""Triangles above which a wanted edge length counts as a slip of the unit."""
+"""Number of triangles above which an edge length is taken for a mistake of units."""
 
 Size = Callable[[FloatArray], FloatArray]
 
@@ -50,11 +50,11 @@ def triangulate(
     polygon : shapely Polygon, mm
         Valid, with or without holes.
     edge_length : float, mm
-        Edge length aimed at. A full turn of the outline (a hole) has at least 24 segments unless
-        that takes edges shorter than a quarter of this length; it grows from there inward.
+        Target edge length. A full turn of the outline (a hole) has at least 24 segments unless
+        that takes edges shorter than a quarter of this length; edges grow from there inwards.
     keep : (k, 2) array, mm, optional
         Points on the outline that become points of the mesh, such as the ends of a patch; those
-        elsewhere, or within a quarter of the edge length of a corner, are passed over.
+        elsewhere, or within a quarter of the edge length of a corner, are ignored.
 
     Returns
     -------
@@ -66,7 +66,7 @@ def triangulate(
     Raises
     ------
     InputError
-        When the polygon is empty or not valid, or the edge length does not suit it.
+        When the polygon is empty or not valid, or the edge length is too long or too short for it.
     """
     _check(polygon, edge_length)
     rings = [np.asarray(r.coords)[:-1, :2] for r in (polygon.exterior, *polygon.interiors)]
@@ -84,11 +84,8 @@ def triangulate(
         points = _smoothed(points, _inside(points, domain), fixed, size)
     outline, inner = _conforming(outline, points[fixed:])
     points = np.concatenate([*outline, inner])
-    triangles = _inside(points, domain)
-    used = np.unique(triangles)
-    number = np.full(len(points), -1)
-    number[used] = np.arange(len(used))
-    return points[used], number[triangles]
+    used, triangles = np.unique(_inside(points, domain), return_inverse=True)
+    return points[used], triangles.reshape(-1, 3)
 
 
 def _check(polygon: shapely.Polygon, edge_length: float) -> None:
@@ -120,7 +117,7 @@ def _turns(ring: FloatArray) -> tuple[FloatArray, FloatArray]:
 
 
 def _size_function(rings: list[FloatArray], edge_length: float) -> Size:
-    """Edge length aimed at as a function of points (n, 2)."""
+    """Target edge length as a function of points (n, 2)."""
     places, sizes = [], []
     for ring in rings:
         turn, side = _turns(ring)
@@ -240,7 +237,7 @@ def _thinned(points: FloatArray, wanted: FloatArray) -> FloatArray:
 def _conforming(
     outline: list[FloatArray], inner: FloatArray
 ) -> tuple[list[FloatArray], FloatArray]:
-    """Outline with a point more wherever the triangulation misses one of its sides."""
+    """Outline with one more point wherever the triangulation misses one of its sides."""
     for _ in range(8):
         points = np.concatenate([*outline, inner])
         corners = _delaunay(points)
@@ -292,13 +289,12 @@ def _smoothed(points: FloatArray, corners: IntArray, fixed: int, size: Size) -> 
     """Points moved to the weighted mean of the centres of the triangles round them."""
     centre = points[corners].mean(axis=1)
     weight = signed_areas(points, corners) / size(centre) ** 2
-    total = np.zeros(len(points))
-    moment = np.zeros_like(points)
-    for column in corners.T:
-        np.add.at(total, column, weight)
-        np.add.at(moment, column, weight[:, None] * centre)
-    moved = points.copy()
+    total, x, y = (
+        np.bincount(corners.T.ravel(), np.tile(weight * values, 3), len(points))
+        for values in (np.ones(len(weight)), *centre.T)
+    )
     free = total > 0.0
     free[:fixed] = False
-    moved[free] = moment[free] / total[free, None]
+    moved = points.copy()
+    moved[free] = np.stack([x, y], axis=1)[free] / total[free, None]
     return moved

@@ -32,18 +32,18 @@ def extrude(
     height : float, mm
         The part reaches from z = 0 to `height`.
     edge_length : float, mm
-        Edge length aimed at; shorter where the outline turns sharply (`triangulate`).
+        Target edge length; shorter where the outline turns sharply (`triangulate`).
     layers : int, optional
-        Layers of prisms over the height; by default as many as make them `edge_length` high.
+        Layers of prisms over the height; by default as many as make them about `edge_length` high.
     keep : (k, 2) array, mm, optional
         Points on the outline that become points of the mesh.
 
     Returns
     -------
     TetMesh
-        Linear, without patches. Each prism is cut into three tetrahedra; the diagonals on its
-        sides follow a random order of the planform's points (of a fixed seed) that is turned
-        round in every other layer, so that they favour no direction.
+        Linear, without patches. Each prism is cut into three tetrahedra. The diagonals on its
+        sides follow a random order of the planform's points (with a fixed seed), reversed in
+        every other layer, so that they favour no direction.
     """
     check_number("height", height, above=0.0, unit="mm")
     if layers is not None:
@@ -57,20 +57,12 @@ def extrude(
     points[:, :, 2] = np.linspace(0.0, height, levels)
     rank = np.random.default_rng(0).permutation(len(plane))
     rising = np.take_along_axis(triangles, np.argsort(rank[triangles], axis=1), axis=1)
-    layer_cells = []
-    for level in range(count):
-        ordered = rising if level % 2 == 0 else rising[:, ::-1]
-        prisms = np.hstack([ordered * levels + level, ordered * levels + level + 1])
-        layer_cells.append(prisms[:, _SPLIT])
-    cells = np.stack(layer_cells, axis=1).reshape(-1, 4)
-    return TetMesh(points.reshape(-1, 3), _turned(points.reshape(-1, 3), cells))
-
-
-def _turned(points: FloatArray, cells: IntArray) -> IntArray:
-    """Cells with positive volume."""
-    inside_out = TetMesh(points, cells).volumes < 0.0
+    ordered = np.stack([rising[:, :: 1 - 2 * (level % 2)] for level in range(count)], axis=1)
+    lower = ordered * levels + np.arange(count)[:, None]
+    cells = np.concatenate([lower, lower + 1], axis=2)[:, :, _SPLIT].reshape(-1, 4)
+    inside_out = TetMesh(points.reshape(-1, 3), cells).volumes < 0.0
     cells[inside_out] = cells[inside_out][:, [0, 2, 1, 3]]
-    return cells
+    return TetMesh(points.reshape(-1, 3), cells)
 
 
 def _numbered_along(points: FloatArray, triangles: IntArray) -> tuple[FloatArray, IntArray]:

@@ -14,7 +14,7 @@ from ccfem.mesh.tet_mesh import TetMesh
 __all__ = ["tetrahedralise"]
 
 _MOST = 2e7
-"""Cells above which a wanted edge length counts as a slip of the unit."""
+"""Number of cells above which an edge length is taken for a mistake of units."""
 
 
 def tetrahedralise(surface: Surface, edge_length: float) -> TetMesh:
@@ -26,7 +26,7 @@ def tetrahedralise(surface: Surface, edge_length: float) -> TetMesh:
     ----------
     surface : Surface
     edge_length : float, mm
-        Edge length aimed at.
+        Target edge length.
 
     Returns
     -------
@@ -36,7 +36,7 @@ def tetrahedralise(surface: Surface, edge_length: float) -> TetMesh:
     Raises
     ------
     InputError
-        When the edge length does not suit the part, or nothing is left inside the surface.
+        When the edge length is too long or too short for the part, or no cells are left.
     """
     size = float(np.linalg.norm(np.ptp(surface.points, axis=0)))
     check_number("edge length", edge_length, above=0.0, below=size, unit="mm (the part's diagonal)")
@@ -48,7 +48,7 @@ def tetrahedralise(surface: Surface, edge_length: float) -> TetMesh:
         )
     import pytetwild
 
-    # fTetWild leaves a file in the working folder: let it be one that goes away.
+    # fTetWild leaves a file in the working folder.
     with TemporaryDirectory() as folder, chdir(folder):
         points, cells = pytetwild.tetrahedralize(
             np.array(surface.points),

@@ -6,9 +6,12 @@ from concurrent.futures import ThreadPoolExecutor
 
 from ccfem.elasticity.part_stress import PartStress
 from ccfem.errors import InputError
+from ccfem.fields.chart import chart_of, flat_view
 from ccfem.layers.layer import Layer
 from ccfem.layers.layer_stress import stress_on
+from ccfem.layers.pitch import check_pitch
 from ccfem.machine.machine import Machine
+from ccfem.planning.steps import in_even_steps
 from ccfem.planning.strategy import PartStrategy, Strategy
 from ccfem.toolpaths import Toolpaths
 
@@ -23,6 +26,8 @@ def plan(
 ) -> Toolpaths:
     """Plan the paths of a whole part, several layers at a time.
 
+    A strategy that works in a plane (`in_plane`) plans on curved layers by their charts.
+
     Parameters
     ----------
     strategy : Strategy
@@ -35,25 +40,30 @@ def plan(
     Returns
     -------
     Toolpaths
-        The paths of all layers, in their order.
+        The paths of all layers, in their order, in steps of at most a fibre width.
 
     Raises
     ------
     InputError
-        When the strategy plans on flat layers only and a layer is curved; and whatever the
-        strategy raises.
+        When the strategy plans on flat layers only and a layer is curved, when layers are nearer
+        than a strand is high; and whatever the strategy raises.
     """
     _check_layers(strategy, layers)
-    if isinstance(strategy, PartStrategy):
-        planner = strategy.for_part(stress, layers, machine)
-    else:
-        planner = strategy
-
-    def planned(layer: Layer) -> Toolpaths:
-        return planner(layer, stress_on(layer, stress), machine)
-
+    check_pitch(layers, machine)
     with ThreadPoolExecutor(min(os.cpu_count() or 1, _MOST_THREADS)) as pool:
-        return Toolpaths.concatenate(pool.map(planned, layers))
+        in_plane = getattr(strategy, "in_plane", False)
+        views = tuple(pool.map(flat_view, layers)) if in_plane else tuple(layers)
+        if isinstance(strategy, PartStrategy):
+            planner = strategy.for_part(stress, views, machine)
+        else:
+            planner = strategy
+
+        def planned(layer: Layer, view: Layer) -> Toolpaths:
+            paths = planner(view, stress_on(view, stress), machine)
+            paths = in_even_steps(paths, machine.fibre_width)
+            return paths if view is layer else chart_of(layer).lifted(paths)
+
+        return Toolpaths.concatenate(pool.map(planned, layers, views))
 
 
 def _check_layers(strategy: Strategy, layers: Sequence[Layer]) -> None:

@@ -23,11 +23,19 @@ class Amount:
         Name of the field.
     most, least : float
         Values that lay the most and the least fibre.
+    before : tuple of Amount, optional
+        Parameters that are taken down to their least, from their own value, where the least of this
+        one is still too much: shells, once the infill is thin.
+    beyond : tuple of Amount, optional
+        Parameters that are taken up to their most, from their own value, where the most of this one
+        is not enough.
     """
 
     parameter: str
     most: float
     least: float
+    before: "tuple[Amount, ...]" = ()
+    beyond: "tuple[Amount, ...]" = ()
 
 
 class LayerPlanner(Protocol):
@@ -42,13 +50,17 @@ class LayerPlanner(Protocol):
 class LayerStrategy(Protocol):
     """A frozen dataclass whose fields are the parameters, called for each layer with data.
 
-    A strategy that works in the plane of a layer has a class variable ``flat_layers_only = True``:
-    `plan` refuses curved layers before any work.
+    A strategy that works in the plane of a layer has a class variable ``in_plane = True``: `plan`
+    gives it curved layers laid flat. One that does not work so either, such as one that solves the
+    part again layer by layer, has ``flat_layers_only = True``: `plan` refuses curved layers before
+    any work.
 
     Attributes
     ----------
     amount : Amount
-        The parameter that sets how much fibre is laid.
+        The parameter that sets how much fibre is laid. A strategy that takes the length itself has
+        ``for_length(length, layers, machine)`` instead, which returns the strategy that lays at
+        most that mean length a layer, mm.
     variants : mapping of str to parameters, optional
         Other parameters than the defaults, by a short name, that the laws of strategies also run:
         ``{"literal": {"fit": "literal"}}``. One for each branch that the defaults never take. A

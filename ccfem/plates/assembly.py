@@ -10,7 +10,7 @@ from ccfem.arrays import FloatArray, IntArray, read_only
 from ccfem.elasticity.assembly import Pattern, pattern
 from ccfem.plates.mesh import PlaneMesh
 
-__all__ = ["PlaneElements", "strain_matrices"]
+__all__ = ["PlaneElements"]
 
 _GAUSS = 1.0 / np.sqrt(3.0)
 _CORNERS = np.array([[-1.0, -1.0], [1.0, -1.0], [1.0, 1.0], [-1.0, 1.0]])
@@ -31,22 +31,11 @@ def _shape_gradients(points: FloatArray, at: FloatArray) -> tuple[FloatArray, Fl
     return local @ inverse, determinant
 
 
-def strain_matrices(points: FloatArray, at: FloatArray) -> tuple[FloatArray, FloatArray]:
-    """Strain of nodal displacements at one local point of each cell.
+def _strain_matrices(points: FloatArray, at: FloatArray) -> tuple[FloatArray, FloatArray]:
+    """Strain of nodal displacements at one local point (2,) in [-1, 1] of each cell (c, q, 2).
 
-    Parameters
-    ----------
-    points : (c, q, 2) array, mm
-        Corners of triangles or quadrilaterals.
-    at : (2,) array in [-1, 1]
-        Local coordinates; of no effect in a triangle.
-
-    Returns
-    -------
-    matrices : (c, 3, 2q) array, 1/mm
-        B with ``[e11, e22, 2 e12] = B @ [u0, v0, u1, v1, ...]``.
-    jacobians : (c,) array, mm^2
-        Area per local area; the local triangle has area 1/2, the local square 4.
+    Matrices B (c, 3, 2q), 1/mm, with ``[e11, e22, 2 e12] = B @ [u0, v0, u1, v1, ...]``, and the
+    area per local area (c,), mm^2; the local triangle has area 1/2, the local square 4.
     """
     gradient, determinant = _shape_gradients(points, at)
     count, q, _ = gradient.shape
@@ -90,9 +79,9 @@ class PlaneElements:
     def gauss(self) -> list[tuple[FloatArray, FloatArray]]:
         """Strain matrices (c, 3, 2q) and weights (c,), mm^2, of every Gauss point."""
         if self.mesh.cells.shape[1] == 3:
-            matrix, jacobian = strain_matrices(self.shapes, np.zeros(2))
+            matrix, jacobian = _strain_matrices(self.shapes, np.zeros(2))
             return [(matrix, 0.5 * jacobian)]
-        return [strain_matrices(self.shapes, _GAUSS * corner) for corner in _CORNERS]
+        return [_strain_matrices(self.shapes, _GAUSS * corner) for corner in _CORNERS]
 
     @cached_property
     def _constant(self) -> FloatArray:
@@ -147,7 +136,7 @@ class PlaneElements:
 
     def centre_strain(self, displacement: FloatArray) -> FloatArray:
         """Strain [e11, e22, 2 e12] at the centre of each cell, (m, 3)."""
-        matrix, _ = strain_matrices(self.shapes, np.zeros(2))
+        matrix, _ = _strain_matrices(self.shapes, np.zeros(2))
         return np.einsum(
             "...ij,...j->...i",
             matrix[0] if self.mesh.congruent else matrix,

@@ -4,7 +4,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from ccfem.arrays import FloatArray, in_brief, read_only
+from ccfem.arrays import FloatArray, freeze, in_brief
 from ccfem.elasticity.stress_field import SolveRecord
 from ccfem.plates.mesh import PlaneMesh
 from ccfem.plates.problem import PlaneProblem
@@ -46,8 +46,8 @@ class PlaneField:
     __repr__ = in_brief
 
     def __post_init__(self) -> None:
-        for name in ("displacement", "strain", "stress", "cell_energy", "reactions"):
-            object.__setattr__(self, name, read_only(getattr(self, name)))
+        freeze(self, displacement=float, strain=float, stress=float)
+        freeze(self, cell_energy=float, reactions=float)
 
     @property
     def mesh(self) -> PlaneMesh:
@@ -82,8 +82,4 @@ class PlaneField:
         """
         if stiffness is None:
             return stress_in_axes(self.stress, angle)
-        return np.einsum("...ij,...j->...i", stiffness, self.strain_in(angle))
-
-    def strain_in(self, angle: FloatArray) -> FloatArray:
-        """Strain [e11, e22, 2 e12] (m, 3) at the centres in axes turned by (m,) angles, radians."""
-        return strain_in_axes(self.strain, angle)
+        return np.einsum("...ij,...j->...i", stiffness, strain_in_axes(self.strain, angle))

@@ -28,7 +28,7 @@ class PlaneProblem:
     thickness : (m,) array, mm
         A float stands for all cells.
     supports : tuple of Support
-        Their component z means nothing here.
+        Their component z has no effect.
     loads : mapping of load case name to tuple of loads
         With no component z.
     """

@@ -98,13 +98,7 @@ class PlaneSystem:
 
 
 def prepare(problem: PlaneProblem, elements: PlaneElements | None = None) -> PlaneSystem:
-    """Check a plate and collect what its solves share.
-
-    Parameters
-    ----------
-    problem : PlaneProblem
-    elements : PlaneElements, optional
-        Of the same mesh, when at hand from an earlier system.
+    """Check a plate and collect what its solves share; elements of an earlier system of its mesh.
 
     Raises
     ------

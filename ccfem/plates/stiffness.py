@@ -10,7 +10,6 @@ from ccfem.errors import InputError
 
 __all__ = [
     "fitted_harmonics",
-    "plane_harmonics",
     "rotate_plane",
     "stack_plane",
     "strain_in_axes",
@@ -45,23 +44,6 @@ def rotate_plane(stiffness: FloatArray, angle: ArrayLike) -> FloatArray:
     return turn @ stiffness @ np.swapaxes(turn, -1, -2)
 
 
-def plane_harmonics(stiffness: FloatArray) -> FloatArray:
-    """Five matrices that give the stiffness at any angle as `turned_by` combines them.
-
-    Parameters
-    ----------
-    stiffness : (3, 3) array, MPa
-        In material axes.
-
-    Returns
-    -------
-    (5, 3, 3) array, MPa
-        Constant, cos 2a, sin 2a, cos 4a, sin 4a; for an orthotropic sheet the invariants U1 to U5
-        of Tsai and Pagano (1968).
-    """
-    return fitted_harmonics(lambda angle: rotate_plane(stiffness, angle))
-
-
 def fitted_harmonics(turned: Callable[[FloatArray], FloatArray]) -> FloatArray:
     """Five matrices (5, k, k) that `turned_by` combines to a stiffness turned about z.
 
@@ -75,7 +57,7 @@ def fitted_harmonics(turned: Callable[[FloatArray], FloatArray]) -> FloatArray:
 
 
 def turned_by(angle: FloatArray, derivative: bool = False) -> FloatArray:
-    """Factors (..., 5) of `plane_harmonics` at an angle (...,), radians, or their derivatives."""
+    """Factors (..., 5) of `fitted_harmonics` at an angle (...,), radians, or their derivatives."""
     two, four = 2.0 * angle, 4.0 * angle
     if derivative:
         parts = [0.0 * two, -2 * np.sin(two), 2 * np.cos(two), -4 * np.sin(four), 4 * np.cos(four)]
@@ -85,7 +67,7 @@ def turned_by(angle: FloatArray, derivative: bool = False) -> FloatArray:
 
 
 def stack_plane(layers: FloatArray, thickness: ArrayLike | None = None) -> FloatArray:
-    """Stiffness of layers that are strained alike in their plane.
+    """Stiffness of layers that share the strain in their plane.
 
     Parameters
     ----------

@@ -1,4 +1,4 @@
-"""Figures of sections: size, scale bar, colour bar, and files. No state of pyplot is touched."""
+"""Figures of sections: size, scale bar, colour bar, and files. Pyplot's state is left alone."""
 
 import io
 from collections.abc import Sequence
@@ -48,12 +48,7 @@ def new_figure(extents: Sequence[float], columns: int = 1) -> tuple["Figure", li
         x and y of the lower left, then of the upper right corner of what is drawn.
     columns : int, default 1
         Pictures; the height of each follows the section's shape, up to one and a half times its
-        width.
-
-    Returns
-    -------
-    figure, list of axes
-        Axes without frame and ticks, in mm, both directions to one scale.
+        width. Their axes have no frame and no ticks, and are in mm, both to one scale.
     """
     from matplotlib.backends.backend_agg import FigureCanvasAgg
     from matplotlib.figure import Figure
@@ -79,30 +74,19 @@ def new_figure(extents: Sequence[float], columns: int = 1) -> tuple["Figure", li
 def title(axes: "Axes", heading: str, caption: str = "", colour: str | None = None) -> None:
     """Write a heading and one line of key numbers above a picture.
 
-    Parameters
-    ----------
-    axes : Axes
-        From `new_figure`.
-    heading, caption : str
-    colour : str, optional
-        Colour of a mark before the heading: that of the strategy.
+    With a colour, that of the strategy, there is a mark of it before the heading.
     """
     figure = _figure(axes)
-    box = axes.get_position()
-    inch = 1.0 / figure.get_figheight()
-    x = box.x0 + 0.12 / figure.get_figwidth()
+    box, wide, high = axes.get_position(), figure.get_figwidth(), figure.get_figheight()
+    x = start = box.x0 + 0.12 / wide
     if colour is not None:
         from matplotlib.patches import Rectangle
 
-        mark = (0.10 / figure.get_figwidth(), 0.13 * inch)
-        figure.add_artist(
-            Rectangle((x, box.y1 + 0.275 * inch), *mark, color=colour, transform=figure.transFigure)
-        )
-        x += 0.17 / figure.get_figwidth()
-    figure.text(x, box.y1 + 0.27 * inch, heading, size=10, weight="bold", **_FONT)
-    figure.text(
-        box.x0 + 0.12 / figure.get_figwidth(), box.y1 + 0.08 * inch, caption, size=7.5, **_FONT
-    )
+        place, size = (x, box.y1 + 0.275 / high), (0.10 / wide, 0.13 / high)
+        figure.add_artist(Rectangle(place, *size, color=colour, transform=figure.transFigure))
+        x += 0.17 / wide
+    figure.text(x, box.y1 + 0.27 / high, heading, size=10, weight="bold", **_FONT)
+    figure.text(start, box.y1 + 0.08 / high, caption, size=7.5, **_FONT)
 
 
 def _figure(axes: "Axes") -> Any:
@@ -145,14 +129,7 @@ def _round_length(most: float) -> float:
 def colour_bar(axes: "Axes", colours: Any, limits: tuple[float, float], label: str) -> None:
     """Draw the scale of a colour map below a picture, at its right.
 
-    Parameters
-    ----------
-    axes : Axes
-    colours : Colormap
-    limits : tuple of 2 floats
-        Values at the ends of the map.
-    label : str
-        Quantity and unit.
+    `limits` are the values at its ends, `label` is quantity and unit.
     """
     figure = _figure(axes)
     box = axes.get_position()

@@ -35,11 +35,6 @@ def matching_curves(
     heading : str
     colours : mapping of name to colour, optional
         Default `palette`.
-
-    Returns
-    -------
-    Figure
-        For `plot.canvas.png` or `plot.canvas.save`.
     """
     for name, rate in rates.items():
         if len(rate) != len(thresholds):
@@ -73,9 +68,8 @@ def curvature_curves(
     radius : float, mm
         Tightest that the machine allows (`Machine.minimum_radius`): its curvature is marked, unless
         it is 0.
-    heading : str
-    colours : mapping of name to colour, optional
-        Default `palette`.
+    heading, colours
+        As in `matching_curves`.
     """
     check_number("the tightest radius", radius, at_least=0.0, unit="mm")
     figure, axes = _axes(heading, "curvature, 1/mm", "share below it, %")

@@ -16,7 +16,7 @@ if TYPE_CHECKING:
     from matplotlib.axes import Axes
     from matplotlib.figure import Figure
 
-__all__ = ["draw_directions", "error_picture", "tension_picture"]
+__all__ = ["error_picture", "tension_picture"]
 
 _STROKES = 45
 """Strokes across the larger extent of a section."""
@@ -27,13 +27,7 @@ def tension_picture(
 ) -> "Figure":
     """Picture of the tension in a layer: its size as colour, its direction as strokes.
 
-    Parameters
-    ----------
-    stress : LayerStress
-        Its nodal values are drawn.
-    heading, caption : str
-    limit : float, MPa, optional
-        End of the colour scale; default `plot.paths.tension_limit`.
+    Parameters as in `plot.paths.layer_picture`; the nodal values of the stress are drawn.
     """
     layer = stress.layer
     figure, (axes,) = new_figure(extents_of(layer.plane.points))
@@ -42,7 +36,7 @@ def tension_picture(
     colours = draw_stress(axes, stress, end)
     plane = in_plane(stress.nodal[layer.triangles].mean(axis=1), layer.plane.frame)
     largest, _, angle = largest_in_plane(plane)
-    draw_directions(
+    _draw_directions(
         axes, layer, np.stack([np.cos(angle), np.sin(angle)], axis=1), largest > 0.02 * end
     )
     colour_bar(axes, colours, (0.0, end), "MPa tension")
@@ -83,25 +77,13 @@ def error_picture(
     return figure
 
 
-def draw_directions(
-    axes: "Axes", layer: Layer, direction: FloatArray, shown: BoolArray | None = None
-) -> None:
-    """Draw strokes along a direction of each triangle, evenly spread over the section.
-
-    Parameters
-    ----------
-    axes : Axes
-    layer : Layer
-    direction : (t, 2) array
-        Unit vectors in the plane; the sign does not matter.
-    shown : (t,) bool array, optional
-        Triangles that have a direction.
-    """
+def _draw_directions(axes: "Axes", layer: Layer, direction: FloatArray, shown: BoolArray) -> None:
+    """Draw strokes along directions (t, 2) of the triangles shown, evenly spread over a section."""
     from matplotlib.collections import LineCollection
 
     middle = layer.plane.points[layer.triangles].mean(axis=1)
     size = float(np.ptp(layer.plane.points, axis=0).max()) / _STROKES
-    kept = np.flatnonzero(np.ones(len(middle), dtype=bool) if shown is None else shown)
+    kept = np.flatnonzero(shown)
     # One triangle for each field of a grid: the one nearest to the middle of the field.
     field = np.floor(middle[kept] / size)
     off = np.linalg.norm(middle[kept] - (field + 0.5) * size, axis=1)

@@ -22,10 +22,9 @@ if TYPE_CHECKING:
 __all__ = [
     "Coloured",
     "compare_layer",
-    "draw_paths",
     "draw_section",
-    "draw_segments",
     "draw_stress",
+    "force_on_paths",
     "layer_picture",
     "mark_failure",
     "picture_extents",
@@ -55,6 +54,23 @@ class Coloured:
     values: FloatArray
     label: str
     limits: tuple[float, float]
+
+
+def force_on_paths(
+    middle: FloatArray, tangent: FloatArray, length: FloatArray, force: FloatArray, layer: Layer
+) -> Coloured:
+    """Axial force in the pieces of fibre of a flat layer, N.
+
+    Pieces of all layers are given by their middle (s, 3), mm, unit tangent (s, 3), length (s,), mm,
+    and force (s,), N. The scale ends at the force that 99 % of those of the layer stay below.
+    """
+    plane = layer.plane
+    here = np.abs(middle @ plane.frame[2] - plane.height) < 1e-6 * (1.0 + abs(plane.height))
+    along = 0.5 * length[here, None] * plane.project(tangent[here])
+    centre = plane.project(middle[here])
+    most = float(np.quantile(force[here], 0.99)) if here.any() else 1.0
+    pieces = np.stack([centre - along, centre + along], axis=1)
+    return Coloured(pieces, force[here], "N in the fibre", (0.0, max(most, 1e-12)))
 
 
 def tension_limit(stress: LayerStress) -> float:
@@ -121,18 +137,8 @@ def draw_stress(axes: "Axes", stress: LayerStress, limit: float) -> Any:
     return colours
 
 
-def draw_paths(axes: "Axes", layer: Layer, paths: Toolpaths, width: float) -> None:
-    """Draw the fibre paths of a layer in one colour, and their links in another.
-
-    Parameters
-    ----------
-    axes : Axes
-    layer : Layer
-    paths : Toolpaths
-        Of the whole part, or of this layer.
-    width : float, mm
-        Of a strand.
-    """
+def _draw_paths(axes: "Axes", layer: Layer, paths: Toolpaths, width: float) -> None:
+    """Draw the fibre paths of a layer in one colour, and their links in another."""
     from matplotlib.collections import LineCollection
 
     wanted = paths.select((paths.layer == layer.index) & (paths.kind == FIBRE))
@@ -165,7 +171,7 @@ def _strands_and_links(paths: Toolpaths, layer: Layer) -> tuple[list[FloatArray]
     return found
 
 
-def draw_segments(axes: "Axes", coloured: Coloured, width: float) -> Any:
+def _draw_segments(axes: "Axes", coloured: Coloured, width: float) -> Any:
     """Draw pieces of fibre coloured by their values; returns the colour map."""
     from matplotlib.collections import LineCollection
 
@@ -202,7 +208,7 @@ def mark_failure(axes: "Axes", point: FloatArray, label: str = "") -> None:
 
 
 def _points(axes: "Axes", length: float) -> float:
-    """Size in points of a length, mm, on the axes, at least a hair."""
+    """Size in points of a length, mm, on the axes, at least that of a hairline."""
     return max(72.0 * inches_per_mm(axes) * length, 0.3)
 
 
@@ -237,11 +243,6 @@ def layer_picture(
         Pieces drawn instead of the paths in one colour.
     colour : str, optional
         Of the mark before the heading: that of the strategy.
-
-    Returns
-    -------
-    Figure
-        For `plot.canvas.png` or `plot.canvas.save`.
     """
     figure, (axes,) = new_figure(picture_extents(layer, [paths]))
     _draw(axes, layer, stress, paths, width, limit, coloured)
@@ -266,10 +267,6 @@ def compare_layer(
     paths : mapping of strategy name to Toolpaths
     captions : mapping of strategy name to str, optional
         Lines with key numbers.
-
-    Returns
-    -------
-    Figure
     """
     figure, columns = new_figure(picture_extents(layer, paths.values()), columns=len(paths))
     colours = palette(paths)
@@ -291,12 +288,12 @@ def _draw(
     """One picture without its title."""
     draw_section(axes, layer, filled=stress is None or coloured is not None)
     if coloured is not None:
-        colours = draw_segments(axes, coloured, width)
+        colours = _draw_segments(axes, coloured, width)
         colour_bar(axes, colours, coloured.limits, coloured.label)
     else:
         if stress is not None:
             end = tension_limit(stress) if limit is None else limit
             colours = draw_stress(axes, stress, end)
             colour_bar(axes, colours, (0.0, end), "MPa tension")
-        draw_paths(axes, layer, paths, width)
+        _draw_paths(axes, layer, paths, width)
     scale_bar(axes)

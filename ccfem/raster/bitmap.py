@@ -18,7 +18,7 @@ NEIGHBOURS.flags.writeable = False
 """Steps (row, column) to the 8 neighbours of a pixel, clockwise; even ones share a side."""
 
 _TIE = 1e-6
-"""Centres nearer to the border than this, in pixels, are outside: ties fall alike on all sides."""
+"""Centres nearer to the border than this, in pixels, are outside: ties agree on all sides."""
 _SAMPLE = 0.05
 _MOST = 4_000_000
 
@@ -37,7 +37,7 @@ class Bitmap:
     origin : (2,) array, mm
         Lower left corner of the bitmap.
     section : shapely (Multi)Polygon, mm
-        Is prepared: no other thread must use it.
+        Prepared: no other thread may use it.
     """
 
     mask: BoolArray

@@ -7,7 +7,6 @@ from scipy import ndimage
 
 from ccfem.arrays import BoolArray, FloatArray, IntArray
 from ccfem.fields.streamlines import streamlines
-from ccfem.layers.layer import Layer
 from ccfem.layers.layer_stress import LayerStress
 from ccfem.raster.bands import depth
 from ccfem.raster.bitmap import Bitmap
@@ -15,12 +14,12 @@ from ccfem.raster.skeleton import segments, skeleton
 from ccfem.raster.thinning import thin
 from ccfem.tensor import in_plane
 
-__all__ = ["guide_pixels", "nearest_pixels", "segment_seeds", "stress_guides"]
+__all__ = ["segment_seeds", "stress_guides"]
 
 _STEP = 0.5
 _APART = 2.0
 _SHORTEST = 6
-"""In pixels: step along a streamline, least distance of guides, and least number of pixels."""
+"""In pixels: step along a streamline, minimum distance of guides, minimum number of pixels."""
 
 
 def segment_seeds(inside: BoolArray) -> IntArray:
@@ -54,25 +53,13 @@ def segment_seeds(inside: BoolArray) -> IntArray:
     return np.array(seeds, dtype=np.int64).reshape(-1, 2)
 
 
-def guide_pixels(
+def _guide_pixels(
     raster: Bitmap, inside: BoolArray, curves: Sequence[FloatArray], seeds: IntArray
 ) -> IntArray:
-    """Guide that each pixel is on, cut where it comes near to one before it.
+    """Guide (H, W) that each pixel is on, -1 for none, cut where it comes near to one before it.
 
-    Parameters
-    ----------
-    raster : Bitmap
-    inside : (H, W) bool array
-        Pixels that guides stay in.
-    curves : sequence of (m, 2) arrays, mm
-        With steps of at most half a pixel; in the order of their importance.
-    seeds : (k, 2) int array
-        Pixel of each curve that its guide has to hold.
-
-    Returns
-    -------
-    (H, W) int array
-        -1 where there is none.
+    Curves are in the order of their importance, with steps of at most half a pixel; a guide holds
+    the seed (k, 2) of its curve.
     """
     guides = np.full(inside.shape, -1, dtype=np.int64)
     free = inside.copy()
@@ -99,18 +86,8 @@ def guide_pixels(
     return guides
 
 
-def nearest_pixels(inside: BoolArray, pixels: IntArray) -> IntArray:
-    """Pixel (k, 2) of those inside, some at least, that is nearest to each of some pixels."""
-    nearest = ndimage.distance_transform_edt(~inside, return_distances=False, return_indices=True)
-    return np.stack([index[tuple(pixels.T)] for index in nearest], axis=1).astype(np.int64)
-
-
 def stress_guides(
-    raster: Bitmap,
-    inside: BoolArray,
-    layer: Layer,
-    stress: LayerStress,
-    points: FloatArray | None = None,
+    raster: Bitmap, inside: BoolArray, stress: LayerStress, points: FloatArray | None = None
 ) -> IntArray:
     """Guides along streamlines of the principal stress of the largest size.
 
@@ -119,7 +96,6 @@ def stress_guides(
     raster : Bitmap
     inside : (H, W) bool array
         Pixels that guides stay in.
-    layer : Layer
     stress : LayerStress
     points : (k, 2) array, mm, optional
         Where streamlines start, at the nearest pixel inside; by default `segment_seeds`.
@@ -134,9 +110,11 @@ def stress_guides(
     if points is None:
         seeds = segment_seeds(inside)
     else:
-        seeds = nearest_pixels(inside, raster.pixels(points))
+        _, nearest = ndimage.distance_transform_edt(~inside, return_indices=True)
+        seeds = nearest[:, *raster.pixels(points).T].T.astype(np.int64)
+    layer = stress.layer
     plane = in_plane(stress.nodal, layer.plane.frame)
     starts = raster.centres(seeds)
     step = _STEP * raster.pixel
     curves = streamlines(layer.plane.points, layer.triangles, plane, starts, step)
-    return guide_pixels(raster, inside, curves, seeds)
+    return _guide_pixels(raster, inside, curves, seeds)

@@ -11,8 +11,6 @@ from scipy import ndimage
 
 from ccfem.arrays import BoolArray, IntArray, freeze
 from ccfem.raster.bands import Metric, bands
-from ccfem.raster.dilation import first_touch, ring_regions, rings_round
-from ccfem.raster.hatch import hatch_lines
 from ccfem.raster.skeleton import nearest_segment, skeleton
 
 __all__ = [
@@ -21,16 +19,19 @@ __all__ = [
     "SHELL",
     "Regions",
     "concentric_regions",
+    "first_touch",
     "grid_regions",
+    "hatch_lines",
     "inside_shells",
     "medial_regions",
+    "rings_round",
     "stress_regions",
 ]
 
 SHELL, GUIDE, INFILL = range(3)
 
 _LEAST_AXIS = 4
-"""Pixels of the least medial axis: a part with a shorter one is filled by concentric rings."""
+"""Minimum number of pixels of a medial axis: a part with fewer is filled by concentric rings."""
 
 
 @dataclass(frozen=True)
@@ -52,9 +53,64 @@ class Regions:
         freeze(self, number=int, domain=int)
 
 
-def inside_shells(mask: BoolArray, shells: int, metric: Metric = "euclid") -> BoolArray:
+def inside_shells(mask: BoolArray, shells: int) -> BoolArray:
     """Pixels that the shells leave."""
-    return bands(mask, metric) >= shells
+    return bands(mask) >= shells
+
+
+def rings_round(guides: IntArray, inside: BoolArray) -> tuple[IntArray, IntArray]:
+    """Find the ring round the nearest guide that each pixel lies in, and that guide.
+
+    Distances are straight, so that rings are round and a pixel apart at every angle.
+
+    Parameters
+    ----------
+    guides : (H, W) int array
+        Guide of each pixel; negative where there is none, some not.
+    inside : (H, W) bool array
+
+    Returns
+    -------
+    ring, guide : (H, W) int arrays
+        Ring 0 is the guides; -1 outside.
+    """
+    distance, nearest = ndimage.distance_transform_edt(guides < 0, return_indices=True)
+    ring = np.floor(distance + 0.5).astype(np.int64)
+    return np.where(inside, ring, -1), np.where(inside, guides[nearest[0], nearest[1]], -1)
+
+
+def first_touch(ring: IntArray) -> int:
+    """Find the first ring with a pixel that shares a side with one outside."""
+    inside = ring >= 0
+    return int(ring[inside & ~ndimage.binary_erosion(inside)].min())
+
+
+def hatch_lines(mask: BoolArray, angle: float, every_row: bool = False) -> IntArray:
+    """Find the line that each pixel lies on.
+
+    Parameters
+    ----------
+    mask : (H, W) bool array
+    angle : float, radians
+        Of the lines to the rows of pixels.
+    every_row : bool, default False
+        Lines of one pixel in every column (or row), which are nearer than a pixel to each other
+        unless they run along rows or columns: at 45 degrees every diagonal is one. Otherwise the
+        lines are strips a pixel wide.
+
+    Returns
+    -------
+    (H, W) int array
+        -1 where the mask is empty.
+    """
+    height, width = mask.shape
+    x = np.arange(width) - 0.5 * (width - 1)
+    y = (0.5 * (height - 1) - np.arange(height))[:, None]
+    across, down = np.cos(angle), np.sin(angle)
+    step = max(abs(across), abs(down)) if every_row else 1.0
+    # Half an odd number of lines falls between two: a small shift decides alike everywhere.
+    line = np.floor((across * y - down * x) / step + 0.5 + 1e-9).astype(np.int64)
+    return np.where(mask, line - line.min(), -1)
 
 
 def _stack(*parts: tuple[IntArray, int]) -> Regions:
@@ -69,38 +125,36 @@ def _stack(*parts: tuple[IntArray, int]) -> Regions:
     return Regions(number, domain)
 
 
-def _shell_rings(mask: BoolArray, shells: int, metric: Metric) -> tuple[IntArray, int]:
+def _shells(
+    mask: BoolArray, shells: int, metric: Metric = "euclid"
+) -> tuple[tuple[IntArray, int], BoolArray]:
+    """Rings of the shells with their domain, and the pixels that they leave."""
     ring = bands(mask, metric)
-    return np.where(ring < shells, ring, -1), SHELL
+    return (np.where(ring < shells, ring, -1), SHELL), ring >= shells
 
 
 def concentric_regions(
     mask: BoolArray, shells: int = 3, rings: int | None = None, metric: Metric = "euclid"
 ) -> Regions:
-    """Rings from the border to the middle, or so many of them."""
+    """Rings from the border to the middle, or the first few of them."""
     ring = bands(mask, metric)
     if rings is not None:
         ring = np.where(ring < rings, ring, -1)
-    return _stack(_shell_rings(mask, min(shells, rings or shells), metric), (ring, INFILL))
+    return _stack(_shells(mask, min(shells, rings or shells), metric)[0], (ring, INFILL))
 
 
 def grid_regions(
-    mask: BoolArray,
-    angle: float,
-    shells: int = 3,
-    every_row: bool = False,
-    metric: Metric = "euclid",
+    mask: BoolArray, angle: float, shells: int = 3, every_row: bool = False
 ) -> Regions:
     """Shells and parallel lines at an angle, radians; `every_row` as in `hatch_lines`."""
-    inside = inside_shells(mask, shells, metric)
+    shell, inside = _shells(mask, shells)
     lines = hatch_lines(inside, angle, every_row) if inside.any() else np.full(mask.shape, -1)
-    return _stack(_shell_rings(mask, shells, metric), (lines, INFILL))
+    return _stack(shell, (lines, INFILL))
 
 
 def medial_regions(mask: BoolArray, shells: int = 3, metric: Metric = "euclid") -> Regions:
     """Shells, rings round the medial axis up to the first that touches them, then concentric."""
-    inside = inside_shells(mask, shells, metric)
-    shell = _shell_rings(mask, shells, metric)
+    shell, inside = _shells(mask, shells, metric)
     line = skeleton(inside)
     pieces, count = ndimage.label(line, np.ones((3, 3)))
     line &= (np.bincount(pieces.ravel(), minlength=count + 1) >= _LEAST_AXIS)[pieces]
@@ -114,19 +168,17 @@ def medial_regions(mask: BoolArray, shells: int = 3, metric: Metric = "euclid") 
     return _stack(shell, (axis, GUIDE), (grown, GUIDE), (rest, INFILL))
 
 
-def stress_regions(
-    mask: BoolArray, guides: IntArray, shells: int = 3, metric: Metric = "euclid"
-) -> Regions:
+def stress_regions(mask: BoolArray, guides: IntArray, shells: int = 3) -> Regions:
     """Shells, and rings round the nearest of some guides, an image, -1 where there is none.
 
     Pieces inside the shells that no guide runs through are filled by concentric rings.
     """
-    inside = inside_shells(mask, shells, metric)
-    shell = _shell_rings(mask, shells, metric)
+    shell, inside = _shells(mask, shells)
     pieces, _ = ndimage.label(inside, np.ones((3, 3)))
     guides = np.where(inside, guides, -1)
     guided = np.isin(pieces, np.unique(pieces[guides >= 0])) & inside
     grown = np.full(mask.shape, -1, dtype=np.int64)
     if guided.any():
-        grown = ring_regions(*rings_round(guides, guided))
-    return _stack(shell, (grown, GUIDE), (bands(inside & ~guided, metric), INFILL))
+        ring, guide = rings_round(guides, guided)
+        grown = np.where(ring >= 0, guide * (ring.max() + 1) + ring, -1)
+    return _stack(shell, (grown, GUIDE), (bands(inside & ~guided), INFILL))

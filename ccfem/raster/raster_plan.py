@@ -46,7 +46,7 @@ class RasterPlan:
     def lines(self) -> list[FloatArray]:
         """Polylines (n_i, 2), mm: straight runs by their ends, staircases made straight.
 
-        A path with a straight way that leaves the section keeps all its staircases.
+        A path that would leave the section by a straight step keeps all its staircases.
         """
         chains = self.chains
         if not chains:

@@ -8,7 +8,7 @@ from ccfem.arrays import BoolArray, IntArray
 __all__ = ["corners"]
 
 _STAIRS = 3
-"""Least number of steps, taking turns between two directions, that make a staircase."""
+"""Minimum number of steps, alternating between two directions, that make a staircase."""
 
 
 def corners(pixels: IntArray, offsets: IntArray, stairs: bool = True) -> BoolArray:
@@ -20,7 +20,7 @@ def corners(pixels: IntArray, offsets: IntArray, stairs: bool = True) -> BoolArr
         Neighbouring pixels a path; a closed path repeats its first.
     offsets : (K + 1,) int array
     stairs : bool, default True
-        Whether three or more steps along sides of pixels, taking turns between two directions, are
+        Whether three or more steps along sides of pixels, alternating between two directions, are
         one straight step from the first pixel to the last. Two staircases share no step, and a
         single corner stays.
 

@@ -49,7 +49,7 @@ class Segment:
 def skeleton(mask: BoolArray) -> BoolArray:
     """Medial axis of the solid pixels.
 
-    Branches that are spurs are taken off and the rest is thinned again, until none is left. Then
+    Branches that are spurs are removed and the rest is thinned again, until none is left. Then
     one half of a bitmap that is its own mirror image is copied onto the other; a line along an
     axis that falls between two rows of pixels becomes two pixels wide.
 
@@ -61,7 +61,7 @@ def skeleton(mask: BoolArray) -> BoolArray:
     Returns
     -------
     (H, W) bool array
-        A pixel at least for every connected piece.
+        At least one pixel for every connected piece.
     """
     line = thin(np.where(mask, 0, -1))
     far = depth(mask)
@@ -162,12 +162,8 @@ def _ordered(pixels: IntArray) -> IntArray:
 def nearest_segment(line: BoolArray) -> IntArray:
     """Segment of the thinned image that each pixel of a medial axis is nearest to; -1 elsewhere.
 
-    A piece that is a single fork is a segment of its own.
-
-    Parameters
-    ----------
-    line : (H, W) bool array
-        As `skeleton` returns it, in places two pixels wide.
+    A piece that is a single fork is a segment of its own. The axis is as `skeleton` returns it, in
+    places two pixels wide.
     """
     found, _ = segments(thin(np.where(line, 0, -1)))
     number = np.full(line.shape, -1, dtype=np.int64)
@@ -176,7 +172,5 @@ def nearest_segment(line: BoolArray) -> IntArray:
     pieces, _ = ndimage.label(line, _ALL)
     alone = ~np.isin(pieces, np.unique(pieces[number >= 0])) & line
     number[alone] = len(found) + pieces[alone]
-    nearest = ndimage.distance_transform_edt(
-        number < 0, return_distances=False, return_indices=True
-    )
+    _, nearest = ndimage.distance_transform_edt(number < 0, return_indices=True)
     return np.where(line, number[nearest[0], nearest[1]], -1)

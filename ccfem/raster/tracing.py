@@ -19,14 +19,14 @@ from ccfem.raster.walking import (
 __all__ = ["PixelPaths", "trace"]
 
 _STUB = 4
-"""Branches and paths of fewer pixels beside another path of their region are none: it takes them
-in."""
+"""Branches and paths of fewer pixels beside another path of their region do not count: it absorbs
+them."""
 _ROUNDS = 20
 
 
 @dataclass(frozen=True)
 class PixelPaths:
-    """Paths as chains of neighbouring pixels, and the path that every solid pixel belongs to.
+    """Paths as chains of neighbouring pixels, and the path that each solid pixel belongs to.
 
     Attributes
     ----------
@@ -91,17 +91,6 @@ def trace(regions: IntArray, linked: BoolArray, seed: int = 0) -> PixelPaths:
         extend_ends(regions, linked, used, following, before)
     join_ends(regions, linked, used, following, before)
     fill_corners(regions, linked, used, following, before)
-    return _collect(regions, linked, used, following, before, seed)
-
-
-def _collect(
-    regions: IntArray,
-    linked: BoolArray,
-    used: BoolArray,
-    following: IntArray,
-    before: IntArray,
-    seed: int,
-) -> PixelPaths:
     pixels, offsets, closed = chains(regions, used, following, before)
     random = np.random.default_rng(seed)
     for k in np.flatnonzero(closed):

@@ -1,4 +1,4 @@
-"""Lines of pixels as linked lists: followed, filled, made longer, joined.
+"""Lines of pixels as linked lists: followed, filled, extended, joined.
 
 Pixels are numbered row by row; `following` and `before` hold the next and the last pixel of the
 path, -1 at its ends, and `used` which pixels are on one. A step goes to a neighbour of the same
@@ -86,7 +86,7 @@ def _beside_on(line, regions, linked, i, j):  # type: ignore[no-untyped-def]
 
 @njit(cache=True)
 def cut_spurs(line, regions, linked, least):  # type: ignore[no-untyped-def]
-    """Take branches of fewer pixels than `least`, from a free end to a fork, off the lines."""
+    """Remove branches of fewer pixels than `least`, from a free end to a fork, from the lines."""
     width = regions.shape[1]
     chain = np.empty(least, dtype=np.int64)
     for start in range(regions.size):
@@ -113,7 +113,7 @@ def cut_spurs(line, regions, linked, least):  # type: ignore[no-untyped-def]
 def walk(line, regions, linked, used, following, before, stub):  # type: ignore[no-untyped-def]
     """Follow all lines, from their ends first; the number of paths found.
 
-    Chains of fewer pixels than `stub` beside a path that was there before are none.
+    Chains of fewer pixels than `stub` beside an earlier path are dropped.
     """
     chain = np.empty(regions.size, dtype=np.int64)
     width = regions.shape[1]
@@ -155,7 +155,7 @@ def _beside(chain, size, regions, linked, used):  # type: ignore[no-untyped-def]
 
 @njit(cache=True)
 def fill_corners(regions, linked, used, following, before):  # type: ignore[no-untyped-def]
-    """Lead diagonal steps of paths round by way of a left over pixel beside both ends."""
+    """Replace diagonal steps of paths by two over an unused pixel beside both their ends."""
     height, width = regions.shape
     for i in range(1, height - 1):
         for j in range(1, width - 1):
@@ -180,7 +180,7 @@ def fill_corners(regions, linked, used, following, before):  # type: ignore[no-u
 
 @njit(cache=True)
 def extend_ends(regions, linked, used, following, before):  # type: ignore[no-untyped-def]
-    """Lead open paths on to pixels left over that lie ahead of their ends."""
+    """Extend open paths over the unused pixels ahead of their ends."""
     width = regions.shape[1]
     for start in range(regions.size):
         if not used[start // width, start % width]:
@@ -240,7 +240,7 @@ def join_ends(regions, linked, used, following, before):  # type: ignore[no-unty
 
 @njit(cache=True)
 def _join(following, before, here, there):  # type: ignore[no-untyped-def]
-    """Join the paths that end at two pixels, or close the one; not one of three pixels."""
+    """Join the paths that end at two pixels, or close the one path of more than three pixels."""
     size, at, back = 1, here, following[here] < 0
     while True:
         onward = before[at] if back else following[at]
@@ -300,7 +300,7 @@ def chains(regions, used, following, before):  # type: ignore[no-untyped-def]
 
 @njit(cache=True)
 def absorb(regions, linked, isolated, label):  # type: ignore[no-untyped-def]
-    """Label isolated pixels by a path beside them, of their region and at a side if there is."""
+    """Label isolated pixels by a path beside them, best of their region and sharing a side."""
     height, width = regions.shape
     changed = True
     while changed:

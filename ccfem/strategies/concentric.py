@@ -26,7 +26,7 @@ _CLOSEST = 0.6
 
 @dataclass(frozen=True)
 class Concentric(Infill):
-    """Rings parallel to every border of the section, the stress unseen.
+    """Rings parallel to every border of the section; it ignores the stress.
 
     The first ring lies half a fibre width inside the border; opposite sides of a ring stay a fibre
     width apart, which leaves a gap along the middle where no further ring fits. This is the fill

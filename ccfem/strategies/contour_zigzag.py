@@ -1,7 +1,7 @@
 """Baseline: contours along the border, a zigzag inside."""
 
 from collections.abc import Mapping
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import Any, ClassVar
 
 import numpy as np
@@ -24,7 +24,7 @@ class ContourZigzag:
     """Rings along every border, and linked parallel lines in what is left.
 
     What commercial fibre slicers lay, and the load-independent paths that Chen et al. 2021 compare
-    theirs with (table 2). The stress is unseen.
+    theirs with (table 2). It ignores the stress.
 
     Attributes
     ----------
@@ -45,8 +45,8 @@ class ContourZigzag:
     turn: float = 90.0
     joined: bool = True
 
-    amount: ClassVar[Amount] = SPACING
-    flat_layers_only: ClassVar[bool] = True
+    amount: ClassVar[Amount] = replace(SPACING, before=(Amount("contours", 2, 1),))
+    in_plane: ClassVar[bool] = True
     direction: ClassVar[str] = "angle"
     variants: ClassVar[Mapping[str, Mapping[str, Any]]] = {"single": {"joined": False}}
 

@@ -11,10 +11,12 @@ from typing import Any, ClassVar
 
 import numpy as np
 import shapely
+from numba import njit
 
 from ccfem.arrays import FloatArray
 from ccfem.errors import InputError
 from ccfem.fields.streamlines import streamlines
+from ccfem.geometry.polylines import is_closed
 from ccfem.geometry.shapes import Region, open_lines
 from ccfem.layers.layer import Layer
 from ccfem.layers.layer_stress import LayerStress
@@ -30,6 +32,8 @@ _STEP = 0.25
 """Step along the seed line, in fibre widths."""
 _CANDIDATES = 20
 """Most stressed places whose streamlines are compared."""
+_OWN = 3.0
+"""Length along the seed line, in fibre widths, within which it is not in its own way."""
 _OFF = 0.005
 """Largest deviation from the distance, in fibre widths."""
 
@@ -39,11 +43,12 @@ class Eqs:
     """A seed line along the stress, and lines at whole multiples of the spacing from it.
 
     The seed line is the longest of the streamlines through the twenty most stressed places of the
-    layer, or the one through a given point. The others are iso-lines of the Euclidean distance from
-    it, to its sides and round its ends: exactly parallel, whatever voids lie between. Distance
-    measured within the section would lay them across every member that leads away from the seed
-    line, and break them behind every hole, where two fronts meet. Away from the seed line the
-    stress has no say.
+    layer, or the one through a given point; it stops where it comes within a fibre width of itself,
+    and does not wind round a hole again and again. The others are iso-lines of the Euclidean
+    distance from it, to its sides and round its ends: exactly parallel, whatever voids lie between.
+    Distance measured within the section would lay them across every member that leads away from the
+    seed line, and break them behind every hole, where two fronts meet. Away from the seed line the
+    stress has no influence.
 
     Attributes
     ----------
@@ -60,7 +65,7 @@ class Eqs:
     minimum_length: float | None = None
 
     amount: ClassVar[Amount] = SPACING
-    flat_layers_only: ClassVar[bool] = True
+    in_plane: ClassVar[bool] = True
     variants: ClassVar[Mapping[str, Mapping[str, Any]]] = {"seed": {"seed": (0.0, 0.0)}}
 
     def __post_init__(self) -> None:
@@ -91,9 +96,50 @@ class Eqs:
         else:
             starts = np.array([self.seed])
         lines = streamlines(layer.plane.points, layer.triangles, plane, starts, step)
+        width = step / _STEP
+        lines = [
+            _until_itself(line, start, width) for line, start in zip(lines, starts, strict=True)
+        ]
         if not lines:
             return np.zeros((0, 2))
         return lines[int(np.argmax([len(line) for line in lines]))]
+
+
+def _until_itself(line: FloatArray, start: FloatArray, width: float) -> FloatArray:
+    """Line (n, 2) from a point on it ahead, then back, to where it meets itself within a width.
+
+    A closed line stays closed where only its ends meet.
+    """
+    if len(line) < 2:
+        return line
+    seed = int(np.argmin(((line - start) ** 2).sum(axis=1)))
+    first, last = _own_way(line, seed, is_closed(line), width, _OWN * width)
+    return line[first : last + 1]
+
+
+@njit(cache=True, nogil=True)
+def _own_way(line, seed, closed, width, own):  # type: ignore[no-untyped-def]
+    """First and last point that keep a distance from all others, `own` mm of arc left aside."""
+    count = len(line)
+    along = np.zeros(count)
+    for p in range(1, count):
+        along[p] = along[p - 1] + np.sqrt(((line[p] - line[p - 1]) ** 2).sum())
+    first = last = seed
+    for sense in (1, -1):
+        p = seed + sense
+        while 0 <= p < count:
+            for q in range(first, last + 1):
+                arc = abs(along[p] - along[q])
+                if closed:
+                    arc = min(arc, along[-1] - arc)
+                if arc > own and ((line[p] - line[q]) ** 2).sum() < width * width:
+                    break
+            else:
+                first, last = min(first, p), max(last, p)
+                p += sense
+                continue
+            break
+    return first, last
 
 
 def _iso_lines(seed: FloatArray, region: Region, pitch: float, off: float) -> list[FloatArray]:

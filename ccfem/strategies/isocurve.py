@@ -14,7 +14,7 @@ from typing import Any, ClassVar, Literal
 import numpy as np
 from scipy.spatial import cKDTree
 
-from ccfem.arrays import BoolArray, FloatArray
+from ccfem.arrays import FloatArray
 from ccfem.checks import check_choices, check_fields
 from ccfem.elasticity.part_stress import PartStress
 from ccfem.errors import InputError
@@ -22,18 +22,19 @@ from ccfem.fields.compatibility import Incompatible
 from ccfem.fields.crease import orient_along
 from ccfem.fields.fill import fill_laplacian, fill_screened
 from ccfem.fields.layer_elements import Surface
-from ccfem.fields.layer_tension import MeshTension, SampledTension, layer_tension, mesh_tension
+from ccfem.fields.layer_tension import layer_tension, mesh_tension
 from ccfem.fields.levels import extract_levels, unit_levels
 from ccfem.fields.orientation import orient
 from ccfem.fields.scalar import fit_cone, fit_constrained, fit_literal, fit_weighted
+from ccfem.fields.tensile import Tension
 from ccfem.geometry.isocontours import Isocontours
-from ccfem.geometry.polylines import is_closed, runs
+from ccfem.geometry.polylines import is_closed, middle_of_longest_run
 from ccfem.layers.holes import holes_on
 from ccfem.layers.layer import Layer
 from ccfem.layers.layer_stress import LayerStress, stress_on
 from ccfem.linking.clearance import trim_to_clearance
 from ccfem.linking.conformal import lead_into, parallel_curve
-from ccfem.linking.finishing import keep_off_border, linked_paths
+from ccfem.linking.finishing import keep_off_border, linked_paths, smooth_strands
 from ccfem.linking.spiral import spiral
 from ccfem.machine.machine import Machine
 from ccfem.planning.strategy import Amount, LayerPlanner
@@ -52,7 +53,7 @@ _LEAST_WEIGHT = 1e-3
 _ROOM = 1.03
 """Bound on the distance of isocurves, in strand widths: strands that stood just at the width would
 be trimmed wherever the numbers fall short of it."""
-_TRIM = 0.98
+_TRIM = 0.95
 """What is nearer than this to a longer strand, in strand widths, is cut: curves that are led along
 each other at one width differ by their chords."""
 _SPIRAL_LIMIT = 4.0
@@ -72,6 +73,8 @@ _LITERAL: Mapping[str, Any] = {
     "spiral": False,
     "boundary_links": False,
     "trim": False,
+    "inset": 0.0,
+    "smooth": False,
 }
 
 
@@ -129,10 +132,13 @@ class Isocurve:
         Links may follow the boundary; in the paper all are straight.
     trim : bool, default True
         Cut branches that come nearer than a strand's width to a longer one.
-    inset : float, default 0
-        Least distance of strands from the boundary, in strand widths. At 0 they may run along the
-        boundary with half of their width outside; 0.5 keeps them in, and their ends still meet
-        the links along the boundary.
+    inset : float, default 0.5
+        Least distance of strands from the boundary, in strand widths. 0.5 keeps them in; at 0 they
+        may run along the boundary with half of their width outside.
+    smooth : bool, default True
+        Strands are pushed apart and off the boundary before any is cut, and neither they nor their
+        links turn more tightly than the machine's minimum radius. Otherwise links have corners, as
+        in the paper, and `boundary_links` says how they run.
     """
 
     cap: float = 86.0
@@ -155,13 +161,20 @@ class Isocurve:
     spiral: bool = True
     boundary_links: bool = True
     trim: bool = True
-    inset: float = 0.0
+    inset: float = 0.5
+    smooth: bool = True
 
-    amount: ClassVar[Amount] = Amount("density", most=4.0, least=0.05)
-    flat_layers_only: ClassVar[bool] = True
+    amount: ClassVar[Amount] = Amount(
+        "density",
+        most=4.0,
+        least=0.05,
+        beyond=(Amount("floor", most=0.0, least=0.4), Amount("cap", most=40.0, least=86.0)),
+    )
+    in_plane: ClassVar[bool] = True
     variants: ClassVar[Mapping[str, Mapping[str, Any]]] = {
         "literal": _LITERAL,
-        "inset": {"inset": 0.5},
+        "border": {"inset": 0.0},
+        "corners": {"smooth": False},
         "search": {"spacing": "search"},
         "cone": {"spacing": "cone"},
         "mesh": {
@@ -222,9 +235,9 @@ class _Planner:
     """The strategy once it has seen the whole part."""
 
     strategy: Isocurve
-    part: MeshTension | None
+    part: Tension | None
 
-    def tension(self, layer: Layer, stress: LayerStress) -> SampledTension:
+    def tension(self, layer: Layer, stress: LayerStress) -> Tension:
         s = self.strategy
         if self.part is not None:
             return self.part.on(layer)
@@ -239,12 +252,13 @@ class _Planner:
         lines = self.connected(lines, layer, tension, stress.held_or_loaded, machine)
         return Toolpaths.from_plane(lines, layer)
 
-    def isocurves(
-        self, surface: Surface, tension: SampledTension, width: float
-    ) -> list[FloatArray]:
+    def isocurves(self, surface: Surface, tension: Tension, width: float) -> list[FloatArray]:
         """Isocurves of the field, at least a width apart."""
         s = self.strategy
-        cap = max(_percentile(tension.stress, surface.areas, s.cap), 1e-300)
+        percentile = np.quantile(
+            tension.stress, s.cap / 100.0, weights=surface.areas, method="inverted_cdf"
+        )
+        cap = max(float(percentile), 1e-300)
         confidence = np.where(tension.defined, np.minimum(tension.stress / cap, 1.0), 0.0)
         direction = tension.direction
         if s.fill == "screened":
@@ -287,7 +301,7 @@ class _Planner:
                 if worth.mean() >= 0.5:
                     kept.append(line)
                     continue
-                middle = _longest_run(~worth[:-1])
+                middle = middle_of_longest_run(~worth[:-1])
                 line = np.roll(line[:-1], -middle, axis=0)
                 worth = np.roll(worth[:-1], -middle)
             inside = np.flatnonzero(worth)
@@ -299,7 +313,7 @@ class _Planner:
         self,
         lines: list[FloatArray],
         layer: Layer,
-        tension: SampledTension,
+        tension: Tension,
         patches: tuple[str, ...],
         machine: Machine,
     ) -> list[FloatArray]:
@@ -311,36 +325,36 @@ class _Planner:
             for distance in s.rings[:-1]:
                 rings += parallel_curve(hole, distance * width, section)
             lines = lead_into(lines, hole, s.rings[-1] * width, section)
-        rings = keep_off_border(rings, section, s.inset * width)
-        lines = keep_off_border(lines, section, s.inset * width)
-        if s.trim:
+        inset, radius = s.inset * width, machine.minimum_radius if s.smooth else 0.0
+        rings = keep_off_border(rings, section, inset)
+        if s.smooth and s.trim:
+            lines = smooth_strands(
+                lines, section, inset, width, radius, _TRIM * width, 3.0 * width, rings
+            )
+        elif s.trim:
+            lines = keep_off_border(lines, section, inset)
             lines = trim_to_clearance(
                 [*rings, *lines], _TRIM * width, 3.0 * width, first=len(rings)
             )
         else:
-            lines = [*rings, *lines]
+            lines = [*rings, *keep_off_border(lines, section, inset)]
         if s.spiral:
-            lines = spiral(lines, _SPIRAL_LIMIT * width, _nearest(layer, tension.stress), section)
+            cost = _nearest(layer, tension.stress)
+            lines = spiral(lines, _SPIRAL_LIMIT * width, cost, section, radius)
         limit, least = s.link_limit * width, machine.minimum_length
-        return linked_paths(lines, section, width, limit, least, s.boundary_links)
+        return linked_paths(
+            lines,
+            section,
+            width,
+            limit,
+            least,
+            s.boundary_links,
+            radius,
+            inset if s.smooth else 0.0,
+        )
 
 
 def _nearest(layer: Layer, values: FloatArray) -> Callable[[FloatArray], FloatArray]:
     """Return a function that gives points (k, 2) the value of the nearest triangle."""
     tree = cKDTree(layer.plane.points[layer.triangles].mean(axis=1))
     return lambda points: values[tree.query(points)[1]]
-
-
-def _longest_run(mask: BoolArray) -> int:
-    """Index of the middle of the longest run of true values on a ring of values."""
-    starts, ends = runs(np.concatenate([mask, mask])).T
-    longest = int(np.argmax(ends - starts))
-    return int(starts[longest] + ends[longest]) // 2 % len(mask)
-
-
-def _percentile(values: FloatArray, weight: FloatArray, share: float) -> float:
-    """Value that `share` percent of the weight lies at or below."""
-    order = np.argsort(values, kind="stable")
-    below = np.cumsum(weight[order])
-    place: Any = np.searchsorted(below, share / 100.0 * below[-1] * (1.0 - 1e-12))
-    return float(values[order[min(int(place), len(order) - 1)]])

@@ -46,7 +46,7 @@ class Offset:
     minimum_length: float | None = None
 
     amount: ClassVar[Amount] = SPACING
-    flat_layers_only: ClassVar[bool] = True
+    in_plane: ClassVar[bool] = True
 
     def __post_init__(self) -> None:
         check_fill(self)

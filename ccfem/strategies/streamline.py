@@ -24,6 +24,9 @@ from ccfem.toolpaths import Toolpaths
 
 __all__ = ["Streamline"]
 
+_LEAST = 0.995
+"""Least distance of lines, in fibre widths: at the width itself rounding would end those that run
+side by side."""
 _TOLERANCE = 2e-3
 """Deviation, in fibre widths, up to which points of a streamline are left out."""
 
@@ -40,7 +43,7 @@ class Streamline:
     spacing : float, default 1
         Distance at which lines begin beside each other in fibre widths, at least 1.
     closest : float, default 0.5
-        Least distance of lines in spacings.
+        Least distance of lines in spacings; never less than a fibre width.
     minimum_length : float, mm, optional
         Shorter paths are dropped; by default the shortest that the machine can cut.
     """
@@ -50,7 +53,7 @@ class Streamline:
     minimum_length: float | None = None
 
     amount: ClassVar[Amount] = SPACING
-    flat_layers_only: ClassVar[bool] = True
+    in_plane: ClassVar[bool] = True
 
     def __post_init__(self) -> None:
         check_fill(self)
@@ -59,13 +62,15 @@ class Streamline:
     def __call__(self, layer: Layer, stress: LayerStress, machine: Machine) -> Toolpaths:
         """Plan the paths of one layer; none where the section is thinner than a fibre."""
         width = machine.fibre_width
+        least = machine.minimum_length if self.minimum_length is None else self.minimum_length
         lines = evenly_spaced_streamlines(
             layer.plane.points,
             layer.triangles,
             in_plane(stress.nodal, layer.plane.frame),
             shapely.buffer(layer.plane.polygon, -0.5 * width),
             self.spacing * width,
-            self.closest,
+            max(self.closest, _LEAST / self.spacing),
+            least,
         )
         smooth = shapely.simplify([shapely.LineString(line) for line in lines], _TOLERANCE * width)
         paths = Toolpaths.from_plane([shapely.get_coordinates(line) for line in smooth], layer)

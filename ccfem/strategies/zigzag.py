@@ -22,7 +22,7 @@ class Zigzag:
     """Parallel lines at one angle a layer, linked into as few strands as possible.
 
     What slicers call rectilinear or isotropic fibre fill, and model B of Chen et al. 2021,
-    figure 3. The stress is unseen.
+    figure 3. It ignores the stress.
 
     Attributes
     ----------
@@ -40,7 +40,7 @@ class Zigzag:
     turn: float = 90.0
 
     amount: ClassVar[Amount] = SPACING
-    flat_layers_only: ClassVar[bool] = True
+    in_plane: ClassVar[bool] = True
     direction: ClassVar[str] = "angle"
 
     def __post_init__(self) -> None:

@@ -1,8 +1,9 @@
 """The band of a main path: the strip between its rails, carried on through joints and free ends.
 
-The middle of both rails and half the vector between them describe the strip. Beside joints and
-free ends the rails belong to other members: there the strip is bridged by a cubic and extended
-straight. While it is made, a strip is an array (n, 5) of both vectors, and of 1 where it is free.
+The middle between both rails and half the vector from one to the other describe the strip. Beside
+joints and free ends the rails belong to other members: there the strip is bridged by a cubic and
+extended straight. While it is made, a strip is an array (n, 5) of both vectors, and of 1 where it
+is free.
 """
 
 from dataclasses import dataclass
@@ -21,7 +22,7 @@ __all__ = ["STEP", "Band", "band"]
 STEP = 0.5
 """Distance of the points of a band, mm."""
 _CLEARING = 0.9
-"""Rails nearer to a joint than so many of its radii are not those of a member."""
+"""Rails nearer to a joint than this many of its radii are not those of a member."""
 _TANGENT = (4.0, 6.0)
 """Lengths, mm, over which the direction of a band is taken where it is bridged and extended."""
 _NORMAL = 2.0
@@ -29,13 +30,13 @@ _NORMAL = 2.0
 _SMOOTHING = 2.0
 """Standard deviation, mm, of the Gaussian that smooths a band."""
 _TURNED = np.array([1.0, 1.0, -1.0, -1.0, 1.0])
-"""What a strip is multiplied by where it is walked the other way."""
+"""Factors on a strip that is walked the other way."""
 _PADDING = 10.0
 """Length, mm, that is cut off at both ends after that."""
 _EXTENSION = 5.0
 _LEAST_HALF = 5.0
-"""A band is extended at both ends by so often half its width and so many mm; its tracks are clipped
-afterwards."""
+"""A band is extended at both ends by this many times the sum of half its width and this many mm;
+its tracks are clipped afterwards."""
 
 
 @dataclass(frozen=True)
@@ -49,7 +50,7 @@ class Band:
     core : slice
         Points that are not extended.
     within : slice
-        Points that do not lie beyond the middle of the joints that it ends in.
+        Points up to the middle of the joints that it ends in.
     width : (k,) array, mm
         Distance of the rails along the core, before smoothing.
     free : (n,) array
@@ -78,7 +79,7 @@ def band(path: MainPath, frame: Frame, crossing: bool = True) -> Band:
     path : MainPath
     frame : Frame
     crossing : bool, default True
-        Whether an end in a joint goes straight on beyond it; otherwise only to its middle.
+        Whether an end in a joint goes straight on beyond it; otherwise it stops in its middle.
     """
     own = np.concatenate([_own(member, frame) for member in path.members])
     left = np.concatenate([member.left for member in path.members])[own]
@@ -94,7 +95,7 @@ def band(path: MainPath, frame: Frame, crossing: bool = True) -> Band:
     if path.closed:
         strip = _smoothed(strip[:-1], "wrap")
         every = slice(0, len(strip))
-        return _as_band(strip, every, every, width, closed=True)
+        return Band(strip[:, :2], strip[:, 2:4], every, every, width, strip[:, 4], closed=True)
     ends = (path.members[0].ends[0], path.members[-1].ends[1])
     farthest = _EXTENSION * (_LEAST_HALF + 0.5 * width[[0, -1]])
     middle = [
@@ -111,7 +112,7 @@ def band(path: MainPath, frame: Frame, crossing: bool = True) -> Band:
         max(0, core.start - round(middle[0] / STEP)),
         min(len(strip), core.stop + round(middle[1] / STEP)),
     )
-    return _as_band(strip, core, within, width, closed=False)
+    return Band(strip[:, :2], strip[:, 2:4], core, within, width, strip[:, 4])
 
 
 def _stub(strip: FloatArray) -> FloatArray:
@@ -122,13 +123,6 @@ def _stub(strip: FloatArray) -> FloatArray:
     ends = np.stack([centre, centre])
     ends[:, :2] += STEP * np.array([[-0.5], [0.5]]) * along
     return ends
-
-
-def _as_band(
-    strip: FloatArray, core: slice, within: slice, width: FloatArray, closed: bool
-) -> Band:
-    free = np.clip(strip[:, 4], 0.0, 1.0)
-    return Band(strip[:, :2], strip[:, 2:4], core, within, width, free, closed)
 
 
 def _own(member: Member, frame: Frame) -> BoolArray:
@@ -227,10 +221,12 @@ def _even(strip: FloatArray, closed: bool) -> FloatArray:
 
 
 def _smoothed(strip: FloatArray, mode: str) -> FloatArray:
-    """Smooth by a Gaussian, twice, so that arcs keep their radius."""
+    """Smooth a strip by a Gaussian, twice, so that arcs keep their radius."""
     once = gaussian_filter1d(strip, _SMOOTHING / STEP, axis=0, mode=mode)
     rest = gaussian_filter1d(strip - once, _SMOOTHING / STEP, axis=0, mode=mode)
-    return np.asarray(once + rest)
+    smooth = once + rest
+    smooth[:, 4] = smooth[:, 4].clip(0.0, 1.0)
+    return np.asarray(smooth)
 
 
 def _extension(strip: FloatArray, reach: float) -> FloatArray:

@@ -7,27 +7,11 @@ from numpy.typing import ArrayLike
 
 from ccfem.arrays import FloatArray
 
-__all__ = ["Criterion", "coefficient"]
+__all__ = ["Criterion"]
 
-
-def coefficient(
-    value: ArrayLike, limit: float, k: float = 1.0, eta: float = 1.0, epsilon: float = 0.1
-) -> FloatArray:
-    """Coefficient of one property of a step: ``gamma(z) = z / limit (k eta - eps) / k + eps``.
-
-    Equation 4 of the paper. It is epsilon at 0 and grows by ``eta - epsilon / k`` to the limit, so
-    that ``k = epsilon / eta`` makes a property not count.
-
-    Parameters
-    ----------
-    value : array
-        Angle alpha or beta, or distance d of a step.
-    limit : float
-        In the same unit.
-    k, eta, epsilon : float
-        Amplification, and the paper's two arbitrary constants.
-    """
-    return np.asarray(value) / limit * (k * eta - epsilon) / k + epsilon
+_EPSILON = 0.1
+"""Coefficient of a property that is 0, an arbitrary constant of the paper. Its two others, the
+amplification k and eta, are 1."""
 
 
 @dataclass(frozen=True)
@@ -51,13 +35,19 @@ class Criterion:
     def __call__(self, turn: ArrayLike, misalignment: ArrayLike, distance: ArrayLike) -> FloatArray:
         """Smoothness of steps, the smaller the better: equation 5, the product over all properties.
 
+        Each property counts by its coefficient (equation 4), which is 0.1 at 0 and 1 at the limit.
+
         Parameters
         ----------
         turn, misalignment : arrays, degrees
         distance : array, mm
         """
         return (
-            coefficient(turn, self.turn)
-            * coefficient(misalignment, self.misalignment)
-            * coefficient(distance, self.distance)
+            _coefficient(turn, self.turn)
+            * _coefficient(misalignment, self.misalignment)
+            * _coefficient(distance, self.distance)
         )
+
+
+def _coefficient(value: ArrayLike, limit: float) -> FloatArray:
+    return np.asarray(value) / limit * (1.0 - _EPSILON) + _EPSILON

@@ -1,5 +1,6 @@
 """A section seen as a frame: members along its medial axis, and the joints where they meet."""
 
+from collections.abc import Sequence
 from dataclasses import dataclass, replace
 from functools import cached_property
 
@@ -10,14 +11,19 @@ from ccfem.geometry.medial_axis import MedialAxis, MedialSegment, medial_axis
 from ccfem.geometry.shapes import Region
 from ccfem.mesh.measures import connected
 
-__all__ = ["FREE", "Frame", "Member", "frame"]
+__all__ = ["ARC_CHORD", "FREE", "Frame", "Member", "ends_at", "frame"]
 
 FREE = -1
 """Joint of an end that meets no other member."""
 
-_ARC_CHORD = 1.6
-"""Way along the border over its chord up to which a branch is the bisector of a corner; a square
+ARC_CHORD = 1.6
+"""Maximum ratio of the length along the border to its chord for the bisector of a corner; a square
 corner has 1.41."""
+
+_CONTRACTION = 1.25
+"""Members between two joints that are shorter than this many radii of the larger one's disc become
+one joint: two members that cross give two neighbouring junctions of the axis, one radius apart
+where they are equally wide and cross at 60 degrees."""
 
 
 @dataclass(frozen=True)
@@ -29,9 +35,9 @@ class Member:
     points : (m, 2) array, mm
         Along the axis.
     left, right : (m, 2) arrays, mm
-        Points of the border nearest to each point, at both sides of the walking direction.
+        Points of the border nearest to each point, on both sides of the walking direction.
     ends : tuple of 2 ints
-        Joints at both ends, `FREE` where there is none; both are `FREE` of a closed member.
+        Joints at both ends, `FREE` where there is none; a closed member has `FREE` twice.
     closed : bool
         Whether the member is a ring.
     """
@@ -54,7 +60,7 @@ class Member:
 
     @property
     def width(self) -> FloatArray:
-        """Distance of both rails at each point, (m,), mm."""
+        """Distance between the rails at each point, (m,), mm."""
         return np.linalg.norm(self.left - self.right, axis=1)
 
 
@@ -79,17 +85,13 @@ class Frame:
     def __post_init__(self) -> None:
         freeze(self, joints=float, radius=float)
 
-    def ends_at(self, joint: int) -> list[tuple[int, int]]:
-        """Find the ends in a joint: number of the member, and 0 for its start or 1 for its end."""
-        return [
-            (number, side)
-            for number, member in enumerate(self.members)
-            for side in (0, 1)
-            if member.ends[side] == joint
-        ]
+
+def ends_at(members: Sequence[Member], joint: int) -> list[tuple[int, int]]:
+    """Find the ends in a joint: the number of the member, and 0 for its start or 1 for its end."""
+    return [(k, side) for k, m in enumerate(members) for side in (0, 1) if m.ends[side] == joint]
 
 
-def frame(section: Region, step: float, contraction: float = 1.25) -> Frame:
+def frame(section: Region, step: float) -> Frame:
     """Members and joints of a section.
 
     Parameters
@@ -97,19 +99,9 @@ def frame(section: Region, step: float, contraction: float = 1.25) -> Frame:
     section : shapely (Multi)Polygon, mm
     step : float, mm
         Largest distance of the samples along the border.
-    contraction : float, default 1.25
-        Members between two joints that are shorter than so many radii of the larger one's disc are
-        taken into one joint: two members that cross give two neighbouring junctions of the axis,
-        one radius apart where they are as wide as each other and cross at 60 degrees.
-
-    Returns
-    -------
-    Frame
     """
-    axis = medial_axis(section, step, object_angle=None, arc_chord=_ARC_CHORD)
-    ends = np.array([segment.ends for segment in axis.segments], dtype=np.int64).reshape(-1, 2)
-    degree = np.bincount(ends[ends >= 0], minlength=len(axis.nodes))
-    joint, short = _joints(axis, ends, degree, contraction)
+    axis = medial_axis(section, step, object_angle=None, arc_chord=ARC_CHORD)
+    joint, short = _joints(axis)
     members = []
     for segment, within in zip(axis.segments, short, strict=True):
         if not within:
@@ -125,16 +117,15 @@ def frame(section: Region, step: float, contraction: float = 1.25) -> Frame:
     return Frame(tuple(members), places[kept], radius[kept])
 
 
-def _joints(
-    axis: MedialAxis, ends: IntArray, degree: IntArray, contraction: float
-) -> tuple[IntArray, BoolArray]:
+def _joints(axis: MedialAxis) -> tuple[IntArray, BoolArray]:
     """Joint of each node of the axis, `FREE` of ends, and which segments lie within a joint."""
-    junction = degree > 2
+    ends = np.array([segment.ends for segment in axis.segments], dtype=np.int64).reshape(-1, 2)
+    junction = np.bincount(ends[ends >= 0], minlength=len(axis.nodes)) > 2
     length = np.array([segment.length for segment in axis.segments])
     short = np.zeros(len(ends), dtype=bool)
     inner = np.flatnonzero((ends >= 0).all(axis=1))
     inner = inner[junction[ends[inner]].all(axis=1)]
-    short[inner] = length[inner] < contraction * axis.radius[ends[inner]].max(axis=1)
+    short[inner] = length[inner] < _CONTRACTION * axis.radius[ends[inner]].max(axis=1)
     group = connected(ends[short], len(axis.nodes))
     joint = np.full(len(axis.nodes), FREE)
     _, joint[junction] = np.unique(group[junction], return_inverse=True)
@@ -142,8 +133,8 @@ def _joints(
 
 
 def _joined(members: list[Member], joint: int) -> list[Member]:
-    """Members with those two joined that are alone in a joint; one that is alone is a ring."""
-    ends = [(k, side) for k, m in enumerate(members) for side in (0, 1) if m.ends[side] == joint]
+    """Members, with the two joined that alone meet in a joint; a single one becomes a ring."""
+    ends = ends_at(members, joint)
     if len(ends) != 2:
         return members
     (k, side), (other, beside) = ends

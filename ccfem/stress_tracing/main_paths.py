@@ -6,14 +6,15 @@ members at every joint instead.
 """
 
 from dataclasses import dataclass
-from itertools import combinations
+from itertools import combinations, groupby
+from typing import NamedTuple
 
 import numpy as np
 
 from ccfem.arrays import FloatArray
 from ccfem.layers.layer_stress import LayerStress
 from ccfem.stress_tracing.criterion import Criterion
-from ccfem.stress_tracing.frame import Frame, Member
+from ccfem.stress_tracing.frame import Frame, Member, ends_at
 from ccfem.stress_tracing.stress_lines import misalignment, plane_stress_at, stress_lines
 
 __all__ = ["MainPath", "main_paths"]
@@ -40,10 +41,10 @@ class MainPath:
     closed: bool = False
 
 
-@dataclass(frozen=True)
-class _End:
+class _End(NamedTuple):
     """End of a member at a joint: its direction away from there, its stress and misalignment."""
 
+    joint: int
     member: int
     side: int
     outward: FloatArray
@@ -70,8 +71,8 @@ def main_paths(
     stress : LayerStress
     criterion : Criterion, optional
     width_ratio : float, default 2
-        Most that the widest member of a main path has over its narrowest, by their medians: all
-        its tracks share out either.
+        Largest ratio of the widest member of a main path to its narrowest, by their median widths:
+        the same tracks fill both.
 
     Returns
     -------
@@ -89,37 +90,33 @@ def main_paths(
             continue
         partner[a], partner[b] = b, a
         chain[both] = chain[a[0]]
-    return _chained(frame, partner)
+    return _chained(frame.members, partner)
 
 
-def _ends(frame: Frame, stress: LayerStress, limit: float) -> list[list[_End]]:
+def _ends(frame: Frame, stress: LayerStress, limit: float) -> list[_End]:
     """Find direction and stress of the members from the disc of each joint outwards."""
-    places, outward, stretches = [], [], []
-    for joint, (middle, radius) in enumerate(zip(frame.joints, frame.radius, strict=True)):
-        for number, side in frame.ends_at(joint):
-            stretch, direction = _stretch(frame.members[number].points, side, middle, radius)
-            places.append((joint, number, side))
-            outward.append(direction)
-            stretches.append(stretch)
-    found: list[list[_End]] = [[] for _ in frame.joints]
+    joints = range(len(frame.joints))
+    places = [(joint, *end) for joint in joints for end in ends_at(frame.members, joint)]
     if not places:
-        return found
+        return []
+    stretches, outward = [], []
+    for joint, number, side in places:
+        points = frame.members[number].points[:: 1 - 2 * side]
+        stretch, direction = _stretch(points, frame.joints[joint], frame.radius[joint])
+        stretches.append(stretch)
+        outward.append(direction)
     plane = plane_stress_at(stress, np.concatenate(stretches), float(frame.radius.max()))
-    first = np.concatenate([[0], np.cumsum([len(stretch) for stretch in stretches])[:-1]])
-    mean = np.add.reduceat(plane, first) / np.array([[len(x)] for x in stretches])
-    lines = stress_lines(mean)
+    sizes = np.array([len(stretch) for stretch in stretches])
+    lines = stress_lines(np.add.reduceat(plane, np.cumsum(sizes) - sizes) / sizes[:, None])
     beta = np.minimum(misalignment(np.array(outward), lines, 0.5 * limit), limit)
-    for k, (joint, number, side) in enumerate(places):
-        end = _End(number, side, outward[k], float(lines.value[k]), float(beta[k]))
-        found[joint].append(end)
-    return found
+    found = zip(places, outward, lines.value.tolist(), beta.tolist(), strict=True)
+    return [_End(*place, *rest) for place, *rest in found]
 
 
 def _stretch(
-    points: FloatArray, side: int, middle: FloatArray, radius: float
+    points: FloatArray, middle: FloatArray, radius: float
 ) -> tuple[FloatArray, FloatArray]:
-    """Points of a member beside a joint, and the direction there, away from the joint."""
-    points = points if side == 0 else points[::-1]
+    """Points of a member beside the joint that it starts in, and their direction away from it."""
     away = np.linalg.norm(points - middle, axis=1)
     first = int(np.argmax(away >= radius)) if (away >= radius).any() else int(np.argmax(away))
     beyond = np.flatnonzero(away[first:] >= radius + _REACH)
@@ -130,11 +127,12 @@ def _stretch(
 
 
 def _candidates(
-    joints: list[list[_End]], rule: Criterion
+    ends: list[_End], rule: Criterion
 ) -> list[tuple[float, tuple[int, int], tuple[int, int]]]:
     """Smoothness of every pair of ends in a joint that turns by less than the limit."""
     found = []
-    for one, other in (pair for ends in joints for pair in combinations(ends, 2)):
+    joints = (list(group) for _, group in groupby(ends, key=lambda end: end.joint))
+    for one, other in (pair for joint in joints for pair in combinations(joint, 2)):
         cosine = np.clip(-one.outward @ other.outward, -1.0, 1.0)
         turn = float(np.degrees(np.arccos(cosine)))
         if turn <= rule.turn:
@@ -145,24 +143,22 @@ def _candidates(
     return found
 
 
-def _chained(frame: Frame, partner: dict[tuple[int, int], tuple[int, int]]) -> list[MainPath]:
+def _chained(
+    members: tuple[Member, ...], partner: dict[tuple[int, int], tuple[int, int]]
+) -> list[MainPath]:
     """Walk from every end without a partner, then round what is closed."""
-    members = frame.members
     used: set[int] = set()
     paths = []
-    starts = [(n, side) for n in range(len(members)) for side in (0, 1) if (n, side) not in partner]
-    for number, side in [*starts, *((n, 0) for n in range(len(members)))]:
+    every = [(number, side) for number in range(len(members)) for side in (0, 1)]
+    for start in sorted(every, key=lambda end: end in partner):
         chain: list[Member] = []
-        while number not in used:
+        end: tuple[int, int] | None = start
+        while end is not None and end[0] not in used:
+            number, side = end
             used.add(number)
             chain.append(members[number] if side == 0 else members[number].reversed)
-            if (number, 1 - side) not in partner:
-                break
-            number, side = partner[number, 1 - side]
-        else:
-            if chain:
-                paths.append(MainPath(tuple(chain), closed=True))
-            continue
-        closed = len(chain) == 1 and chain[0].closed
-        paths.append(MainPath(tuple(chain), closed))
+            end = partner.get((number, 1 - side))
+        if chain:
+            closed = end is not None or (len(chain) == 1 and chain[0].closed)
+            paths.append(MainPath(tuple(chain), closed))
     return paths

@@ -1,4 +1,4 @@
-"""The stress that load paths follow: at any points of a flat layer, as lines with a sign."""
+"""The stress that load paths follow, at any points of a flat layer, as lines with a sign."""
 
 from dataclasses import dataclass
 
@@ -23,7 +23,7 @@ class StressLines:
     value : (k,) array, MPa
         Positive in tension.
     defined : (k,) bool array
-        Whether there is one: not where both principal stresses are of one size (`tensor`).
+        Whether there is one: not where both principal stresses have the same size (`tensor`).
     """
 
     direction: FloatArray
@@ -34,7 +34,7 @@ class StressLines:
 def plane_stress_at(stress: LayerStress, points: FloatArray, reach: float) -> FloatArray:
     """Recovered plane stress [s11, s22, s12] (k, 3), MPa, at points (k, 2) of a layer.
 
-    Points outside the layer by no more than `reach`, mm, take the stress of its border; others 0.
+    Points outside the layer by up to `reach`, mm, take the stress at its border; others 0.
     """
     layer = stress.layer
     cell, weights = locate(layer.plane.points, layer.triangles, points, reach)

@@ -1,6 +1,6 @@
-"""Tracks of a main path: strands that share out the width of its band.
+"""Tracks of a main path: strands that fill the width of its band evenly.
 
-The paper shows tracks whose distance follows the width of the member, and gives no formula.
+The paper shows tracks whose spacing follows the width of the member, and gives no formula.
 """
 
 import numpy as np
@@ -18,14 +18,14 @@ from ccfem.stress_tracing.turning import relaxed
 __all__ = ["clipped", "eased", "track_count", "tracks"]
 
 _WIDE, _NARROW = 75.0, 5.0
-"""Percentiles of the width of a band that its tracks are counted for: wide members are to be
+"""Percentiles of the width of a band that decide how many tracks it has: wide members are to be
 filled, while in narrow ones tracks come no nearer than some share of the pitch."""
 _CLOSEST = 0.45
 """That share."""
 _OUTSIDE = 1.5
-"""Way outside the section, mm, after which a track has left it for good."""
+"""Length outside the section, mm, after which a track has left it for good."""
 _INSET = 0.1
-"""Distance from the border, mm, to which a track is pushed that comes to lie outside."""
+"""Distance inside the border, mm, to which a track that lies outside is pushed."""
 _SPREAD = 1.5
 """Standard deviation, mm, of the Gaussian that spreads such a push to the points beside it."""
 _EASING = 1.0
@@ -36,7 +36,7 @@ _ROUNDS = 60
 def track_count(band: Band, pitch: float) -> int:
     """Count the tracks of a band, a pitch, mm, apart where it is wide; at least 1.
 
-    Fewer, where they would come nearer than 0.45 pitches along more than a twentieth of the band.
+    Fewer where they would be closer than 0.45 pitches along more than a twentieth of the band.
     """
     narrow, wide = np.percentile(band.width, [_NARROW, _WIDE])
     return max(1, min(round(wide / pitch), int(narrow / (_CLOSEST * pitch))))
@@ -57,9 +57,9 @@ def tracks(
     count : int
     section : shapely (Multi)Polygon, mm
     radius : float, mm, default 0
-        Tighter turns are eased; where the border leaves no room for that they stay.
+        Tighter turns are eased; where the border leaves no room for that, they stay.
     stress : LayerStress, optional
-        That the tracks turn to in joints and beside free ends.
+        Stress that the tracks turn to in joints and beside free ends.
 
     Returns
     -------
@@ -88,8 +88,6 @@ def tracks(
 
 def eased(line: FloatArray, radius: float, closed: bool = False) -> FloatArray:
     """Smooth a line (n, 2) in even steps wherever it turns more tightly than a radius, mm."""
-    if radius <= 0.0:
-        return line
     mode = "wrap" if closed else "nearest"
     reach = round(4.0 * _EASING / STEP) + 1
     for _ in range(_ROUNDS):
@@ -137,7 +135,7 @@ def clipped(line: FloatArray, section: Region, core: slice, within: slice) -> Fl
 
 
 def _last_inside(line: FloatArray, inside: BoolArray) -> int:
-    """Index of the last point inside before a line is outside for more than a while."""
+    """Index of the last point inside before a line leaves for good."""
     along = along_line(line)
     within = np.flatnonzero(inside)
     left = np.flatnonzero(np.diff(along[within]) > _OUTSIDE + STEP)
@@ -154,20 +152,18 @@ def _way_out(inner: FloatArray, outer: FloatArray, section: Region) -> FloatArra
 
 
 def _held(line: FloatArray, section: Region, inner: Region, closed: bool) -> FloatArray:
-    """Push a line back where it leaves a section between its ends, and what is beside that less."""
+    """Push a line back where it leaves a section between its ends, and its neighbours less."""
     step = 0.2 * STEP
     fine, _, _ = subdivide(line, np.array([0, len(line)]), step)
-    ends = round(STEP / step)
-    outside = ~shapely.contains_xy(section, fine)
-    if not closed:
-        outside[:ends] = outside[-ends:] = False
+    ends = 0 if closed else round(STEP / step)
+    between = np.arange(len(fine)) >= ends
+    between &= between[::-1]
+    outside = between & ~shapely.contains_xy(section, fine)
     if not outside.any() or shapely.is_empty(inner):
         return line
     mode = "wrap" if closed else "nearest"
     reach = 2 * round(2.0 * _SPREAD / step) + 1
-    beside = maximum_filter1d(outside.astype(np.float64), reach, mode=mode) > 0.0
-    if not closed:
-        beside[:ends] = beside[-ends:] = False
+    beside = between & (maximum_filter1d(outside.astype(np.float64), reach, mode=mode) > 0.0)
     push = np.zeros_like(fine)
     for _ in range(_ROUNDS):
         out = np.flatnonzero(beside)[~shapely.contains_xy(inner, fine[beside])]

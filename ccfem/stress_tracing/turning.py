@@ -1,21 +1,19 @@
 """Tracks turned to the stress where no rails guide them: in joints and beside free ends.
 
-A track may move sidewise by u(s). What is least is the sum over its length of ::
+A track may move sideways by u(s). The turned track minimises the sum, over its length, of ::
 
     cos(2 r) (u' - tan r)^2 + (c u'')^2 + (u / l)^2
 
-with the angle r from the track to the stress: misalignment, curvature, and the distance from where
-it was, which counts much in members, where tracks share out the width, and little in joints. Where
-r is over 45 degrees, in the joints that it crosses, a track is left alone.
+with the angle r from the track to the stress: misalignment, curvature, and the distance from its
+old place. That distance counts much in members, whose width the tracks fill evenly, and little in
+joints. Where r is over 45 degrees, in joints that it crosses, a track is left alone.
 """
-
-from typing import Any
 
 import numpy as np
 import shapely
 from scipy.ndimage import gaussian_filter1d
 from scipy.optimize import isotonic_regression
-from scipy.sparse import coo_array
+from scipy.sparse import diags_array, eye_array
 from scipy.sparse.linalg import spsolve
 
 from ccfem.arrays import FloatArray
@@ -31,7 +29,7 @@ _HELD = 2.0
 _FREE = 12.0
 """Lengths, mm: c, and l in members and in joints."""
 _CLOSEST = 0.6
-"""Share of their distance that tracks keep."""
+"""Share of their distance from each other that tracks keep."""
 _ROUNDS = 2
 
 
@@ -92,18 +90,12 @@ def _wanted(
 
 
 def _least(weight: FloatArray, slope: FloatArray, hold: FloatArray, closed: bool) -> FloatArray:
-    """Move (n,) of one line for which the sum is least."""
-    count = len(hold)
-    first = np.arange(len(weight))
-    bent = np.arange(count) if closed else np.arange(1, count - 1)
-    rise = _rows([(first, -1.0), ((first + 1) % count, 1.0)], count) / STEP
-    bend = _rows([(bent - 1, 1.0), (bent, -2.0), ((bent + 1) % count, 1.0)], count) / STEP**2
-    diagonal = np.arange(count)
-    matrix = (
-        rise.T @ (weight[:, None] * rise)
-        + _BENDING**2 * (bend.T @ bend)
-        + coo_array((hold, (diagonal, diagonal)), shape=(count, count))
-    )
+    """Move (n,) of one line that minimises the sum."""
+    here = eye_array(len(hold), format="csr")
+    ahead = here[np.roll(np.arange(len(hold)), -1)]
+    rise = (ahead - here)[: len(weight)] / STEP
+    bend = (ahead - 2.0 * here + ahead.T)[slice(None) if closed else slice(1, -1)] / STEP**2
+    matrix = rise.T @ (weight[:, None] * rise) + _BENDING**2 * (bend.T @ bend) + diags_array(hold)
     return np.asarray(spsolve(matrix.tocsc(), rise.T @ (weight * slope)))
 
 
@@ -119,12 +111,3 @@ def _apart(moved: FloatArray, band: Band) -> FloatArray:
         place[:, column] = isotonic_regression(place[:, column]).x
     mode = "wrap" if band.closed else "nearest"
     return np.asarray(gaussian_filter1d(even - place - least, 1.0 / STEP, axis=1, mode=mode))
-
-
-def _rows(terms: list[tuple[Any, float]], count: int) -> Any:
-    """Sparse matrix with one row for every entry of the columns of each term."""
-    size = len(terms[0][0])
-    row = np.tile(np.arange(size), len(terms))
-    column = np.concatenate([index % count for index, _ in terms])
-    value = np.repeat([factor for _, factor in terms], size)
-    return coo_array((value, (row, column)), shape=(size, count)).tocsr()

@@ -14,27 +14,24 @@ from ccfem.geometry.polylines import inner_points, pack, resample
 from ccfem.geometry.shapes import Region
 from ccfem.layers.layer_stress import LayerStress
 from ccfem.stress_tracing.criterion import Criterion
+from ccfem.stress_tracing.frame import ARC_CHORD
 from ccfem.stress_tracing.stress_lines import misalignment, plane_stress_at, stress_lines
 
 __all__ = ["walk"]
 
 _LEAST_POINTS = 3
-_ARC_CHORD = 1.6
+_STEP = 1.0
+"""Distance, mm, of the points of the axis."""
+_RULE = Criterion(90.0, 45.0, 3.0 * _STEP)
 
 
-def walk(
-    section: Region,
-    stress: LayerStress,
-    sampling: float,
-    step: float = 1.0,
-    criterion: Criterion | None = None,
-) -> list[FloatArray]:
+def walk(section: Region, stress: LayerStress, sampling: float) -> list[FloatArray]:
     """Trace load paths over the points of the medial axis.
 
     From an end of the axis under the largest stress, or else the point under the largest stress,
-    the next point is always the one with the least smoothness, within the limits of the criterion
-    and without leaving the section. The walk ends where there is none; it starts anew until no
-    point is left. Joints may be passed once for every two members.
+    the next point is always the one with the least smoothness, within 90 degrees of turn, 45
+    degrees of misalignment and 3 mm, and without leaving the section. The walk ends where there is
+    none; a new one starts until no point is left. Joints may be passed once for every two members.
 
     Parameters
     ----------
@@ -42,47 +39,53 @@ def walk(
     stress : LayerStress
     sampling : float, mm
         Largest distance of the samples along the border.
-    step : float, mm, default 1
-        Distance of the points of the axis.
-    criterion : Criterion, optional
-        Limits by default 90 and 45 degrees and 3 steps.
 
     Returns
     -------
     list of (n, 2) arrays, mm
-        Those of at least three points.
+        Those of at least three points, 1 mm apart.
     """
-    rule = criterion or Criterion(90.0, 45.0, 3.0 * step)
-    points, uses, ends = _points(section, sampling, step)
+    points, uses, ends = _points(section, sampling)
     if len(points) < _LEAST_POINTS:
         return []
-    walker = _Walker(section, points, uses, plane_stress_at(stress, points, step), rule)
-    size = np.abs(stress_lines(walker.stress).value)
+    shapely.prepare(section)
+    tree, plane_stress, left = cKDTree(points), plane_stress_at(stress, points, _STEP), uses.copy()
+    size = np.abs(stress_lines(plane_stress).value)
+
+    def followed(path: list[int]) -> list[int]:
+        """Path continued from its last point until no point is left within the limits."""
+        while True:
+            near = np.array(tree.query_ball_point(points[path[-1]], _RULE.distance))
+            near = near[(left[near] > 0) & ~np.isin(near, path)]
+            following = _next(path, near, points, plane_stress, section)
+            if following is None:
+                return path
+            left[following] -= 1
+            path = [*path, following]
+
     paths = []
-    while (walker.uses > 0).any():
-        fresh = walker.uses == uses
-        first = np.flatnonzero(fresh & ends if (fresh & ends).any() else walker.uses > 0)
+    while (left > 0).any():
+        fresh_ends = (left == uses) & ends
+        first = np.flatnonzero(fresh_ends if fresh_ends.any() else left > 0)
         start = int(first[np.argmax(size[first])])
-        walker.uses[start] -= 1
-        path = walker.follow([start])
+        left[start] -= 1
+        path = followed([start])
         if not ends[start]:
-            path = walker.follow(path[::-1])
+            path = followed(path[::-1])
         if len(path) >= _LEAST_POINTS:
             paths.append(points[path])
     return paths
 
 
-def _points(
-    section: Region, sampling: float, step: float
-) -> tuple[FloatArray, IntArray, BoolArray]:
+def _points(section: Region, sampling: float) -> tuple[FloatArray, IntArray, BoolArray]:
     """Points (n, 2) of the axis, how often each may be passed, and which are ends."""
-    axis = medial_axis(section, sampling, object_angle=None, arc_chord=_ARC_CHORD)
+    axis = medial_axis(section, sampling, object_angle=None, arc_chord=ARC_CHORD)
     if not axis.segments:
         return np.zeros((0, 2)), np.zeros(0, dtype=np.int64), np.zeros(0, dtype=bool)
-    lines, offsets = resample(*pack([segment.points for segment in axis.segments]), step)
+    lines, offsets = resample(*pack([segment.points for segment in axis.segments]), _STEP)
     inner = inner_points(offsets, np.array([segment.ends[0] < 0 for segment in axis.segments]))
     ends = [end for segment in axis.segments for end in segment.ends if end >= 0]
-    degree = np.bincount(ends, minlength=len(axis.nodes)) if ends else np.zeros(0, dtype=np.int64)
+    degree = np.bincount(np.array(ends, dtype=np.int64), minlength=len(axis.nodes))
     nodes = np.flatnonzero(degree)
     points = np.concatenate([axis.nodes[nodes], lines[inner]])
     uses = np.ones(len(points), dtype=np.int64)
@@ -92,54 +95,25 @@ def _points(
     return points, uses, free
 
 
-class _Walker:
-    """The walk: points with how often each may still be passed."""
-
-    def __init__(
-        self,
-        section: Region,
-        points: FloatArray,
-        uses: IntArray,
-        stress: FloatArray,
-        rule: Criterion,
-    ) -> None:
-        self.section, self.points, self.stress, self.rule = section, points, stress, rule
-        self.uses = uses.copy()
-        self.tree = cKDTree(points)
-        shapely.prepare(section)
-
-    def follow(self, path: list[int]) -> list[int]:
-        """Path continued from its last point until no point is left within the limits."""
-        path = list(path)
-        while (following := self._next(path)) is not None:
-            self.uses[following] -= 1
-            path.append(following)
-        return path
-
-    def _next(self, path: list[int]) -> int | None:
-        here = path[-1]
-        near = np.array(self.tree.query_ball_point(self.points[here], self.rule.distance))
-        near = near[(self.uses[near] > 0) & ~np.isin(near, path)]
-        steps = self.points[near] - self.points[here]
-        distance = np.linalg.norm(steps, axis=1)
-        near, steps, distance = (
-            near[distance > 0.0],
-            steps[distance > 0.0],
-            distance[distance > 0.0],
-        )
-        if not len(near):
-            return None
-        lines = stress_lines(0.5 * (self.stress[here] + self.stress[near]))
-        beta = misalignment(steps, lines, 0.5 * self.rule.misalignment)
-        alpha = beta
-        if len(path) > 1:
-            before = self.points[here] - self.points[path[-2]]
-            cosine = steps @ before / (distance * np.linalg.norm(before))
-            alpha = np.degrees(np.arccos(np.clip(cosine, -1.0, 1.0)))
-        delta = self.rule(alpha, beta, distance)
-        allowed = (alpha <= self.rule.turn) & (beta <= self.rule.misalignment)
-        for k in np.argsort(delta, kind="stable"):
-            way = shapely.LineString([self.points[here], self.points[near[k]]])
-            if allowed[k] and self.section.covers(way):
-                return int(near[k])
+def _next(
+    path: list[int], near: IntArray, points: FloatArray, plane_stress: FloatArray, section: Region
+) -> int | None:
+    """Point of those near that a path goes on to."""
+    here = path[-1]
+    distance = np.linalg.norm(points[near] - points[here], axis=1)
+    near, distance = near[distance > 0.0], distance[distance > 0.0]
+    if not len(near):
         return None
+    steps = points[near] - points[here]
+    lines = stress_lines(0.5 * (plane_stress[here] + plane_stress[near]))
+    alpha = beta = misalignment(steps, lines, 0.5 * _RULE.misalignment)
+    if len(path) > 1:
+        before = points[here] - points[path[-2]]
+        cosine = steps @ before / (distance * np.linalg.norm(before))
+        alpha = np.degrees(np.arccos(np.clip(cosine, -1.0, 1.0)))
+    allowed = (alpha <= _RULE.turn) & (beta <= _RULE.misalignment)
+    for k in np.argsort(_RULE(alpha, beta, distance), kind="stable"):
+        way = shapely.LineString([points[here], points[near[k]]])
+        if allowed[k] and section.covers(way):
+            return int(near[k])
+    return None

@@ -59,15 +59,7 @@ class CutMesh(NamedTuple):
 
 
 def volume_above(mesh: TetMesh, values: FloatArray, level: float) -> float:
-    """Volume where a piecewise linear field is above a level, mm^3.
-
-    Parameters
-    ----------
-    mesh : TetMesh
-    values : (n,) array
-        At the nodes.
-    level : float
-    """
+    """Volume where a piecewise linear field, (n,) at the nodes, is above a level, mm^3."""
     off = np.sort(values[mesh.corners] - level, axis=1)[:, ::-1]
     count = (off > 0.0).sum(axis=1)
     share = (count == 4).astype(np.float64)

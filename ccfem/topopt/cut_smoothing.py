@@ -105,7 +105,7 @@ def _patch_ends(mesh: TetMesh, border: IntArray) -> BoolArray:
 
 
 def _safely_moved(cells: IntArray, points: FloatArray, wanted: FloatArray) -> FloatArray:
-    """Points moved to where they are wanted, save those whose cells would become flat."""
+    """Points moved to where they are wanted, except those whose cells would become flat."""
     before = signed_volumes(points, cells)
     least = _THIN * float(before.mean())
     moved = wanted.copy()

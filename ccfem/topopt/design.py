@@ -6,8 +6,8 @@ import numpy as np
 from scipy.spatial import cKDTree
 
 from ccfem.arrays import BoolArray, FloatArray, freeze, in_brief
+from ccfem.checks import check_number
 from ccfem.elasticity.problem import Order, Problem
-from ccfem.errors import InputError
 from ccfem.plates.problem import PlaneProblem
 from ccfem.topopt.material_axes import axes_about_z
 
@@ -31,10 +31,10 @@ class Design:
     density : (m,) array in [0, 1]
         Of each cell (filtered, with a density filter).
     variables : (m,) array in [0, 1]
-        What the optimiser moves: equal to `density` unless that is filtered. Start from them to go
-        on with a run.
+        What the optimiser changes: equal to `density` unless that is filtered. Start from them to
+        continue a run.
     factor : (m,) array in (0, 1]
-        What the density makes of the stiffness of each cell.
+        On the stiffness of each cell, from its density.
     compliance : (k,) array, N mm
         Weighted compliance of every iterate, the last one being that of `density`.
     change : (k - 1,) array
@@ -101,20 +101,15 @@ class Design:
         return axes_about_z(self.angle[cKDTree(centres).query(points[:, : centres.shape[1]])[1]])
 
     def filled(self, volume_fraction: float | None = None) -> BoolArray:
-        """Densest cells that make up a share of the volume.
+        """Densest cells, as an (m,) mask, that make up a share of the volume.
 
         Parameters
         ----------
         volume_fraction : float in (0, 1], optional
             Default that of the design.
-
-        Returns
-        -------
-        (m,) bool array
         """
         share = self.volume_fraction if volume_fraction is None else volume_fraction
-        if not 0.0 < share <= 1.0:
-            raise InputError(f"volume_fraction must lie in (0, 1]; got {share}: correct it")
+        check_number("volume_fraction", share, above=0.0, at_most=1.0)
         order = np.argsort(-self.density, kind="stable")
         reached = np.cumsum(self.volumes[order])
         count = int(np.searchsorted(reached, share * reached[-1] * (1.0 + 1e-12), side="right"))

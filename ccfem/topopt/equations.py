@@ -70,12 +70,12 @@ class TetEquations:
         self.volumes = problem.mesh.volumes
 
     def backend(self) -> str:
-        """Name the backend for many solves of parts with voids, which a multigrid is slow on."""
+        """Name the backend for many solves of parts with voids, for which multigrid is slow."""
         best, unknowns = direct_backend(), 3 * len(self.system.held.nodes)
         return best if best != "superlu" and unknowns <= LARGEST_DIRECT else "auto"
 
     def elements(self, stiffness: FloatArray | None) -> FloatArray:
-        """Return the stiffness, where there is none that of the problem."""
+        """Return the stiffness, by default that of the problem."""
         return self.system.stiffness if stiffness is None else stiffness
 
     def assemble(self, factor: FloatArray, elements: FloatArray) -> sp.bsr_array:

@@ -40,7 +40,7 @@ class ConeFilter:
         Raises
         ------
         InputError
-            For a radius so large that every cell sees most others.
+            For a radius so large that it reaches too many cells.
         """
         m = len(centres)
         tree = cKDTree(centres)

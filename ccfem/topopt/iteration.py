@@ -18,7 +18,7 @@ from ccfem.topopt.parametrisation import Parametrisation
 __all__ = ["iterate"]
 
 _WINDOW = 10
-"""Iterations over which the objective must stand still."""
+"""Iterations over which the objective must not change."""
 
 ModelT = TypeVar("ModelT", bound=Callable[[FloatArray], Response])
 """Response of a part to factors (g,) on the stiffness of its groups of cells."""
@@ -32,26 +32,10 @@ def iterate(
     progress: Progress,
     turn: Callable[[ModelT, Response, FloatArray], ModelT] | None = None,
 ) -> tuple[Design, ModelT]:
-    """Iterate to convergence.
+    """Iterate to convergence: the design of a problem, and the model of the last iteration.
 
-    Parameters
-    ----------
-    problem : PlaneProblem or Problem
-        At full density, for the design.
-    model : callable
-        Response to factors (g,) on the stiffness of the groups.
-    space : Parametrisation
-        Of m cells in g groups.
-    start : (m,) array in [0, 1], optional
-    progress : callable
-    turn : callable, optional
-        Model of the next iteration, from that of this one, its response and the factors (g,).
-
-    Returns
-    -------
-    design : Design
-    model : callable
-        That of the last iteration.
+    The problem is that of full density. `turn`, where given, makes the model of the next iteration
+    from that of this one, its response and the factors (g,); start and progress as in `Simp`.
     """
     parameters, volumes, free = space.parameters, space.cone.volumes, space.free
     variables, per_volume = space.start(start), space.volume_gradient()[free]

@@ -4,7 +4,7 @@ import numpy as np
 
 from ccfem.arrays import FloatArray
 from ccfem.errors import InputError
-from ccfem.plates.stiffness import fitted_harmonics, plane_harmonics, turned_by
+from ccfem.plates.stiffness import fitted_harmonics, rotate_plane, turned_by
 from ccfem.tensor import rotate_stiffness
 
 __all__ = ["axes_about_z", "harmonics", "sheet"]
@@ -21,8 +21,8 @@ def sheet(plane: FloatArray) -> FloatArray:
     Returns
     -------
     (6, 6) array, MPa
-        Stress and strain along z have nothing to do with those in the plane; the shears across it
-        are as stiff as the one in it. For tetrahedra that are held along z at every node.
+        Stress and strain along z are uncoupled from those in the plane; the shears across it are
+        as stiff as the one in it. For tetrahedra that are held along z at every node.
     """
     solid = np.diag([0.0, 0.0, 0.5 * (plane[0, 0] + plane[1, 1]), plane[2, 2], plane[2, 2], 0.0])
     solid[np.ix_([0, 1, 5], [0, 1, 5])] = plane
@@ -40,17 +40,21 @@ def axes_about_z(angle: FloatArray) -> FloatArray:
 def harmonics(material: FloatArray) -> FloatArray:
     """Five matrices (5, k, k) that give the stiffness turned about z, as `turned_by` combines them.
 
+    Constant, cos 2a, sin 2a, cos 4a, sin 4a; for an orthotropic sheet the invariants U1 to U5 of
+    Tsai and Pagano (1968).
+
     Parameters
     ----------
     material : (3, 3) or (6, 6) array, MPa
+        In material axes.
 
     Raises
     ------
     InputError
-        For a solid that is not alike on both sides of the x-y plane.
+        For a solid that is not symmetric about the x-y plane.
     """
     if material.shape == (3, 3):
-        return plane_harmonics(material)
+        return fitted_harmonics(lambda angle: rotate_plane(material, angle))
 
     def turned(angle: FloatArray) -> FloatArray:
         return rotate_stiffness(material, axes_about_z(angle))
@@ -60,7 +64,7 @@ def harmonics(material: FloatArray) -> FloatArray:
     missed = turned(other) - np.tensordot(turned_by(other), found, axes=1)
     if np.abs(missed).max() > 1e-9 * np.abs(material).max():
         raise InputError(
-            "a material whose axis turns about z must be alike on both sides of the x-y plane: "
+            "a material whose axis turns about z must be symmetric about the x-y plane: "
             "give one with an axis of symmetry along z"
         )
     return found

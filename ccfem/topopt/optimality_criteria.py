@@ -41,7 +41,7 @@ def optimality_criteria(
     largest = float(np.sqrt(gain.max()))
     if not largest > 0.0:
         return np.clip(density, low, high)
-    # By the logarithm of the root of the multiplier, over 16 decades of it.
+    # Bisection of the logarithm of the root of the multiplier, over 16 decades.
     least, most = np.log(largest) - 18.5, np.log(largest) + 18.5
     for _ in range(60):
         middle = 0.5 * (least + most)

@@ -67,41 +67,37 @@ Turn = Callable[[OrientedCompliance, Response, FloatArray], OrientedCompliance]
 """Compliance of the next iteration, from that of this one, its response and factors (g,)."""
 
 
-def to_principal_stress(cone: ConeFilter, relaxation: float) -> Turn:
+def to_principal_stress(
+    model: OrientedCompliance,
+    response: Response,
+    factor: FloatArray,
+    cone: ConeFilter,
+    relaxation: float,
+) -> OrientedCompliance:
     """Turn towards the filtered direction of the principal stress of largest size."""
-
-    def turn(
-        model: OrientedCompliance, response: Response, factor: FloatArray
-    ) -> OrientedCompliance:
-        wanted = cone.average(model.principal(response, factor))
-        size = np.linalg.norm(wanted, axis=1)
-        present = _doubled(model.angle)
-        direction = np.where(
-            size[:, None] > 0.0, wanted / np.where(size > 0.0, size, 1.0)[:, None], present
-        )
-        mixed = (1.0 - relaxation) * present + relaxation * direction
-        # At right angles the two cancel: turn at once.
-        lost = np.linalg.norm(mixed, axis=1) < 1e-6
-        mixed[lost] = direction[lost]
-        return replace(model, angle=0.5 * np.arctan2(mixed[:, 1], mixed[:, 0]))
-
-    return turn
+    wanted = cone.average(model.principal(response, factor))
+    size = np.linalg.norm(wanted, axis=1)
+    present = _doubled(model.angle)
+    direction = np.where(
+        size[:, None] > 0.0, wanted / np.where(size > 0.0, size, 1.0)[:, None], present
+    )
+    mixed = (1.0 - relaxation) * present + relaxation * direction
+    # At right angles the two cancel: turn at once.
+    lost = np.linalg.norm(mixed, axis=1) < 1e-6
+    mixed[lost] = direction[lost]
+    return replace(model, angle=0.5 * np.arctan2(mixed[:, 1], mixed[:, 0]))
 
 
-def down_the_gradient(cone: ConeFilter) -> Turn:
-    """Step down the filtered gradient, by 5 degrees where it is as large as at most cells."""
-
-    def turn(
-        model: OrientedCompliance, response: Response, factor: FloatArray
-    ) -> OrientedCompliance:
-        gradient = cone.average(model.angle_gradient(response, factor) / cone.volumes)
-        scale = float(np.percentile(np.abs(gradient), 90.0))
-        if not scale > 0.0:
-            return model
-        step = model.angle - _LARGEST_TURN * np.clip(gradient / scale, -1.0, 1.0)
-        return replace(model, angle=0.5 * np.arctan2(np.sin(2 * step), np.cos(2 * step)))
-
-    return turn
+def down_the_gradient(
+    model: OrientedCompliance, response: Response, factor: FloatArray, cone: ConeFilter
+) -> OrientedCompliance:
+    """Step down the filtered gradient, by 5 degrees where it reaches its 90th percentile."""
+    gradient = cone.average(model.angle_gradient(response, factor) / cone.volumes)
+    scale = float(np.percentile(np.abs(gradient), 90.0))
+    if not scale > 0.0:
+        return model
+    step = model.angle - _LARGEST_TURN * np.clip(gradient / scale, -1.0, 1.0)
+    return replace(model, angle=0.5 * np.arctan2(np.sin(2 * step), np.cos(2 * step)))
 
 
 def _doubled(angle: FloatArray) -> FloatArray:

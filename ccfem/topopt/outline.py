@@ -7,8 +7,10 @@ import numpy as np
 import shapely
 
 from ccfem.arrays import BoolArray, FloatArray
+from ccfem.checks import check_number
 from ccfem.errors import InputError
 from ccfem.geometry.isocontours import isocontours
+from ccfem.geometry.polylines import along_line, points_along
 from ccfem.topopt.design import FALLS_APART
 
 __all__ = ["outline"]
@@ -25,14 +27,8 @@ def _over_nodes(density: FloatArray, inside: BoolArray) -> FloatArray:
     Outside the domain it is carried on for some pixels, so that the contour crosses the border of
     the domain squarely and is rounded outside it only.
     """
-    total = np.pad(np.where(inside, density, 0.0), 1)
-    count = np.pad(inside.astype(np.float64), 1)
-
-    def nodes(image: FloatArray) -> FloatArray:
-        return image[:-1, :-1] + image[1:, :-1] + image[:-1, 1:] + image[1:, 1:]
-
-    weight = nodes(count)
-    value = nodes(total) / np.maximum(weight, 1.0)
+    weight = _squares(np.pad(inside.astype(np.float64), 1))
+    value = _squares(np.pad(np.where(inside, density, 0.0), 1)) / np.maximum(weight, 1.0)
     known = weight > 0.0
     for _ in range(_RINGS):
         near = np.pad(known, 1).astype(np.float64)
@@ -41,6 +37,11 @@ def _over_nodes(density: FloatArray, inside: BoolArray) -> FloatArray:
         value = np.where(known, value, spread / np.maximum(weight, 1.0))
         known = known | (weight > 0.0)
     return np.where(known, value, 0.0)
+
+
+def _squares(image: FloatArray) -> FloatArray:
+    """Sum over the entries of every square of 2 x 2."""
+    return image[:-1, :-1] + image[1:, :-1] + image[:-1, 1:] + image[1:, 1:]
 
 
 def _around(image: FloatArray) -> FloatArray:
@@ -54,7 +55,7 @@ def _contour(nodes: FloatArray, threshold: float, size: float) -> list[FloatArra
     height, width = nodes.shape
     x, y = np.meshgrid(np.arange(width), np.arange(height)[::-1])
     corners = np.stack([x, y], axis=-1).reshape(-1, 2).astype(np.float64)
-    inner = nodes[:-1, :-1] + nodes[1:, :-1] + nodes[:-1, 1:] + nodes[1:, 1:]
+    inner = _squares(nodes)
     middles = np.stack([x[1:, :-1] + 0.5, y[1:, :-1] + 0.5], axis=-1).reshape(-1, 2)
     number = np.arange(height * width).reshape(height, width)
     ring = [number[:-1, :-1], number[1:, :-1], number[1:, 1:], number[:-1, 1:]]
@@ -76,10 +77,9 @@ def _smoothed(ring: FloatArray, step: float) -> FloatArray:
 
     Taubin, Curve and surface smoothing without shrinkage, ICCV 1995.
     """
-    along = np.concatenate([[0.0], np.cumsum(np.linalg.norm(np.diff(ring, axis=0), axis=1))])
+    along = along_line(ring)
     count = max(8, round(along[-1] / step))
-    at = along[-1] * np.arange(count) / count
-    points = np.stack([np.interp(at, along, column) for column in ring.T], axis=1)
+    points = points_along(ring, along, along[-1] * np.arange(count) / count)
     for _ in range(_PASSES):
         for factor in (0.5, -0.53):
             mean = 0.5 * (np.roll(points, 1, axis=0) + np.roll(points, -1, axis=0))
@@ -143,8 +143,8 @@ def outline(
     inside : (H, W) bool array, optional
         Pixels of the domain; default all.
     keep : (k, 2) array, mm, optional
-        Points, such as loads and supports, that must hang together; by default the largest piece
-        is the part.
+        Points, such as loads and supports, that must be joined; by default the largest piece is
+        the part.
     least_hole : float, default 4
         Holes below this many pixels are closed.
 
@@ -166,10 +166,10 @@ def outline(
             f"an outline needs an (H, W) image of densities and a pixel size > 0; got shape "
             f"{density.shape} and size {size}"
         )
-    if volume_fraction is not None and not 0.0 < volume_fraction <= 1.0:
-        raise InputError(f"volume_fraction must lie in (0, 1]; got {volume_fraction}: correct it")
-    if threshold is not None and not 0.0 < threshold < 1.0:
-        raise InputError(f"threshold must lie in (0, 1); got {threshold}: correct it")
+    if volume_fraction is not None:
+        check_number("volume_fraction", volume_fraction, above=0.0, at_most=1.0)
+    if threshold is not None:
+        check_number("threshold", threshold, above=0.0, below=1.0)
     if domain is None:
         domain = _domain(known, size)
     nodes = np.pad(_over_nodes(np.pad(density, _RINGS + 1), np.pad(known, _RINGS + 1)), 1)

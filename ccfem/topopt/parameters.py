@@ -1,15 +1,11 @@
 """The parameters that SIMP and SOMP share."""
 
 from dataclasses import dataclass
-from typing import Literal, get_args
+from typing import Literal
 
-import numpy as np
-
-from ccfem.errors import InputError
+from ccfem.checks import check_choices, check_fields
 
 __all__ = ["Parameters"]
-
-_Filter = Literal["sensitivity", "density"]
 
 
 @dataclass(frozen=True)
@@ -19,7 +15,7 @@ class Parameters:
     volume_fraction: float
     penalty: float = 3.0
     radius: float = 2.5
-    filter: _Filter = "sensitivity"
+    filter: Literal["sensitivity", "density"] = "sensitivity"
     minimum_stiffness: float = 1e-9
     move: float = 0.2
     tolerance: float = 0.01
@@ -28,17 +24,9 @@ class Parameters:
     backend: str = "auto"
 
     def __post_init__(self) -> None:
-        expected = {
-            "volume_fraction": (0.0 < self.volume_fraction < 1.0, "in (0, 1)"),
-            "penalty": (1.0 <= self.penalty < np.inf, "at least 1"),
-            "radius": (0.0 < self.radius < np.inf, "above 0 mm"),
-            "filter": (self.filter in get_args(_Filter), f"one of {', '.join(get_args(_Filter))}"),
-            "minimum_stiffness": (0.0 < self.minimum_stiffness < 1.0, "in (0, 1)"),
-            "move": (0.0 < self.move <= 1.0, "in (0, 1]"),
-            "tolerance": (self.tolerance >= 0.0, "at least 0"),
-            "objective_tolerance": (self.objective_tolerance >= 0.0, "at least 0"),
-            "max_iterations": (self.max_iterations >= 1, "at least 1"),
-        }
-        for name, (kept, rule) in expected.items():
-            if not kept:
-                raise InputError(f"{name} must be {rule}; got {getattr(self, name)!r}: correct it")
+        check_fields(self, "volume_fraction", "minimum_stiffness", above=0.0, below=1.0)
+        check_fields(self, "penalty", "max_iterations", at_least=1)
+        check_fields(self, "radius", above=0.0, unit="mm")
+        check_fields(self, "move", above=0.0, at_most=1.0)
+        check_fields(self, "tolerance", "objective_tolerance", at_least=0.0)
+        check_choices(self)

@@ -43,19 +43,13 @@ class Parametrisation:
         solid: BoolArray | None,
         void: BoolArray | None,
     ) -> "Parametrisation":
-        """Make the filter of a part, and check its passive cells.
-
-        Parameters
-        ----------
-        parameters : Parameters
-        part : Compliance
-        solid, void : (m,) bool arrays or None
+        """Make the filter of a part, and check its passive cells, (m,) bool arrays or None.
 
         Raises
         ------
         InputError
             For cells that are both solid and void, a volume fraction that the passive cells make
-            impossible, and a radius so large that every cell sees most others.
+            impossible, and a radius so large that it reaches too many cells.
         """
         cells = part.cells
         solid, void = _mask(cells, "solid", solid), _mask(cells, "void", void)

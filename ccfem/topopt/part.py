@@ -11,7 +11,7 @@ from ccfem.materials import Material
 from ccfem.plates.problem import PlaneProblem
 from ccfem.topopt.design import Design
 from ccfem.topopt.plate_part import plate_outline, plate_part
-from ccfem.topopt.tet_part import part_mesh, tet_part
+from ccfem.topopt.tet_part import part_mesh
 
 __all__ = ["as_problem", "part_shape"]
 
@@ -98,16 +98,15 @@ def as_problem(
     volume_fraction : float in (0, 1], optional
         Share of the domain that the part fills; default that of the design.
 
-    Returns
-    -------
-    Problem
-
     Raises
     ------
     InputError
         When no piece joins all loads and supports, or a patch is not reached.
     """
-    if isinstance(design.full, PlaneProblem):
+    full = design.full
+    if isinstance(full, PlaneProblem):
         return plate_part(design, material, thickness, edge_length, domain, volume_fraction)
     _no_plate(thickness=thickness, edge_length=edge_length, domain=domain)
-    return tet_part(design, material, volume_fraction)
+    mesh = part_mesh(design, volume_fraction)
+    axes = design.axes_at(mesh.points[mesh.corners].mean(axis=1))
+    return Problem(mesh, material, full.supports, full.loads, axes, order=full.order)

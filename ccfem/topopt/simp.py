@@ -38,7 +38,7 @@ class Simp(Parameters):
     move : float in (0, 1], default 0.2
         Largest change of a variable in one iteration.
     tolerance : float, default 0.01
-        Stop when no variable changes more; 0 for never.
+        Stop when no variable changes by more; 0 for never.
     objective_tolerance : float, default 1e-4
         Stop when the compliance changed less, relatively, over ten iterations; 0 for never.
     max_iterations : int, default 200
@@ -75,13 +75,9 @@ class Simp(Parameters):
         groups : (m,) int array, optional
             Cells with the same number share one density: the columns of a plate of tetrahedra.
         start : (m,) array in [0, 1], optional
-            Variables to start from (`Design.variables` to go on with a run); default uniform.
+            Variables to start from (`Design.variables` to continue a run); default uniform.
         progress : callable, optional
-            Told the compliance, the volume and the change of each iteration.
-
-        Returns
-        -------
-        Design
+            Told the compliance, volume and change of each iteration.
 
         Raises
         ------

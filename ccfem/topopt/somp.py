@@ -2,11 +2,13 @@
 
 from collections.abc import Mapping
 from dataclasses import dataclass, replace
-from typing import Literal, get_args
+from functools import partial
+from typing import Literal
 
 import numpy as np
 
 from ccfem.arrays import BoolArray, FloatArray, IntArray
+from ccfem.checks import check_fields
 from ccfem.elasticity.problem import Problem
 from ccfem.errors import InputError
 from ccfem.plates.problem import PlaneProblem
@@ -26,8 +28,6 @@ from ccfem.topopt.parameters import Parameters
 from ccfem.topopt.parametrisation import Parametrisation
 
 __all__ = ["Somp"]
-
-_Orientation = Literal["principal", "gradient", "fixed"]
 
 
 @dataclass(frozen=True)
@@ -57,19 +57,12 @@ class Somp(Parameters):
     """
 
     minimum_stiffness: float = 1e-3
-    orientation: _Orientation = "principal"
+    orientation: Literal["principal", "gradient", "fixed"] = "principal"
     relaxation: float = 0.5
 
     def __post_init__(self) -> None:
         super().__post_init__()
-        known = get_args(_Orientation)
-        if self.orientation not in known:
-            raise InputError(
-                f"orientation must be one of {', '.join(known)}; got "
-                f"{self.orientation!r}: correct it"
-            )
-        if not 0.0 < self.relaxation <= 1.0:
-            raise InputError(f"relaxation must be in (0, 1]; got {self.relaxation!r}: correct it")
+        check_fields(self, "relaxation", above=0.0, at_most=1.0)
 
     def __call__(
         self,
@@ -102,7 +95,7 @@ class Somp(Parameters):
             Cells with the same number share density and angle: the columns of a plate of
             tetrahedra.
         start : (m,) array in [0, 1], optional
-            As in `Simp`. To go on with a run give its variables, and its `angle` as `angle`.
+            As in `Simp`. To continue a run give its variables, and its `angle` as `angle`.
 
         Returns
         -------
@@ -112,7 +105,7 @@ class Somp(Parameters):
         Raises
         ------
         InputError
-            As in `Simp`, and for a material that is not alike on both sides of the x-y plane.
+            As in `Simp`, and for a material that is not symmetric about the x-y plane.
         SolveError
             When a solve misses its tolerance.
         """
@@ -132,8 +125,8 @@ class Somp(Parameters):
     def _turn(self, cone: ConeFilter) -> Turn | None:
         """How the axes turn from one iteration to the next."""
         if self.orientation == "principal":
-            return to_principal_stress(cone, self.relaxation)
-        return down_the_gradient(cone) if self.orientation == "gradient" else None
+            return partial(to_principal_stress, cone=cone, relaxation=self.relaxation)
+        return partial(down_the_gradient, cone=cone) if self.orientation == "gradient" else None
 
 
 def _first_angle(angle: FloatArray | float, m: int) -> FloatArray:

@@ -1,4 +1,4 @@
-"""The part that a design of tetrahedra stands for, cut out of its mesh, held and loaded."""
+"""The part that a design of tetrahedra stands for, cut out of its mesh."""
 
 from typing import NamedTuple
 
@@ -6,9 +6,9 @@ import numpy as np
 from scipy.spatial import cKDTree
 
 from ccfem.arrays import BoolArray, FloatArray, IntArray
+from ccfem.checks import check_number
 from ccfem.elasticity.problem import PointForce, Problem
 from ccfem.errors import InputError
-from ccfem.materials import Material
 from ccfem.mesh.facets import unique_edges
 from ccfem.mesh.measures import connected
 from ccfem.mesh.tet_mesh import TetMesh
@@ -16,25 +16,18 @@ from ccfem.topopt.cut import cut_mesh, volume_above
 from ccfem.topopt.cut_smoothing import relaxed
 from ccfem.topopt.design import FALLS_APART, Design
 
-__all__ = ["part_mesh", "tet_part"]
+__all__ = ["part_mesh"]
 
 _LEAST_VOID = 30.0
 """Enclosed voids below this many cells are filled."""
 
 
 class _Field(NamedTuple):
-    """Density at the nodes of a mesh, and what has to hang together.
+    """Density at the nodes of a mesh, and what has to be joined.
 
-    Attributes
-    ----------
-    mesh : TetMesh
-    values : (n,) array
-    share : (n,) array
-        Volume of the cells round each node that is its own, in mean cells.
-    pairs : (e, 2) int array
-        Nodes joined by an edge.
-    anchors : list of int arrays
-        Nodes of every loaded and held patch, and of point forces.
+    The share (n,) of a node is its part of the volume of the cells round it, in mean cells; pairs
+    (e, 2) are joined by an edge; anchors are the nodes of every loaded and held patch, and of
+    point forces.
     """
 
     mesh: TetMesh
@@ -72,26 +65,16 @@ def part_mesh(
     problem = design.full
     assert isinstance(problem, Problem)
     field = _field(problem, design.density)
-    if threshold is not None and not 0.0 < threshold < 1.0:
-        raise InputError(f"threshold must lie in (0, 1); got {threshold}: correct it")
     if threshold is None:
         share = design.volume_fraction if volume_fraction is None else volume_fraction
-        if not 0.0 < share <= 1.0:
-            raise InputError(f"volume_fraction must lie in (0, 1]; got {share}: correct it")
+        check_number("volume_fraction", share, above=0.0, at_most=1.0)
         threshold = _level(field, share * float(problem.mesh.volumes.sum()))
+    else:
+        check_number("threshold", threshold, above=0.0, below=1.0)
     cleaned = _cleaned(field, threshold)
     if cleaned is None:
         raise InputError(FALLS_APART)
     return relaxed(cut_mesh(problem.mesh, cleaned, threshold))
-
-
-def tet_part(design: Design, material: Material, volume_fraction: float | None) -> Problem:
-    """Make the part of a design of tetrahedra a problem: see `as_problem`."""
-    problem = design.full
-    assert isinstance(problem, Problem)
-    mesh = part_mesh(design, volume_fraction)
-    axes = design.axes_at(mesh.points[mesh.corners].mean(axis=1))
-    return Problem(mesh, material, problem.supports, problem.loads, axes, order=problem.order)
 
 
 def _field(problem: Problem, density: FloatArray) -> _Field:
@@ -114,8 +97,7 @@ def _field(problem: Problem, density: FloatArray) -> _Field:
 
 def _pieces(field: _Field, chosen: BoolArray) -> IntArray:
     """Piece (n,) of each chosen node, by edges between chosen nodes; others by themselves."""
-    pairs, n = field.pairs[chosen[field.pairs].all(axis=1)], len(chosen)
-    return connected(pairs, n)
+    return connected(field.pairs[chosen[field.pairs].all(axis=1)], len(chosen))
 
 
 def _cleaned(field: _Field, level: float) -> FloatArray | None:

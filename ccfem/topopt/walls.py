@@ -53,12 +53,12 @@ class Walls:
         return cls(facets, middle, normal[upright, :2], pixel, edge_length)
 
     def patches(self, plate: PlaneMesh, needed: tuple[str, ...]) -> dict[str, IntArray]:
-        """Patches of the walls by those of the plate; the ones that nothing is left of drop out.
+        """Patches of the walls by those of the plate; those without a wall are dropped.
 
         Raises
         ------
         InputError
-            When a needed one drops out.
+            When a needed one is dropped.
         """
         patches = {}
         for name, edges in plate.patches.items():

@@ -5,6 +5,7 @@ more, of the same part printed with known fibre paths, gives rho = EA/E of a str
 values are far off for printed parts, which deflect a lot and are not solid.
 """
 
+import json
 import math
 import tomllib
 from dataclasses import dataclass, replace
@@ -13,11 +14,11 @@ from pathlib import Path
 import numpy as np
 from scipy.optimize import brentq
 
-from ccfem.checks import check_number
 from ccfem.elasticity.problem import Problem
 from ccfem.elasticity.solve import solve
 from ccfem.elasticity.stress_field import StressField
 from ccfem.errors import InputError
+from ccfem.io.toml import from_table
 from ccfem.io.whole import existing_file, whole_file
 from ccfem.materials import Material, isotropic
 from ccfem.toolpaths import Toolpaths
@@ -46,8 +47,9 @@ class Calibration:
         Young's modulus of the printed matrix.
     poisson : float
         As assumed for the calibration.
-    matrix_strength : float, MPa
-        Von Mises stress, averaged over a ball, at which the part without fibre failed.
+    tensile_strength : float, MPa
+        Of the matrix: von Mises stress, averaged over a ball, at which the part without fibre
+        failed.
     rho : float or None, mm^2
         EA of a strand over the modulus; None without a reinforced test.
     source : str
@@ -57,7 +59,7 @@ class Calibration:
     name: str
     modulus: float
     poisson: float
-    matrix_strength: float
+    tensile_strength: float
     rho: float | None = None
     source: str = ""
 
@@ -65,26 +67,22 @@ class Calibration:
     def material(self) -> Material:
         """The matrix."""
         return isotropic(
-            self.modulus, self.poisson, self.name, self.matrix_strength, source=self.source
+            self.modulus, self.poisson, self.name, self.tensile_strength, source=self.source
         )
 
     def strand(self, default: Strand | None = None) -> Strand:
         """Return the strand: `default` (rho = 4) with the calibrated rho, where there is one."""
-        default = Strand() if default is None else default
+        default = default or Strand()
         return default if self.rho is None else replace(default, rho=self.rho)
 
     def write(self, path: str | Path) -> None:
         """Write a material file (TOML) that `read_calibration` reads."""
-        lines = [
-            "# Material calibrated on printed parts. Units: mm, N, MPa.",
-            f"name = {_quoted(self.name)}",
-            f"modulus = {self.modulus!r}",
-            f"poisson = {self.poisson!r}",
-            f"tensile_strength = {self.matrix_strength!r}",
-            f"source = {_quoted(self.source)}",
-        ]
-        if self.rho is not None:
-            lines.append(f"rho = {self.rho!r}")
+        lines = ["# Material calibrated on printed parts. Units: mm, N, MPa."]
+        for key, value in vars(self).items():
+            if value is not None:
+                # JSON writes strings and numbers as TOML does, but for the delete character.
+                text = json.dumps(value, ensure_ascii=False).replace("\x7f", "\\u007f")
+                lines.append(f"{key} = {text}")
         with whole_file(path) as temporary:
             temporary.write_text("\n".join(lines) + "\n", encoding="utf-8")
 
@@ -97,7 +95,7 @@ def calibrate(
     case: str | None = None,
     name: str = "calibrated",
 ) -> Calibration:
-    """Fit matrix and strand to tests of one part, the strand with fibres that carry tension only.
+    """Fit matrix and strand to tests of one part, with fibres that carry tension only.
 
     Parameters
     ----------
@@ -107,21 +105,18 @@ def calibrate(
     unreinforced : Curve
         Of the part without fibre. The displacement is taken as that of the load.
     reinforced : Curve, optional
-        Of the same part with `toolpaths` in it.
+        Of the same part with fibres.
     toolpaths : Toolpaths, optional
+        Fibres in the reinforced part.
     case : str, optional
         Load case that stands for the test; needed where there are several.
     name : str
         Name of the material.
 
-    Returns
-    -------
-    Calibration
-
     Raises
     ------
     InputError
-        For curves that nothing can be fitted to, with the cure.
+        For curves that do not suit each other or the part.
     """
     if (reinforced is None) != (toolpaths is None):
         raise InputError(
@@ -138,7 +133,7 @@ def calibrate(
         name=name,
         modulus=specimen.modulus * slope / computed,
         poisson=poisson,
-        matrix_strength=index * unreinforced.peak / specimen.force(field.reactions),
+        tensile_strength=index * unreinforced.peak / specimen.force(field.reactions),
         source=source,
     )
     if reinforced is None or toolpaths is None:
@@ -212,37 +207,14 @@ def read_calibration(path: str | Path) -> Calibration:
     Raises
     ------
     InputError
-        When the file cannot be read or a value is missing.
+        When the file cannot be read, or its values are not those of a calibration.
     """
     path = existing_file(path, "material file")
     try:
-        values = tomllib.loads(path.read_text(encoding="utf-8"))
-    except (OSError, UnicodeDecodeError, tomllib.TOMLDecodeError) as error:
+        values = {"name": path.stem, **tomllib.loads(path.read_text(encoding="utf-8"))}
+        return from_table(Calibration, values, "material")
+    except (OSError, UnicodeDecodeError, tomllib.TOMLDecodeError, InputError) as error:
         raise InputError(
             f"expected a material file at {path}; it cannot be read: {error}: write it by ccfem "
             "calibrate"
         ) from None
-    numbers = {}
-    for key in ("modulus", "poisson", "tensile_strength", "rho"):
-        value = values.get(key)
-        if value is None and key == "rho":
-            continue
-        check_number(f"{path}: {key}", value)
-        numbers[key] = float(values[key])
-    return Calibration(
-        name=str(values.get("name", path.stem)),
-        modulus=numbers["modulus"],
-        poisson=numbers["poisson"],
-        matrix_strength=numbers["tensile_strength"],
-        rho=numbers.get("rho"),
-        source=str(values.get("source", "")),
-    )
-
-
-def _quoted(text: str) -> str:
-    """Text as a TOML basic string."""
-    escaped = "".join(
-        f"\\u{ord(c):04x}" if ord(c) < 32 or ord(c) == 127 else "\\" + c if c in '"\\' else c
-        for c in text
-    )
-    return f'"{escaped}"'

@@ -135,6 +135,6 @@ def _reinforced(
 ) -> sp.bsr_array:
     """Stiffness matrix (3n, 3n), N/mm, of the part and the pieces of fibre (s,) that carry."""
     system = specimen.system
-    bars = bar_matrix(strands, system.problem.mesh, system.where, carries.astype(np.float64))
+    bars = bar_matrix(strands, system.problem.mesh, system.where, carries * strands.share)
     data = specimen.matrix.data + axial_stiffness * bars.data
     return sp.bsr_array((data, bars.indices, bars.indptr), shape=bars.shape)

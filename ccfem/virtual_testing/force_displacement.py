@@ -56,7 +56,7 @@ class Curve:
     def slope(self) -> float:
         """Stiffness, N/mm: line through the rising points between 10 and 40 % of the peak.
 
-        These shares, as in ISO 6891, leave out the slack at the start and the yield.
+        These shares, as in ISO 6891, exclude the slack at the start and the yield.
 
         Raises
         ------
@@ -89,7 +89,7 @@ def read_curve(path: str | Path) -> Curve:
     Raises
     ------
     InputError
-        When the file cannot be read, a column is missing, or a value is no number.
+        When the file cannot be read, a column is missing, or a value is not a number.
     """
     path = existing_file(path, "CSV file")
     try:
@@ -106,22 +106,22 @@ def read_curve(path: str | Path) -> Curve:
     header = lines[0][1]
     delimiter = max(";\t,", key=header.count)
     rows = list(csv.reader([line for _, line in lines], delimiter=delimiter))
-    columns = {kind: _column(rows[0], kind, path) for kind in ("displacement", "force")}
-    values = np.empty((2, len(rows) - 1))
-    for k, ((number, _), row) in enumerate(zip(lines[1:], rows[1:], strict=True)):
-        for i, (column, scale) in enumerate(columns.values()):
-            try:
-                values[i, k] = scale * float(row[column])
-            except (ValueError, IndexError):
-                raise InputError(
-                    f"{path}, line {number}: expected numbers for displacement and force; got "
-                    f"'{delimiter.join(row)}': correct or delete the line"
-                ) from None
-    return Curve(values[0], values[1], path.name)
+    columns = [_column(rows[0], kind, path) for kind in ("displacement", "force")]
+    values = []
+    for (number, _), row in zip(lines[1:], rows[1:], strict=True):
+        try:
+            values.append([scale * float(row[column]) for column, scale in columns])
+        except (ValueError, IndexError):
+            raise InputError(
+                f"{path}, line {number}: expected numbers for displacement and force; got "
+                f"'{delimiter.join(row)}': correct or delete the line"
+            ) from None
+    displacement, force = np.array(values).T
+    return Curve(displacement, force, path.name)
 
 
 def _column(names: list[str], kind: str, path: Path) -> tuple[int, float]:
-    """Index of the column of a kind, and what its unit is worth in mm or N."""
+    """Index of the column of a kind, and the factor from its unit to mm or N."""
     found = [k for k, name in enumerate(names) if name.strip().lower().startswith(kind)]
     if len(found) != 1:
         raise InputError(

@@ -9,8 +9,10 @@ from ccfem.arrays import FloatArray, IntArray, freeze, in_brief
 from ccfem.errors import InputError
 from ccfem.geometry.buckets import Buckets, bucket
 from ccfem.geometry.polylines import starts_segment
+from ccfem.machine.machine import Machine
 from ccfem.mesh.tet_mesh import TetMesh
 from ccfem.toolpaths import FIBRE, Toolpaths
+from ccfem.virtual_testing.strand_room import room_of
 
 __all__ = ["Strands", "cut_strands"]
 
@@ -42,6 +44,9 @@ class Strands:
     middle : (s, 3) array, mm
     outside : float, mm
         Length of fibre, links left out, that lies outside the mesh and carries nothing.
+    share : (s,) array in [0, 1]
+        How much of its stiffness each piece lends: fibre on other fibre has no room, and lends
+        nothing (`ccfem.virtual_testing.strand_room`).
     """
 
     cell: IntArray
@@ -51,11 +56,13 @@ class Strands:
     arc: FloatArray
     middle: FloatArray
     outside: float
+    share: FloatArray
 
     __repr__ = in_brief
 
     def __post_init__(self) -> None:
-        freeze(self, cell=int, path=int, length=float, tangent=float, arc=float, middle=float)
+        freeze(self, cell=int, path=int, length=float, tangent=float)
+        freeze(self, arc=float, middle=float, share=float)
 
     def __len__(self) -> int:
         return len(self.cell)
@@ -66,7 +73,12 @@ class Strands:
         return float(self.length.sum())
 
 
-def cut_strands(toolpaths: Toolpaths, mesh: TetMesh, most_outside: float = 0.01) -> Strands:
+def cut_strands(
+    toolpaths: Toolpaths,
+    mesh: TetMesh,
+    most_outside: float = 0.01,
+    machine: Machine | None = None,
+) -> Strands:
     """Cut the fibre paths at the faces of the cells.
 
     Parameters
@@ -78,6 +90,9 @@ def cut_strands(toolpaths: Toolpaths, mesh: TetMesh, most_outside: float = 0.01)
         Quadratic cells are taken as straight-sided.
     most_outside : float in [0, 1], default 0.01
         Share of the fibre length, links left out, that may lie outside the mesh.
+    machine : Machine, optional
+        Whose strands keep their room: those of about the same direction that lie nearer than its
+        fibre width share it. Default: every strand counts in full, wherever it lies.
 
     Returns
     -------
@@ -132,14 +147,17 @@ def cut_strands(toolpaths: Toolpaths, mesh: TetMesh, most_outside: float = 0.01)
     before -= before[np.searchsorted(path, path)]
     middle = 0.5 * (begin + end)
     unit = step / np.maximum(length, 1e-300)[:, None]
+    arc = before[segment] + middle * length[segment]
+    lent = np.ones(count) if machine is None else room_of(toolpaths, path[segment], arc, machine)
     return Strands(
         cell=cell,
         length=piece * share,
         tangent=unit[segment],
         path=path[segment],
-        arc=before[segment] + middle * length[segment],
+        arc=arc,
         middle=start[segment] + middle[:, None] * step[segment],
         outside=outside,
+        share=lent,
     )
 
 

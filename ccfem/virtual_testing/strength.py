@@ -24,20 +24,12 @@ from ccfem.tensor import von_mises
 from ccfem.virtual_testing.strand import Strand
 from ccfem.virtual_testing.virtual_test import VirtualTest
 
-__all__ = [
-    "BALL",
-    "FIBRE_SHARE",
-    "ZONE",
-    "FirstFailure",
-    "fibre_peak",
-    "first_failure",
-    "matrix_peak",
-]
+__all__ = ["FIBRE_SHARE", "FirstFailure", "fibre_peak", "first_failure", "matrix_peak"]
 
-BALL = 2.0
+_BALL = 2.0
 """Radius, mm, of the ball over which the von Mises stress is averaged."""
 
-ZONE = 3.0
+_ZONE = 3.0
 """Distance, mm, from patches of loads and supports within which stress is not judged."""
 
 FIBRE_SHARE = 0.99
@@ -128,26 +120,18 @@ def first_failure(
 def fibre_peak(test: VirtualTest, share: float = FIBRE_SHARE) -> tuple[float, FloatArray]:
     """Axial force, N, that `share` of the fibre length stays below, and a place (3,) of it."""
     order = np.argsort(test.axial_force, kind="stable")
-    reached = np.cumsum(test.strands.length[order])
+    reached = np.cumsum((test.strands.length * test.strands.share)[order])
     at = order[min(np.searchsorted(reached, share * reached[-1]), len(order) - 1)]
     return float(test.axial_force[at]), test.strands.middle[at]
 
 
-def matrix_peak(
-    stress: StressField, ball: float = BALL, zone: float = ZONE
-) -> tuple[float, FloatArray]:
-    """Largest averaged von Mises stress, MPa, and its place (3,).
+def matrix_peak(stress: StressField) -> tuple[float, FloatArray]:
+    """Largest averaged von Mises stress of the matrix, MPa, and its place (3,).
 
-    Parameters
-    ----------
-    stress : StressField
-        Stress of the matrix.
-    ball : float, mm
-        Radius of the ball over which the von Mises stress of the cells is averaged by volume.
-    zone : float, mm
-        Cells whose centroid is closer to a patch with a load or a support are left out, though
-        they count in the averages of others. A whole flat face that slides in its plane, as a
-        plane of symmetry does, is no such patch: no stress peaks there.
+    The von Mises stress of the cells is averaged by volume over a ball of 2 mm radius. Cells whose
+    centroid is closer than 3 mm to a patch with a load or a support are left out, though they count
+    in the averages of others. A whole flat face that slides in its plane, as a plane of symmetry
+    does, is no such patch: no stress peaks there.
 
     Raises
     ------
@@ -157,15 +141,15 @@ def matrix_peak(
     mesh = stress.mesh
     centroid = mesh.points[mesh.corners].mean(axis=1)
     # Beyond the bound the distance is infinite, and the search short.
-    tree, bound = cKDTree(_held_and_loaded(stress)), np.nextafter(zone, np.inf)
+    tree, bound = cKDTree(_held_and_loaded(stress)), np.nextafter(_ZONE, np.inf)
     distance, _ = tree.query(centroid, distance_upper_bound=bound)
     judged = np.flatnonzero(np.isinf(distance))
     if not len(judged):
         raise InputError(
-            f"no cell lies farther than {zone:g} mm from the patches of loads and supports, so "
+            f"no cell lies farther than {_ZONE:g} mm from the patches of loads and supports, so "
             "no matrix stress can be judged: the part is too small for this index"
         )
-    average = _averages(centroid, von_mises(stress.stress), mesh.volumes, judged, ball)
+    average = _averages(centroid, von_mises(stress.stress), mesh.volumes, judged, _BALL)
     peak = average.argmax()
     return float(average[peak]), centroid[judged[peak]]
 

@@ -8,6 +8,7 @@ import numpy as np
 
 from ccfem.arrays import FloatArray, freeze, in_brief
 from ccfem.elasticity.stress_field import SolveRecord, StressField
+from ccfem.machine.machine import Machine
 from ccfem.toolpaths import Toolpaths
 from ccfem.virtual_testing.equilibrium import BONDED, TENSION, equilibrium
 from ccfem.virtual_testing.specimen import Specimen
@@ -38,7 +39,7 @@ class VirtualTest:
     strands : Strands
         Pieces of fibre.
     axial_force : (s,) array, N
-        Force in the strand at each piece; tension is positive.
+        Force in a strand that has room, at each piece; tension is positive.
     fibre_energy : float, N mm
         Strain energy of the fibres.
     force : float, N
@@ -100,7 +101,7 @@ def virtual_test(
     strand: Strand | None = None,
     mode: str = TENSION,
     span: Sequence[float] = RHO_SPAN,
-    backend: str = "auto",
+    machine: Machine | None = None,
 ) -> VirtualTest:
     """Test a part with its fibres under the load case that it was solved for.
 
@@ -112,15 +113,17 @@ def virtual_test(
     fibres : Toolpaths or Strands
         In the frame of the mesh; only fibre counts.
     part : StressField or Specimen
-        The part without fibres; a specimen shares its factorisation among tests.
+        The part without fibres. A specimen shares its factorisation, by the solver that it was
+        made with, among tests.
     strand : Strand, optional
         Stiffness of a strand; default rho = EA/E = 4 mm^2.
     mode : str, default "tension"
         "tension": fibres in compression carry nothing. "bonded": all fibres carry.
     span : sequence of float, mm^2, default (2, 6)
         Further values of rho to report the ratio at; () for none.
-    backend : str, default "auto"
-        Solver, where `part` is a StressField.
+    machine : Machine, optional
+        Whose strands keep their room, where `fibres` are Toolpaths: fibre on other fibre lends
+        nothing. Default: every strand counts in full.
 
     Returns
     -------
@@ -133,7 +136,7 @@ def virtual_test(
     SolveError
         When the solve misses its tolerance.
     """
-    specimen, strands = _prepared(fibres, part, backend)
+    specimen, strands = _prepared(fibres, part, machine)
     before = specimen.unreinforced
     axial = (Strand() if strand is None else strand).stiffness(specimen.modulus)
     started = perf_counter()
@@ -170,7 +173,7 @@ def virtual_test(
         solution=after,
         strands=strands,
         axial_force=force,
-        fibre_energy=0.5 * float(np.vdot(force * strands.length, found.strain)),
+        fibre_energy=0.5 * float(np.vdot(force * strands.length * strands.share, found.strain)),
         force=specimen.force(after.reactions),
         stiffness=specimen.stiffness(after.displacement, after.strain_energy),
         unreinforced_stiffness=unreinforced,
@@ -180,11 +183,11 @@ def virtual_test(
 
 
 def _prepared(
-    fibres: Toolpaths | Strands, part: StressField | Specimen, backend: str = "auto"
+    fibres: Toolpaths | Strands, part: StressField | Specimen, machine: Machine | None
 ) -> tuple[Specimen, Strands]:
-    specimen = Specimen.of(part, backend) if isinstance(part, StressField) else part
+    specimen = Specimen.of(part) if isinstance(part, StressField) else part
     if isinstance(fibres, Toolpaths):
-        fibres = cut_strands(fibres, specimen.unreinforced.mesh)
+        fibres = cut_strands(fibres, specimen.unreinforced.mesh, machine=machine)
     return specimen, fibres
 
 
@@ -193,8 +196,9 @@ def virtual_bracket(
     part: StressField | Specimen,
     strand: Strand | None = None,
     span: Sequence[float] = RHO_SPAN,
+    machine: Machine | None = None,
 ) -> Bracket:
     """Both tests of `virtual_test`, with one factorisation; parameters as there."""
-    specimen, strands = _prepared(fibres, part)
+    specimen, strands = _prepared(fibres, part, machine)
     tension = virtual_test(strands, specimen, strand, TENSION, span)
     return Bracket(tension, virtual_test(strands, specimen, strand, BONDED, span))

@@ -170,10 +170,10 @@ def test_thickness_and_order():
 
 
 def test_bad_input_is_refused(bridge):
-    with pytest.raises(InputError, match=r"volume_fraction must lie in \(0, 1\]; got 0"):
+    with pytest.raises(InputError, match="volume_fraction must be above 0 and at most 1; got 0"):
         replace(bridge, volume_fraction=0.0)
     with pytest.raises(InputError, match=r"no wall of the part lies between"):
         replace(bridge, load=Stretch((10.0, 50.0), (12.0, 50.0))).mesh(bridge.part, 3.0, 1.0)
-    with pytest.raises(InputError, match="mirror must be"):
+    with pytest.raises(InputError, match="mirror must be one of '', 'x', 'y'; got 'z'"):
         replace(bridge, mirror="z")
     assert isinstance(bridge, DesignPlate)

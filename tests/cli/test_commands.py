@@ -145,6 +145,33 @@ def test_the_report_needs_no_other_file(ccfem, folder):
     assert {p.name for p in (folder / "one").glob("*layer*")} == {"zigzag_layer_00.png"}
 
 
+def test_paths_of_other_programs_stand_beside_the_strategies(ccfem, folder):
+    line = "".join(f"{x},{y},{z},{path},{layer}\n" for path, (y, z, layer) in enumerate(
+        [(4, 1.0, 0), (9, 1.0, 0), (15, 1.0, 0), (12, 3.0, 1)]) for x in (1, 59))  # fmt: skip
+    (folder / "mine.csv").write_text("x,y,z,path,layer\n" + line)
+    (folder / "piled.csv").write_text("x,y,z,path,layer\n" + "".join(
+        f"{x},12,{z},{k + 9 * z:.0f},0\n" for z in (1.0, 3.0) for k in range(9) for x in (1, 59)
+    ))  # fmt: skip
+    code, out, err = ccfem("compare", "part.toml", "--strategies", "zigzag",
+                           "--paths", "mine.csv,piled.csv", "--out", "given")  # fmt: skip
+    assert (code, err) == (0, "")
+    about = json.loads((folder / "given" / "results.json").read_text())
+    assert about["case"]["heights"] == [1.0, 3.0]
+    runs = {run["name"]: run for run in about["strategies"]}
+    assert runs["mine"]["total"]["fibre_length"] == pytest.approx(4 * 58.0)
+    assert about["fibre_per_layer"] == pytest.approx(2 * 58.0)
+    assert (runs["mine"]["printable"], runs["mine"]["why_not"]) == (True, "")
+    assert runs["piled"]["why_not"].startswith("89% of the fibre lies on other fibre")
+    assert "piled: not printable as planned: 89% of the fibre" in " ".join(out.split())
+    refused(ccfem, folder, "'zigzag' is the name of two runs",
+            "compare", "part.toml", "--strategies", "zigzag", "--paths", "zigzag.csv")  # fmt: skip
+    refused(ccfem, folder, r"mine.csv: path 3 lies at 3 mm .*, on none of the 2 layers",
+            "compare", "part.toml", "--strategies", "zigzag", "--paths", "mine.csv",
+            "--heights", "1,1.4")  # fmt: skip
+    refused(ccfem, folder, "got no --paths",
+            "compare", "part.toml", "--paths-frame", "tool")  # fmt: skip
+
+
 @pytest.mark.parametrize("name", ["angle", "zigzag.angle"])
 def test_plan_takes_a_parameter_with_and_without_its_strategy(ccfem, folder, name):
     code, _, err = ccfem("plan", "part.toml", "--strategy", "zigzag", "--set", f"{name}=30",

@@ -9,10 +9,9 @@ import pytest
 
 from ccfem.cases.case import Case
 from ccfem.comparison.compare import compare, create_all
-from ccfem.comparison.headline import headline_values
+from ccfem.comparison.headline import HEADLINE, headline_values
 from ccfem.comparison.pictures import caption
-from ccfem.comparison.ranking import best_values, ranking
-from ccfem.comparison.remarks import remarks, verdict
+from ccfem.comparison.ranking import best_values
 from ccfem.elasticity.problem import Force, Problem, Support
 from ccfem.errors import InputError
 from ccfem.evaluation import evaluate
@@ -80,30 +79,41 @@ def test_fibre_along_the_pull_wins_by_the_rule_of_mixtures():
         "along": create("zigzag", {"angle": 0.0, "turn": 0.0, "spacing": 2.0}),
     }
     result = compare(strip(), strategies, fibre_per_layer=700.0)
-    assert [run.name for run in ranking(result)] == ["along", "across"]
+    assert [run.name for run in result.ranking] == ["along", "across"]
     along = headline_values(result.runs[1])
     # EA of the strands over E of the matrix is 4 mm^2: n strands add 4 n to the area. The turns of
     # the zigzag run across, and its strands end half a width inside the strip.
     strands = along["fibre_length"] / SIZE[0]
     mixtures = 1.0 + 4.0 * strands / (SIZE[1] * SIZE[2])
     assert along["stiffness_ratio_tension"] == pytest.approx(mixtures, rel=0.1)
-    assert verdict(result).startswith("along makes the stiffest part, at 700 mm of fibre per layer")
-    best = best_values(result)
+    assert result.verdict.startswith("along makes the stiffest part, at 700 mm of fibre per layer")
+    best = best_values(result.runs, result.fibre_per_layer)
     assert best["stiffness_ratio_tension"] == along["stiffness_ratio_tension"]
     assert best["efficiency"] == along["efficiency"]
 
 
+def test_best_values_are_the_largest_or_the_smallest_as_each_column_says(compared):
+    best, sides = best_values(compared.runs, compared.fibre_per_layer), set()
+    for head in HEADLINE:
+        values = sorted(headline_values(run)[head.column] for run in compared.runs)
+        if head.better and values[0] < values[-1]:
+            assert best.pop(head.column) == values[{"low": 0, "high": -1}[head.better]]
+            sides.add(head.better)
+    assert not best
+    assert sides == {"low", "high"}
+
+
 def test_opposite_orders_are_undecided(compared):
-    first, second = ranking(compared)[:2]
+    first, second = compared.ranking[:2]
     bracket = second.tested.bracket
     stiffer = replace(bracket.bonded, stiffness=10.0 * bracket.bonded.stiffness)
     tested = replace(second.tested, bracket=replace(bracket, bonded=stiffer))
     turned = replace(compared, runs=(first, replace(second, tested=tested)))
-    assert verdict(turned).startswith(f"Undecided between {first.name} and {second.name}")
-    assert any(f"{first.name}: undecided against" in line for line in remarks(turned))
+    assert turned.verdict.startswith(f"Undecided between {first.name} and {second.name}")
+    assert any(f"{first.name}: undecided against" in line for line in turned.remarks)
     same = replace(compared, runs=(first, second))
-    assert not any("undecided" in line for line in remarks(same))
-    assert verdict(same).startswith(f"{first.name} makes the stiffest part")
+    assert not any("undecided" in line for line in same.remarks)
+    assert same.verdict.startswith(f"{first.name} makes the stiffest part")
 
 
 def test_what_cannot_be_thinned_leaves_layers_out():
@@ -131,10 +141,10 @@ def test_more_fibre_than_wanted_comes_last():
     rings, zigzag = result.runs
     assert rings.length_per_layer > 330.0
     assert rings.tested.bracket.tension.ratio > zigzag.tested.bracket.tension.ratio
-    assert ranking(result) == (zigzag, rings)
-    assert any("rings: lays" in line and "placed last" in line for line in remarks(result))
-    assert "stiffness_ratio_tension" not in best_values(result)
-    assert verdict(result) == ""
+    assert result.ranking == (zigzag, rings)
+    assert any("rings: lays" in line and "placed last" in line for line in result.remarks)
+    assert "stiffness_ratio_tension" not in best_values(result.runs, result.fibre_per_layer)
+    assert result.verdict == ""
 
 
 def test_unequal_fibre_is_in_the_verdict():
@@ -144,8 +154,8 @@ def test_unequal_fibre_is_in_the_verdict():
     }
     result = compare(strip(), strategies, natural=True)
     dense = result.runs[1].length_per_layer / result.runs[0].length_per_layer - 1.0
-    assert "each with its own amount of fibre" in verdict(result)
-    assert f"{dense:.0%} more fibre than thin" in verdict(replace(result, fibre_per_layer=1e4))
+    assert "each with its own amount of fibre" in result.verdict
+    assert f"{dense:.0%} more fibre than thin" in replace(result, fibre_per_layer=1e4).verdict
 
 
 def test_a_strategy_that_fails_stays_with_its_reason():
@@ -154,8 +164,8 @@ def test_a_strategy_that_fails_stays_with_its_reason():
     assert "expected tension" in isocurve.failure
     assert isocurve.evaluation is None
     assert not zigzag.failure
-    assert ranking(result) == (zigzag, isocurve)
-    assert any(line.startswith("isocurve: failed: expected tension") for line in remarks(result))
+    assert result.ranking == (zigzag, isocurve)
+    assert any(line.startswith("isocurve: failed: expected tension") for line in result.remarks)
 
 
 @dataclass(frozen=True)
@@ -176,8 +186,8 @@ def test_links_outside_the_part_are_reported_and_carry_nothing():
     assert total["outside_length"] == 0.0
     inside = run.tested.bracket.tension.strands.total
     assert inside == pytest.approx(total["fibre_length"] - total["link_outside"], rel=1e-4)
-    assert "joined: 80 mm of links lie outside the part, to be cut off" in remarks(result)
-    assert not any("voids" in line for line in remarks(result))
+    assert "joined: 80 mm of links lie outside the part, to be cut off" in result.remarks
+    assert not any("voids" in line for line in result.remarks)
 
 
 @dataclass(frozen=True)
@@ -195,18 +205,18 @@ class Woven:
 def test_strands_that_cross_by_intention_are_reported():
     result = compare(strip(), {"woven": Woven()}, natural=True)
     said = "woven: strands cross in the joints: 12 crossings on 2 of 4 layers, thicker there"
-    assert f"{said}; the bound does not hold for strands laid over each other" in remarks(result)
-    assert said in remarks(replace(result, bound=None))
+    assert f"{said}; the bound does not hold for strands laid over each other" in result.remarks
+    assert said in replace(result, bound=None).remarks
 
 
 def test_the_bound_says_that_it_is_not_one_of_bonded_fibres(compared):
-    best = ranking(compared)[0]
-    assert "(fibres carrying tension only): " in remarks(compared)[-1]
+    best = compared.ranking[0]
+    assert "(fibres carrying tension only): " in compared.remarks[-1]
     bracket = best.tested.bracket
     stiff = replace(bracket.bonded, stiffness=10.0 * bracket.bonded.stiffness)
     tested = replace(best.tested, bracket=replace(bracket, bonded=stiff))
     more = replace(compared, runs=(replace(best, tested=tested),))
-    assert "tension only; bonded fibres are not bounded): " in remarks(more)[-1]
+    assert "tension only; bonded fibres are not bounded): " in more.remarks[-1]
 
 
 def test_the_print_is_planned_where_it_is_asked_for(compared):
@@ -230,7 +240,7 @@ def test_what_cannot_be_printed_as_planned_is_reported():
     assert not run.failure
     assert run.evaluation is not None
     assert run.unprinted.startswith("the part needs 59.2 x 23.2 x 5 mm, but the pri")
-    assert f"zigzag: cannot be printed as planned: {run.unprinted}" in remarks(result)
+    assert f"zigzag: cannot be printed as planned: {run.unprinted}" in result.remarks
     with pytest.raises(InputError, match="fibre_speed must be above 0 to print"):
         compare(replace(strip(), machine=Machine(fibre_speed=0.0)), **options)
 
@@ -274,14 +284,14 @@ def test_no_run_exceeds_the_bound(compared):
     length = max(float(run.toolpaths.lengths.sum()) for run in compared.runs)
     area = SIZE[1] * SIZE[2]
     assert compared.bound.ratio == pytest.approx(1.0 + 4.0 * length / SIZE[0] / area, rel=2e-2)
-    assert f"more than {compared.bound.ratio:.2f} times" in remarks(compared)[-1]
+    assert f"more than {compared.bound.ratio:.2f} times" in compared.remarks[-1]
 
 
 def test_strands_that_overlap_may_exceed_the_bound(compared):
-    best = ranking(compared)[0]
+    best = compared.ranking[0]
     ratio = 0.5 * (1.0 + best.tested.bracket.tension.ratio)
     beaten = replace(compared, bound=replace(compared.bound, ratio=ratio))
-    said = remarks(beaten)[-1]
+    said = beaten.remarks[-1]
     assert said.startswith(f"only where strands overlap, as those of {best.name} do, paths of ")
     assert f"more than {ratio:.2f} times as stiff" in said
 

@@ -128,3 +128,23 @@ def test_out_of_plane_stress_does_not_count(make_part):
     values = indices(make_part(vertical), strand(10.5))
     assert values["angle_mean"] == pytest.approx(10.5)
     assert values["efficiency"] == pytest.approx(np.cos(np.radians(10.5)) ** 2)
+
+
+def test_the_angle_where_the_tension_is_highest(make_part):
+    """Tension along x that grows with x: of a strand along x and one that turns at its end."""
+
+    def growing(points):
+        tensor = np.zeros((len(points), 3, 3))
+        tensor[:, 0, 0] = 1.0 + points[:, 0]
+        return tensor
+
+    part = make_part(growing)
+    # 40 mm along the tension, then 10 mm at 45 degrees where it is highest: the last fifth.
+    step = 10.0 / np.sqrt(2.0)
+    line = [[5, 5], [45, 5], [45 + step, 5 + step]]
+    values = indices(part, line)
+    assert values["angle_mean"] == pytest.approx(0.2 * 45.0, rel=0.01)
+    assert values["angle_mean_top_20"] == pytest.approx(45.0, rel=0.05)
+    # without tension there are no critical places
+    none = make_part(lambda points: np.zeros((len(points), 3, 3)))
+    assert np.isnan(indices(none, line)["angle_mean_top_20"])

@@ -72,6 +72,8 @@ def test_stress_weighting_and_quartiles(make_part):
 
 def test_equal_stress_counts_in_full(pulled):
     values = indices(pulled, [[0, 20], [60, 20]])
+    # Of the two free rectangles only the corners are too narrow: 1 - pi/4 mm^2 in each.
+    assert values.pop("gap_area") == pytest.approx(2.0 * (1.0 - 0.25 * np.pi), abs=0.3)
     for name, value in values.items():
         assert value == pytest.approx(values["coverage"]), name
 
@@ -80,6 +82,7 @@ def test_without_tension_only_the_area_counts(make_part, uniform):
     for stress in (uniform(0.0), uniform(-3.0, -1.0)):
         values = indices(make_part(stress), [[0, 20], [60, 20]])
         assert np.isnan(values.pop("coverage_stress"))
+        assert values.pop("gap_area") < 1.0
         assert list(values.values()) == pytest.approx([1.0 / 40.0] * 8, abs=0.001)
 
 
@@ -97,4 +100,14 @@ def test_overfill_counts_overlapping_strands_twice(pulled):
 
 def test_no_path_covers_nothing(pulled):
     values = indices(pulled)
+    assert values.pop("gap_area") == pytest.approx(1.0 - 0.25 * np.pi, abs=0.15)
     assert set(values.values()) == {0.0}
+
+
+@pytest.mark.parametrize(("pitch", "gap"), [(1.0, 0.0), (1.6, 0.6), (2.6, 0.0)])
+def test_gaps_are_what_is_too_narrow_for_a_strand(pulled, pitch, gap):
+    """Strands from end to end of a plate of 60 mm: between two a slit of pitch less width."""
+    lines = [[[-1, y], [61, y]] for y in 10.0 + pitch * np.arange(4)]
+    found = sample_coverage(pulled.plane(*lines), stress_on(pulled.layers[0], pulled.stress), 1.0)
+    area = coverage_indices(found)["gap_area"]
+    assert area == pytest.approx(3 * 60.0 * gap, rel=0.01, abs=1.0)

@@ -71,11 +71,16 @@ def test_links_beyond_the_part_change_no_index_of_the_fibre_in_it(framed):
         *("fibre_length", "paths", "cuts", "length_min", "length_median", "length_max"),
         *("long_enough_count", "long_enough_length", "print_time", "mean_speed", "sinuosity"),
         *("sinuosity_mean", "over_40_count", "over_40_length", "turns_45", "turns_90"),
-        *("links", "link_inside", "link_over_void", "link_outside"),
+        *("links", "link_inside", "link_over_void", "link_outside", "free_span", "free_length"),
+        # A link over a hole hangs there; the order and the mass are of all fibre too.
+        *("free_span", "free_length", "print_time_nearest", "fibre_mass"),
+        *("matrix_length", "matrix_mass"),
     }
     for name in set(joined) - of_all_fibre:
         # The cut of a link lies 0.0001 mm beyond the border, which is still inside.
-        assert joined[name] == pytest.approx(alone[name], rel=1e-3, abs=1e-3, nan_ok=True), name
+        # What is sampled along the strands lies elsewhere where they are cut.
+        near = 0.02 if name == "fibre_fraction_99" else 1e-3
+        assert joined[name] == pytest.approx(alone[name], rel=1e-3, abs=near, nan_ok=True), name
     assert joined["fibre_length"] == pytest.approx(135.0)
     assert joined["paths"] == 1.0
 

@@ -65,3 +65,23 @@ def test_no_path(pulled):
     values = indices(pulled, pulled.paths())
     assert [values[k] for k in ("fibre_length", "paths", "cuts", "print_time")] == [0.0] * 4
     assert np.isnan([values["length_min"], values["long_enough_count"]]).all()
+
+
+def test_mass_of_fibre_and_of_the_matrix_that_is_left(pulled):
+    machine = replace(MACHINE, filament_area=0.1, fibre_density=1.5, matrix_density=1.2)
+    machine = replace(machine, matrix_width=0.8, matrix_height=0.5)
+    values = indices(pulled, pulled.paths([[5, 5], [55, 5]]), machine)
+    # 50 mm of 0.1 mm^2 in a plate of 60 x 40 x 2 mm
+    assert values["fibre_mass"] == pytest.approx(1.5e-3 * 5.0)
+    assert values["matrix_mass"] == pytest.approx(1.2e-3 * (4800.0 - 5.0))
+    assert values["matrix_length"] == pytest.approx((4800.0 - 5.0) / 0.4)
+
+
+def test_print_time_by_nearest_ends(pulled):
+    """Three strands of 10 mm drawn in an order that goes to and fro."""
+    lines = [[[0, 0], [10, 0]], [[0, 8], [10, 8]], [[0, 4], [10, 4]]]
+    values = indices(pulled, pulled.paths(*lines))
+    ways = np.hypot(10.0, 8.0) + np.hypot(10.0, 4.0)
+    assert values["print_time"] == pytest.approx((30.0 / 5.0) + ways / 80.0)
+    # walked from either end: 4 mm up, and 4 mm more
+    assert values["print_time_nearest"] == pytest.approx((30.0 / 5.0) + 8.0 / 80.0)

@@ -121,6 +121,25 @@ def test_every_path_is_fed_its_length_and_cut_before_its_end(printed, plate):
     assert fed == pytest.approx(plate[2].lengths.sum(), abs=0.02)
 
 
+def test_matrix_fills_the_section_at_the_middle_of_its_layer():
+    """Of a pyramid, whose sides lean in by half a millimetre for each of height."""
+    box = box_mesh((80.0, 60.0, 6.0), (16, 12, 6))
+    lean = 1.0 - box.points[:, 2:] / [80.0, 60.0]
+    plane = [40.0, 30.0] + (box.points[:, :2] - [40.0, 30.0]) * lean
+    mesh = replace(box, points=np.column_stack([plane, box.points[:, 2]]))
+    layers = Planar(count=1).cut(mesh)
+    line = np.array([[10.0, 30.0], [70.0, 30.0]])
+    machine = replace(MACHINE, matrix_height=1.45)
+    plan = plan_print(Toolpaths.from_plane([line], layers[0]), layers, mesh, machine)
+    matrix = plan.paths.of_kind(MATRIX)
+    middles = (plan.top - 0.5 * plan.thickness)[np.unique(matrix.layer)]
+    assert len(middles) == 6
+    for number, middle in zip(np.unique(matrix.layer), middles, strict=True):
+        size = np.ptp(matrix.on_layer(number).points[:, :2], axis=0)
+        wanted = np.array([80.0, 60.0]) - middle - machine.matrix_width
+        np.testing.assert_allclose(size, wanted, atol=2e-3)
+
+
 def test_travel_feeds_nothing_and_does_not_drag(printed):
     *_, run = printed
     level = 0.0

@@ -66,7 +66,7 @@ def test_names_are_escaped(tmp_path):
 
 
 def test_refused_data_leaves_no_file(tmp_path):
-    with pytest.raises(InputError, match="one value a path, 2 in all; got 7"):
+    with pytest.raises(InputError, match="one value per path, 2 in all; got 7"):
         write_paths(toolpaths(), tmp_path / "a.vtp", path_data={"cost": np.ones(7)})
     with pytest.raises(InputError, match="no folder"):
         write_paths(toolpaths(), tmp_path / "missing" / "a.vtp")

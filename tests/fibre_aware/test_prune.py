@@ -1,3 +1,4 @@
+from dataclasses import replace
 from itertools import product
 
 import numpy as np
@@ -98,7 +99,8 @@ def test_short_enough_is_left_alone(pulled_bar):
 
 def test_other_kinds_of_paths_stay(pulled_bar):
     stress, layers = pulled_bar
-    rim = Toolpaths.from_plane([np.array([[1.0, 1.0], [59.0, 1.0]])], layers[0], kind=MATRIX)
+    rim = Toolpaths.from_plane([np.array([[1.0, 1.0], [59.0, 1.0]])], layers[0])
+    rim = replace(rim, kind=np.array([MATRIX]))
     paths = Toolpaths.concatenate([rim, crossing_strands(layers[0])])
     left = prune(paths, stress, 120.0, SHORT)
     assert left.of_kind(MATRIX).lengths.sum() == pytest.approx(58.0)

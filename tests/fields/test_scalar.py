@@ -118,3 +118,17 @@ def test_neighbours_are_the_pairs_that_share_an_edge() -> None:
     assert {tuple(sorted(pair)) for pair in surface.neighbours.tolist()} == expected
     oriented = orient(hoop(surface), surface.neighbours)
     assert len(np.unique(np.sign(np.einsum("ij,ij->i", oriented, hoop(surface))))) == 1
+
+
+@pytest.mark.parametrize("length", [1.0, 3.0])
+def test_screened_fill_damps_a_wave_as_its_equation_says(length: float) -> None:
+    """``x - length^2 x'' = cos(k x)`` between free ends: a wave of 1 / (1 + (k length)^2)."""
+    x, y = np.meshgrid(np.linspace(0.0, 20.0, 161), np.linspace(0.0, 1.0, 5))
+    points = np.column_stack([x.ravel(), y.ravel()])
+    surface = Surface(points, Delaunay(points).simplices)
+    centre = surface.points[surface.triangles].mean(axis=1)
+    wave = np.cos(2.0 * np.pi / 20.0 * centre[:, 0])
+    along = np.tile([1.0, 0.0], (len(centre), 1))
+    _, filled = fill_screened(surface, along, 5.0 + wave, np.ones(len(centre)), length)
+    damped = wave / (1.0 + (2.0 * np.pi / 20.0 * length) ** 2)
+    np.testing.assert_allclose(filled, 5.0 + damped, atol=2e-3)

@@ -98,7 +98,7 @@ def test_the_search_finds_the_number_of_the_plain_search(seed: int) -> None:
 def test_least_distance_of_straight_lines() -> None:
     surface = square()
     curves = isocontours(surface.points, surface.triangles, surface.points[:, 0], -9.0, 1.5)
-    found = least_distance(curves.points, curves.offsets, curves.level, 4.0, 0.0)
+    found = least_distance(curves, 4.0, 0.0)
     assert found == pytest.approx(1.5, rel=1e-6)
 
 

@@ -8,7 +8,7 @@ from ccfem.elasticity.problem import Problem, Support
 from ccfem.elasticity.stress_field import SolveRecord, StressField
 from ccfem.errors import InputError
 from ccfem.geometry.buckets import bucket
-from ccfem.geometry.locate import locate, locate_tets
+from ccfem.geometry.locate import locate
 from ccfem.materials import isotropic
 from ccfem.mesh.box import box_mesh
 
@@ -20,8 +20,7 @@ def test_the_simplex_found_is_the_one_that_holds_the_point(dimension: int) -> No
     points = RNG.random((400, dimension)) * [50.0, 3.0, 20.0][:dimension]
     mesh = Delaunay(points)
     queries = RNG.random((5000, dimension)) * [50.0, 3.0, 20.0][:dimension]
-    find = locate if dimension == 2 else locate_tets
-    found, weights = find(points, mesh.simplices.astype(np.int64), queries)
+    found, weights = locate(points, mesh.simplices.astype(np.int64), queries)
     expected = mesh.find_simplex(queries)
     inside = expected >= 0
     assert inside.sum() > 2000

@@ -18,6 +18,7 @@ from ccfem.geometry.polylines import (
     lengths,
     line_length,
     merge_repeated,
+    middle_of_longest_run,
     pack,
     point_at,
     points_along,
@@ -236,3 +237,13 @@ def test_straight_pieces_follow_the_lines():
 )
 def test_runs_of_a_mask(text, wanted):
     assert runs(np.array([letter == "#" for letter in text], dtype=bool)).tolist() == wanted
+
+
+@pytest.mark.parametrize(
+    ("text", "middle"),
+    [("#....###..", 6), ("##.##...##", 0), ("..#####", 4), ("#.###....", 3), ("###.#.####", 9)],
+)
+def test_middle_of_the_longest_run_of_a_ring(text, middle):
+    ring = np.array([letter == "#" for letter in text])
+    for turn in range(len(text)):
+        assert middle_of_longest_run(np.roll(ring, turn)) == (middle + turn) % len(text)

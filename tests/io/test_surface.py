@@ -63,7 +63,7 @@ def test_an_open_file_is_one_line(box, tmp_path):
 def test_a_turned_triangle_is_named(box):
     points, triangles = box_surface(box)
     triangles[4] = triangles[4][::-1]
-    with pytest.raises(InputError, match="3 edges are run along twice"):
+    with pytest.raises(InputError, match="3 edges are traversed twice"):
         Surface(points, triangles)
 
 

@@ -16,6 +16,7 @@ from ccfem.layers.slicing.planar import Planar
 from ccfem.machine.machine import Machine
 from ccfem.planning import plan
 from ccfem.planning.infill import Infill, long_enough
+from ccfem.planning.steps import in_even_steps
 from ccfem.raster.patterns import grid_regions
 from ccfem.strategies.grid import Grid
 from ccfem.strategies.mat import Mat
@@ -88,6 +89,7 @@ def test_a_part_is_planned_as_its_layers_are(strategy, part):
     whole = plan(strategy, layers, stress, MACHINE)
     for layer in layers[:2]:
         alone = strategy(layer, stress_on(layer, stress), MACHINE)
+        alone = in_even_steps(alone, MACHINE.fibre_width)
         np.testing.assert_array_equal(whole.on_layer(layer.index).points, alone.points)
     planner(layers[0], stress_on(layers[0], stress), MACHINE)
     held = [x for made in planner.known.values() for x in made if isinstance(x, shapely.Geometry)]

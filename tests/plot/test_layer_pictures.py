@@ -11,10 +11,10 @@ from ccfem.mesh.box import box_mesh
 from ccfem.plot.canvas import extents_of, inches_per_mm, new_figure, png, save
 from ccfem.plot.colours import INK, LINK, SECTION, palette, scale
 from ccfem.plot.fields import tension_picture
-from ccfem.plot.forces import force_on_paths
 from ccfem.plot.paths import (
     Coloured,
     compare_layer,
+    force_on_paths,
     layer_picture,
     mark_failure,
     tension_limit,

@@ -4,17 +4,18 @@ from scipy import ndimage
 from scipy.spatial.distance import cdist
 
 from ccfem.raster.bands import bands, depth
-from ccfem.raster.dilation import first_touch, rings_round
 from ccfem.raster.guides import segment_seeds
-from ccfem.raster.hatch import hatch_lines
 from ccfem.raster.patterns import (
     GUIDE,
     INFILL,
     SHELL,
     concentric_regions,
+    first_touch,
     grid_regions,
+    hatch_lines,
     inside_shells,
     medial_regions,
+    rings_round,
     stress_regions,
 )
 

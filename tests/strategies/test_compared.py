@@ -14,6 +14,7 @@ from ccfem.materials import isotropic
 from ccfem.mesh.box import box_mesh
 from ccfem.planning import plan
 from ccfem.strategies import create
+from ccfem.strategies.eqs import _until_itself
 from ccfem.strategies.offset import _level_sets
 
 MACHINE = Machine(fibre_width=1.0, minimum_length=5.0)
@@ -113,3 +114,25 @@ def test_bad_parameters_are_refused(name) -> None:
         create(name, {"spacing": 0.5})
     with pytest.raises(InputError, match="minimum_length"):
         create(name, {"minimum_length": -1.0})
+
+
+def test_a_seed_line_stops_where_it_meets_itself() -> None:
+    """An inward spiral, 2 mm from turn to turn, then 0.5 mm: what is laid keeps the width."""
+    angle = np.linspace(0.0, 10.0 * np.pi, 4000)
+    radius = np.where(angle < 4 * np.pi, 20.0 - angle / np.pi, 17.0 - 0.25 * angle / np.pi)
+    line = radius[:, None] * np.column_stack([np.cos(angle), np.sin(angle)])
+    kept = _until_itself(line, line[0], 1.0)
+    # At t half turns the third turn lies 5 - 0.75 t mm inside the second: 1 mm at t = 16 / 3.
+    assert len(kept) == pytest.approx(4000 * 16.0 / 30.0, abs=3)
+    assert _until_itself(line[:1600], line[800], 1.0) == pytest.approx(line[:1600])
+    ring = np.concatenate([20.0 * line[:801] / radius[:801, None]])
+    ring[-1] = ring[0]
+    assert len(_until_itself(ring, ring[100], 1.0)) == len(ring)
+
+
+@pytest.mark.parametrize("name", ["streamline", "eqs"])
+def test_lines_keep_the_fibre_width(holed, name) -> None:
+    stress, layers = holed
+    paths = plan(create(name), layers, stress, MACHINE)
+    total = evaluate(paths, layers, stress, MACHINE).total
+    assert total["spacing_1"] >= 0.99

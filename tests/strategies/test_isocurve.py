@@ -1,7 +1,7 @@
 """The isocurve strategy on fields whose paths are known, and on the authors' part."""
 
-import dataclasses
 import os
+from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
@@ -69,7 +69,7 @@ def planned(strategy: Isocurve, field: StressField, count: int = 1) -> tuple:
 )
 def test_uniform_tension_gives_straight_equidistant_paths(strategy: Isocurve, angle: float) -> None:
     field = field_of(box_mesh((60.0, 60.0, 2.0), (20, 20, 1)), uniform(angle))
-    unlinked = dataclasses.replace(strategy, link_limit=0.0)
+    unlinked = replace(strategy, link_limit=0.0)
     paths, layers = planned(unlinked, field)
     total = evaluate(paths, layers, field, MACHINE).total
     assert total["aligned_10"] == pytest.approx(1.0)
@@ -115,10 +115,31 @@ def test_adaptive_density_follows_the_stress() -> None:
     # one strand a width at the largest stress, and their number up to y as the stress's integral
     expected = places**2 / (2.0 * 60.0 * 1.03)
     np.testing.assert_allclose(np.arange(len(places)) + 0.5, expected, atol=1.0)
-    even, _ = planned(dataclasses.replace(adaptive, power=0.0), field)
+    even, _ = planned(replace(adaptive, power=0.0), field)
     places = np.sort([line[0, 1] for line in even])
     gaps = np.diff(places[places > 6.0])  # next to the edge there is no stress to follow
     np.testing.assert_allclose(gaps, gaps.mean(), rtol=0.05)
+
+
+@pytest.mark.parametrize("finer", ["low", "high"])
+def test_cap_is_a_percentile_of_the_area_not_of_the_triangles(finer: str) -> None:
+    """Half of the part is stressed twice as much, and one half has nine times the triangles."""
+
+    def halves(points: np.ndarray) -> np.ndarray:
+        stress = np.zeros((len(points), 3, 3))
+        stress[:, 1, 1] = np.where(points[:, 0] < 30.0, 10.0, 20.0)
+        return stress
+
+    box = box_mesh((20.0, 60.0, 2.0), (40, 20, 1))
+    x = box.points[:, 0]
+    x = np.where(x < 15.0, 2.0 * x, 30.0 + 6.0 * (x - 15.0))  # 30 and 10 columns of cells
+    x = x if finer == "low" else 60.0 - x[::-1]
+    field = field_of(replace(box, points=np.column_stack([x, box.points[:, 1:]])), halves)
+    for cap, dense in ((40.0, True), (60.0, False)):
+        paths, _ = planned(Isocurve(cap=cap, floor=0.0, link_limit=0.0), field)
+        low = sum(line[:, 0].mean() < 28.0 for line in paths)
+        # The low half is filled where its stress is the cap; half filled where it is half of it.
+        assert low == pytest.approx(27 if dense else 14, abs=3)
 
 
 def test_strands_keep_off_the_boundary() -> None:

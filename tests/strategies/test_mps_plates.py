@@ -62,7 +62,7 @@ def test_plates_are_filled_along_the_stress(plate, laid):
     assert laid.agreement > SHARES[plate[0]]
     assert laid.overlap < 0.016
     assert laid.gaps < 0.02
-    # Nothing lies outside: length times width is the section, less gaps, plus overlap.
+    # Nothing lies outside: length times width is the section, minus gaps, plus overlap.
     (layer, *_), _ = plate[1].planned_on(1)
     used = laid.length * plate[1].bead / layer.plane.polygon.area
     assert used == pytest.approx(1.0 + laid.overlap - laid.gaps, abs=1e-4)

@@ -2,17 +2,16 @@ import numpy as np
 import pytest
 import shapely
 
-from ccfem.stress_tracing.criterion import Criterion, coefficient
+from ccfem.stress_tracing.criterion import Criterion
 from ccfem.stress_tracing.stress_lines import misalignment, plane_stress_at, stress_lines
 
 
-def test_coefficient_by_hand():
-    """At 0 it is epsilon; eta = 1, epsilon = 0.1, k = 2 grow by 1 - 0.05 up to the limit."""
-    np.testing.assert_allclose(coefficient([0.0, 30.0, 60.0], 60.0, k=2.0), [0.1, 0.575, 1.05])
-
-
-def test_property_is_switched_off_by_its_amplification():
-    np.testing.assert_allclose(coefficient([0.0, 20.0, 60.0], 60.0, k=0.1), 0.1)
+def test_smoothness_by_hand():
+    """Equation 4 with k = eta = 1, epsilon = 0.1: from 0.1 at 0 to 1 at the limit."""
+    rule = Criterion(90.0, 45.0, 3.0)
+    np.testing.assert_allclose(rule([0.0, 45.0, 90.0], 45.0, 3.0), [0.1, 0.55, 1.0])
+    np.testing.assert_allclose(rule(90.0, [0.0, 22.5, 45.0], 3.0), [0.1, 0.55, 1.0])
+    np.testing.assert_allclose(rule(90.0, 45.0, [0.0, 1.5, 3.0]), [0.1, 0.55, 1.0])
 
 
 def test_smoothness_is_the_product():

@@ -3,7 +3,7 @@ import pytest
 import shapely
 from shapely import affinity
 
-from ccfem.stress_tracing.frame import FREE, frame
+from ccfem.stress_tracing.frame import FREE, ends_at, frame
 from ccfem.stress_tracing.main_paths import main_paths
 from ccfem.stress_tracing.walk import walk
 
@@ -24,13 +24,14 @@ def test_strip_is_one_member_between_its_long_sides():
     np.testing.assert_array_equal(member.reversed.left, member.right[::-1])
 
 
-def test_two_bars_that_cross_are_four_members_and_one_joint():
+def test_two_bars_that_cross_are_four_members_and_one_joint(monkeypatch):
     """Their axis has two junctions, here as far apart as the radius of their discs."""
     found = frame(CROSS, 0.4)
     assert len(found.members) == 4
     np.testing.assert_allclose(found.joints, [[0.0, 0.0]], atol=0.05)
-    assert len(found.ends_at(0)) == 4
-    assert len(frame(CROSS, 0.4, contraction=0.0).members) == 5
+    assert len(ends_at(found.members, 0)) == 4
+    monkeypatch.setattr("ccfem.stress_tracing.frame._CONTRACTION", 0.0)
+    assert len(frame(CROSS, 0.4).members) == 5
 
 
 @pytest.mark.parametrize("part", [shapely.Point(3, 4).buffer(9), shapely.box(-1, 0, 7, 8)])

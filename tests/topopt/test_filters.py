@@ -31,6 +31,25 @@ def test_cone_weights(seed, radius, dimension):
     np.testing.assert_allclose(equal.sensitivities(values, gradient), wanted)
 
 
+@settings(max_examples=20, deadline=None)
+@given(seed=st.integers(0, 999), radius=st.floats(0.05, 2.0), share=st.floats(0.1, 0.9))
+def test_a_cell_in_two_pieces_has_the_sensitivity_of_the_whole(seed, radius, share):
+    rng = np.random.default_rng(seed)
+    centres, volumes = rng.random((30, 2)), rng.uniform(0.5, 2.0, 30)
+    density, gradient = rng.uniform(0.1, 1.0, 30), -rng.random(30)
+    whole = ConeFilter.of_cells(centres, volumes, radius).sensitivities(density, gradient)
+    pieces = np.array([share, 1.0 - share])
+    split = ConeFilter.of_cells(
+        np.concatenate([centres[1:], centres[[0, 0]]]),
+        np.concatenate([volumes[1:], volumes[0] * pieces]),
+        radius,
+    ).sensitivities(
+        np.concatenate([density[1:], density[[0, 0]]]),
+        np.concatenate([gradient[1:], gradient[0] * pieces]),
+    )
+    np.testing.assert_allclose(split, np.concatenate([whole[1:], whole[0] * pieces]))
+
+
 @settings(max_examples=30, deadline=None)
 @given(seed=st.integers(0, 999), share=st.floats(0.1, 0.9))
 def test_optimality_criteria(seed, share):

@@ -84,9 +84,9 @@ def test_share_of_the_volume(share):
 def test_bad_images_are_refused():
     with pytest.raises(InputError, match=r"\(H, W\) image"):
         outline(np.ones(5))
-    with pytest.raises(InputError, match=r"volume_fraction must lie in \(0, 1\]; got 1.5"):
+    with pytest.raises(InputError, match=r"volume_fraction must be above 0 and at most 1; got 1.5"):
         outline(np.ones((5, 5)), volume_fraction=1.5)
-    with pytest.raises(InputError, match=r"threshold must lie in \(0, 1\); got 0.0"):
+    with pytest.raises(InputError, match=r"threshold must be above 0 and below 1; got 0.0"):
         outline(np.ones((5, 5)), threshold=0.0)
     with pytest.raises(InputError, match="outline is empty"):
         outline(np.zeros((5, 5)), threshold=0.5)

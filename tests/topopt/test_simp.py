@@ -248,14 +248,20 @@ def test_filled_cells_have_the_volume():
 @pytest.mark.parametrize(
     ("more", "message"),
     [
-        ({"volume_fraction": 1.0}, r"volume_fraction must be in \(0, 1\); got 1.0: correct it"),
+        (
+            {"volume_fraction": 1.0},
+            r"simp\.volume_fraction must be above 0 and below 1; got 1.0: correct it",
+        ),
         ({"penalty": 0.5}, "penalty must be at least 1; got 0.5"),
-        ({"filter": "none"}, "filter must be one of sensitivity, density; got 'none'"),
+        ({"filter": "none"}, "filter must be one of 'sensitivity', 'density'; got 'none'"),
         ({"radius": 0.0}, "radius must be above 0 mm; got 0.0"),
-        ({"minimum_stiffness": 0.0}, r"minimum_stiffness must be in \(0, 1\); got 0.0"),
-        ({"move": 0.0}, r"move must be in \(0, 1\]; got 0.0"),
+        ({"minimum_stiffness": 0.0}, "minimum_stiffness must be above 0 and below 1; got 0.0"),
+        ({"move": 0.0}, "move must be above 0 and at most 1; got 0.0"),
         ({"tolerance": -1.0}, "tolerance must be at least 0; got -1.0"),
-        ({"objective_tolerance": float("nan")}, "objective_tolerance must be at least 0; got nan"),
+        (
+            {"objective_tolerance": float("nan")},
+            "objective_tolerance must be a finite number, at least 0; got nan",
+        ),
         ({"max_iterations": 0}, "max_iterations must be at least 1; got 0"),
     ],
 )

@@ -149,9 +149,9 @@ def test_the_design_is_mirrored_with_the_load():
 @pytest.mark.parametrize(
     ("more", "message"),
     [
-        ({"orientation": "random"}, "one of principal, gradient, fixed; got 'random'"),
-        ({"relaxation": 0.0}, r"relaxation must be in \(0, 1\]; got 0.0"),
-        ({"volume_fraction": 1.5}, r"volume_fraction must be in \(0, 1\); got 1.5"),
+        ({"orientation": "random"}, "one of 'principal', 'gradient', 'fixed'; got 'random'"),
+        ({"relaxation": 0.0}, "relaxation must be above 0 and at most 1; got 0.0"),
+        ({"volume_fraction": 1.5}, r"somp\.volume_fraction must be above 0 and below 1; got 1.5"),
     ],
 )
 def test_bad_parameters_are_refused(more, message):

@@ -201,7 +201,7 @@ def test_axes_follow_the_angles():
 def test_options_of_plates_are_refused():
     with pytest.raises(InputError, match="thickness, edge_length: for plates only"):
         as_problem(made_up(np.ones(len(BOX.cells))), PLA, 2.0, 1.0)
-    with pytest.raises(InputError, match=r"volume_fraction must lie in \(0, 1\]; got 1.5"):
+    with pytest.raises(InputError, match=r"volume_fraction must be above 0 and at most 1; got 1.5"):
         part_shape(made_up(np.ones(len(BOX.cells))), 1.5)
-    with pytest.raises(InputError, match=r"threshold must lie in \(0, 1\); got 1.0"):
+    with pytest.raises(InputError, match=r"threshold must be above 0 and below 1; got 1.0"):
         part_shape(made_up(np.ones(len(BOX.cells))), threshold=1.0)

@@ -248,7 +248,7 @@ def test_bad_parameters_are_refused():
     part, columns = plate(4, 3)
     tilted = np.eye(6) * 1e3
     tilted[0, 3] = tilted[3, 0] = 100.0
-    with pytest.raises(InputError, match="alike on both sides of the x-y plane"):
+    with pytest.raises(InputError, match="must be symmetric about the x-y plane"):
         Somp(0.5)(part, tilted)
     with pytest.raises(InputError, match=r"shape \(6, 6\) here; got \(2, 2\)"):
         Somp(0.5)(part, np.eye(2))

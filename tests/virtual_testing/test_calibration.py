@@ -54,7 +54,7 @@ def test_modulus_strength_and_rho_are_found():
     with_fibre = curve(stiffness * (1.0 + COUNT * rho / AREA), 3000.0, "fibre.csv")
     alone = calibrate(pulled(), none)
     assert alone.modulus == pytest.approx(modulus, rel=1e-6)
-    assert alone.matrix_strength == pytest.approx(strength, rel=1e-6)
+    assert alone.tensile_strength == pytest.approx(strength, rel=1e-6)
     assert alone.poisson == pytest.approx(0.3, rel=1e-9)
     assert alone.rho is None
     assert alone.strand() == Strand()
@@ -65,7 +65,7 @@ def test_modulus_strength_and_rho_are_found():
     assert both.strand().strength == 86.0
     assert "none.csv" in both.source
     assert "fibre.csv" in both.source
-    assert both.material.tensile_strength == both.matrix_strength
+    assert both.material.tensile_strength == both.tensile_strength
     np.testing.assert_allclose(
         both.material.stiffness, isotropic(modulus, 0.3).stiffness, rtol=1e-6
     )
@@ -119,7 +119,10 @@ def test_missing_files_are_refused(tmp_path):
         read_calibration(tmp_path / "none.toml")
     path = tmp_path / "m.toml"
     path.write_text("modulus = 'a'\n")
-    with pytest.raises(InputError, match="modulus must be a finite number; got 'a'"):
+    with pytest.raises(InputError, match="modulus must be a number; got 'a'"):
+        read_calibration(path)
+    path.write_text("modulus = 500\npoisson = 0.3\n")
+    with pytest.raises(InputError, match="needs the key 'tensile_strength'"):
         read_calibration(path)
     path.write_text("modulus = \n")
     with pytest.raises(InputError, match=r"cannot be read.*write it by ccfem calibrate"):

@@ -68,11 +68,13 @@ def test_matrix_peak_is_the_largest_ball_average_away_from_the_patches():
     assert index < mises.max()
 
 
-def test_a_point_force_has_its_zone_too():
+def test_a_point_force_has_its_zone_too(monkeypatch):
+    monkeypatch.setattr("ccfem.virtual_testing.strength._BALL", 0.1)
     node = np.array([12.0, 4.0 / 3.0, 4.0])
     field = solve(clamped((PointForce(tuple(node), (50.0, 0.0, 0.0)),)))["load"]
-    _, near = matrix_peak(field, ball=0.1, zone=0.5)
-    _, far = matrix_peak(field, ball=0.1, zone=3.0)
+    _, far = matrix_peak(field)
+    monkeypatch.setattr("ccfem.virtual_testing.strength._ZONE", 0.5)
+    _, near = matrix_peak(field)
     assert np.linalg.norm(near - node) < 3.0 < np.linalg.norm(far - node)
 
 
@@ -107,6 +109,11 @@ def test_fibre_peak_is_the_length_weighted_percentile():
     piece = np.linalg.norm(test.strands.middle - where, axis=1).argmin()
     assert test.axial_force[piece] == pytest.approx(index)
     assert fibre_peak(test, 1.0)[0] == test.axial_force.max()
+    # By default that of 99 % of the length.
+    index = fibre_peak(test)[0]
+    below = test.strands.length[test.axial_force < index].sum() / test.strands.total
+    upto = test.strands.length[test.axial_force <= index].sum() / test.strands.total
+    assert 0.9 < below <= 0.99 <= upto
 
 
 def test_failure_load_does_not_depend_on_the_load_of_the_test():
@@ -126,9 +133,10 @@ def test_no_stretched_fibre_never_breaks():
     assert (failure.what, failure.fibre_load) == ("matrix", np.inf)
 
 
-def test_a_part_within_the_zones_is_refused():
+def test_a_part_within_the_zones_is_refused(monkeypatch):
+    monkeypatch.setattr("ccfem.virtual_testing.strength._ZONE", 12.0)
     with pytest.raises(InputError, match=r"farther than 12 mm .* too small for this index"):
-        matrix_peak(solve(clamped(BEND))["load"], zone=12.0)
+        matrix_peak(solve(clamped(BEND))["load"])
 
 
 def test_missing_strengths_are_refused():

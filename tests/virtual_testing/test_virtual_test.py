@@ -11,13 +11,14 @@ from hypothesis import strategies as st
 from ccfem.elasticity.problem import Force, PointForce, Problem, Support
 from ccfem.elasticity.solve import solve
 from ccfem.errors import InputError, SolveError
+from ccfem.machine import Machine
 from ccfem.materials import isotropic
 from ccfem.mesh.box import box_mesh
 from ccfem.toolpaths import Toolpaths
 from ccfem.virtual_testing import equilibrium as equilibrium_module
 from ccfem.virtual_testing.equilibrium import BONDED, MODES, TENSION, equilibrium
 from ccfem.virtual_testing.specimen import Specimen
-from ccfem.virtual_testing.stiffer import FIRST, SECOND, UNDECIDED, stiffer
+from ccfem.virtual_testing.stiffer import FIRST, RESOLUTION, SAME, SECOND, UNDECIDED, stiffer
 from ccfem.virtual_testing.strand import Strand
 from ccfem.virtual_testing.strands import cut_strands
 from ccfem.virtual_testing.virtual_test import (
@@ -235,8 +236,8 @@ def test_ratio_depends_on_rho_alone_and_grows_with_it():
 def test_the_solver_does_not_count():
     field = solve(clamped())["load"]
     lines = toolpaths(*random_lines())
-    direct = virtual_test(lines, field, backend="superlu", span=())
-    iterative = virtual_test(lines, field, backend="amg", span=())
+    direct = virtual_test(lines, Specimen.of(field, "superlu"), span=())
+    iterative = virtual_test(lines, Specimen.of(field, "amg"), span=())
     assert iterative.stiffness == pytest.approx(direct.stiffness, rel=1e-7)
     assert iterative.solution.record.backend == "amg"
     assert iterative.solution.record.residual <= 1e-8
@@ -263,7 +264,13 @@ def test_neither_is_stiffer_where_the_tests_disagree():
     more = virtual_bracket(toolpaths(*low, *high), field)
     assert stiffer(more, below) == FIRST
     assert stiffer(below, more) == SECOND
-    assert stiffer(below, below) == UNDECIDED
+    assert stiffer(below, below) == SAME
+    # the resolution of the test: gains of both modes below it are no difference
+    for share, said in ((0.5, SAME), (2.0, FIRST)):
+        gain = 1.0 + share * RESOLUTION
+        tests = {name: getattr(below, name) for name in ("tension", "bonded")}
+        tests = {n: dataclasses.replace(t, stiffness=gain * t.stiffness) for n, t in tests.items()}
+        assert stiffer(dataclasses.replace(below, **tests), below) == said
     with pytest.raises(InputError, match="one part under one load case"):
         stiffer(below, virtual_bracket(low, solve(clamped())["load"], span=()))
     ratios = [ratio for _, ratio in more.tension.span]
@@ -295,8 +302,54 @@ def test_bad_input_is_refused():
     problem = dataclasses.replace(clamped(PULL), supports=(Support("x_min"), *STRETCH))
     with pytest.raises(InputError, match="one or the other"):
         virtual_test(lines, solve(problem)["load"])
+    held = dataclasses.replace(clamped(), loads={"held": (Force("x_min", (10.0, 0.0, 0.0)),)})
+    with pytest.raises(InputError, match="load case 'held' acts on nodes only that the supports"):
+        virtual_test(lines, solve(held)["held"])
     with pytest.raises(InputError, match="axial stiffness"):
         equilibrium(Specimen.of(field), cut_strands(lines, field.mesh), np.inf)
+
+
+WIDE = Machine(fibre_width=1.0, fibre_height=0.1, filament_area=0.05)
+
+
+@pytest.mark.parametrize(
+    ("lines", "room"),
+    [
+        ([(1.0, 1.0)], 1.0),
+        ([(1.0, 1.0), (2.0, 1.0)], 2.0),  # a width apart
+        ([(1.5, 1.0)] * 5, 1.0),  # copies
+        ([(1.2, 1.0), (1.7, 1.0)], 1.5),  # bands that overlap by half
+        ([(1.5, 0.5), (1.5, 1.5)], 2.0),  # above each other, on layers of their own
+        ([(1.5, 0.5), (1.5, 0.52)], 1.0),  # nearer than a strand is high
+    ],
+)
+@pytest.mark.parametrize("mode", MODES)
+def test_fibre_beyond_the_room_counts_nothing(lines, room, mode):
+    """A bar stretched evenly: each strand that has room adds EA / L, by the rule of mixtures."""
+    paths = [np.array([[0.0, y, z], [SIZE[0], y, z]]) for y, z in lines]
+    laid = dataclasses.replace(toolpaths(*paths), layer=np.array([int(100 * z) for _, z in lines]))
+    field = solve(stretched())["load"]
+    area = SIZE[1] * SIZE[2]
+    with_room = virtual_test(laid, field, Strand(rho=2.0), mode, span=(), machine=WIDE)
+    assert with_room.ratio == pytest.approx(1.0 + 2.0 * room / area, rel=1e-9)
+    as_laid = virtual_test(laid, field, Strand(rho=2.0), mode, span=())
+    assert as_laid.ratio == pytest.approx(1.0 + 2.0 * len(lines) / area, rel=1e-9)
+    for test in (with_room, as_laid):
+        # a strand that has room carries what it would alone: copies do not share its load
+        np.testing.assert_allclose(test.axial_force, 2.0 * MODULUS * 0.01 / SIZE[0], rtol=1e-9)
+        total = 0.5 * MODULUS * (0.01 / SIZE[0]) ** 2 * SIZE[0] * area * test.ratio
+        assert test.solution.strain_energy == pytest.approx(total, rel=1e-9)
+        fibre = total * (1.0 - 1.0 / test.ratio)
+        assert test.fibre_energy == pytest.approx(fibre, rel=1e-6)
+
+
+def test_strands_across_each_other_count_as_laid():
+    """Crossings take no room: the layer is thicker there."""
+    lines = [np.array([[0.0, 1.5, 1.0], [8.0, 1.5, 1.0]])]
+    lines += [np.array([[x, 0.0, 1.0], [x, 3.0, 1.0]]) for x in (2.0, 4.0, 6.0)]
+    field = solve(clamped(PULL))["load"]
+    strands = cut_strands(toolpaths(*lines), field.mesh, machine=WIDE)
+    np.testing.assert_array_equal(strands.share, 1.0)
 
 
 def test_a_set_that_does_not_settle_is_an_error(monkeypatch):

@@ -34,9 +34,9 @@ Both chains follow the same rules; they share no code. Where they differ:
   holes of I and II differ from the prototype's by a few pixels, which may be what moves the peak
   stress of 0/90 on case I; the outline of III is smoothed here.
 - MAT: the medial axis is symmetric here; MAT of case II, which has most of it, agrees better.
-- Paths over 40 mm and SI of raw pixels hang on the tracer. Here a ring stays one path where it can,
-  so that concentric has more long paths; pixels at its sharp tips stay isolated, and diagonal steps
-  cut its corners, so that raw chains wind less.
+- Paths over 40 mm and SI of raw pixels depend on the tracer. Here a ring stays one path where it
+  can, so that concentric has more long paths; pixels at its sharp tips stay isolated, and diagonal
+  steps cut its corners, so that raw chains wind less.
 """
 
 

@@ -122,7 +122,6 @@ def machine_of(plate: Plate) -> Machine:
     """Printer of the paper's table 4, which cuts nothing off."""
     return Machine(
         fibre_width=plate.bead,
-        deposited_width=plate.bead,
         minimum_length=0.0,
         minimum_radius=0.0,
         cutter_distance=0.0,

@@ -1,4 +1,4 @@
-"""What was tried where a number of the paper may hang on what it does not state."""
+"""What was tried where a number of the paper may depend on what it does not state."""
 
 from collections.abc import Mapping
 from dataclasses import dataclass

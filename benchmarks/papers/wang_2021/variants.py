@@ -1,4 +1,4 @@
-"""What was tried where a number of the paper hangs on what it does not state.
+"""What was tried where a number of the paper depends on what it does not state.
 
 The radius of the turns, and the hole of the bridge.
 """

@@ -3,18 +3,17 @@
 from collections.abc import Mapping
 from dataclasses import dataclass, replace
 from functools import cached_property
-from types import MappingProxyType
-from typing import Any
+from typing import Any, Literal
 
 import numpy as np
 import shapely
 from scipy.spatial import cKDTree
 
-from ccfem.arrays import BoolArray, IntArray
+from ccfem.arrays import BoolArray, IntArray, freeze
 from ccfem.cases.designed.border import NEAR, Hole, Stretch
 from ccfem.cases.stored.stored_files import stored_outline
+from ccfem.checks import check_choices, check_fields
 from ccfem.elasticity.problem import Force, Support
-from ccfem.errors import InputError
 from ccfem.materials import plane_stress
 from ccfem.mesh.patches import Cylinder, Plane, patches_from_rules
 from ccfem.mesh.tet_mesh import TetMesh
@@ -47,7 +46,8 @@ class DesignPlate:
     holes : tuple of Hole
     force : float, N
     mirror : str, default ""
-        "x" or "y" where the plate and its load are symmetric along that axis: so is its part then.
+        "x" or "y" where the plate and its load are symmetric along that axis: its part is then
+        made symmetric too.
     pixel : float, mm, default 1
         Side of a cell of the optimisation.
     radius : float, default 2.5
@@ -62,16 +62,14 @@ class DesignPlate:
     volume_fraction: float
     holes: tuple[Hole, ...] = ()
     force: float = 100.0
-    mirror: str = ""
+    mirror: Literal["", "x", "y"] = ""
     pixel: float = 1.0
     radius: float = 2.5
 
     def __post_init__(self) -> None:
-        object.__setattr__(self, "supports", MappingProxyType(dict(self.supports)))
-        if not 0.0 < self.volume_fraction <= 1.0:
-            raise InputError(f"volume_fraction must lie in (0, 1]; got {self.volume_fraction}")
-        if self.mirror not in ("", "x", "y"):
-            raise InputError(f"mirror must be 'x', 'y' or empty; got '{self.mirror}'")
+        freeze(self, supports=dict)
+        check_fields(self, "volume_fraction", above=0.0, at_most=1.0)
+        check_choices(self)
 
     @cached_property
     def domain(self) -> Any:

@@ -29,7 +29,6 @@ def prepreg_printer() -> Machine:
     """
     return Machine(
         fibre_width=0.9,
-        deposited_width=0.9,
         minimum_length=10.0,
         minimum_radius=1.5,
         speeds=SpeedTable(),
@@ -37,15 +36,7 @@ def prepreg_printer() -> Machine:
 
 
 def case_of(plate: Callable[..., DesignPlate], title: str) -> Callable[..., Case]:
-    """Make the case of a plate: a function of the parameters that all of them share.
-
-    Parameters
-    ----------
-    plate : callable
-        Makes the plate, of its `force`.
-    title : str
-        What it is, for the list of cases.
-    """
+    """Make the case of a plate, made of its force: a function of the parameters that all share."""
 
     def case(
         optimised: bool = True,
@@ -56,22 +47,7 @@ def case_of(plate: Callable[..., DesignPlate], title: str) -> Callable[..., Case
     ) -> Case:
         return designed_case(plate(force=force), optimised, element_size, order, thickness)
 
-    case.__doc__ = f"""{title}: optimised, or the full plate.
-
-    It is printed of plain matrix, so that the virtual test adds the fibre, and stands on its face
-    at z = 0 without friction, so that it stays plane.
-
-    Parameters
-    ----------
-    optimised : bool, default True
-        Whether to take the optimised part, or the full plate.
-    element_size : float, mm
-        Edge length of the cells aimed at.
-    order : 1, 2 or "auto"
-        Linear or quadratic cells, or what their estimated error calls for.
-    force : float, N
-    thickness : float, mm
-    """
+    case.__doc__ = f"{title}: optimised, or the full plate.\n\nParameters as in `designed_case`."
     return case
 
 
@@ -82,7 +58,21 @@ def designed_case(
     order: Order = 1,
     thickness: float = THICKNESS,
 ) -> Case:
-    """Make the case of one plate; parameters as those of the functions that `case_of` makes."""
+    """Make the case of one plate.
+
+    It is printed of plain matrix, so that the virtual test adds the fibre, and stands on its face
+    at z = 0 without friction, so that it stays plane.
+
+    Parameters
+    ----------
+    plate : DesignPlate
+        With its force.
+    optimised : bool, default True
+        Whether to take the optimised part, or the full plate.
+    element_size, order
+        As in `ccfem.cases.bar`.
+    thickness : float, mm
+    """
     polygon = None if optimised else plate.domain
     key = plate.name if optimised and thickness == THICKNESS else ""
 

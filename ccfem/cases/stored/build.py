@@ -13,26 +13,13 @@ from ccfem.mesh.tet_mesh import TetMesh
 
 __all__ = ["CASES", "DESIGNED", "build"]
 
-CASES = ("bar", "loop", "open_hole", "bracket")
+CASES = ("bar", "loop", "open_hole", "bracket", "t_bracket")
 DESIGNED = ("bridge", "suspension", "cantilever", "m_shape", "l_shape")
 """Cases of optimised plates: an outline and its mesh each."""
 
 
 def build(folder: Path, names: Sequence[str] = (*CASES, *DESIGNED)) -> Path:
-    """Make the stored meshes and outlines, and their manifest.
-
-    Parameters
-    ----------
-    folder : Path
-        Where to write; it must exist.
-    names : sequence of str
-        Cases to make.
-
-    Returns
-    -------
-    Path
-        The manifest.
-    """
+    """Make the stored meshes and outlines of cases in a folder, and their manifest: its path."""
     text = (
         "# Meshes of the cases at their default element size, mm, and outlines of the optimised\n"
         f"# plates. Made by: {COMMAND}\n"
@@ -59,28 +46,35 @@ def _designed(folder: Path, name: str) -> str:
     path = folder / f"{name}_outline.npz"
     write_outline(outline, path)
     points = len(outline.exterior.coords) + sum(len(ring.coords) for ring in outline.interiors)
-    return (
-        f"\n[{name}_outline]\n"
-        f'file = "{path.name}"\n'
-        f'what = "{points} points on {1 + len(outline.interiors)} rings; compliance '
-        f'{design.compliance[-1]:.4g} N mm after {design.iterations} iterations"\n'
-        f'command = "{COMMAND}"\n'
-        f"volume_fraction = {plate.volume_fraction}\n"
-        f'sha256 = "{hashlib.sha256(path.read_bytes()).hexdigest()}"\n'
-    ) + _mesh_entry(folder, name, plate.mesh(outline, ELEMENT_SIZE, THICKNESS), ELEMENT_SIZE)
+    what = (
+        f"{points} points on {1 + len(outline.interiors)} rings; compliance "
+        f"{design.compliance[-1]:.4g} N mm after {design.iterations} iterations"
+    )
+    mesh = plate.mesh(outline, ELEMENT_SIZE, THICKNESS)
+    return _entry(path, what, f"volume_fraction = {plate.volume_fraction}") + _mesh_entry(
+        folder, name, mesh, ELEMENT_SIZE
+    )
 
 
 def _mesh_entry(folder: Path, name: str, mesh: TetMesh, element_size: float) -> str:
     """Write a mesh; its entry."""
     path = folder / f"{name}.npz"
     write_mesh(mesh, path)
+    what = (
+        f"{len(mesh.cells)} linear tetrahedra, {len(mesh.points)} nodes, patches "
+        f"{', '.join(sorted(mesh.patches))}"
+    )
+    return _entry(path, what, f"element_size = {element_size}")
+
+
+def _entry(path: Path, what: str, made_for: str) -> str:
+    """Entry of the manifest for a file that was written."""
     return (
-        f"\n[{name}]\n"
+        f"\n[{path.stem}]\n"
         f'file = "{path.name}"\n'
-        f'what = "{len(mesh.cells)} linear tetrahedra, {len(mesh.points)} nodes, patches '
-        f'{", ".join(sorted(mesh.patches))}"\n'
+        f'what = "{what}"\n'
         f'command = "{COMMAND}"\n'
-        f"element_size = {element_size}\n"
+        f"{made_for}\n"
         f'sha256 = "{hashlib.sha256(path.read_bytes()).hexdigest()}"\n'
     )
 

@@ -48,27 +48,13 @@ def manifest() -> dict[str, Any]:
 
 
 def stored_mesh(name: str, element_size: float) -> TetMesh | None:
-    """Read the stored mesh of a case; None where there is none of this element size, mm.
-
-    Raises
-    ------
-    InputError
-        When the file is not the one that the manifest names.
-    """
+    """Read the stored mesh of a case; None where there is none of this element size, mm."""
     path = _stored_file(name, "element_size", element_size)
     return None if path is None else read_mesh(path, check=False)
 
 
 def stored_outline(name: str, volume_fraction: float) -> shapely.Polygon | None:
-    """Read the stored outline of an optimised plate, mm: a shapely Polygon.
-
-    None where there is none of this share of the plate's volume.
-
-    Raises
-    ------
-    InputError
-        When the file is not the one that the manifest names.
-    """
+    """Read the stored outline of an optimised plate, mm; None where there is none of this share."""
     path = _stored_file(f"{name}_outline", "volume_fraction", volume_fraction)
     if path is None:
         return None
@@ -86,7 +72,13 @@ def write_outline(polygon: shapely.Polygon, path: Path) -> None:
 
 
 def _stored_file(name: str, key: str, value: float) -> Path | None:
-    """File of an entry of the manifest that has this value; None where there is none."""
+    """File of an entry of the manifest that has this value; None where there is none.
+
+    Raises
+    ------
+    InputError
+        When the file is not the one that the manifest names.
+    """
     entry = manifest().get(name)
     if entry is None or entry[key] != value:
         return None

@@ -1,15 +1,21 @@
 """Slicing: against volumes, areas and boundaries that are known from elsewhere."""
 
+from dataclasses import replace
+
 import numpy as np
 import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
+from ccfem.elasticity import GivenStress
 from ccfem.errors import InputError
 from ccfem.layers import plane_frame
 from ccfem.layers.slicing.planar import Planar, slice_heights
+from ccfem.machine import Machine
 from ccfem.mesh import TetMesh
 from ccfem.mesh.box import box_mesh
+from ccfem.planning import plan
+from ccfem.strategies import create
 
 
 def test_a_box_gives_rectangles_of_its_section() -> None:
@@ -116,3 +122,25 @@ def test_a_build_direction_has_a_direction() -> None:
 
 def test_twelve_layers_where_nothing_is_asked_for() -> None:
     assert Planar() == Planar(count=12)
+
+
+def test_a_height_is_given_once() -> None:
+    with pytest.raises(InputError, match=r"each layer height must be given once; got 1 mm more"):
+        Planar(heights=(1.0, 1.0, 0.5))
+
+
+def test_layers_are_no_nearer_than_their_fibre_is_high() -> None:
+    mesh = box_mesh((60.0, 24.0, 4.0), (6, 3, 2))
+    stress = GivenStress(
+        mesh, np.zeros((len(mesh.cells), 3, 3)), np.zeros((len(mesh.points), 3, 3))
+    )
+    machine = Machine(fibre_height=0.1, filament_area=0.1, fibre_width=1.0)
+    assert len(Planar(count=40)(stress, (0, 0, 1), machine)) == 40
+    with pytest.raises(InputError, match=r"at least 0.1 mm apart.*got 0.08 mm"):
+        Planar(count=50)(stress, (0, 0, 1), machine)
+    # the volume of a strand needs more height than the machine claims
+    with pytest.raises(InputError, match=r"at least 0.2 mm apart"):
+        Planar(count=40)(stress, (0, 0, 1), replace(machine, filament_area=0.2))
+    layers = Planar(count=50).cut(mesh)
+    with pytest.raises(InputError, match="use fewer layers"):
+        plan(create("zigzag"), layers, stress, machine)

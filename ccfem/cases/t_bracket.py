@@ -1,0 +1,142 @@
+"""The T-bracket of Fang et al. 2024: a base with two bolt holes and a head with one across them."""
+
+import json
+from contextlib import chdir
+from pathlib import Path
+from tempfile import TemporaryDirectory
+
+import numpy as np
+import shapely
+
+from ccfem.arrays import FloatArray
+from ccfem.cases.case import Case
+from ccfem.cases.stored import mesh_of_case
+from ccfem.elasticity.problem import Bearing, Force, Order, Problem, Support
+from ccfem.layers.slicing.spatial import Spatial
+from ccfem.materials import printed_pla
+from ccfem.mesh.check import check_mesh
+from ccfem.mesh.patches import Cylinder, patches_from_rules
+from ccfem.mesh.tet_mesh import TetMesh
+from ccfem.meshing import extrude
+
+__all__ = ["t_bracket", "t_bracket_front", "t_bracket_mesh", "t_bracket_top"]
+
+ELEMENT_SIZE = 3.0
+HOLE_RADIUS = 5.5
+_DEPTH = 15.0
+"""Half of the thickness of the head, along z, and of the width of the base, mm."""
+_TOLERANCE = 5e-4
+"""Of the mesher, in the diagonal of the part."""
+HOLES = {
+    "base_left": Cylinder((-50.0, 0.0, 0.0), "y", HOLE_RADIUS),
+    "base_right": Cylinder((50.0, 0.0, 0.0), "y", HOLE_RADIUS),
+    "head": Cylinder((0.0, 50.0, 0.0), "z", HOLE_RADIUS),
+    "pull": Cylinder((0.0, 50.0, 0.0), "z", HOLE_RADIUS, half="y"),
+}
+"""Patches: the walls of the holes, and the half of the head's that a bolt pulls."""
+
+
+def _arc(x: float, y: float, radius: float, first: float, last: float) -> FloatArray:
+    """Points every 6 degrees on an arc from one angle to another, degrees."""
+    angle = np.radians(np.linspace(first, last, int(np.ceil(abs(last - first) / 6.0)) + 1))
+    return np.stack([x + radius * np.cos(angle), y + radius * np.sin(angle)], axis=1)
+
+
+def t_bracket_front() -> shapely.Polygon:
+    """Outline seen along z: a head of radius 15 mm about (0, 50), led into a base 15 mm high.
+
+    The base goes on to x = 80 mm either side, beyond `t_bracket_top`.
+    """
+    root = 40.0 - np.sqrt(45.0**2 - 35.0**2)
+    end = float(np.degrees(np.arctan2(40.0 - root, 35.0)))
+    right = np.concatenate(
+        [
+            _arc(0.0, 50.0, 15.0, 90.0, 0.0),
+            _arc(35.0, 40.0, 20.0, 180.0, 270.0),
+            [[80.0, 20.0], [80.0, 5.0]],
+            _arc(35.0, 40.0, 35.0, 270.0, 180.0 + end),
+            _arc(0.0, root, 10.0, end, 90.0),
+        ]
+    )
+    outline = shapely.Polygon(np.concatenate([right, right[::-1] * [-1.0, 1.0]])).buffer(0.0)
+    return outline.difference(shapely.Point(0.0, 50.0).buffer(HOLE_RADIUS, quad_segs=16))
+
+
+def t_bracket_top() -> shapely.Polygon:
+    """Outline seen along y: all within 15 mm of the line from (-50, 0) to (50, 0), two holes."""
+    outline = shapely.LineString([(-50.0, 0.0), (50.0, 0.0)]).buffer(_DEPTH, quad_segs=16)
+    holes = [shapely.Point(x, 0.0).buffer(HOLE_RADIUS, quad_segs=16) for x in (-50.0, 50.0)]
+    return outline.difference(shapely.union_all(holes))
+
+
+def t_bracket_mesh(element_size: float) -> TetMesh:
+    """Mesh of what two extrusions have in common; takes a quarter of an hour.
+
+    Patches are the walls of the holes, and `pull`: half of the wall of the head's.
+    """
+    import pytetwild
+
+    front = extrude(t_bracket_front(), 44.0, 2.0 * element_size)
+    top = extrude(t_bracket_top(), 84.0, 2.0 * element_size)
+    # The planform of `top` lies in x and z, and is extruded along y.
+    upright = top.points @ np.array([[1.0, 0.0, 0.0], [0.0, 0.0, 1.0], [0.0, -1.0, 0.0]])
+    with TemporaryDirectory() as folder, chdir(folder):
+        _write_surface("front.stl", front.points - [0.0, 0.0, 22.0], front)
+        _write_surface("top.stl", upright - [0.0, -80.0, 0.0], top)
+        tree = {"operation": "intersection", "left": "front.stl", "right": "top.stl"}
+        Path("tree.json").write_text(json.dumps(tree), encoding="utf-8")
+        diagonal = float(np.linalg.norm([160.0, 84.0, 44.0]))
+        grid = pytetwild.tetrahedralize_csg(
+            "tree.json",
+            epsilon=_TOLERANCE,
+            edge_length_r=element_size / diagonal,
+            num_threads=1,
+        )
+    cells = np.asarray(grid.cells).reshape(-1, 5)[:, 1:]
+    mesh = check_mesh(TetMesh(np.asarray(grid.points), cells))[0]
+    return patches_from_rules(mesh, HOLES)
+
+
+def _write_surface(name: str, points: FloatArray, mesh: TetMesh) -> None:
+    """Write the boundary of a mesh, moved to other points, as STL."""
+    import pyvista
+
+    faces = np.column_stack([np.full(len(mesh.boundary), 3), mesh.boundary])
+    pyvista.PolyData(points, faces.ravel()).save(name)
+
+
+def t_bracket(element_size: float = ELEMENT_SIZE, order: Order = 2, force: float = 1000.0) -> Case:
+    """T-bracket of 130 x 60 x 30 mm: bolted down at its base, pulled by a bolt through its head.
+
+    The shape is recovered from the layers that the authors published (GuoxinFang/
+    SpatialFiberPrinting): the base's holes run along y, the head's along z. Their load is a pull of
+    the head away from the base (`pull`); `side` pushes the head out of the plane of the T.
+
+    Parameters
+    ----------
+    element_size : float, mm
+        The mesh is stored for the default; any other takes a quarter of an hour.
+    order : 1, 2 or "auto"
+        Linear or quadratic cells, or what their estimated error calls for.
+    force : float, N
+        Of the pull; a quarter of it sideways.
+    """
+    mesh = mesh_of_case("t_bracket", element_size, order, t_bracket_mesh)
+    return Case(
+        name="t_bracket",
+        title="T-bracket 130 x 60 x 30 mm, bolts through base and head at right angles",
+        problem=Problem(
+            mesh,
+            printed_pla(),
+            (Support("base_left"), Support("base_right")),
+            {
+                "pull": (Bearing("pull", (0.0, force, 0.0)),),
+                "side": (Force("pull", (0.0, 0.0, 0.25 * force)),),
+            },
+            order=order,
+        ),
+        build=(0.0, 1.0, 0.0),
+        slicing=Spatial(),
+        source="shape recovered from the layers published by Fang et al., Additive Manufacturing "
+        "79 (2024) 103903; load in the direction of theirs",
+    )

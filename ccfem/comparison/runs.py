@@ -1,0 +1,117 @@
+"""One strategy of a comparison: its paths, and what became of them."""
+
+import dataclasses
+from collections.abc import Mapping
+from dataclasses import dataclass, field
+from typing import Any
+
+from ccfem.arrays import freeze
+from ccfem.evaluation import Evaluation
+from ccfem.export.print_plan import PrintPlan
+from ccfem.planning.strategy import Strategy
+from ccfem.toolpaths import Toolpaths
+from ccfem.virtual_testing.strength import FirstFailure
+from ccfem.virtual_testing.virtual_test import Bracket
+
+__all__ = ["Run", "Tested"]
+
+
+@dataclass(frozen=True)
+class Tested:
+    """The virtual test of one strategy's paths.
+
+    Attributes
+    ----------
+    bracket : Bracket
+        Fibres that carry tension only, and bonded fibres.
+    failure : FirstFailure or None
+        Of the tension-only test; None where a strength is unknown.
+    note : str
+        Why there is no first-failure load; else empty.
+    matrix_before : float, MPa
+        Peak of the averaged von Mises stress without fibre; NaN where it cannot be judged.
+    """
+
+    bracket: Bracket
+    failure: FirstFailure | None
+    note: str = ""
+    matrix_before: float = float("nan")
+
+
+@dataclass(frozen=True)
+class Run:
+    """What one strategy did on the part.
+
+    Attributes
+    ----------
+    name : str
+    strategy : Strategy
+        With the parameters that it ran with.
+    toolpaths : Toolpaths
+    evaluation : Evaluation or None
+        None where the strategy failed.
+    tested : Tested or None
+        None where the strategy failed, and where no virtual test was asked for or possible.
+    print_plan : PrintPlan or None
+        The whole part, matrix and fibre; None where the strategy failed, and where no print was
+        asked for or possible.
+    printed_volume : float
+        Volume of matrix and fibre of the print plan over that of the part; NaN without a plan.
+    length_per_layer : float, mm
+    note : str
+        Why the length is not the wanted one, or that it sets it; else empty.
+    failure : str
+        One line that says why there are no paths, or why they could not be evaluated; else empty.
+    untested : str
+        Why there is no virtual test though one was asked for; else empty.
+    why_not : str
+        What keeps the paths from being printed as they are: lengths, turns, room, what lies outside
+        or on nothing; empty where they can be.
+    unprinted : str
+        Why the part cannot be printed as planned though a print was asked for; else empty.
+    seconds : mapping of stage to float
+    """
+
+    name: str
+    strategy: Strategy
+    toolpaths: Toolpaths
+    evaluation: Evaluation | None
+    tested: Tested | None = None
+    print_plan: PrintPlan | None = None
+    printed_volume: float = float("nan")
+    length_per_layer: float = 0.0
+    note: str = ""
+    failure: str = ""
+    untested: str = ""
+    why_not: str = ""
+    unprinted: str = ""
+    seconds: Mapping[str, float] = field(default_factory=dict)
+
+    def __post_init__(self) -> None:
+        freeze(self, seconds=dict)
+
+    def __repr__(self) -> str:
+        if self.failure:
+            return f"Run {self.name!r}: failed: {self.failure}"
+        laid = f"{len(self.toolpaths)} paths, {self.length_per_layer:.0f} mm of fibre a layer"
+        if self.tested is None:
+            return f"Run {self.name!r}: {laid}"
+        return f"Run {self.name!r}: {laid}, {self.tested.bracket.tension.ratio:.2f} times as stiff"
+
+    @property
+    def printable(self) -> bool:
+        """Whether there are paths, within all limits of the machine."""
+        return self.evaluation is not None and not self.why_not
+
+    @property
+    def empty_layers(self) -> int:
+        """Layers on which the run lays no fibre."""
+        if self.evaluation is None:
+            return 0
+        return int((self.evaluation.values["paths"][:-1] == 0.0).sum())
+
+    @property
+    def parameters(self) -> dict[str, Any]:
+        """Parameters of the strategy by name."""
+        fields = dataclasses.fields(self.strategy)  # type: ignore[arg-type]
+        return {f.name: getattr(self.strategy, f.name) for f in fields}

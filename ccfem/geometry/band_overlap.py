@@ -1,0 +1,169 @@
+"""How bands of strands overlap, across each of their parts."""
+
+import numpy as np
+from numba import njit
+
+from ccfem.arrays import FloatArray, IntArray
+from ccfem.geometry.buckets import Buckets
+
+__all__ = ["share_room"]
+
+_SLIVER = 1e-9
+"""Share of a width below which an overlap is rounding."""
+
+
+def share_room(
+    grid: Buckets,
+    middle: FloatArray,
+    direction: FloatArray,
+    normal: FloatArray,
+    ahead: FloatArray,
+    often: FloatArray,
+    fold: FloatArray,
+    layer: IntArray,
+    line: IntArray,
+    apart: IntArray,
+    ring: IntArray,
+    width: float,
+    height: float,
+    same_cosine: float,
+) -> FloatArray:
+    """Share the room across each part among the bands that cover it.
+
+    A neighbouring part covers a rectangle about its middle, as long as it goes ahead and one width
+    wide. Parts of one line count from `apart` parts of it on: nearer ones are its own band.
+
+    Parameters
+    ----------
+    grid : Buckets
+        The middles.
+    middle, direction, normal : (s, 3) arrays
+        Of each part, mm and unit vectors.
+    ahead : (s,) array, mm
+        How far each part goes ahead.
+    often, fold : (s,) arrays
+        Strands that lie along the band of the part, and strands that its length amounts to.
+    layer, line : (s,) int arrays
+        Of each part; parts come in the order of the lines.
+    apart : (s,) int array
+        Parts of the same line that are the part's own band, to either side.
+    ring : (s,) int array
+        Number of parts of the line where it is closed, else 0.
+    width, height : float, mm
+        Of a strand. Strands of different layers share room where they lie nearer than `height`.
+    same_cosine : float
+        Cosine of the largest angle between strands of the same direction.
+
+    Returns
+    -------
+    (s, 4) array
+        alone, every, fill and stack of `ccfem.geometry.beads.Beads`.
+    """
+    return np.asarray(
+        _shared(grid.origin, grid.cell, grid.shape, grid.starts, grid.items, middle, direction,
+                normal, np.cross(normal, direction), ahead, often, fold, layer, line, apart, ring,
+                width, height, same_cosine)
+    )  # fmt: skip
+
+
+@njit(cache=True)
+def _shared(  # type: ignore[no-untyped-def]
+    origin, cell, shape, starts, items, middle, direction, normal, across, ahead, often, fold,
+    layer, line, apart, ring, width, height, same_cosine
+):  # fmt: skip  # pragma: no cover
+    half = 0.5 * width
+    # The furthest that a middle may lie whose rectangle meets the line across a part.
+    reach = (half + np.sqrt(half * half + 0.25 * ahead.max() ** 2)) * (1.0 + 1e-9)
+    found = np.ones((len(middle), 4))
+    room = 64
+    at, change = np.empty(room), np.empty((room, 4))
+    low, high = np.empty(3, np.int64), np.empty(3, np.int64)
+    current = np.empty(4)
+    for k in range(len(middle)):
+        for i in range(3):
+            low[i] = max(int(np.floor((middle[k, i] - reach - origin[i]) / cell)), 0)
+            high[i] = min(int(np.floor((middle[k, i] + reach - origin[i]) / cell)), shape[i] - 1)
+        events = 0
+        for a in range(low[0], high[0] + 1):
+            for b in range(low[1], high[1] + 1):
+                for c in range(low[2], high[2] + 1):
+                    box = (a * shape[1] + b) * shape[2] + c
+                    for item in range(starts[box], starts[box + 1]):
+                        other = items[item]
+                        square = 0.0
+                        for i in range(3):
+                            square += (middle[k, i] - middle[other, i]) ** 2
+                        if square > reach * reach:
+                            continue
+                        if line[other] == line[k]:
+                            between = abs(other - k)
+                            if ring[k]:
+                                between = min(between, ring[k] - between)
+                            if between < apart[k]:
+                                continue
+                        # Of the middle of k along, across and above the other part, and how these
+                        # and the direction change with the way across k.
+                        along, side, above, turned, shift, cosine = 0.0, 0.0, 0.0, 0.0, 0.0, 0.0
+                        for i in range(3):
+                            d = middle[k, i] - middle[other, i]
+                            along += d * direction[other, i]
+                            side += d * across[other, i]
+                            above += d * normal[k, i]
+                            turned += across[k, i] * direction[other, i]
+                            shift += across[k, i] * across[other, i]
+                            cosine += direction[k, i] * direction[other, i]
+                        if layer[other] != layer[k] and abs(above) >= height:
+                            continue
+                        begin, end = _clipped(-half, half, along, turned, 0.5 * ahead[other])
+                        begin, end = _clipped(begin, end, side, shift, half)
+                        if end - begin <= _SLIVER * width:
+                            continue
+                        if events + 2 > room:
+                            at, change = _longer(at, change, room)
+                            room *= 2
+                        beside = often[other] if abs(cosine) >= same_cosine else 0.0
+                        for sign, place in ((1.0, begin), (-1.0, end)):
+                            at[events] = place
+                            change[events, 0] = sign * beside
+                            change[events, 1] = sign * often[other]
+                            change[events, 2] = sign * fold[other]
+                            change[events, 3] = sign
+                            events += 1
+        if events == 0:
+            found[k, 0], found[k, 1], found[k, 2] = 1.0 / often[k], 1.0 / often[k], fold[k]
+            continue
+        order = np.argsort(at[:events])
+        current[0], current[1], current[2], current[3] = often[k], often[k], fold[k], 1.0
+        alone, every, fill, most, here = 0.0, 0.0, 0.0, 1.0, -half
+        for e in range(events + 1):
+            following = half if e == events else min(at[order[e]], half)
+            step = following - here
+            if step > 0.0:
+                alone += step / current[0]
+                every += step / current[1]
+                fill += step * current[2]
+                if step > _SLIVER * width:
+                    most = max(most, current[3])
+                here = following
+            if e < events:
+                for i in range(4):
+                    current[i] += change[order[e], i]
+        found[k, 0], found[k, 1] = alone / width, every / width
+        found[k, 2], found[k, 3] = fill / width, most
+    return found
+
+
+@njit(cache=True)
+def _clipped(low, high, value, slope, limit):  # type: ignore[no-untyped-def]  # pragma: no cover
+    """Part of [low, high] where ``|value + x slope| < limit``; empty where low is not below."""
+    if abs(slope) < 1e-12:
+        return (low, high) if -limit <= value < limit else (1.0, 0.0)
+    a, b = (-limit - value) / slope, (limit - value) / slope
+    return max(low, min(a, b)), min(high, max(a, b))
+
+
+@njit(cache=True)
+def _longer(at, change, room):  # type: ignore[no-untyped-def]  # pragma: no cover
+    longer, wider = np.empty(2 * room), np.empty((2 * room, 4))
+    longer[:room], wider[:room] = at, change
+    return longer, wider

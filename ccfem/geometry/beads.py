@@ -1,0 +1,180 @@
+"""Beads: the bands that strands of a layer fill, and how much of each finds room.
+
+A strand fills a band one width W wide. Where bands of strands of about the same direction overlap,
+the room is shared equally: at a point of the layer that m of them cover, each has the m-th part.
+Across a strand, with x from -W/2 to W/2,
+
+    room = 1/W integral of 1 / m(x) dx,
+
+so that what strands find in all, times the width, is the area of the union of their bands: N copies
+of a line find the room of one, two strands W/2 apart that of one and a half, strands W apart or
+more all of it. Strands that cross at a larger angle lie over each other and take no room from each
+other; they do in `Beads.every`.
+
+A strand that goes back and forth along its own line takes its room as often as it passes, so that
+no more fibre finds room in a band than fits. A strand that winds has the direction of its chord
+over a width.
+"""
+
+from typing import NamedTuple
+
+import numpy as np
+
+from ccfem.arrays import BoolArray, FloatArray, IntArray
+from ccfem.geometry.band_overlap import share_room
+from ccfem.geometry.buckets import bucket
+from ccfem.geometry.polylines import lengths, resample, starts_segment
+
+__all__ = ["SAME_DIRECTION", "Beads", "beads"]
+
+SAME_DIRECTION = np.radians(30.0)
+"""Largest angle, radians, between strands that lie beside each other and do not cross."""
+
+_PARTS = 4
+"""Parts a width long that a strand is cut into."""
+
+_AHEAD = _PARTS // 2
+"""Parts to either side over which the direction of a strand is taken."""
+
+
+class Beads(NamedTuple):
+    """Parts of strands, and what of their bands finds room.
+
+    Attributes
+    ----------
+    line : (s,) int array
+        Polyline of each part; parts come in the order of the polylines.
+    first : (K + 1,) int array
+        First part of each polyline, with their number at the end.
+    length : (s,) array, mm
+        Of the strand; the parts of a line are equal, about a quarter of a width.
+    middle, direction, normal : (s, 3) arrays, mm and 1
+        Middle of the part, unit vector along its chord over a width, unit normal of the layer.
+    alone : (s,) array in (0, 1]
+        Share of the strand that finds room among strands of its direction: ``1 - alone`` lies on
+        other fibre.
+    every : (s,) array in (0, 1]
+        As `alone`, among strands of any direction.
+    fill : (s,) array
+        Mean number of strands, of any direction, over the width of the band; a strand that winds
+        counts by its length.
+    stack : (s,) array
+        Largest number of strands, of any direction, above each other in the band.
+    """
+
+    line: IntArray
+    first: IntArray
+    length: FloatArray
+    middle: FloatArray
+    direction: FloatArray
+    normal: FloatArray
+    alone: FloatArray
+    every: FloatArray
+    fill: FloatArray
+    stack: FloatArray
+
+
+def beads(
+    points: FloatArray,
+    normals: FloatArray,
+    offsets: IntArray,
+    closed: BoolArray,
+    layer: IntArray,
+    width: float,
+    height: float,
+) -> Beads:
+    """Cut strands into parts and find the room of each.
+
+    Parameters
+    ----------
+    points, normals : (P, 3) arrays, mm and 1
+        Of the strands and of the layers that they lie on.
+    offsets : (K + 1,) int array
+        Polylines of at least one point; those of no length have one part of no length.
+    closed : (K,) bool array
+    layer : (K,) int array
+    width, height : float, mm
+        Of a strand. Strands on different layers share room where the layers are nearer than
+        `height`.
+    """
+    nodes, ends = resample(points, offsets, width / _PARTS)
+    count = np.diff(ends) - 1
+    start = np.flatnonzero(starts_segment(ends))
+    line = np.repeat(np.arange(len(count)), count)
+    first = np.concatenate([[0], np.cumsum(count)])
+    if not len(line):
+        none, triples = np.zeros(0), np.zeros((0, 3))
+        return Beads(line, first, none, triples, triples, triples, none, none, none, none)
+    length = (lengths(points, offsets) / count)[line]
+    middle = 0.5 * (nodes[start] + nodes[start + 1])
+    normal = _normals(points, normals, offsets, middle, line)
+    own = nodes[start + 1] - nodes[start]
+    direction, straight, often = _chords(own, length, line, first, closed)
+    direction = direction - np.einsum("ij,ij->i", direction, normal)[:, None] * normal
+    direction /= np.maximum(np.linalg.norm(direction, axis=1), 1e-300)[:, None]
+    found = share_room(
+        bucket(middle, middle, 1.05 * width),
+        middle,
+        direction,
+        normal,
+        length * straight,
+        often,
+        1.0 / straight,
+        layer[line],
+        line,
+        np.ceil(width * (1.0 - 1e-9) / np.maximum(length, 1e-300)).clip(1, 1e9).astype(np.int64),
+        np.where(closed, count, 0)[line],
+        width,
+        height,
+        float(np.cos(SAME_DIRECTION)),
+    )
+    return Beads(line, first, length, middle, direction, normal, *found.T)
+
+
+def _normals(
+    points: FloatArray,
+    normals: FloatArray,
+    offsets: IntArray,
+    middle: FloatArray,
+    line: IntArray,
+) -> FloatArray:
+    """Find the normal of the layer at each part: that of the nearest point of its polyline."""
+    first = normals[offsets[:-1]]
+    path = np.repeat(np.arange(len(offsets) - 1), np.diff(offsets))
+    bent = np.zeros(len(offsets) - 1, dtype=bool)
+    bent[path[(np.abs(normals - first[path]) > 1e-12).any(axis=1)]] = True
+    found = first[line]
+    for k in np.flatnonzero(bent).tolist():
+        at = slice(offsets[k], offsets[k + 1])
+        mine = np.flatnonzero(line == k)
+        apart = np.linalg.norm(middle[mine][:, None] - points[at][None], axis=2)
+        found[mine] = normals[at][apart.argmin(axis=1)]
+    return found
+
+
+def _chords(
+    own: FloatArray, length: FloatArray, line: IntArray, first: IntArray, closed: BoolArray
+) -> tuple[FloatArray, FloatArray, FloatArray]:
+    """Direction (s, 3), share of the length that goes ahead (s,), and passes of the chord (s,)."""
+    index = np.arange(len(line))
+    low, high = first[line], first[line + 1]
+    ring = closed[line] & (high - low > 2 * _AHEAD)
+    window = []
+    for shift in range(-_AHEAD, _AHEAD + 1):
+        at = np.where(ring, low + (index + shift - low) % (high - low), index + shift)
+        window.append((np.clip(at, low, high - 1), (at >= low) & (at < high)))
+    chord = np.sum([own[at] * there[:, None] for at, there in window], axis=0)
+    whole = np.sum([length[at] * there for at, there in window], axis=0)
+    size = np.linalg.norm(chord, axis=1)
+    # A strand that turns back on itself within a width has the direction of its own piece.
+    lost = size < 1e-3 * whole
+    direction = np.where(lost[:, None], own, chord)
+    direction = direction / np.maximum(np.linalg.norm(direction, axis=1), 1e-300)[:, None]
+    passed = np.zeros(len(line))
+    for at, there in window:
+        piece = np.maximum(np.linalg.norm(own[at], axis=1), 1e-300)
+        along = np.abs(np.einsum("ij,ij->i", own[at], direction)) / piece
+        passed += along * length[at] * there
+    straight = np.clip(size / np.maximum(whole, 1e-300), 1e-3, 1.0)
+    often = np.clip(passed / np.maximum(size, 1e-300), 1.0, 1e3)
+    return direction, straight, np.where(lost, 1e3, often)

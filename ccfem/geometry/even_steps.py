@@ -1,0 +1,100 @@
+"""Polylines in steps of about one length: curves without needless points, straight lines cut."""
+
+import numpy as np
+from numba import njit
+
+from ccfem.arrays import BoolArray, FloatArray, IntArray
+from ccfem.geometry.polylines import merge_repeated, subdivide
+
+__all__ = ["even_steps"]
+
+_REPEATED = 1e-6
+"""Points nearer than this share of the step to the one before them are the same point."""
+
+
+def even_steps(
+    points: FloatArray, offsets: IntArray, fixed: BoolArray, step: float, tolerance: float
+) -> tuple[FloatArray, IntArray, IntArray, FloatArray]:
+    """Polylines in steps no longer than a length, and shorter only where they bend.
+
+    Points that lie within the tolerance of the chord between their neighbours are left out (Douglas
+    and Peucker 1973), and what is longer than the step is cut into equal parts. Corners and ends
+    stay where they are; no step has no length.
+
+    Parameters
+    ----------
+    points : (P, d) array, mm
+        In two or three dimensions.
+    offsets : (K + 1,) int array
+        As in CSR; each polyline has at least one point.
+    fixed : (P,) bool array
+        Points that stay in any case.
+    step : float, mm
+        Longest step, > 0.
+    tolerance : float, mm
+        Largest distance of a point that is left out from the new polyline.
+
+    Returns
+    -------
+    points, offsets
+        The new polylines; one of no length keeps one point.
+    source : (P', 2) int array
+        Indices of the given points between which each new point lies.
+    share : (P',) array
+        Of the way from the first to the second of them, in [0, 1).
+
+    Notes
+    -----
+    D. H. Douglas, T. K. Peucker, Algorithms for the reduction of the number of points required to
+    represent a digitized line or its caricature, Cartographica 10 (1973) 112.
+    """
+    merged, ends, first = merge_repeated(points, offsets, _REPEATED * step)
+    last = np.append(first[1:], len(points)) - 1  # of the points that are one
+    held = np.bitwise_or.reduceat(fixed, first) if len(first) else fixed
+    # A polyline ends at its last point, whichever points near to it are one.
+    long = np.diff(ends) > 1
+    merged[ends[1:][long] - 1] = points[offsets[1:][long] - 1]
+    keep = _needed(np.ascontiguousarray(merged), ends, held, tolerance)
+    chosen, kept = merged[keep], np.concatenate([[0], np.cumsum(keep)])[ends]
+    found, parts, segment = subdivide(chosen, kept, step)
+    source = last[keep]
+    following = np.minimum(segment + 1, len(source) - 1)
+    size = np.linalg.norm(chosen[following] - chosen[segment], axis=1)
+    way = np.linalg.norm(found - chosen[segment], axis=1)
+    share = np.divide(way, size, out=np.zeros(len(way)), where=way > 0.0)
+    return found, parts, np.stack([source[segment], source[following]], axis=1), share
+
+
+@njit(cache=True, nogil=True)
+def _needed(points, offsets, fixed, tolerance):  # type: ignore[no-untyped-def]
+    """Mask (P,) of the points that Douglas and Peucker keep, the fixed ones among them."""
+    keep = fixed.copy()
+    stack = np.empty((len(points) + 1, 2), np.int64)
+    for k in range(len(offsets) - 1):
+        first, end = offsets[k], offsets[k + 1] - 1
+        if end < first:
+            continue
+        keep[first] = keep[end] = True
+        count, begin = 0, first
+        for p in range(first + 1, end + 1):
+            if keep[p]:
+                stack[count, 0], stack[count, 1] = begin, p
+                count, begin = count + 1, p
+        while count > 0:
+            count -= 1
+            a, b = stack[count]
+            farthest, most = -1, tolerance * tolerance
+            chord = points[b] - points[a]
+            size = (chord**2).sum()
+            for p in range(a + 1, b):
+                way = points[p] - points[a]
+                share = min(max((way * chord).sum() / size, 0.0), 1.0) if size > 0.0 else 0.0
+                off = ((way - share * chord) ** 2).sum()
+                if off > most:
+                    farthest, most = p, off
+            if farthest >= 0:
+                keep[farthest] = True
+                stack[count, 0], stack[count, 1] = a, farthest
+                stack[count + 1, 0], stack[count + 1, 1] = farthest, b
+                count += 2
+    return keep

@@ -1,0 +1,205 @@
+"""Joints of a part: where bolts sit, found from the patches that are held or loaded."""
+
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
+import scipy.sparse as sp
+from scipy.sparse.csgraph import connected_components
+
+from ccfem.arrays import FloatArray, IntArray, read_only
+from ccfem.elasticity.part_stress import PartStress
+from ccfem.errors import InputError
+from ccfem.mesh.tet_mesh import TetMesh
+
+__all__ = ["Joint", "joining_pairs", "joint_of", "joints_of"]
+
+_FLAT = 0.02
+"""Share of a patch's squared normals that may lie along the axis of a cylinder."""
+_ROUND = 0.05
+"""Largest distance of a cylinder's nodes from it, in its radius."""
+
+
+@dataclass(frozen=True)
+class Joint:
+    """A joint: the wall of a bolt hole, or any other patch, and the part round it.
+
+    Attributes
+    ----------
+    name : str
+        Of the patch that it was found from.
+    wall : (k,) int array
+        Nodes on the wall: of a cylinder all round, also where the patch covers a part of it.
+    region : (r,) int array
+        Cells all of whose nodes are within so many edges of the wall.
+    direction : (3,) array or None
+        Unit vector that the layers are to be square to: the axis of the hole, or what the user
+        says. Its sign means nothing. None where the wall is no cylinder and nobody says.
+    radius : float, mm
+        Of the hole; 0 where the patch is no cylinder.
+    """
+
+    name: str
+    wall: IntArray
+    region: IntArray
+    direction: FloatArray | None
+    radius: float = 0.0
+
+    def __post_init__(self) -> None:
+        object.__setattr__(self, "wall", read_only(self.wall, np.int64))
+        object.__setattr__(self, "region", read_only(self.region, np.int64))
+        if self.direction is not None:
+            object.__setattr__(self, "direction", read_only(self.direction))
+
+
+def joint_of(
+    mesh: TetMesh, name: str, rings: int = 4, direction: FloatArray | None = None
+) -> Joint:
+    """Find the joint that a patch belongs to.
+
+    Parameters
+    ----------
+    mesh : TetMesh
+    name : str
+        Patch: the wall of a hole, or a part of it; or any other patch.
+    rings : int, default 4
+        How many edges round the wall its region reaches (Fang et al. 2024: 4).
+    direction : (3,) array, optional
+        Instead of the axis of the hole.
+
+    Raises
+    ------
+    InputError
+        When the mesh has no such patch, or it is empty.
+    """
+    facets = mesh.patch(name)
+    if not len(facets):
+        raise InputError(f"joint '{name}' is an empty patch: name one that has facets")
+    wall, radius, axis = np.unique(facets), 0.0, None
+    if (found := _cylinder(mesh, facets)) is not None:
+        axis, centre, radius = found
+        wall = _whole_wall(mesh, wall, axis, centre, radius)
+    if direction is not None:
+        axis = np.asarray(direction, dtype=np.float64)
+        if axis.shape != (3,) or not 0.0 < np.linalg.norm(axis) < np.inf:
+            raise InputError(f"direction of joint '{name}' must be three numbers; got {direction}")
+        axis = axis / np.linalg.norm(axis)
+    return Joint(name, wall, _cells_within(mesh, wall, rings), axis, radius)
+
+
+def joints_of(
+    stress: PartStress,
+    names: Sequence[str] = (),
+    rings: int = 4,
+    directions: Mapping[str, Any] | None = None,
+) -> tuple[Joint, ...]:
+    """Find the joints of a part in the order of their names, each hole once.
+
+    Parameters
+    ----------
+    stress : PartStress
+    names : sequence of str, default ()
+        Patches; by default all that are held or loaded.
+    rings : int, default 4
+    directions : mapping of patch to three numbers, optional
+        As in `joint_of`.
+
+    Raises
+    ------
+    InputError
+    """
+    names, directions = tuple(names) or stress.held_or_loaded, directions or {}
+    for name in directions:
+        if name not in names:
+            raise InputError(
+                f"directions names '{name}', which is no joint; the joints are: "
+                f"{', '.join(names) or 'none'}"
+            )
+    found: list[Joint] = []
+    for name in names:
+        joint = joint_of(stress.mesh, name, rings, directions.get(name))
+        shared = [len(np.intersect1d(joint.wall, other.wall)) for other in found]
+        if not any(
+            both > 0.5 * min(len(joint.wall), len(other.wall))
+            for both, other in zip(shared, found, strict=True)
+        ):
+            found.append(joint)
+    return tuple(found)
+
+
+def joining_pairs(joints: Sequence[Joint], stress: PartStress) -> list[tuple[int, int]] | None:
+    """Pairs of a held joint and a loaded one; None where these are not told apart."""
+    loaded = [set(np.unique(stress.mesh.patch(name)).tolist()) for name in stress.loaded]
+    if not loaded:
+        return None
+    is_loaded = [any(len(nodes & set(j.wall.tolist())) for nodes in loaded) for j in joints]
+    pairs = [
+        (i, k)
+        for i, one in enumerate(is_loaded)
+        for k, other in enumerate(is_loaded)
+        if one and not other
+    ]
+    return pairs or None
+
+
+def _cylinder(mesh: TetMesh, facets: IntArray) -> tuple[FloatArray, FloatArray, float] | None:
+    """Axis, a point on it and radius of the cylinder that facets lie on; None where there is none.
+
+    The axis is square to all normals; the circle is fitted to the nodes (Kasa, IEEE Trans. Instrum.
+    Meas. 25 (1976) 8-14).
+    """
+    area, normal = mesh.facet_areas(facets)
+    spread = np.einsum("f,fi,fj->ij", area / area.sum(), normal, normal)
+    values, vectors = np.linalg.eigh(spread)
+    # Of a plane the two smallest vanish.
+    if values[0] > _FLAT or values[1] < 2.0 * _FLAT:
+        return None
+    frame = vectors[:, ::-1].T
+    nodes = np.unique(facets)
+    x, y = (mesh.points[nodes] @ frame[:2].T).T
+    system = np.stack([x, y, np.ones_like(x)], axis=1)
+    a, b, c = np.linalg.lstsq(system, x**2 + y**2, rcond=None)[0]
+    centre = 0.5 * np.array([a, b])
+    square = c + centre @ centre
+    if not square > 0.0:
+        return None
+    radius = float(np.sqrt(square))
+    if np.abs(np.hypot(x - centre[0], y - centre[1]) - radius).max() > _ROUND * radius:
+        return None
+    axis = frame[2] * np.sign(frame[2][np.argmax(np.abs(frame[2]))])
+    return axis, centre @ frame[:2], radius
+
+
+def _whole_wall(
+    mesh: TetMesh, nodes: IntArray, axis: FloatArray, centre: FloatArray, radius: float
+) -> IntArray:
+    """Nodes of the boundary on the cylinder that hang together with the nodes given."""
+    facets = mesh.boundary
+    away = mesh.points - centre
+    away = away - (away @ axis)[:, None] * axis
+    near = np.abs(np.linalg.norm(away, axis=1) - radius) <= _ROUND * radius
+    facets = facets[near[facets].all(axis=1)]
+    _, normal = mesh.facet_areas(facets)
+    facets = facets[np.abs(normal @ axis) < 0.3]
+    n = len(mesh.points)
+    ones = np.ones(2 * len(facets))
+    rows, columns = np.repeat(facets[:, 0], 2), facets[:, 1:].ravel()
+    graph = sp.coo_array((ones, (rows, columns)), shape=(n, n))
+    _, piece = connected_components(graph, directed=False)
+    on_wall = np.zeros(n, dtype=bool)
+    on_wall[facets] = True
+    on_wall &= np.isin(piece, piece[nodes])
+    on_wall[nodes] = True
+    return np.flatnonzero(on_wall)
+
+
+def _cells_within(mesh: TetMesh, nodes: IntArray, rings: int) -> IntArray:
+    """Cells all of whose corners are within so many edges of the nodes."""
+    corners, n = mesh.corners, len(mesh.points)
+    reached = np.zeros(n, dtype=bool)
+    reached[nodes] = True
+    for _ in range(rings):
+        touched = corners[reached[corners].any(axis=1)]
+        reached[touched] = True
+    return np.flatnonzero(reached[corners].all(axis=1))

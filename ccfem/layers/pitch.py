@@ -1,0 +1,36 @@
+"""The distance between layers: none lies nearer to the next than its fibre is high."""
+
+from collections.abc import Sequence
+
+import numpy as np
+
+from ccfem.errors import InputError
+from ccfem.layers.layer import Layer
+from ccfem.machine.machine import Machine
+
+__all__ = ["check_pitch"]
+
+_ROUNDING = 1e-6
+"""Layers nearer than the height of a strand by no more than this share of it keep it."""
+
+
+def check_pitch(layers: Sequence[Layer], machine: Machine) -> None:
+    """Refuse flat layers that lie nearer to each other than a strand of the machine is high.
+
+    Curved layers are not checked: their distance changes from place to place.
+
+    Raises
+    ------
+    InputError
+    """
+    heights = np.sort([layer.flat.height for layer in layers if layer.flat is not None])
+    if len(heights) < 2:
+        return
+    gaps, least = np.diff(heights), machine.strand_height
+    k = int(gaps.argmin())
+    if gaps[k] < least * (1.0 - _ROUNDING):
+        raise InputError(
+            f"layers must lie at least {least:.4g} mm apart, the height of a strand "
+            f"(machine.fibre_height, or filament_area over fibre_width); got {gaps[k]:.4g} mm "
+            f"between those at {heights[k]:.6g} and {heights[k + 1]:.6g} mm: use fewer layers"
+        )

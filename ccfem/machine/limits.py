@@ -1,0 +1,50 @@
+"""What a printer tolerates: beyond one of these limits, paths cannot be printed as they are."""
+
+from dataclasses import dataclass
+
+from ccfem.checks import check_fields
+
+__all__ = ["Limits"]
+
+
+@dataclass(frozen=True)
+class Limits:
+    """Largest shares and lengths of what goes wrong that still prints.
+
+    In a part file ``[machine.limits]``. All are our choice, above what was measured on the paths
+    that Chen et al. 2021 printed (Loop, "ours" and "zigzag"), and below what makes a design of
+    something that is none.
+
+    Attributes
+    ----------
+    short : float
+        Share of the fibre's length in paths shorter than `Machine.minimum_length`.
+    tight : float
+        Share of the fibre's length that turns tighter than `Machine.minimum_radius`.
+    on_fibre : float
+        Share of the fibre that lies on other fibre of its direction.
+    across_fibre : float
+        Share of the fibre that lies on fibre that it crosses.
+    outside : float
+        Share of the strands, by their width, that lies outside the part.
+    free_span : float, mm
+        Longest run of fibre that has nothing to lie on.
+    links : float
+        Share of the fibre's length that is marked as links.
+    fraction : float
+        Fibre volume fraction that 99 % of the fibre's length stays at or below.
+    """
+
+    short: float = 0.01
+    tight: float = 0.15
+    on_fibre: float = 0.1
+    across_fibre: float = 0.15
+    outside: float = 0.1
+    free_span: float = 8.0
+    links: float = 0.3
+    fraction: float = 1.0
+
+    def __post_init__(self) -> None:
+        shares = ("short", "tight", "on_fibre", "across_fibre", "outside", "links", "fraction")
+        check_fields(self, *shares, at_least=0.0)
+        check_fields(self, "free_span", at_least=0.0, unit="mm")

@@ -1,0 +1,53 @@
+"""Paths as they leave the planner: in steps of about a fibre width, none without length."""
+
+from dataclasses import replace
+
+import numpy as np
+
+from ccfem.geometry.even_steps import even_steps
+from ccfem.toolpaths import Toolpaths
+
+__all__ = ["in_even_steps"]
+
+_OFF = 0.005
+"""Largest deviation from the path as planned, in steps."""
+_SHORTEST = 1e-6
+"""Paths no longer than that, in steps, are none."""
+
+
+def in_even_steps(toolpaths: Toolpaths, step: float) -> Toolpaths:
+    """Paths in steps no longer than a length, mm, and shorter only where they bend.
+
+    Parameters
+    ----------
+    toolpaths : Toolpaths
+    step : float, mm
+        Machines that get more points than they need stutter; indices that are sampled at points
+        want no fewer.
+
+    Returns
+    -------
+    Toolpaths
+        The same paths to 0.005 steps, corners and ends exactly; paths of no length are left out.
+    """
+    paths = toolpaths.select(toolpaths.lengths > _SHORTEST * step)
+    if not len(paths):
+        return paths
+    # Where a link begins or ends, its first step is the first that is one, or is none any more.
+    inner = np.ones(len(paths.points), dtype=bool)
+    inner[paths.offsets[:-1]] = False
+    changes = inner & (paths.link != np.roll(paths.link, 1))
+    points, offsets, source, share = even_steps(
+        paths.points, paths.offsets, changes, step, _OFF * step
+    )
+    before, after = (paths.normals[source[:, k]] for k in (0, 1))
+    normals = before + share[:, None] * (after - before)
+    link = paths.link[source[:, 0]]
+    link[offsets[1:] - 1] = False
+    return replace(
+        paths,
+        points=points,
+        normals=normals / np.linalg.norm(normals, axis=1)[:, None],
+        offsets=offsets,
+        link=link,
+    )

@@ -1,0 +1,221 @@
+"""Strands that wind round all joints of a layer, flat or curved: Fang et al. 2024, section 2.4.
+
+G. Fang, T. Zhang, Y. Huang, Z. Zhang, K. Masania, C. C. L. Wang, Exceptional mechanical performance
+by spatial printing with continuous fiber: Curved slicing, toolpath generation and physical
+verification, Additive Manufacturing 79 (2024) 103903. The layer is cut along curves that join its
+holes, and strands are level lines of a field from there to the outer border. The values on both
+borders are ours: with the paper's gradients the field rises and falls, and lines close on islands.
+"""
+
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
+from typing import Any, ClassVar, Literal
+
+import numpy as np
+
+from ccfem.arrays import FloatArray
+from ccfem.checks import check_choices, check_fields
+from ccfem.elasticity.part_stress import PartStress
+from ccfem.errors import InputError
+from ccfem.geometry.isocontours import isocontours
+from ccfem.geometry.nearest_on_triangles import nearest_on_triangles
+from ccfem.guidance.joints import joining_pairs, joints_of
+from ccfem.layers.layer import Layer
+from ccfem.layers.layer_stress import LayerStress
+from ccfem.machine.machine import Machine
+from ccfem.planning.infill import SPACING, check_fill, long_enough
+from ccfem.planning.strategy import Amount, LayerPlanner
+from ccfem.principal_lines.critical import Keep, critical_region
+from ccfem.principal_lines.strongest import strongest_stress
+from ccfem.toolpaths import Toolpaths
+from ccfem.winding.annulus import annulus_field
+from ccfem.winding.bends import limit_bends
+from ccfem.winding.even_levels import evened, steep
+from ccfem.winding.piece import Piece, pieces_with_joints
+
+__all__ = ["Winding"]
+
+_CLIP = 5.0
+"""Largest weight of a triangle, in means over its layer."""
+_REACH = 4.0
+"""How far along the curves the lift of the holes reaches, mm."""
+_KEPT = 0.6
+"""Share of the length of the strands that keeps the spacing asked for."""
+
+
+@dataclass(frozen=True)
+class Winding:
+    """Closed strands round all joints of a piece of a layer, along the strongest stress.
+
+    Attributes
+    ----------
+    joints : tuple of str, default ()
+        Patches where bolts sit; by default all that are held or loaded. Only those whose border
+        on a layer is a hole count there.
+    spacing : float, default 2.2
+        Distance of strands in fibre widths that 60 % of their length keep.
+    isotropy : float, default 0.003
+        The smaller, the closer strands follow the stress; the larger, the more even they lie.
+    smoothness : float, mm^2, default 0.3
+        Against bends of the strands.
+    weight : {"lines", "stress", "even"}
+        What strands follow most: cells that many stress lines cross that join the joints (the
+        paper), cells of large stress, or all alike.
+    lines : {"joining", "touching", "all"}
+        Stress lines that count, as in the slicer `spatial`.
+    cut : bool, default True
+        Cut the layer along the curves that join its holes, so that strands wind round all of them.
+    repulsion : float, mm^2, default 4
+        How much these curves keep off the outer border.
+    lift, rise : float, default 0.1 and 0.4
+        Where the field starts: below 0 on the holes, so that the innermost strand keeps off them;
+        and below 0 where curves are further from the border than the holes are, so that strands do
+        not spread there.
+    sharpest : float, 1/mm, default 0.125
+        Strands that bend more sharply are smoothed there.
+    joined : int, optional
+        Joints that a piece must hold to get fibre; by default as many as any piece of the part
+        does, which are the layers that the paper lays fibre on.
+    minimum_length : float, mm, optional
+        Shorter strands are dropped; by default the shortest that the machine can cut.
+    """
+
+    joints: tuple[str, ...] = ()
+    spacing: float = 2.2
+    isotropy: float = 0.003
+    smoothness: float = 0.3
+    weight: Literal["lines", "stress", "even"] = "lines"
+    lines: Keep = "joining"
+    cut: bool = True
+    repulsion: float = 4.0
+    lift: float = 0.1
+    rise: float = 0.4
+    sharpest: float = 0.125
+    joined: int | None = None
+    minimum_length: float | None = None
+
+    amount: ClassVar[Amount] = SPACING
+    variants: ClassVar[Mapping[str, Mapping[str, Any]]] = {
+        "stress": {"weight": "stress"},
+        "even": {"weight": "even", "isotropy": 1.0, "smoothness": 0.0},
+        "uncut": {"cut": False},
+    }
+
+    def __post_init__(self) -> None:
+        check_fill(self)
+        check_choices(self)
+        check_fields(self, "isotropy", "sharpest", above=0.0)
+        if self.joined is not None:
+            check_fields(self, "joined", at_least=1)
+        check_fields(self, "smoothness", "repulsion", "lift", "rise", at_least=0.0)
+
+    def for_part(
+        self, stress: PartStress, layers: Sequence[Layer], machine: Machine
+    ) -> LayerPlanner:
+        """Find the joints of the layers, and what weighs in each cell.
+
+        Raises
+        ------
+        InputError
+            When no layer has a hole at a joint, or no stress line joins the joints.
+        """
+        names = self.joints or stress.held_or_loaded
+        for name in self.joints:
+            stress.mesh.patch(name)
+        pieces = (piece for layer in layers for piece in pieces_with_joints(layer, names))
+        most = max((len(piece.loops) for piece in pieces), default=0)
+        if not most:
+            raise InputError(
+                "winding needs joints: patches that lie round a hole of a layer; none of "
+                f"{', '.join(names) or 'no patch'} does: name others (joints), or choose another "
+                "strategy or slicing"
+            )
+        strongest = strongest_stress(stress.stress)
+        if self.weight == "lines":
+            joints = joints_of(stress, names)
+            weight = critical_region(
+                stress.mesh,
+                strongest.direction,
+                [joint.wall for joint in joints],
+                joining_pairs(joints, stress),
+                self.lines if len(joints) > 1 or self.lines != "joining" else "touching",
+            ).weight
+        elif self.weight == "stress":
+            weight = np.abs(strongest.value)
+        else:
+            weight = np.ones(len(stress.mesh.cells))
+        least = most if self.joined is None else self.joined
+        return _Planner(self, tuple(names), strongest.direction, weight, least)
+
+
+@dataclass(frozen=True)
+class _Planner:
+    """The strategy once it has seen the whole part.
+
+    Attributes
+    ----------
+    strategy : Winding
+    names : tuple of str
+        Patches of the joints.
+    direction : (m, 3) array
+        Of the strongest stress of each cell.
+    weight : (m,) array
+    least : int
+        Joints that a piece must hold.
+    """
+
+    strategy: Winding
+    names: tuple[str, ...]
+    direction: FloatArray
+    weight: FloatArray
+    least: int
+
+    def __call__(self, layer: Layer, stress: LayerStress, machine: Machine) -> Toolpaths:
+        lines: list[FloatArray] = []
+        for piece in pieces_with_joints(layer, self.names):
+            if len(piece.loops) >= self.least:
+                lines += self.strands(piece, self.strategy.spacing * machine.fibre_width)
+        normals = []
+        for k, line in enumerate(lines):
+            found = nearest_on_triangles(layer.points, layer.triangles, line)
+            corners = layer.point_normals[layer.triangles[found.triangle]]
+            normal = np.einsum("qk,qkd->qd", found.weights, corners)
+            size = np.linalg.norm(normal, axis=1, keepdims=True)
+            normals.append(normal / np.maximum(size, 1e-300))
+            lines[k] = found.points
+        paths = Toolpaths.in_space(lines, normals, layer)
+        return long_enough(paths, self.strategy.minimum_length, machine)
+
+    def strands(self, piece: Piece, spacing: float) -> list[FloatArray]:
+        """Level lines of the field on a piece of a layer, near its surface."""
+        s = self.strategy
+        piece = piece.joined(s.repulsion) if s.cut else piece
+        surface = piece.surface
+        inner, low = piece.inner_values(s.lift, s.rise, _REACH)
+        outer = np.setdiff1d(np.concatenate(piece.outer), inner)
+        fixed = np.concatenate([inner, outer])
+        values = np.concatenate([low, np.ones(len(outer))])
+        tension = self.tension(piece.layer)[piece.mesh.source]
+        field = annulus_field(surface, tension, s.isotropy, s.smoothness, fixed, values)
+        field = evened(surface, field)
+        count = max(1, round(1.0 / (steep(surface, field, _KEPT) * spacing)))
+        found = isocontours(
+            piece.mesh.points, piece.mesh.triangles, field, 0.5 / count, 1.0 / count
+        )
+        return [
+            limit_bends(line, s.sharpest)
+            for line, level in zip(found.lines(), found.level, strict=True)
+            if 0 <= level < count and np.array_equal(line[0], line[-1])
+        ]
+
+    def tension(self, layer: Layer) -> FloatArray:
+        """``w t t^T`` on each triangle, (t, 3, 3), of mean trace 1: t is the stress along it."""
+        direction, normal = self.direction[layer.cell], layer.normals
+        along = direction - np.einsum("td,td->t", direction, normal)[:, None] * normal
+        weight = self.weight[layer.cell]
+        size = weight * np.einsum("td,td->t", along, along)
+        mean = float(np.average(size, weights=layer.areas))
+        if not mean > 0.0:
+            return np.zeros((len(layer.triangles), 3, 3))
+        limited = np.minimum(1.0, _CLIP * mean / np.maximum(size, 1e-300)) / mean
+        return np.asarray(np.einsum("t,ti,tj->tij", weight * limited, along, along))

@@ -1,0 +1,1 @@
+"""Fibre that winds round the joints of a layer: what the strategy `winding` stands on."""

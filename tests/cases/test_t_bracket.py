@@ -1,0 +1,54 @@
+"""The T-bracket: its size is that of the published layers, its holes are round."""
+
+import numpy as np
+import pytest
+
+from ccfem.cases.t_bracket import HOLES, t_bracket, t_bracket_front, t_bracket_top
+from ccfem.layers.slicing import Planar, Spatial
+
+
+@pytest.fixture(scope="module")
+def case():
+    return t_bracket(order=1)
+
+
+def test_volume_and_extent_are_those_of_the_authors_part(case):
+    """78,746 mm^3 and 130 x 60 x 30 mm: measured on their layers (specification, addendum A)."""
+    mesh = case.problem.mesh
+    assert mesh.volumes.sum() == pytest.approx(78746.0, rel=0.005)
+    np.testing.assert_allclose(np.ptp(mesh.points, axis=0), [130.0, 60.0, 30.0], atol=0.2)
+    assert mesh.volumes.min() > 0.0
+    assert mesh.aspects.max() < 20.0
+
+
+def test_walls_of_the_holes_have_the_area_of_cylinders(case):
+    mesh = case.problem.mesh
+    expected = {"base_left": 15.0, "base_right": 15.0, "head": 30.0, "pull": 15.0}
+    assert set(HOLES) == set(mesh.patches)
+    for name, height in expected.items():
+        area, normal = mesh.facet_areas(mesh.patch(name))
+        assert area.sum() == pytest.approx(2.0 * np.pi * 5.5 * height, rel=0.015)
+        axis = 2 if name in ("head", "pull") else 1
+        assert np.average(np.abs(normal[:, axis]), weights=area) < 0.05
+
+
+def test_outlines_meet_in_the_part():
+    front, top = t_bracket_front(), t_bracket_top()
+    assert front.is_valid
+    assert top.is_valid
+    assert len(front.interiors) == 1
+    assert len(top.interiors) == 2
+    assert front.bounds[1::2] == pytest.approx((5.0, 65.0))
+    assert top.area == pytest.approx(100.0 * 30.0 + np.pi * (15.0**2 - 2 * 5.5**2), rel=0.005)
+
+
+def test_it_is_layered_along_the_stress_unless_asked_otherwise(case):
+    assert isinstance(case.slicing, Spatial)
+    assert case.problem.held_or_loaded == ("base_left", "base_right", "pull")
+
+
+@pytest.mark.parametrize(("axis", "direction"), [("x", 0), ("y", 1), ("z", 2)])
+def test_planar_layers_lie_across_the_axis_asked_for(case, axis, direction):
+    for layer in Planar(count=3, axis=axis).cut(case.problem.mesh, (1.0, 1.0, 0.0)):
+        assert np.ptp(layer.points[:, direction]) < 1e-9
+        assert layer.flat.frame[2][direction] == 1.0

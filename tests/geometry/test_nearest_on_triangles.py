@@ -1,0 +1,35 @@
+"""Nearest points of a surface, against a plane, and against sampled triangles."""
+
+import numpy as np
+from scipy.spatial import Delaunay, cKDTree
+
+from ccfem.geometry.nearest_on_triangles import nearest_on_triangles
+
+
+def wavy(count=400):
+    rng = np.random.default_rng(5)
+    plane = rng.uniform(0.0, 20.0, (count, 2))
+    triangles = Delaunay(plane).simplices
+    return np.column_stack([plane, np.sin(0.4 * plane[:, 0])]), triangles
+
+
+def test_over_a_square_the_nearest_point_is_the_foot_or_on_the_border():
+    points = np.array([[0.0, 0, 0], [4, 0, 0], [4, 4, 0], [0, 4, 0]])
+    triangles = np.array([[0, 1, 2], [0, 2, 3]])
+    queries = np.array([[1.0, 3.0, 2.0], [-3.0, 2.0, 4.0], [7.0, 8.0, 0.0], [2.0, 2.0, -1.0]])
+    found = nearest_on_triangles(points, triangles, queries)
+    np.testing.assert_allclose(found.distance, [2.0, 5.0, 5.0, 1.0])
+    np.testing.assert_allclose(found.points, [[1, 3, 0], [0, 2, 0], [4, 4, 0], [2, 2, 0]])
+
+
+def test_no_sample_of_the_surface_is_nearer():
+    points, triangles = wavy()
+    queries = np.random.default_rng(6).uniform([2, 2, -2], [18, 18, 3], (200, 3))
+    found = nearest_on_triangles(points, triangles, queries)
+    share = np.random.default_rng(7).dirichlet(np.ones(3), 300)
+    samples = np.einsum("sk,tkd->tsd", share, points[triangles]).reshape(-1, 3)
+    sampled, _ = cKDTree(samples).query(queries)
+    assert (found.distance <= sampled + 1e-9).all()
+    assert (sampled - found.distance).max() < 0.35
+    np.testing.assert_allclose(found.weights.sum(axis=1), 1.0)
+    assert found.weights.min() >= 0.0

@@ -1,0 +1,205 @@
+"""The law of the judge: paths that nobody can print do not win, and are named for what they are.
+
+Each cheat takes the rings of `concentric`, or the lines of `zigzag`, and lays more of them than
+fits, or where nothing holds them.
+"""
+
+from collections.abc import Callable
+from dataclasses import dataclass
+
+import numpy as np
+import pytest
+
+import ccfem
+from ccfem.errors import InputError
+from ccfem.geometry.polylines import lengths, sample_at
+from ccfem.layers import Layer
+from ccfem.strategies import create
+from ccfem.toolpaths import Toolpaths
+
+HONEST = ("isocurve", "concentric", "zigzag")
+
+Lines = list[np.ndarray]
+
+
+def rings(layer, stress, machine, spacing=3.0) -> Lines:
+    paths = create("concentric", {"spacing": spacing})(layer, stress, machine)
+    return [layer.plane.project(path) for path in paths]
+
+
+def along(line, arc):
+    """Points of a line at arc lengths."""
+    points, _ = sample_at(line, np.array([0, len(line)]), np.zeros(len(arc), dtype=int), arc)
+    return points
+
+
+def waves(line, height, period):
+    length = lengths(line, np.array([0, len(line)]))[0]
+    arc = np.linspace(0.0, length, int(12 * length / period))
+    points = along(line, arc)
+    tangent = np.gradient(points, axis=0)
+    tangent /= np.linalg.norm(tangent, axis=1)[:, None]
+    normal = np.stack([-tangent[:, 1], tangent[:, 0]], axis=1)
+    return points + height * np.sin(2.0 * np.pi * arc / period)[:, None] * normal
+
+
+def back_and_forth(line):
+    length = lengths(line, np.array([0, len(line)]))[0]
+    steps = np.cumsum(np.tile([1.0, -0.8], int(length / 0.2)))
+    return along(line, np.clip(np.append(0.0, steps), 0.0, length))
+
+
+def pieces(line):
+    length = lengths(line, np.array([0, len(line)]))[0]
+    starts = np.arange(0.0, length - 1.0, 1.2)
+    return [along(line, np.array([s, s + 0.5, s + 1.0])) for s in starts]
+
+
+def copies(layer, stress, machine):
+    return rings(layer, stress, machine) * 8
+
+
+def bundles(layer, stress, machine):
+    lines = rings(layer, stress, machine, 6.0)
+    return [line + 0.15 * k for line in lines for k in range(-3, 4)]
+
+
+def short_pieces(layer, stress, machine):
+    return [piece for line in rings(layer, stress, machine, 1.0) for piece in pieces(line)]
+
+
+def micro_waves(layer, stress, machine):
+    return [waves(line, 0.4, 1.2) for line in rings(layer, stress, machine, 2.0)]
+
+
+def meanders(layer, stress, machine):
+    return [waves(line, 1.2, 1.0) for line in rings(layer, stress, machine)]
+
+
+def there_and_back(layer, stress, machine):
+    return [back_and_forth(line) for line in rings(layer, stress, machine)]
+
+
+def one_layer(layer, stress, machine):
+    return rings(layer, stress, machine, 1.0) * 4 if layer.index == 1 else []
+
+
+def winding(layer, stress, machine):
+    """Each ring as one strand of ten turns."""
+    turns = [[line] + [line[1:]] * 9 for line in rings(layer, stress, machine)]
+    return [np.concatenate(line) for line in turns]
+
+
+def on_the_border(layer, stress, machine):
+    """Strands of which half lies outside the part."""
+    parts = [layer.plane.polygon] if layer.plane.polygon.geom_type == "Polygon" else []
+    loops = [ring for part in parts for ring in (part.exterior, *part.interiors)]
+    return [np.asarray(ring.coords) for ring in loops]
+
+
+def fan(layer, stress, machine):
+    """Two dense families of strands that cross at 31 degrees."""
+    hatches = [{"angle": a, "turn": 0.0, "spacing": 1.0} for a in (15.5, -15.5)]
+    paths = [create("zigzag", each)(layer, stress, machine) for each in hatches]
+    return [layer.plane.project(path) for each in paths for path in each]
+
+
+def outside(layer, stress, machine):
+    """Rings in the part, and their ends drawn far beyond it."""
+    far = layer.plane.points.max(axis=0) + 60.0
+    return [np.concatenate([line[:-1], [far]]) for line in rings(layer, stress, machine)]
+
+
+def as_links(layer, stress, machine):
+    return rings(layer, stress, machine, 1.0)
+
+
+CHEATS: dict[str, tuple[Callable[..., Lines], str]] = {
+    "copies": (copies, "lies on other fibre"),
+    "bundles": (bundles, "lies on other fibre"),
+    "short_pieces": (short_pieces, "in paths shorter than"),
+    "micro_waves": (micro_waves, "turns tighter than"),
+    "meanders": (meanders, "turns tighter than"),
+    "there_and_back": (there_and_back, "lies on other fibre"),
+    "one_layer": (one_layer, "lies on other fibre"),
+    "winding": (winding, "lies on other fibre"),
+    "on_the_border": (on_the_border, "lies outside the part"),
+    "fan": (fan, "lies across other fibre"),
+    "outside": (outside, "hangs free over"),
+    "as_links": (as_links, "is marked as links"),
+}
+
+
+@dataclass(frozen=True)
+class Cheat:
+    """A strategy that lays what a function draws."""
+
+    name: str
+
+    def __call__(self, layer: Layer, stress, machine) -> Toolpaths:
+        draw, _ = CHEATS[self.name]
+        lines = [np.asarray(line, dtype=float) for line in draw(layer, stress, machine)]
+        link = None
+        if draw is as_links:
+            link = [np.append(np.ones(len(line) - 1, dtype=bool), False) for line in lines]
+        return Toolpaths.from_plane(lines, layer, link=link)
+
+
+@pytest.fixture(scope="module", params=["bar", "loop"])
+def judged(request):
+    case = ccfem.read(request.param, element_size={"bar": 4.0, "loop": 6.0}[request.param])
+    strategies = {name: create(name, case.parameters.get(name, {})) for name in HONEST}
+    strategies |= {name: Cheat(name) for name in CHEATS}
+    return ccfem.compare(case, strategies, layers=3, natural=True)
+
+
+def test_no_cheat_ranks_above_an_honest_strategy(judged):
+    order = [run.name for run in judged.ranking]
+    assert set(order[: len(HONEST)]) == set(HONEST)
+    assert judged.ranking[0].printable
+    assert not any(name in judged.verdict.split(" Not printable")[0] for name in CHEATS)
+    table = judged.frame.set_index("strategy")
+    assert table.loc[list(HONEST), "printable"].all()
+    assert not table.loc[list(CHEATS), "printable"].any()
+
+
+@pytest.mark.parametrize("name", CHEATS)
+def test_each_cheat_is_named_for_what_it_is(judged, name):
+    (run,) = [run for run in judged.runs if run.name == name]
+    _, said = CHEATS[name]
+    assert said in run.why_not, run.why_not
+    assert any(name in line.split(":")[0] and said in line for line in judged.remarks)
+
+
+def test_piling_up_gains_nothing(judged):
+    """Without the verdict too: copies and turns of a winding are worth the ring that they hide."""
+    case, stress = judged.case, judged.stress
+    plain = ccfem.plan(create("concentric", {"spacing": 3.0}), judged.layers, stress, case.machine)
+    once = ccfem.virtual_test(plain, stress, machine=case.machine, span=()).ratio
+    runs = {run.name: run for run in judged.runs}
+    for name, rel in (("copies", 1e-3), ("winding", 0.01)):
+        found = runs[name].tested.bracket.tension.ratio
+        assert found == pytest.approx(once, rel=rel), name
+    as_laid = ccfem.virtual_test(runs["copies"].toolpaths, stress, span=()).ratio
+    assert as_laid > 1.5 * once
+    # Nothing that is piled up beats strands that fill the layer side by side.
+    dense = ccfem.plan(create("concentric", {"spacing": 1.0}), judged.layers, stress, case.machine)
+    full = ccfem.virtual_test(dense, stress, machine=case.machine, span=()).ratio
+    piled = ("copies", "bundles", "winding", "one_layer", "there_and_back", "micro_waves")
+    # Bundles reach out of a round part, and are not tested there.
+    tested = [runs[name].tested for name in piled if runs[name].tested is not None]
+    assert len(tested) >= 5
+    assert all(each.bracket.tension.ratio < full for each in tested)
+
+
+@pytest.mark.parametrize(
+    ("layers", "said"),
+    [
+        ([1.0, 1.0, 1.0], "each layer height must be given once"),
+        ([1.0, 1.01, 1.02], "layers must lie at least 0.1075 mm apart"),
+        (500, "layers must lie at least 0.1075 mm apart"),
+    ],
+)
+def test_layers_on_each_other_are_refused(layers, said):
+    with pytest.raises(InputError, match=said):
+        ccfem.compare(ccfem.read("bar", element_size=5.0), ["zigzag"], layers=layers)
