@@ -24,7 +24,7 @@ _SWEEPS = (40, 20)
 """Sweeps that move strands smoothly, and then almost point by point."""
 _PASSES = (12, 2)
 """Averages over neighbours that the moves of such a sweep get."""
-_AIM = 1.002
+_AIM = 1.02
 """Distance that strands are pushed to, in widths."""
 _OVER = 1.2
 """Share of what is missing by which two strands together are pushed apart in one sweep."""
@@ -89,9 +89,19 @@ def _without_steep_ends(line: FloatArray, room: Region, reach: float) -> FloatAr
         return line
     along = along_line(line)
     first, last = within[0], within[-1]
-    start = first if along[first] <= reach else 0
-    end = last if along[-1] - along[last] <= reach else len(line) - 1
-    return line[start : end + 1]
+    kept = line
+    if last + 1 < len(line) and along[-1] - along[last] <= reach:
+        kept = np.concatenate([line[: last + 1], _exit(line[last], line[last + 1], room)])
+    if first > 0 and along[first] <= reach:
+        kept = np.concatenate([_exit(line[first], line[first - 1], room), kept[first:]])
+    return kept
+
+
+def _exit(inside: FloatArray, outside: FloatArray, room: Region) -> FloatArray:
+    """Place (1, 2) where a step leaves the room."""
+    way = shapely.intersection(shapely.linestrings([inside, outside]), room)
+    ends = shapely.get_coordinates(way)
+    return ends[[np.argmax(((ends - inside) ** 2).sum(axis=1))]]
 
 
 def _inside(points: FloatArray, room: Region, edge: shapely.Geometry) -> FloatArray:

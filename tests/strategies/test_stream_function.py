@@ -54,7 +54,7 @@ def bent_plate():
 
 def test_uniform_tension_gets_straight_fibre_and_the_stiffness_of_parallel_bars(pulled_bar):
     stress, layers = pulled_bar
-    paths = plan(StreamFunction(coverage=0.4, evaluations=10), layers, stress, MACHINE)
+    paths = plan(StreamFunction(coverage=0.4, evaluations=10, inset=0.0), layers, stress, MACHINE)
     steps = np.concatenate([np.diff(path, axis=0) for path in paths])
     middle = np.concatenate([0.5 * (path[1:, 0] + path[:-1, 0]) for path in paths])
     inner = steps[np.abs(middle - 30.0) < 25.0]  # without the links at the ends
@@ -67,10 +67,12 @@ def test_uniform_tension_gets_straight_fibre_and_the_stiffness_of_parallel_bars(
 
 def test_stiffer_than_isocurves_of_the_same_length(bent_beam):
     stress, layers = bent_beam
-    paths = plan(StreamFunction(coverage=0.3), layers, stress, MACHINE)
+    paths = plan(StreamFunction(coverage=0.3, inset=0.0), layers, stress, MACHINE)
     length = paths.lengths.sum()
     assert 0.97 * 0.3 < coverage_of(paths, layers) <= 0.3 * (1.0 + 1e-9)
-    isocurves = prune(plan(Isocurve(cap=60.0), layers, stress, MACHINE), stress, length, MACHINE)
+    isocurves = prune(
+        plan(Isocurve(cap=60.0, inset=0.0), layers, stress, MACHINE), stress, length, MACHINE
+    )
     ratios = [virtual_test(p, stress, span=()).ratio for p in (isocurves, paths)]
     assert isocurves.lengths.sum() > 0.9 * length
     assert ratios[1] > 1.02 * ratios[0]
