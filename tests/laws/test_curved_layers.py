@@ -140,6 +140,8 @@ def test_curved_slicing_turns_with_the_part():
         assert two.areas.sum() == pytest.approx(one.areas.sum(), rel=5e-3, abs=0.5)
         back = two.points @ turn()
         away = nearest_on_triangles(one.points, one.triangles, back).distance
-        # Cleaning collapses edges in an order that rounding decides: a fifth of an edge's sag.
-        assert np.quantile(away, 0.99) < 0.1
+        # Rounding decides in which order cleaning collapses edges, and on which side of a corner a
+        # stress line passes: within a fifth of the thickness, and mostly far less.
+        assert np.quantile(away, 0.5) < 0.05
+        assert np.quantile(away, 0.99) < 0.2
         assert np.einsum("d,td,t->", build, one.normals, one.areas) > 0.0
