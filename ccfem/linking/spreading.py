@@ -13,7 +13,7 @@ import shapely
 from numba import njit
 
 from ccfem.arrays import FloatArray
-from ccfem.geometry.polylines import is_closed, pack, resample
+from ccfem.geometry.polylines import along_line, is_closed, pack, resample
 from ccfem.geometry.shapes import Region
 
 __all__ = ["spread"]
@@ -30,6 +30,8 @@ _OVER = 1.2
 """Share of what is missing by which two strands together are pushed apart in one sweep."""
 _OWN = 5.0
 """Arc length, in widths, from which on a strand keeps a distance from itself."""
+_STEEP = 3.0
+"""Length, in widths, of ends outside the room that are cut off: others lie along its border."""
 _SNAP = 1e-4
 """Depth, in widths, to which what is outside is put inside."""
 
@@ -53,15 +55,24 @@ def spread(
     Returns
     -------
     list of (m_i, 2) arrays, mm
-        In steps of about 0.7 widths, in the order of those given. Where strands are too many for
+        In steps of about 0.7 widths, in the order of those given, without ends that lead straight
+        out of the region. Where strands are too many for
         the room they stay too near to each other.
     """
     if not lines or shapely.is_empty(room):
         return []
-    closed = np.array([is_closed(line) for line in lines])
-    points, offsets = resample(*pack(lines), _STEP * width)
     room = shapely.buffer(room, -_SNAP * width)
     shapely.prepare(room)
+    points, offsets = resample(*pack(lines), _STEP * width)
+    cut = [
+        _without_steep_ends(points[a:b], room, _STEEP * width)
+        for a, b in itertools.pairwise(offsets)
+    ]
+    cut = [line for line in cut if len(line) > 1]
+    if not cut:
+        return []
+    closed = np.array([is_closed(line) for line in cut])
+    points, offsets = pack(cut)
     edge = shapely.boundary(room)
     points = _inside(points, room, edge)
     for sweeps, passes in zip(_SWEEPS, _PASSES, strict=True):
@@ -69,6 +80,18 @@ def spread(
             points = points + _pushes(points, offsets, closed, width, passes)
             points = _inside(_eased(points, offsets, closed, radius), room, edge)
     return [points[a:b] for a, b in itertools.pairwise(offsets)]
+
+
+def _without_steep_ends(line: FloatArray, room: Region, reach: float) -> FloatArray:
+    """Open line without ends that leave the room for good within a reach, mm."""
+    within = np.flatnonzero(shapely.contains_xy(room, line))
+    if is_closed(line) or not len(within):
+        return line
+    along = along_line(line)
+    first, last = within[0], within[-1]
+    start = first if along[first] <= reach else 0
+    end = last if along[-1] - along[last] <= reach else len(line) - 1
+    return line[start : end + 1]
 
 
 def _inside(points: FloatArray, room: Region, edge: shapely.Geometry) -> FloatArray:

@@ -32,8 +32,7 @@ from ccfem.fields.layer_tension import layer_tension
 from ccfem.geometry.isocontours import isocontours, triangle_edges
 from ccfem.layers.layer import Layer
 from ccfem.layers.layer_stress import LayerStress, stress_on
-from ccfem.linking.clearance import trim_to_clearance
-from ccfem.linking.finishing import keep_off_border, linked_paths, smooth_strands
+from ccfem.linking.finishing import linked_paths, smooth_strands
 from ccfem.machine.machine import Machine
 from ccfem.planning.strategy import Amount, LayerPlanner
 from ccfem.toolpaths import Toolpaths
@@ -217,37 +216,30 @@ class _Extraction:
     def plan(self, layers: Sequence[Layer], group: IntArray) -> Toolpaths:
         """Paths of all layers, as long as the coverage says."""
         s, minimum = self.strategy, self.machine.minimum_length
-        length = s.coverage * sum(float(layer.areas.sum()) for layer in layers)
-        length /= self.machine.fibre_width
         fields = [self.field(k) for k in range(self.problem.groups)]
-        own = [fields[k] for k in group]
-        shifts = self.shifts(layers, own, length)
-        toolpaths = Toolpaths.concatenate(
-            self.layer_paths(*one) for one in zip(layers, own, shifts, strict=True)
-        )
-        if not len(toolpaths):
-            return toolpaths
-        return shorten(toolpaths, self.profiles(toolpaths), length, minimum, _CUT_COST)
-
-    def shifts(
-        self, layers: Sequence[Layer], fields: Sequence[FloatArray], length: float
-    ) -> FloatArray:
-        """Position of the levels on each layer, (n,), whose strands are worth most as they are."""
-        s, minimum = self.strategy, self.machine.minimum_length
         shifts = (np.arange(s.phases) + 0.5) / s.phases
         variants = [
-            self.raw_paths(layer, field, shift)
-            for layer, field in zip(layers, fields, strict=True)
+            self.layer_paths(layer, fields[k], shift)
+            for layer, k in zip(layers, group, strict=True)
             for shift in shifts
         ]
-        along = self.profiles(Toolpaths.concatenate(variants))
+        toolpaths = Toolpaths.concatenate(variants)
+        if not len(toolpaths):
+            return toolpaths
+        along = self.profiles(toolpaths)
+        length = s.coverage * sum(float(layer.areas.sum()) for layer in layers)
+        length /= self.machine.fibre_width
         variant = np.repeat(np.arange(len(variants)), [len(paths) for paths in variants])
         middle = [one for one in along if variant[one.path] % s.phases == s.phases // 2]
         price = least_price(middle, length, minimum, _CUT_COST) if middle else 0.0
         gain = np.zeros(len(variants))
         for one in along:
             gain[variant[one.path]] += one.kept(price, minimum, _CUT_COST)[1]
-        return np.asarray(shifts[np.argmax(gain.reshape(-1, s.phases), axis=1)])
+        best = np.argmax(gain.reshape(-1, s.phases), axis=1) + s.phases * np.arange(len(layers))
+        wanted = np.isin(variant, best)
+        number = np.cumsum(wanted) - 1
+        kept = [replace(one, path=int(number[one.path])) for one in along if wanted[one.path]]
+        return shorten(toolpaths.select(wanted), kept, length, minimum, _CUT_COST)
 
     def field(self, group: int) -> FloatArray:
         """Coefficients of one field, with the sign that does not depend on the axes."""
@@ -259,28 +251,15 @@ class _Extraction:
         values = values - weight @ values / weight.sum()
         return field if weight @ values**3 >= 0.0 else -field
 
-    def levels(self, layer: Layer, field: FloatArray, shift: float) -> list[FloatArray]:
-        """Find unit levels of a field on a layer, the first `shift` above the lowest value."""
-        points, triangles = _refined(layer)
-        values = self.problem.grid.values(points) @ field
-        return isocontours(points, triangles, values, float(values.min()) + shift, 1.0).lines()
-
-    def raw_paths(self, layer: Layer, field: FloatArray, shift: float) -> Toolpaths:
-        """Levels that are long enough, kept off the border and apart by cutting alone."""
-        width, section = self.problem.width, layer.plane.polygon
-        lines = keep_off_border(
-            self.levels(layer, field, shift), section, self.strategy.inset * width
-        )
-        lines = trim_to_clearance(lines, _CLEARANCE * width, self.machine.minimum_length)
-        return Toolpaths.from_plane(lines, layer)
-
     def layer_paths(self, layer: Layer, field: FloatArray, shift: float) -> Toolpaths:
-        """Paths of one layer along its levels."""
+        """Paths of one layer along unit levels, the first one `shift` above the lowest value."""
         width, section = self.problem.width, layer.plane.polygon
         inset, radius = self.strategy.inset * width, self.machine.minimum_radius
-        lines = self.levels(layer, field, shift)
+        points, triangles = _refined(layer)
+        values = self.problem.grid.values(points) @ field
+        curves = isocontours(points, triangles, values, float(values.min()) + shift, 1.0)
         lines = smooth_strands(
-            lines, section, inset, width, radius, _CLEARANCE * width, _SHORTEST * width
+            curves.lines(), section, inset, width, radius, _CLEARANCE * width, _SHORTEST * width
         )
         limit, least = self.strategy.link_limit * width, self.machine.minimum_length
         lines = linked_paths(lines, section, width, limit, least, radius=radius, inset=inset)
