@@ -103,7 +103,7 @@ def compared(name: str, order: int, rounds: int, folder: Path) -> None:
     print(f"{name}, order {order}: {len(mesh.cells):,} cells, {3 * len(mesh.points):,} unknowns")
     runs = {"ccfem": lambda: ours(mesh)}
     if has_dolfinx():
-        if len(mesh.points) < 250_000:
+        if len(mesh.points) < 60_000:
             runs["dolfinx, MUMPS"] = lambda: dolfinx(linear, order, "mumps", folder)
         runs["dolfinx, GAMG"] = lambda: dolfinx(linear, order, "gamg", folder)
     if shutil.which("ccx") and len(mesh.points) < 50_000:

@@ -27,11 +27,7 @@ DENSEST = 0.95
 _OVER_BUDGET = 20.0
 _STEEP = 100.0
 _ROUGH = 1e-3
-_END = 5e-4
-"""Weights of the penalties."""
-
-_ROUNDED = 0.1
-"""Rise of the field from point to point, in strands, below which its size is rounded off."""
+"""Weights of the three penalties."""
 
 _SMALLEST = 0.02
 """Strands a width below which |g| is rounded off, so that it has a gradient everywhere."""
@@ -77,9 +73,8 @@ class StreamProblem:
     """What a stream function is designed for.
 
     Minimised is ``-log(stiffness) + 20 max(length / budget - 1, 0)^2 + 100 mean(max(|g| - 0.95,
-    0)^2) + 0.001 mean((Laplacian s)^2) + 0.0005 ends``, g in strands a width, means over the part
-    and over the coefficients, and the number of strands that end on the border of a layer, mean
-    over the fields: short pieces are lost there.
+    0)^2) + 0.001 mean((Laplacian s)^2)``, g in strands a width, means over the part and over the
+    coefficients.
 
     Attributes
     ----------
@@ -98,8 +93,6 @@ class StreamProblem:
         EA of a strand.
     budget : float, mm
         Length of fibre in the whole part.
-    border : sparse matrix (b, c), optional
-        From coefficients to the rise of the field, in strands, from point to point of the borders.
     """
 
     part: SmearedPart
@@ -110,7 +103,6 @@ class StreamProblem:
     width: float
     axial_stiffness: float
     budget: float
-    border: Any = None
 
     @cached_property
     def groups(self) -> int:
@@ -181,11 +173,6 @@ class StreamProblem:
         x, y = self._transposed
         gradient = x @ (dx + push * gx / size) + y @ (dy + push * gy / size)
         gradient += 2.0 * _ROUGH / len(field) * (self.laplacian @ bend)
-        if self.border is not None:
-            rise = self.border @ field
-            rounded = np.sqrt(rise * rise + _ROUNDED**2)
-            value += _END / self.groups * float((rounded - _ROUNDED).sum())
-            gradient += _END / self.groups * (self.border.T @ (rise / rounded))
         return Objective(float(value), gradient, ratio, length, solution)
 
     def _solve(

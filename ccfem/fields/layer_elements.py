@@ -78,9 +78,9 @@ class Surface:
 
     @cached_property
     def areas(self) -> FloatArray:
-        """Area of each triangle, (t,), mm^2."""
+        """Area of each triangle, (t,), mm^2; 0 where a chart has turned it over."""
         own = np.arange(3 * len(self.triangles)).reshape(-1, 3)
-        return read_only(signed_areas(self._corners.reshape(-1, 2), own))
+        return read_only(np.maximum(signed_areas(self._corners.reshape(-1, 2), own), 0.0))
 
     @cached_property
     def gradients(self) -> FloatArray:

@@ -10,7 +10,7 @@ from ccfem.arrays import FloatArray, IntArray
 
 __all__ = ["Nearest", "nearest_on_triangles"]
 
-_CANDIDATES = 24
+_CANDIDATES = 40
 """Triangles whose middles are nearest are looked at."""
 
 
@@ -36,7 +36,7 @@ class Nearest:
 def nearest_on_triangles(points: FloatArray, triangles: IntArray, queries: FloatArray) -> Nearest:
     """Find the points of a surface that are nearest to given ones.
 
-    Of the 24 triangles whose middles are nearest the nearest one counts, which is exact as long as
+    Of the 40 triangles whose middles are nearest the nearest one counts, which is exact as long as
     no triangle is many times larger than those round it.
 
     Parameters

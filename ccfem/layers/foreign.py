@@ -6,8 +6,8 @@ from ccfem.arrays import FloatArray, IntArray
 from ccfem.errors import InputError
 from ccfem.geometry.locate import locate
 from ccfem.geometry.nearest_on_triangles import nearest_on_triangles
-from ccfem.layers.cutting import border_edges, chain
 from ccfem.layers.layer import Layer
+from ccfem.layers.level_cut import border_edges, chain
 from ccfem.mesh.tet_mesh import TetMesh
 
 __all__ = ["layer_from_surface"]

@@ -12,8 +12,8 @@ from scipy.sparse.csgraph import connected_components
 from ccfem.arrays import BoolArray, FloatArray, IntArray
 from ccfem.elasticity.assembly import cell_gradients
 from ccfem.layers.cleaning import clean
-from ccfem.layers.cutting import border_edges, chain, cut_at_zero
 from ccfem.layers.layer import Layer
+from ccfem.layers.level_cut import border_edges, chain, cut_at_zero
 from ccfem.mesh.tet_mesh import TetMesh
 
 __all__ = ["LevelSurfaces", "level_surfaces"]

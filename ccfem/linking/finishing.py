@@ -8,60 +8,9 @@ import shapely
 from ccfem.arrays import FloatArray
 from ccfem.geometry.polylines import along_line, is_closed, line_length, points_along
 from ccfem.geometry.shapes import Region, open_lines
-from ccfem.linking.clearance import trim_to_clearance
 from ccfem.linking.joining import link_ends
-from ccfem.linking.spreading import spread
-from ccfem.linking.tight_turns import without_tight_turns
 
-__all__ = ["close_short_ring", "keep_off_border", "linked_paths", "smooth_strands"]
-
-_TOO_NEAR = 0.7
-"""Distance, in widths, below which strands are not pushed apart: the shorter one is cut."""
-_CHORDS = 0.03
-"""By how much, in widths, the chords of curves along the border may pass inside its distance."""
-
-
-def smooth_strands(
-    lines: Sequence[FloatArray],
-    section: Region,
-    inset: float,
-    width: float,
-    radius: float,
-    clearance: float,
-    shortest: float,
-    first: Sequence[FloatArray] = (),
-) -> list[FloatArray]:
-    """Strands that keep their distance, that to the border, and a radius.
-
-    They are pushed apart and off the border as far as that goes, and cut where it does not.
-
-    Parameters
-    ----------
-    lines : sequence of (n_i, 2) arrays, mm
-        Strands about a width apart, with steps of not much more than half a width.
-    section : Polygon or MultiPolygon
-    inset : float, mm
-        Least distance from its border.
-    width, radius : float, mm
-        Of a strand, and the tightest turn that it follows.
-    clearance : float, mm
-        Least distance of strands.
-    shortest : float, mm
-        Shorter pieces are dropped.
-    first : sequence of (n_i, 2) arrays, mm
-        Strands that are laid before all others, as they are.
-
-    Returns
-    -------
-    list of (m, 2) arrays, mm
-    """
-    lines = trim_to_clearance([*first, *lines], _TOO_NEAR * width, shortest, first=len(first))
-    if not len(first):
-        lines = spread(lines, shapely.buffer(section, -inset), width, radius)
-    lines = keep_off_border(lines, section, max(inset - _CHORDS * width, 0.0))
-    lines = trim_to_clearance(lines, clearance, shortest)
-    return without_tight_turns(lines, radius, width, shortest)
-
+__all__ = ["close_short_ring", "keep_off_border", "linked_paths"]
 
 _OVERLAP = 0.1
 """Largest part of a ring's length that is laid twice [Chen et al. 2021: the ring round a hole of
@@ -83,7 +32,7 @@ def keep_off_border(lines: Sequence[FloatArray], section: Region, inset: float) 
     list of (n_i, 2) arrays
         A closed line stays closed only where all of it is kept.
     """
-    if inset <= 0.0:
+    if inset == 0.0:
         return list(lines)
     room = shapely.buffer(section, -inset)
     shapely.prepare(room)
@@ -104,8 +53,6 @@ def linked_paths(
     link_limit: float,
     least_length: float,
     along_boundary: bool = True,
-    radius: float = 0.0,
-    inset: float = 0.0,
 ) -> list[FloatArray]:
     """Link the ends of strands, close short rings, and drop what is too short to be cut.
 
@@ -122,13 +69,8 @@ def linked_paths(
         Of a path (`Machine.minimum_length`).
     along_boundary : bool, default True
         Whether links may follow the boundary; otherwise all are straight.
-    radius : float, mm, default 0
-        Least radius of links; 0 for links with corners.
-    inset : float, mm, default 0
-        Least distance of links from the border.
     """
-    room = section if inset == 0.0 else shapely.buffer(section, _CHORDS * width - inset)
-    lines = link_ends(lines, room, link_limit, width, along_boundary=along_boundary, radius=radius)
+    lines = link_ends(lines, section, link_limit, width, along_boundary=along_boundary)
     lines = [close_short_ring(line, least_length) for line in lines]
     return [line for line in lines if line_length(line) >= least_length]
 

@@ -11,7 +11,6 @@ from scipy.spatial import cKDTree
 from ccfem.arrays import FloatArray, IntArray
 from ccfem.geometry.polylines import along_line, is_closed, points_along
 from ccfem.geometry.shapes import Region, Shapes, strings
-from ccfem.linking.smooth_links import smooth_links
 
 __all__ = ["Joint", "join", "link_ends", "ring_arc"]
 
@@ -104,15 +103,13 @@ def link_ends(
     width: float,
     turn_cost: float = 1.0,
     along_boundary: bool = True,
-    radius: float = 0.0,
 ) -> list[FloatArray]:
     """Join ends that lie near each other by links inside the section.
 
     A link is straight, or it follows the boundary half a strand's width inside it, where two
     neighbouring ends lie on that boundary. Links are taken in the order of their cost: their
     length, and `turn_cost` mm for every right angle that the path turns at its ends. A link
-    crosses nothing and stays 0.9 widths away from all strands but the two that it joins. With a
-    radius, links are `smooth_links` of that radius instead, and nothing else.
+    crosses nothing and stays 0.9 widths away from all strands but the two that it joins.
 
     Parameters
     ----------
@@ -125,8 +122,6 @@ def link_ends(
     turn_cost : float, mm, default 1.0
     along_boundary : bool, default True
         Whether links may follow the boundary; otherwise all are straight.
-    radius : float, mm, default 0
-        Least radius of links; 0 for links with corners.
 
     Returns
     -------
@@ -136,12 +131,6 @@ def link_ends(
     if not opened or limit <= 0.0:
         return list(lines)
     ends = np.array([2 * k + side for k in opened for side in (0, 1)])
-    if radius > 0.0:
-        smooth = smooth_links(lines, ends, limit, width, radius)
-        smooth.sort(key=lambda link: (round(link.cost, 6), link.first, link.second))
-        return _accept(
-            list(lines), [_Link(*link) for link in smooth], section, _CLEARANCE * width, np.pi
-        )
     points = np.array([lines[end // 2][-(end % 2)] for end in ends])
     outward = np.array([_outward(lines[end // 2], end % 2) for end in ends])
     links = _straight_links(points, outward, ends, limit, turn_cost)
@@ -155,11 +144,7 @@ def link_ends(
 
 
 def _accept(
-    lines: list[FloatArray],
-    links: list[_Link],
-    section: Region,
-    clearance: float,
-    closing_turn: float = _CLOSING_TURN,
+    lines: list[FloatArray], links: list[_Link], section: Region, clearance: float
 ) -> list[FloatArray]:
     """Take links greedily, cheapest first, as long as they keep off everything else."""
     if not links:
@@ -176,7 +161,7 @@ def _accept(
         if link.first in taken or link.second in taken:
             continue
         closes = chain[link.first // 2] == chain[link.second // 2]
-        if closes and link.turn > closing_turn:
+        if closes and link.turn > _CLOSING_TURN:
             continue
         if accepted and shapely.dwithin(path, np.array(accepted), clearance).any():
             continue

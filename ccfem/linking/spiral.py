@@ -1,13 +1,11 @@
 """Nested closed strands joined to one spiral, so that the fibre is cut once and not at each."""
 
-import itertools
 from collections.abc import Callable, Sequence
 
 import numpy as np
 import shapely
 
 from ccfem.arrays import FloatArray
-from ccfem.geometry.dubins import shortest_curve
 from ccfem.geometry.polylines import is_closed
 from ccfem.geometry.shapes import Region
 from ccfem.linking.joining import ring_arc
@@ -16,10 +14,6 @@ __all__ = ["spiral"]
 
 _STRIDE = 4
 """Every so many points of a ring are tried as the place of the seam."""
-_EASY = 2.4
-"""Length of a ramp over the root of its radius and the distance of its rings: 2 is the least."""
-_RAMP = 0.1
-"""Step along a ramp, in radii."""
 
 
 def spiral(
@@ -27,7 +21,6 @@ def spiral(
     limit: float,
     cost: Callable[[FloatArray], FloatArray],
     section: Region,
-    radius: float = 0.0,
 ) -> list[FloatArray]:
     """Join closed lines that lie in each other to spirals.
 
@@ -45,8 +38,6 @@ def spiral(
         Maps points (k, 2) to (k,) values: how much it hurts to disturb the strand there.
     section : shapely (Multi)Polygon
         The connecting pieces stay inside it.
-    radius : float, mm, default 0
-        The connecting pieces are Dubins curves of that radius; 0 for straight ones.
 
     Returns
     -------
@@ -60,7 +51,7 @@ def spiral(
     for chain in _nested_chains(rings, limit):
         left = []
         while chain:  # without the innermost ring, until the rest can be wound
-            joined = _wind([rings[k] for k in chain], limit, cost, radius)
+            joined = _wind([rings[k] for k in chain], limit, cost)
             if joined is not None and _fits(joined, obstacles, section):
                 kept.append(joined)
                 break
@@ -94,10 +85,7 @@ def _nested_chains(rings: list[FloatArray], limit: float) -> list[list[int]]:
 
 
 def _wind(
-    rings: list[FloatArray],
-    limit: float,
-    cost: Callable[[FloatArray], FloatArray],
-    radius: float,
+    rings: list[FloatArray], limit: float, cost: Callable[[FloatArray], FloatArray]
 ) -> FloatArray | None:
     """Return one open line through all rings, or None where they are nowhere near enough."""
     if len(rings) < 2:
@@ -111,10 +99,8 @@ def _wind(
     pieces = []
     for k, string in enumerate(strings):
         neighbour = strings[k + 1] if k + 1 < len(strings) else strings[k - 1]
-        apart = float(shapely.distance(neighbour, seam))
-        # Two arcs of the radius that shift the path by `apart` take 2 sqrt(radius apart).
-        gap = max(2.5 * apart, _EASY * np.sqrt(radius * apart))
-        if apart > limit or gap > 0.5 * string.length:
+        gap = 2.5 * float(shapely.distance(neighbour, seam))
+        if gap > 2.5 * limit or gap > 0.5 * string.length:
             return None
         place = float(shapely.line_locate_point(string, seam))
         start = (place + 0.5 * gap) % string.length
@@ -123,22 +109,7 @@ def _wind(
             seam = shapely.points(
                 shapely.get_coordinates(shapely.shortest_line(strings[k + 1], seam))[0]
             )
-    if radius > 0.0:
-        ramps = [
-            shortest_curve(
-                _pose(a[-2], a[-1], a[-1]), _pose(b[0], b[1], b[0]), radius, _RAMP * radius
-            )
-            for a, b in itertools.pairwise(pieces)
-        ]
-        between = [ramp[1:-1] for ramp in ramps] + [pieces[-1][:0]]
-        pieces = [part for pair in zip(pieces, between, strict=True) for part in pair]
     return np.concatenate(pieces)
-
-
-def _pose(start: FloatArray, end: FloatArray, place: FloatArray) -> FloatArray:
-    """Pose (3,) at a place with the heading from one point to another."""
-    way = end - start
-    return np.array([*place, np.arctan2(way[1], way[0])])
 
 
 def _fits(line: FloatArray, obstacles: list[shapely.LineString], section: Region) -> bool:

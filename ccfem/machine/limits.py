@@ -36,7 +36,7 @@ class Limits:
     """
 
     short: float = 0.01
-    tight: float = 0.15
+    tight: float = 0.2
     on_fibre: float = 0.1
     across_fibre: float = 0.15
     outside: float = 0.1

@@ -16,7 +16,6 @@ from ccfem.checks import check_number
 from ccfem.elasticity.part_stress import PartStress
 from ccfem.layers.layer import Layer
 from ccfem.machine.machine import Machine
-from ccfem.planning.cutting import cut_to_length
 from ccfem.planning.plan import plan
 from ccfem.planning.strategy import Amount, Strategy
 from ccfem.toolpaths import FIBRE, Toolpaths
@@ -38,12 +37,6 @@ _FINEST = 1e-5
 """Share of the parameter's range below which a step in length is taken for what it is."""
 _POWERS = (0.5, 3.0)
 """Bounds of the power of the parameter that the length is taken to go with."""
-_SPARE = 0.005
-"""Share of the wanted length that may stay unused where plans are mixed."""
-_ASKED = 3
-"""Plans of a strategy that is told the length."""
-_MOST_ASKED = 1.5
-"""Largest factor from one asked length to the next."""
 _FEW = 4
 """Stacks of at most this many layers are searched as they are."""
 
@@ -61,16 +54,12 @@ class Planned:
         Fibre length divided by the number of layers.
     note : str
         Empty, or one line: which layers have another value, or why the wanted length was missed.
-    reached : bool
-        Whether the wanted length was reached within `TOLERANCE`; where it was not, the strategy
-        lays its most.
     """
 
     strategy: Strategy
     toolpaths: Toolpaths
     length_per_layer: float
     note: str = ""
-    reached: bool = True
 
     __repr__ = in_brief
 
@@ -101,11 +90,8 @@ def plan_to_length(
     the whole stack; the ratio of the two lengths corrects the next search. Of the values tried on
     the whole stack, the one that lays most without laying too much is kept. Where the length
     changes in steps (one contour more or less) and that leaves too much missing, again some layers
-    take the next value that lays more, and the strands of one layer are cut back to what is left.
-    Where the parameter's least is too much, or its most too little, those of `Amount.before` or
-    `Amount.beyond` follow; where all that is still too much, strands are cut back on all layers.
-
-    A strategy with ``for_length`` is told the length instead.
+    take the next value that lays more; where even the least is too much, some layers stay without
+    fibre.
 
     Parameters
     ----------
@@ -116,7 +102,7 @@ def plan_to_length(
     machine : Machine
     wanted : float, mm
         Fibre per layer: mean over the stack. The search stops within the share `TOLERANCE` below
-        it. A strategy whose most is less misses that: `Planned.reached` and `note` say so.
+        it. A strategy may miss that: `Planned.note` says so.
     start : Planned, optional
         The strategy's plan with its own value, where there is one already.
 
@@ -130,76 +116,14 @@ def plan_to_length(
         When `wanted` is not a positive number, or whatever the strategy raises.
     """
     check_wanted(wanted)
-    if hasattr(strategy, "for_length"):
-        return _told(strategy, layers, stress, machine, wanted)
-    amount = strategy.amount
-    trials = _Trials(strategy, amount, layers, stress, machine, wanted)
-    own = getattr(strategy, amount.parameter)
+    trials = _Trials(strategy, layers, stress, machine, wanted)
+    own = getattr(strategy, strategy.amount.parameter)
     if start is not None and own is not None:
         trials.tried[float(own)] = start
         near = trials.guess()
         if near is not None:
             return near
-    best = trials.search()
-    for further, end in ((amount.before, amount.least), (amount.beyond, amount.most)):
-        at_end = _with_value(strategy, amount.parameter, end)
-        for stage in further:
-            if _meets(best, wanted) or (best.length_per_layer > wanted) != (end == amount.least):
-                break
-            own, last = getattr(at_end, stage.parameter), end == amount.least
-            stage = replace(stage, most=own) if last else replace(stage, least=own)
-            if stage.most == stage.least:
-                continue
-            best = _Trials(at_end, stage, layers, stress, machine, wanted).search()
-            amount = stage
-            at_end = _with_value(at_end, stage.parameter, stage.least if last else stage.most)
-    if best.length_per_layer > wanted * (1.0 + 1e-9):
-        best = _cut_evenly(best, layers, machine, wanted)
-    return replace(best, note=_note(best, amount, wanted), reached=_meets(best, wanted))
-
-
-def _meets(plan: Planned, wanted: float) -> bool:
-    return (1.0 - TOLERANCE) * wanted <= plan.length_per_layer <= wanted * (1.0 + 1e-9)
-
-
-def _told(
-    strategy: Any,
-    layers: Sequence[Layer],
-    stress: PartStress,
-    machine: Machine,
-    wanted: float,
-) -> Planned:
-    """Plan of a strategy that takes the length itself; asked for more where it lays less."""
-    ask = wanted
-    best = Planned(strategy, Toolpaths.empty(), 0.0)
-    for _ in range(_ASKED):
-        told = strategy.for_length(ask, layers, machine)
-        toolpaths = plan(told, layers, stress, machine)
-        found = Planned(told, toolpaths, length_per_layer(toolpaths, layers))
-        if found.length_per_layer > wanted:
-            found = _cut_evenly(found, layers, machine, wanted)
-        if found.length_per_layer > best.length_per_layer:
-            best = found
-        if _meets(best, wanted) or not found.length_per_layer > 0.0:
-            break
-        ask *= min(1.02 * wanted / found.length_per_layer, _MOST_ASKED)
-    reached = _meets(best, wanted)
-    note = "" if reached else f"lays {best.length_per_layer:.0f} of {wanted:.0f} mm per layer"
-    return replace(best, note=note, reached=reached)
-
-
-def _cut_evenly(best: Planned, layers: Sequence[Layer], machine: Machine, wanted: float) -> Planned:
-    """Plan with the strands of every layer cut back in the same proportion."""
-    share, room = wanted / best.length_per_layer, 0.0
-    parts = []
-    for layer in layers:
-        own = best.toolpaths.on_layer(layer.index)
-        room += share * float(own.lengths.sum())
-        parts.append(cut_to_length(own, room, machine.minimum_length))
-        room -= float(parts[-1].lengths.sum())
-    toolpaths = Toolpaths.concatenate(parts)
-    length = length_per_layer(toolpaths, layers)
-    return replace(best, toolpaths=toolpaths, length_per_layer=length, note="strands cut back")
+    return trials.search()
 
 
 @dataclass
@@ -207,7 +131,6 @@ class _Trials:
     """Plans of one strategy with several values of its parameter, on the way to a length."""
 
     strategy: Strategy
-    amount: Amount
     layers: Sequence[Layer]
     stress: PartStress
     machine: Machine
@@ -222,7 +145,7 @@ class _Trials:
         return layers if len(layers) <= _FEW else [layers[0], layers[len(layers) // 2], layers[-1]]
 
     def planned(self, value: float, on: Sequence[Layer]) -> Planned:
-        changed = _with_value(self.strategy, self.amount.parameter, value)
+        changed = _with_value(self.strategy, self.strategy.amount, value)
         toolpaths = plan(changed, on, self.stress, self.machine)
         return Planned(changed, toolpaths, length_per_layer(toolpaths, on))
 
@@ -244,18 +167,18 @@ class _Trials:
         target = self.wanted * (1.0 - 0.5 * TOLERANCE)
         for _ in range(_GUESSES):
             lengths = {value: one.length_per_layer for value, one in self.tried.items()}
-            value = _by_power(lengths, self.amount, target)
+            value = _by_power(lengths, self.strategy.amount, target)
             if value in self.tried:
                 break
             self.tried[value] = self.planned(value, self.layers)
-            reached = _between(self)
+            reached = _between(list(self.tried.values()), self.layers, self.wanted)
             if self.meets(reached.length_per_layer):
                 return reached
         return None
 
     def search(self) -> Planned:
         """Search on the few layers, check on the stack, and again with the ratio of the two."""
-        amount, wanted, tried = self.amount, self.wanted, self.tried
+        amount, wanted, tried = self.strategy.amount, self.wanted, self.tried
         own = getattr(self.strategy, amount.parameter)
         value, margin = amount.most if own is None else float(own), 0.0
         ratio = self._ratio()
@@ -266,15 +189,15 @@ class _Trials:
                 break
             tried[value] = self.planned(value, self.layers)
             length = tried[value].length_per_layer
-            if self.meets(length) or not self.sample(value) > 0.0:
+            if self.meets(length) or not self.sampled[value] > 0.0:
                 break
-            ratio, margin = length / self.sample(value), 0.3 * TOLERANCE
-            if not ratio > 0.0:
-                break
+            ratio, margin = length / self.sampled[value], 0.3 * TOLERANCE
         best = _best(list(tried.values()), wanted)
-        if best.length_per_layer < (1.0 - TOLERANCE) * wanted:
+        if best.length_per_layer > wanted * (1.0 + 1e-9):
+            best = _mixed(replace(best, toolpaths=Toolpaths.empty()), best, self.layers, wanted)
+        elif best.length_per_layer < (1.0 - TOLERANCE) * wanted:
             best = self._raised(best, ratio)
-        return best
+        return replace(best, note=_note(best, amount, wanted))
 
     def _ratio(self) -> float:
         """Length on the stack over that on the few layers, where a plan is known."""
@@ -292,36 +215,22 @@ class _Trials:
             values = [v for v in self.sampled if self.sampled[v] * ratio > self.wanted]
             nearest = min(values, key=self.sampled.__getitem__, default=None)
             above = [] if nearest is None else [self.planned(nearest, self.layers)]
-        mixed = [
-            best,
-            *(
-                _mixed(best, more, self.layers, self.wanted, self.amount, self.machine)
-                for more in above
-            ),
-        ]
+        mixed = [best, *(_mixed(best, more, self.layers, self.wanted) for more in above)]
         return max(mixed, key=lambda one: one.length_per_layer)
 
 
-def _between(trials: _Trials) -> Planned:
+def _between(tried: list[Planned], layers: Sequence[Layer], wanted: float) -> Planned:
     """Longest plan that is not too long, with layers of one that is where the two are close."""
-    tried, wanted = list(trials.tried.values()), trials.wanted
     best = _best(tried, wanted)
     above = [one for one in tried if one.length_per_layer > wanted]
     more = min(above, key=lambda one: one.length_per_layer, default=best)
     if 0.0 < more.length_per_layer - best.length_per_layer <= _CLOSE * wanted:
-        return _mixed(best, more, trials.layers, wanted, trials.amount, trials.machine)
+        return _mixed(best, more, layers, wanted)
     return best
 
 
-def _mixed(
-    less: Planned,
-    more: Planned,
-    layers: Sequence[Layer],
-    wanted: float,
-    amount: Amount,
-    machine: Machine,
-) -> Planned:
-    """Take as many layers as fit, evenly spread, from a plan that lays more, and cut one to fit."""
+def _mixed(less: Planned, more: Planned, layers: Sequence[Layer], wanted: float) -> Planned:
+    """Take as many layers as fit, evenly spread, from a plan that lays more."""
     count, index = len(layers), [layer.index for layer in layers]
     each = [
         np.bincount(one.toolpaths.layer, one.toolpaths.lengths, minlength=max(index) + 1)[index]
@@ -333,28 +242,20 @@ def _mixed(
         gain = each[1][k] - each[0][k]
         if 0.0 < gain <= room:
             chosen[k], room = True, room - gain
-    parts = [
+    if not chosen.any():
+        return less if len(less.toolpaths) else more
+    toolpaths = Toolpaths.concatenate(
         (more if taken else less).toolpaths.on_layer(k)
         for k, taken in zip(index, chosen, strict=True)
-    ]
-    gains = np.where(chosen, 0.0, each[1] - each[0])
-    left = int(np.argmax(gains))
-    if room > _SPARE * wanted * count and gains[left] > 0.0:
-        longer = more.toolpaths.on_layer(index[left])
-        cut = cut_to_length(longer, each[0][left] + room, machine.minimum_length)
-        if cut.lengths.sum() > each[0][left]:
-            parts[left], chosen[left] = cut, True
-    if not chosen.any():
-        return less
-    toolpaths = Toolpaths.concatenate(parts)
-    name = amount.parameter
-    note = f"{name} = {getattr(more.strategy, name):.6g} on {chosen.sum()} of {count} layers"
+    )
+    amount = less.strategy.amount.parameter
+    note = f"{amount} = {getattr(more.strategy, amount):.6g} on {chosen.sum()} of {count} layers"
+    note += "" if len(less.toolpaths) else ", no fibre on the others"
     return Planned(less.strategy, toolpaths, length_per_layer(toolpaths, layers), note)
 
 
-def _with_value(strategy: Strategy, parameter: str, value: float) -> Strategy:
-    whole = isinstance(getattr(strategy, parameter), int)
-    changed: Any = replace(strategy, **{parameter: round(value) if whole else value})  # type: ignore[type-var]
+def _with_value(strategy: Strategy, amount: Amount, value: float) -> Strategy:
+    changed: Any = replace(strategy, **{amount.parameter: value})  # type: ignore[type-var]
     return changed
 
 
@@ -367,15 +268,16 @@ def _best(tried: list[Planned], wanted: float) -> Planned:
 
 
 def _note(best: Planned, amount: Amount, wanted: float) -> str:
-    length = best.length_per_layer
-    if _meets(best, wanted):
+    length, value = best.length_per_layer, getattr(best.strategy, amount.parameter)
+    if (1.0 - TOLERANCE) * wanted <= length <= wanted * (1.0 + 1e-9):
         return best.note
     mixed = f"{best.note}; " if best.note else ""
     reached = f"{mixed}lays {length:.0f} of {wanted:.0f} mm per layer"
-    value = getattr(best.strategy, amount.parameter)
     if value == amount.most and length < wanted:
         return f"{reached}: its most, at {amount.parameter} = {value:g}"
-    return f"{reached}: the nearest that its strands allow"
+    if value == amount.least and length > wanted:
+        return f"{reached}: its least, at {amount.parameter} = {value:g}"
+    return f"{reached}: the nearest that its steps allow"
 
 
 def _search(

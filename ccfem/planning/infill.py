@@ -22,13 +22,10 @@ from ccfem.raster.patterns import Regions
 from ccfem.raster.raster_plan import RasterPlan, raster_plan
 from ccfem.toolpaths import Toolpaths
 
-__all__ = ["SPACING", "WITHIN_SHELLS", "Infill", "check_fill", "check_shells", "long_enough"]
+__all__ = ["SPACING", "Infill", "check_fill", "check_shells", "long_enough"]
 
 SPACING = Amount("spacing", most=1.0, least=20.0)
 """Of a strategy whose parameter `spacing` is the distance of strands in fibre widths."""
-
-WITHIN_SHELLS = Amount("spacing", most=1.0, least=20.0, before=(Amount("shells", 3, 1),))
-"""Of a strategy whose infill is thinned first, and whose shells go after that."""
 
 
 def check_fill(strategy: object) -> None:

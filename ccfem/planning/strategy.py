@@ -23,19 +23,11 @@ class Amount:
         Name of the field.
     most, least : float
         Values that lay the most and the least fibre.
-    before : tuple of Amount, optional
-        Parameters that are taken down to their least, from their own value, where the least of this
-        one is still too much: shells, once the infill is thin.
-    beyond : tuple of Amount, optional
-        Parameters that are taken up to their most, from their own value, where the most of this one
-        is not enough.
     """
 
     parameter: str
     most: float
     least: float
-    before: "tuple[Amount, ...]" = ()
-    beyond: "tuple[Amount, ...]" = ()
 
 
 class LayerPlanner(Protocol):
@@ -58,9 +50,7 @@ class LayerStrategy(Protocol):
     Attributes
     ----------
     amount : Amount
-        The parameter that sets how much fibre is laid. A strategy that takes the length itself has
-        ``for_length(length, layers, machine)`` instead, which returns the strategy that lays at
-        most that mean length a layer, mm.
+        The parameter that sets how much fibre is laid.
     variants : mapping of str to parameters, optional
         Other parameters than the defaults, by a short name, that the laws of strategies also run:
         ``{"literal": {"fit": "literal"}}``. One for each branch that the defaults never take. A

@@ -1,7 +1,7 @@
 """Baseline: contours along the border, a zigzag inside."""
 
 from collections.abc import Mapping
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 from typing import Any, ClassVar
 
 import numpy as np
@@ -45,7 +45,7 @@ class ContourZigzag:
     turn: float = 90.0
     joined: bool = True
 
-    amount: ClassVar[Amount] = replace(SPACING, before=(Amount("contours", 2, 1),))
+    amount: ClassVar[Amount] = SPACING
     in_plane: ClassVar[bool] = True
     direction: ClassVar[str] = "angle"
     variants: ClassVar[Mapping[str, Mapping[str, Any]]] = {"single": {"joined": False}}

@@ -21,8 +21,7 @@ from ccfem.geometry.shells import shells
 from ccfem.layers.layer import Layer
 from ccfem.layers.layer_stress import LayerStress
 from ccfem.machine.machine import Machine
-from ccfem.planning.infill import WITHIN_SHELLS, Infill, check_shells
-from ccfem.planning.strategy import Amount
+from ccfem.planning.infill import Infill, check_shells
 from ccfem.raster.bitmap import Bitmap
 from ccfem.raster.patterns import Regions, grid_regions
 
@@ -38,9 +37,9 @@ class Grid(Infill):
     Attributes
     ----------
     spacing : float, default 1
-        Distance of neighbouring strands inside the shells in fibre widths, at least 1.
+        Distance of neighbouring strands in fibre widths, at least 1.
     shells : int, default 3
-        Number of rings along every border, a fibre width apart.
+        Number of rings along every border.
     angle, turn : float, degrees, default 45 and 90
         Direction of the first family of lines to the first axis of the layer, and its turn to the
         second one: 45 for +-45, 0 for 0/90.
@@ -68,7 +67,6 @@ class Grid(Infill):
     mode: Literal["polyline", "raster"] = "polyline"
 
     direction: ClassVar[str] = "angle"
-    amount: ClassVar[Amount] = WITHIN_SHELLS
     variants: ClassVar[Mapping[str, Mapping[str, Any]]] = {
         "both": {"families": "both"},
         "paper": {"lines": "paper"},
@@ -95,8 +93,8 @@ class Grid(Infill):
 
     def prepare(self, section: Region, machine: Machine) -> tuple[list[FloatArray], Region]:
         """Shells, and what they leave."""
-        width = machine.fibre_width
-        return shells(section, width, width, self.shells, self.closest)
+        pitch = self.spacing * machine.fibre_width
+        return shells(section, machine.fibre_width, pitch, self.shells, self.closest)
 
     def strands(
         self,

@@ -34,7 +34,7 @@ from ccfem.layers.layer import Layer
 from ccfem.layers.layer_stress import LayerStress, stress_on
 from ccfem.linking.clearance import trim_to_clearance
 from ccfem.linking.conformal import lead_into, parallel_curve
-from ccfem.linking.finishing import keep_off_border, linked_paths, smooth_strands
+from ccfem.linking.finishing import keep_off_border, linked_paths
 from ccfem.linking.spiral import spiral
 from ccfem.machine.machine import Machine
 from ccfem.planning.strategy import Amount, LayerPlanner
@@ -53,7 +53,7 @@ _LEAST_WEIGHT = 1e-3
 _ROOM = 1.03
 """Bound on the distance of isocurves, in strand widths: strands that stood just at the width would
 be trimmed wherever the numbers fall short of it."""
-_TRIM = 0.95
+_TRIM = 0.98
 """What is nearer than this to a longer strand, in strand widths, is cut: curves that are led along
 each other at one width differ by their chords."""
 _SPIRAL_LIMIT = 4.0
@@ -73,8 +73,6 @@ _LITERAL: Mapping[str, Any] = {
     "spiral": False,
     "boundary_links": False,
     "trim": False,
-    "inset": 0.0,
-    "smooth": False,
 }
 
 
@@ -132,13 +130,10 @@ class Isocurve:
         Links may follow the boundary; in the paper all are straight.
     trim : bool, default True
         Cut branches that come nearer than a strand's width to a longer one.
-    inset : float, default 0.5
-        Least distance of strands from the boundary, in strand widths. 0.5 keeps them in; at 0 they
-        may run along the boundary with half of their width outside.
-    smooth : bool, default True
-        Strands are pushed apart and off the boundary before any is cut, and neither they nor their
-        links turn more tightly than the machine's minimum radius. Otherwise links have corners, as
-        in the paper, and `boundary_links` says how they run.
+    inset : float, default 0
+        Least distance of strands from the boundary, in strand widths. At 0 they may run along the
+        boundary with half of their width outside; 0.5 keeps them in, and their ends still meet
+        the links along the boundary.
     """
 
     cap: float = 86.0
@@ -161,20 +156,13 @@ class Isocurve:
     spiral: bool = True
     boundary_links: bool = True
     trim: bool = True
-    inset: float = 0.5
-    smooth: bool = True
+    inset: float = 0.0
 
-    amount: ClassVar[Amount] = Amount(
-        "density",
-        most=4.0,
-        least=0.05,
-        beyond=(Amount("floor", most=0.0, least=0.4), Amount("cap", most=40.0, least=86.0)),
-    )
+    amount: ClassVar[Amount] = Amount("density", most=4.0, least=0.05)
     in_plane: ClassVar[bool] = True
     variants: ClassVar[Mapping[str, Mapping[str, Any]]] = {
         "literal": _LITERAL,
-        "border": {"inset": 0.0},
-        "corners": {"smooth": False},
+        "inset": {"inset": 0.5},
         "search": {"spacing": "search"},
         "cone": {"spacing": "cone"},
         "mesh": {
@@ -325,33 +313,18 @@ class _Planner:
             for distance in s.rings[:-1]:
                 rings += parallel_curve(hole, distance * width, section)
             lines = lead_into(lines, hole, s.rings[-1] * width, section)
-        inset, radius = s.inset * width, machine.minimum_radius if s.smooth else 0.0
-        rings = keep_off_border(rings, section, inset)
-        if s.smooth and s.trim:
-            lines = smooth_strands(
-                lines, section, inset, width, radius, _TRIM * width, 3.0 * width, rings
-            )
-        elif s.trim:
-            lines = keep_off_border(lines, section, inset)
+        rings = keep_off_border(rings, section, s.inset * width)
+        lines = keep_off_border(lines, section, s.inset * width)
+        if s.trim:
             lines = trim_to_clearance(
                 [*rings, *lines], _TRIM * width, 3.0 * width, first=len(rings)
             )
         else:
-            lines = [*rings, *keep_off_border(lines, section, inset)]
+            lines = [*rings, *lines]
         if s.spiral:
-            cost = _nearest(layer, tension.stress)
-            lines = spiral(lines, _SPIRAL_LIMIT * width, cost, section, radius)
+            lines = spiral(lines, _SPIRAL_LIMIT * width, _nearest(layer, tension.stress), section)
         limit, least = s.link_limit * width, machine.minimum_length
-        return linked_paths(
-            lines,
-            section,
-            width,
-            limit,
-            least,
-            s.boundary_links,
-            radius,
-            inset if s.smooth else 0.0,
-        )
+        return linked_paths(lines, section, width, limit, least, s.boundary_links)
 
 
 def _nearest(layer: Layer, values: FloatArray) -> Callable[[FloatArray], FloatArray]:

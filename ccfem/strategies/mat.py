@@ -16,8 +16,7 @@ from ccfem.geometry.shells import shells
 from ccfem.layers.layer import Layer
 from ccfem.layers.layer_stress import LayerStress
 from ccfem.machine.machine import Machine
-from ccfem.planning.infill import WITHIN_SHELLS, Infill, check_shells
-from ccfem.planning.strategy import Amount
+from ccfem.planning.infill import Infill, check_shells
 from ccfem.raster.bitmap import Bitmap
 from ccfem.raster.patterns import Regions, medial_regions
 
@@ -35,9 +34,9 @@ class Mat(Infill):
     Attributes
     ----------
     spacing : float, default 1
-        Distance of neighbouring strands inside the shells in fibre widths, at least 1.
+        Distance of neighbouring strands in fibre widths, at least 1.
     shells : int, default 3
-        Number of rings along every border, a fibre width apart.
+        Number of rings along every border.
     closest : float, default 0.6
         As in `Mps`.
     minimum_length : float, mm, optional
@@ -52,7 +51,6 @@ class Mat(Infill):
     minimum_length: float | None = None
     mode: Literal["polyline", "raster"] = "polyline"
 
-    amount: ClassVar[Amount] = WITHIN_SHELLS
     variants: ClassVar[Mapping[str, Mapping[str, Any]]] = {"raster": {"mode": "raster"}}
 
     def __post_init__(self) -> None:
@@ -61,8 +59,8 @@ class Mat(Infill):
 
     def prepare(self, section: Region, machine: Machine) -> list[FloatArray]:
         """All strands: they depend on the section alone."""
-        width, pitch = machine.fibre_width, self.spacing * machine.fibre_width
-        rings, interior = shells(section, width, width, self.shells, self.closest)
+        pitch = self.spacing * machine.fibre_width
+        rings, interior = shells(section, machine.fibre_width, pitch, self.shells, self.closest)
         return rings + medial_fill(interior, pitch, self.closest)
 
     def strands(

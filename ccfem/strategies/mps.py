@@ -24,8 +24,7 @@ from ccfem.geometry.shells import shells
 from ccfem.layers.layer import Layer
 from ccfem.layers.layer_stress import LayerStress
 from ccfem.machine.machine import Machine
-from ccfem.planning.infill import WITHIN_SHELLS, Infill, check_shells
-from ccfem.planning.strategy import Amount
+from ccfem.planning.infill import Infill, check_shells
 from ccfem.raster.bitmap import Bitmap
 from ccfem.raster.guides import stress_guides
 from ccfem.raster.patterns import Regions, inside_shells, stress_regions
@@ -63,9 +62,9 @@ class Mps(Infill):
     Attributes
     ----------
     spacing : float, default 1
-        Distance of neighbouring strands inside the shells in fibre widths, at least 1.
+        Distance of neighbouring strands in fibre widths, at least 1.
     shells : int, default 3
-        Number of rings along every border, a fibre width apart.
+        Number of rings along every border.
     seeds : "segments", "ends" or tuple of points, default "segments"
         Where the streamlines start: at the middle of each segment of the medial axis inside the
         shells; at the middle of each patch that carries a load or a support (the paper); or at
@@ -86,7 +85,6 @@ class Mps(Infill):
     minimum_length: float | None = None
     mode: Literal["polyline", "raster"] = "polyline"
 
-    amount: ClassVar[Amount] = WITHIN_SHELLS
     variants: ClassVar[Mapping[str, Mapping[str, Any]]] = {
         "ends": {"seeds": "ends"},
         "raster": {"mode": "raster"},
@@ -103,8 +101,8 @@ class Mps(Infill):
 
     def prepare(self, section: Region, machine: Machine) -> _Inside:
         """Shells, what they leave, and the middles of its medial axis where these are seeds."""
-        width, pitch = machine.fibre_width, self.spacing * machine.fibre_width
-        rings, interior = shells(section, width, width, self.shells, self.closest)
+        pitch = self.spacing * machine.fibre_width
+        rings, interior = shells(section, machine.fibre_width, pitch, self.shells, self.closest)
         wanted = self.seeds == "segments" and not shapely.is_empty(interior)
         return _Inside(rings, interior, _middles(interior, pitch) if wanted else np.zeros((0, 2)))
 

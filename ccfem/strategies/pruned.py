@@ -5,7 +5,7 @@ least work go, until the wanted length is left (`ccfem.fibre_aware.prune`).
 """
 
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 from typing import Any, ClassVar
 
 import numpy as np
@@ -64,11 +64,6 @@ class Pruned:
         check_fields(self, "coverage", above=0.0, at_most=1.0)
         check_fields(self, "overfill", "rounds", at_least=1)
         check_fields(self, "rho", above=0.0, unit="mm^2")
-
-    def for_length(self, length: float, layers: Sequence[Layer], machine: Machine) -> "Pruned":
-        """Strategy that lays at most a mean length of fibre a layer, mm."""
-        area = float(np.mean([layer.areas.sum() for layer in layers]))
-        return replace(self, coverage=min(length * machine.fibre_width / area, 1.0))
 
     def for_part(
         self, stress: PartStress, layers: Sequence[Layer], machine: Machine

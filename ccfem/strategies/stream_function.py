@@ -25,7 +25,6 @@ from ccfem.fibre_aware.heights import (
 from ccfem.fibre_aware.prune import Profile, least_price, profiles, shorten
 from ccfem.fibre_aware.smeared import SmearedPart, on_linear_cells
 from ccfem.fibre_aware.spline_grid import SplineGrid
-from ccfem.fibre_aware.stream_border import border_points, border_rise
 from ccfem.fibre_aware.stream_design import StreamDesign, StreamProblem, design
 from ccfem.fibre_aware.stream_start import plane_axes, start_field
 from ccfem.fields.layer_tension import layer_tension
@@ -33,7 +32,7 @@ from ccfem.geometry.isocontours import isocontours, triangle_edges
 from ccfem.layers.layer import Layer
 from ccfem.layers.layer_stress import LayerStress, stress_on
 from ccfem.linking.clearance import trim_to_clearance
-from ccfem.linking.finishing import keep_off_border, linked_paths, smooth_strands
+from ccfem.linking.finishing import keep_off_border, linked_paths
 from ccfem.machine.machine import Machine
 from ccfem.planning.strategy import Amount, LayerPlanner
 from ccfem.toolpaths import Toolpaths
@@ -44,8 +43,8 @@ from ccfem.virtual_testing.strands import cut_strands
 __all__ = ["StreamFunction"]
 
 _CLEARANCE = 0.95
-"""Least distance of strands in widths: they are pushed apart, and what is cut for a hundredth of a
-width would be lost."""
+"""Least distance of strands in widths: they are designed to be 1 / 0.95 apart, and what is cut for
+a hundredth of a width would be lost."""
 
 _SHORTEST = 5.0
 """Length, in strand widths, of the shortest pieces that are kept for linking."""
@@ -72,7 +71,7 @@ class StreamFunction:
     ----------
     coverage : float, default 0.45
         Fibre length times strand width over area of the layers, in (0, 1].
-    overfill : float, default 1.3
+    overfill : float, default 1.15
         Fibre length of the design over that kept, at least 1.
     rho : float, mm^2, default 4
         Axial stiffness of a strand over Young's modulus of the matrix.
@@ -88,15 +87,15 @@ class StreamFunction:
     phases : int, default 5
         Positions of the levels of which the best is taken, layer by layer.
     link_limit : float, default 7
-        Largest distance of two ends that are linked, in strand widths. Links turn no tighter than
-        the machine's minimum radius.
-    inset : float, default 0.5
-        Least distance of strands from the boundary, in strand widths. 0.5 keeps them in; at 0 they
-        may run along the boundary with half of their width outside.
+        Longest link between two ends, in strand widths.
+    inset : float, default 0
+        Least distance of strands from the boundary, in strand widths. At 0, as in the other
+        strategies of isocurves, strands may run along the boundary with half of their width
+        outside; 0.5 keeps them in, and their ends still meet the links along the boundary.
     """
 
     coverage: float = 0.45
-    overfill: float = 1.3
+    overfill: float = 1.15
     rho: float = RHO
     evaluations: int = 50
     groups: int = 0
@@ -104,12 +103,12 @@ class StreamFunction:
     cap: float = 90.0
     phases: int = 5
     link_limit: float = 7.0
-    inset: float = 0.5
+    inset: float = 0.0
 
     amount: ClassVar[Amount] = Amount("coverage", most=0.85, least=0.1)
     flat_layers_only: ClassVar[bool] = True
     variants: ClassVar[Mapping[str, Mapping[str, Any]]] = {
-        "border": {"inset": 0.0, "evaluations": 5},
+        "inset": {"inset": 0.5, "evaluations": 5},
         "groups": {"groups": 2, "evaluations": 5},
     }
 
@@ -120,13 +119,6 @@ class StreamFunction:
         check_fields(self, "grid", above=0.0, unit="fibre widths")
         check_fields(self, "cap", above=0.0, at_most=100.0)
         check_fields(self, "groups", "link_limit", "inset", at_least=0)
-
-    def for_length(
-        self, length: float, layers: Sequence[Layer], machine: Machine
-    ) -> "StreamFunction":
-        """Strategy that lays at most a mean length of fibre a layer, mm."""
-        area = float(np.mean([layer.areas.sum() for layer in layers]))
-        return replace(self, coverage=min(length * machine.fibre_width / area, 1.0))
 
     def for_part(
         self, stress: PartStress, layers: Sequence[Layer], machine: Machine
@@ -165,11 +157,7 @@ class StreamFunction:
             groups = 1 if alike > _ALIKE else _MOST_GROUPS
         group = group_layers(layers, groups)
         corners = mesh.points[np.unique(mesh.corners)] @ part.frame[:2].T
-        borders = [border_points(layer, size) for layer in layers]
-        points = [corners, centres, *(ring for rings in borders for ring in rings)]
-        for layer in layers:
-            middles = layer.plane.points[layer.triangles].mean(axis=1)
-            points += [layer.plane.points, middles, _refined(layer)[0]]
+        points = [corners, centres, *(_refined(layer)[0] for layer in layers)]
         energy = mesh.volumes * np.einsum("cij,cij->c", linear.stress, linear.stress)
         grid = SplineGrid.over(np.concatenate(points), *plane_axes(part, energy), size)
         capacity = fibre_capacity(part, layers, machine)
@@ -184,8 +172,6 @@ class StreamFunction:
             budget=self.overfill * self.coverage * float(mesh.volumes @ capacity),
         )
         chosen = [layers[_middle(np.flatnonzero(group == k))] for k in range(group.max() + 1)]
-        border = border_rise(grid, [border_points(layer, size) for layer in chosen])
-        problem = replace(problem, border=border)
         start = start_field(problem, stress, chosen, self.cap)
         return problem, group, design(problem, start, self.evaluations)
 
@@ -217,37 +203,30 @@ class _Extraction:
     def plan(self, layers: Sequence[Layer], group: IntArray) -> Toolpaths:
         """Paths of all layers, as long as the coverage says."""
         s, minimum = self.strategy, self.machine.minimum_length
-        length = s.coverage * sum(float(layer.areas.sum()) for layer in layers)
-        length /= self.machine.fibre_width
         fields = [self.field(k) for k in range(self.problem.groups)]
-        own = [fields[k] for k in group]
-        shifts = self.shifts(layers, own, length)
-        toolpaths = Toolpaths.concatenate(
-            self.layer_paths(*one) for one in zip(layers, own, shifts, strict=True)
-        )
-        if not len(toolpaths):
-            return toolpaths
-        return shorten(toolpaths, self.profiles(toolpaths), length, minimum, _CUT_COST)
-
-    def shifts(
-        self, layers: Sequence[Layer], fields: Sequence[FloatArray], length: float
-    ) -> FloatArray:
-        """Position of the levels on each layer, (n,), whose strands are worth most as they are."""
-        s, minimum = self.strategy, self.machine.minimum_length
         shifts = (np.arange(s.phases) + 0.5) / s.phases
         variants = [
-            self.raw_paths(layer, field, shift)
-            for layer, field in zip(layers, fields, strict=True)
+            self.layer_paths(layer, fields[k], shift)
+            for layer, k in zip(layers, group, strict=True)
             for shift in shifts
         ]
-        along = self.profiles(Toolpaths.concatenate(variants))
+        toolpaths = Toolpaths.concatenate(variants)
+        if not len(toolpaths):
+            return toolpaths
+        along = self.profiles(toolpaths)
+        length = s.coverage * sum(float(layer.areas.sum()) for layer in layers)
+        length /= self.machine.fibre_width
         variant = np.repeat(np.arange(len(variants)), [len(paths) for paths in variants])
         middle = [one for one in along if variant[one.path] % s.phases == s.phases // 2]
         price = least_price(middle, length, minimum, _CUT_COST) if middle else 0.0
         gain = np.zeros(len(variants))
         for one in along:
             gain[variant[one.path]] += one.kept(price, minimum, _CUT_COST)[1]
-        return np.asarray(shifts[np.argmax(gain.reshape(-1, s.phases), axis=1)])
+        best = np.argmax(gain.reshape(-1, s.phases), axis=1) + s.phases * np.arange(len(layers))
+        wanted = np.isin(variant, best)
+        number = np.cumsum(wanted) - 1
+        kept = [replace(one, path=int(number[one.path])) for one in along if wanted[one.path]]
+        return shorten(toolpaths.select(wanted), kept, length, minimum, _CUT_COST)
 
     def field(self, group: int) -> FloatArray:
         """Coefficients of one field, with the sign that does not depend on the axes."""
@@ -259,32 +238,16 @@ class _Extraction:
         values = values - weight @ values / weight.sum()
         return field if weight @ values**3 >= 0.0 else -field
 
-    def levels(self, layer: Layer, field: FloatArray, shift: float) -> list[FloatArray]:
-        """Find unit levels of a field on a layer, the first `shift` above the lowest value."""
+    def layer_paths(self, layer: Layer, field: FloatArray, shift: float) -> Toolpaths:
+        """Paths of one layer along unit levels, the first one `shift` above the lowest value."""
+        width, section = self.problem.width, layer.plane.polygon
         points, triangles = _refined(layer)
         values = self.problem.grid.values(points) @ field
-        return isocontours(points, triangles, values, float(values.min()) + shift, 1.0).lines()
-
-    def raw_paths(self, layer: Layer, field: FloatArray, shift: float) -> Toolpaths:
-        """Levels that are long enough, kept off the border and apart by cutting alone."""
-        width, section = self.problem.width, layer.plane.polygon
-        lines = keep_off_border(
-            self.levels(layer, field, shift), section, self.strategy.inset * width
-        )
-        lines = trim_to_clearance(lines, _CLEARANCE * width, self.machine.minimum_length)
-        return Toolpaths.from_plane(lines, layer)
-
-    def layer_paths(self, layer: Layer, field: FloatArray, shift: float) -> Toolpaths:
-        """Paths of one layer along its levels."""
-        width, section = self.problem.width, layer.plane.polygon
-        inset, radius = self.strategy.inset * width, self.machine.minimum_radius
-        lines = self.levels(layer, field, shift)
-        lines = smooth_strands(
-            lines, section, inset, width, radius, _CLEARANCE * width, _SHORTEST * width
-        )
+        curves = isocontours(points, triangles, values, float(values.min()) + shift, 1.0)
+        lines = keep_off_border(curves.lines(), section, self.strategy.inset * width)
+        lines = trim_to_clearance(lines, _CLEARANCE * width, _SHORTEST * width)
         limit, least = self.strategy.link_limit * width, self.machine.minimum_length
-        lines = linked_paths(lines, section, width, limit, least, radius=radius, inset=inset)
-        return Toolpaths.from_plane(lines, layer)
+        return Toolpaths.from_plane(linked_paths(lines, section, width, limit, least), layer)
 
     def profiles(self, toolpaths: Toolpaths) -> list[Profile]:
         """Value of the paths at the strains of the designed part."""

@@ -1,11 +1,11 @@
 """Comparison: equal fibre, nobody dropped, and the order by the virtual test."""
 
-import re
 from dataclasses import dataclass, replace
 from typing import ClassVar
 
 import numpy as np
 import pytest
+import shapely
 
 from ccfem.cases.case import Case
 from ccfem.comparison.compare import compare, create_all
@@ -19,7 +19,7 @@ from ccfem.layers.slicing import Planar
 from ccfem.machine import GcodeProfile, Machine
 from ccfem.materials import isotropic
 from ccfem.mesh.box import box_mesh
-from ccfem.planning import plan
+from ccfem.planning import GivenPaths, plan
 from ccfem.planning.equal_fibre import length_per_layer
 from ccfem.strategies import create
 from ccfem.toolpaths import FIBRE, Toolpaths
@@ -116,7 +116,7 @@ def test_opposite_orders_are_undecided(compared):
     assert same.verdict.startswith(f"{first.name} makes the stiffest part")
 
 
-def test_what_cannot_be_thinned_leaves_layers_out():
+def test_what_cannot_be_thinned_is_cut_back():
     strategies = {
         "rings": create("contour_zigzag", {"contours": 4}),
         "zigzag": create("zigzag", {"spacing": 8.0}),
@@ -124,17 +124,30 @@ def test_what_cannot_be_thinned_leaves_layers_out():
     result = compare(strip(), strategies, strand=None)
     rings, zigzag = result.runs
     assert result.fibre_per_layer == zigzag.length_per_layer
-    assert 0.0 < rings.length_per_layer <= result.fibre_per_layer
-    assert re.search(r"spacing = 20 on \d of 4 layers, no fibre on the others", rings.note)
+    assert rings.length_per_layer == pytest.approx(result.fibre_per_layer, rel=0.01)
+    assert "strands cut back" in rings.note
+    assert rings.empty_layers == 0
+    # What is left lies on the strands as they were.
     whole = plan(rings.strategy, result.layers, result.stress, result.case.machine)
     for layer in result.layers:
-        mine = rings.toolpaths.on_layer(layer.index).points
-        assert not len(mine) or np.array_equal(mine, whole.on_layer(layer.index).points)
+        lines = [layer.plane.project(path) for path in whole.on_layer(layer.index)]
+        drawn = shapely.multilinestrings([shapely.linestrings(line) for line in lines])
+        mine = layer.plane.project(rings.toolpaths.on_layer(layer.index).points)
+        assert len(mine)
+        assert shapely.distance(drawn, shapely.points(mine)).max() < 0.02
 
 
 def test_more_fibre_than_wanted_comes_last():
+    own = compare(
+        strip(),
+        {"rings": create("contour_zigzag", {"contours": 4})},
+        layers=1,
+        natural=True,
+        strand=None,
+    )
+    # Paths of another program stay as they are.
     strategies = {
-        "rings": create("contour_zigzag", {"contours": 4}),
+        "rings": GivenPaths(own.runs[0].toolpaths),
         "zigzag": create("zigzag", {"turn": 0.0}),
     }
     result = compare(strip(), strategies, layers=1, fibre_per_layer=300.0)
@@ -142,7 +155,10 @@ def test_more_fibre_than_wanted_comes_last():
     assert rings.length_per_layer > 330.0
     assert rings.tested.bracket.tension.ratio > zigzag.tested.bracket.tension.ratio
     assert result.ranking == (zigzag, rings)
-    assert any("rings: lays" in line and "placed last" in line for line in result.remarks)
+    assert any(
+        line.startswith("rings: given paths stay as they are: lays") and "placed last" in line
+        for line in result.remarks
+    )
     assert "stiffness_ratio_tension" not in best_values(result.runs, result.fibre_per_layer)
     assert result.verdict == ""
 

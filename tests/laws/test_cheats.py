@@ -192,6 +192,14 @@ def test_piling_up_gains_nothing(judged):
     assert all(each.bracket.tension.ratio < full for each in tested)
 
 
+def test_no_cheat_exceeds_the_bound(judged):
+    """The bound has one strand a width in each layer; only strands that cross may have more."""
+    ratios = {run.name: run.tested.bracket.tension.ratio for run in judged.runs if run.tested}
+    del ratios["fan"]
+    assert len(ratios) >= 10
+    assert max(ratios.values()) <= judged.bound.ratio
+
+
 @pytest.mark.parametrize(
     ("layers", "said"),
     [

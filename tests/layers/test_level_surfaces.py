@@ -6,7 +6,7 @@ import shapely
 from scipy.integrate import dblquad
 
 from ccfem.layers.cleaning import clean
-from ccfem.layers.cutting import border_edges
+from ccfem.layers.level_cut import border_edges
 from ccfem.layers.level_surfaces import level_surfaces
 from ccfem.mesh import box_mesh
 from ccfem.mesh.patches import Cylinder, patches_from_rules

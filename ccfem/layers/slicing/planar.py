@@ -9,8 +9,8 @@ from ccfem.arrays import FloatArray, IntArray
 from ccfem.checks import check_choices
 from ccfem.elasticity.part_stress import PartStress
 from ccfem.errors import InputError
-from ccfem.layers.cutting import border_edges, chain, cut_at_zero, patch_edges
 from ccfem.layers.layer import Layer
+from ccfem.layers.level_cut import border_edges, chain, cut_at_zero, patch_edges
 from ccfem.layers.pitch import check_pitch
 from ccfem.layers.plane import Plane, plane_frame
 from ccfem.layers.slicer import Vector
