@@ -127,7 +127,7 @@ def run(
     seconds = {"start": imported - _STARTED, "mesh": time.perf_counter() - imported}
     if calibration is not None:
         case, options = _calibrated(case, options, calibration)
-    chosen = create_all(case, strategies, parameters) if strategies else {}
+    chosen = create_all(case, strategies, parameters) if strategies or not paths else {}
     chosen |= _given(case, paths, frame, chosen)
     where = out if out is not None else Path("results") / f"{case.name}{suffix}"
     with whole_folder(where, force) as folder, progress_bar() as progress:

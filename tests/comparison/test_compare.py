@@ -1,11 +1,11 @@
 """Comparison: equal fibre, nobody dropped, and the order by the virtual test."""
 
+import re
 from dataclasses import dataclass, replace
 from typing import ClassVar
 
 import numpy as np
 import pytest
-import shapely
 
 from ccfem.cases.case import Case
 from ccfem.comparison.compare import compare, create_all
@@ -116,7 +116,7 @@ def test_opposite_orders_are_undecided(compared):
     assert same.verdict.startswith(f"{first.name} makes the stiffest part")
 
 
-def test_what_cannot_be_thinned_is_cut_back():
+def test_what_cannot_be_thinned_leaves_layers_out():
     strategies = {
         "rings": create("contour_zigzag", {"contours": 4}),
         "zigzag": create("zigzag", {"spacing": 8.0}),
@@ -124,17 +124,12 @@ def test_what_cannot_be_thinned_is_cut_back():
     result = compare(strip(), strategies, strand=None)
     rings, zigzag = result.runs
     assert result.fibre_per_layer == zigzag.length_per_layer
-    assert rings.length_per_layer == pytest.approx(result.fibre_per_layer, rel=0.01)
-    assert "strands cut back" in rings.note
-    assert rings.empty_layers == 0
-    # What is left lies on the strands as they were.
+    assert 0.0 < rings.length_per_layer <= result.fibre_per_layer
+    assert re.search(r"spacing = 20 on \d of 4 layers, no fibre on the others", rings.note)
     whole = plan(rings.strategy, result.layers, result.stress, result.case.machine)
     for layer in result.layers:
-        lines = [layer.plane.project(path) for path in whole.on_layer(layer.index)]
-        drawn = shapely.multilinestrings([shapely.linestrings(line) for line in lines])
-        mine = layer.plane.project(rings.toolpaths.on_layer(layer.index).points)
-        assert len(mine)
-        assert shapely.distance(drawn, shapely.points(mine)).max() < 0.02
+        mine = rings.toolpaths.on_layer(layer.index).points
+        assert not len(mine) or np.array_equal(mine, whole.on_layer(layer.index).points)
 
 
 def test_more_fibre_than_wanted_comes_last():

@@ -112,7 +112,7 @@ def test_the_folder_that_one_works_in_stays(tmp_path, monkeypatch):
 def test_a_block_that_raises_leaves_the_folder_as_it_was(tmp_path):
     where = tmp_path / "results"
     write(where, report_html="first")
-    with pytest.raises(FileNotFoundError), whole_folder(where) as folder:
+    with pytest.raises(InputError, match="No such file"), whole_folder(where) as folder:
         (folder / "missing" / "report.html").write_text("half")
     assert contents(where) == {"report.html": "first"}
     assert leftovers(tmp_path) == []
