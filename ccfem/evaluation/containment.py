@@ -42,6 +42,10 @@ COLUMNS = (
 )
 
 
+_SHARES = np.array([0.01, 0.5]) * (1.0 - 1e-9)
+"""Shares of `border_1` and `border_50`; a tie goes to the smaller distance, whatever rounding."""
+
+
 @dataclass(frozen=True)
 class ContainmentSamples:
     """Fibre about the border of a layer, mm.
@@ -154,7 +158,5 @@ def containment_indices(samples: ContainmentSamples) -> dict[str, float]:
 def _border_indices(samples: ContainmentSamples) -> dict[str, float]:
     if not samples.step.sum() > 0.0:
         return dict.fromkeys(("border_1", "border_50"), float("nan"))
-    quantiles = np.quantile(
-        samples.border, [0.01, 0.5], weights=samples.step, method="inverted_cdf"
-    )
+    quantiles = np.quantile(samples.border, _SHARES, weights=samples.step, method="inverted_cdf")
     return dict(zip(("border_1", "border_50"), quantiles.tolist(), strict=True))

@@ -30,14 +30,15 @@ COLUMNS = (
     Column(
         "spacing_below",
         "1",
-        "Share of the fibre's length whose neighbour (see spacing_1) is nearer than the fibre "
-        "width.",
+        "Share of the fibre's length whose neighbour (see spacing_1) is nearer than 0.99 fibre "
+        "widths: paths are laid to 0.005 of them.",
         "0 to 1, 0 is best; NaN without fibre",
     ),
 )
 
-_ROUNDING = 1e-6
-"""Strands nearer than the fibre width by no more than this share of it keep their distance."""
+_ROUNDING = 0.01
+"""Strands nearer than the fibre width by no more than this share of it keep their distance: two
+paths in even steps each lie within 0.005 widths of where they were planned."""
 
 
 @dataclass(frozen=True)

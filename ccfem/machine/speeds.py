@@ -17,7 +17,10 @@ from ccfem.machine.speed_table import SpeedTable
 __all__ = ["table_speeds"]
 
 _DIGITS = 9
-"""Decimals that curvature, length and angle are rounded to: a right angle is one exactly."""
+"""Decimals that curvature and length are rounded to."""
+_ANGLE_DIGITS = 0
+"""Decimals that angles, degrees, are rounded to: a right angle between steps of 1 mm is one, though
+their points are written to 0.001 mm."""
 
 
 def table_speeds(
@@ -55,7 +58,7 @@ def table_speeds(
     points, offsets, kept = merge_repeated(points, offsets)
     open_ended = np.zeros(len(offsets) - 1, dtype=bool)
     turn = np.degrees(turning_angles(points, offsets, open_ended))
-    angle = (180.0 - turn).round(_DIGITS)
+    angle = (180.0 - turn).round(_ANGLE_DIGITS)
     corner = angle < table.angle[1]
     start = np.flatnonzero(starts_segment(offsets))
     if not len(start):

@@ -244,7 +244,10 @@ class _Planner:
         """Isocurves of the field, at least a width apart."""
         s = self.strategy
         percentile = np.quantile(
-            tension.stress, s.cap / 100.0, weights=surface.areas, method="inverted_cdf"
+            tension.stress,
+            s.cap / 100.0 * (1.0 - 1e-12),
+            weights=surface.areas,
+            method="inverted_cdf",
         )
         cap = max(float(percentile), 1e-300)
         confidence = np.where(tension.defined, np.minimum(tension.stress / cap, 1.0), 0.0)

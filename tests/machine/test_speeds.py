@@ -1,5 +1,6 @@
 """The speed table of paper 001: its limits, paths worked out by hand, and its place in files."""
 
+from dataclasses import replace
 from itertools import pairwise
 
 import numpy as np
@@ -154,8 +155,8 @@ def test_repeated_points_and_paths_without_length_change_nothing():
 def test_the_table_is_for_fibre_and_the_print_time_goes_by_it():
     (layer,) = Planar(count=1).cut(box_mesh((90.0, 90.0, 1.0), (1, 1, 1)))
     fibre = Toolpaths.from_plane([turned([30.0, 40.0, 20.0], [90.0, 90.0])], layer)
-    matrix = Toolpaths.from_plane([turned([30.0], [])], layer, kind=MATRIX)
-    travel = Toolpaths.from_plane([turned([8.0], [])], layer, kind=TRAVEL)
+    matrix = replace(Toolpaths.from_plane([turned([30.0], [])], layer), kind=[MATRIX])
+    travel = replace(Toolpaths.from_plane([turned([8.0], [])], layer), kind=[TRAVEL])
     every = Toolpaths.concatenate([fibre, travel, matrix])
     machine = Machine(speeds=TABLE, fibre_speed=1.0)
     steps = [15.0, 15.0, 15.0, None, 80.0, None, 12.0, None]
