@@ -147,10 +147,10 @@ class Cheat:
 
 @pytest.fixture(scope="module", params=["bar", "loop"])
 def judged(request):
-    case = ccfem.read(request.param, element_size={"bar": 4.0, "loop": 6.0}[request.param])
+    case = ccfem.read(request.param, element_size={"bar": 5.0, "loop": 8.0}[request.param])
     strategies = {name: create(name, case.parameters.get(name, {})) for name in HONEST}
     strategies |= {name: Cheat(name) for name in CHEATS}
-    return ccfem.compare(case, strategies, layers=3, natural=True)
+    return ccfem.compare(case, strategies, layers=2, natural=True)
 
 
 def test_no_cheat_ranks_above_an_honest_strategy(judged):
@@ -181,7 +181,7 @@ def test_piling_up_gains_nothing(judged):
         found = runs[name].tested.bracket.tension.ratio
         assert found == pytest.approx(once, rel=rel), name
     as_laid = ccfem.virtual_test(runs["copies"].toolpaths, stress, span=()).ratio
-    assert as_laid > 1.5 * once
+    assert as_laid - 1.0 > 3.0 * (once - 1.0)
     # Nothing that is piled up beats strands that fill the layer side by side.
     dense = ccfem.plan(create("concentric", {"spacing": 1.0}), judged.layers, stress, case.machine)
     full = ccfem.virtual_test(dense, stress, machine=case.machine, span=()).ratio
