@@ -8,9 +8,11 @@ from rich.table import Table
 
 from ccfem.arrays import FloatArray, IntArray
 from ccfem.cases.reading import read
+from ccfem.errors import InputError
 from ccfem.io.mesh_file import read_mesh
 from ccfem.io.surface import is_surface, read_surface
 from ccfem.mesh.smooth_faces import Face, smooth_faces
+from ccfem.plot.canvas import check_picture
 from ccfem.plot.part_views import Label, draw_part
 
 __all__ = ["list_faces"]
@@ -34,6 +36,7 @@ def list_faces(body: Path, angle: float, scale: float, picture: Path) -> None:
     picture : Path
         File of the picture.
     """
+    check_picture(picture)
     points, triangles = _boundary(body, scale)
     faces = smooth_faces(points, triangles, angle)
     table = Table(box=None, padding=(0, 2, 0, 0))
@@ -61,6 +64,11 @@ def _boundary(body: Path, scale: float) -> tuple[FloatArray, IntArray]:
         surface = read_surface(body, scale)
         return surface.points, surface.triangles
     is_part = body.suffix in ("", ".toml")
+    if is_part and scale != 1.0:
+        raise InputError(
+            f"--scale is for surface and mesh files; got {scale:g} for the part '{body}': leave it "
+            "out, or scale in the part file"
+        )
     mesh = read(str(body)).problem.mesh if is_part else read_mesh(body, scale)
     return mesh.points, mesh.boundary
 

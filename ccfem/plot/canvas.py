@@ -9,7 +9,7 @@ import numpy as np
 
 from ccfem.arrays import FloatArray
 from ccfem.errors import InputError
-from ccfem.io.whole import whole_file
+from ccfem.io.whole import check_writable, whole_file
 from ccfem.plot.colours import INK, OUTLINE
 
 if TYPE_CHECKING:
@@ -17,6 +17,7 @@ if TYPE_CHECKING:
     from matplotlib.figure import Figure
 
 __all__ = [
+    "check_picture",
     "colour_bar",
     "extents_of",
     "inches_per_mm",
@@ -179,16 +180,27 @@ def save(figure: "Figure", path: str | Path, dpi: float = _DPI) -> None:
     InputError
         When the file cannot be written, or the format is another one.
     """
-    path = Path(path)
-    if path.suffix.lower() not in _FORMATS:
-        raise InputError(
-            f"a picture is written as {', '.join(_FORMATS)}; got '{path.name}': change its suffix"
-        )
+    path = check_picture(path)
     with whole_file(path) as temporary:
         if path.suffix.lower() == ".png":
             temporary.write_bytes(png(figure, dpi))
         else:
             figure.savefig(temporary, dpi=dpi)
+
+
+def check_picture(path: str | Path) -> Path:
+    """Return `path` when a picture of that name can be written: to be asked before any work.
+
+    Raises
+    ------
+    InputError
+    """
+    path = Path(path)
+    if path.suffix.lower() not in _FORMATS:
+        raise InputError(
+            f"a picture is written as {', '.join(_FORMATS)}; got '{path.name}': change its suffix"
+        )
+    return check_writable(path)
 
 
 def extents_of(points: FloatArray) -> tuple[float, float, float, float]:

@@ -218,12 +218,11 @@ def test_files_of_others_are_replaced_by_force_alone(ccfem, folder):
 
 
 def test_a_name_that_is_no_folder_is_refused(ccfem, folder):
-    for name in ("../../X", "[/red]", "", "x" * 300, "\\u001b[31m"):
+    for name in ("../../X", "[/red]", "x" * 300, "\\u001b[31m"):
         (folder / "named.toml").write_text(f'name = "{name}"\n' + PART)
         code, _, err = ccfem("plan", "named.toml", "--strategy", "zigzag")
-        if name:
-            assert (code, err.count("\n")) == (2, 1)
-            assert "the name of a case must have letters" in err
+        assert (code, err.count("\n")) == (2, 1)
+        assert "the name of a case must have letters" in err
     assert not (folder.parent.parent / "X").exists()
 
 
@@ -246,6 +245,22 @@ def test_what_was_found_in_the_mesh_is_printed(ccfem, folder):
     (folder / "inside.toml").write_text(PART.replace("body.npz", "in.npz"))
     _, out, _ = ccfem("plan", "inside.toml", "--strategy", "zigzag", "--no-virtual-test")
     assert f"mesh: {len(mesh.cells)} cells were inside out: turned" in out
+
+
+def test_faces_are_listed_and_drawn(ccfem, folder):
+    code, out, err = ccfem("faces", "body.npz", "--out", "faces.png")
+    assert (code, err) == (0, "")
+    assert "6 faces at a feature angle of 30 degrees" in out
+    assert "plane of 1440 mm^2, normal -z, centre [30, 12, 0]" in out
+    assert (folder / "faces.png").stat().st_size > 10_000
+    for options, message in (
+        (("body.npz", "--out", "faces.txt"), "a picture is written as .png"),
+        (("bar", "--scale", "nan"), "--scale is for surface and mesh files"),
+        (("body.npz", "--scale", "0"), "mesh scale must be above 0"),
+    ):
+        code, out, err = ccfem("faces", *options)
+        assert (code, out, err.count("\n")) == (2, "", 1)
+        assert message in err
 
 
 def test_lists(ccfem):
