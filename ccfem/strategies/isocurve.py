@@ -158,7 +158,9 @@ class Isocurve:
     trim: bool = True
     inset: float = 0.0
 
-    amount: ClassVar[Amount] = Amount("density", most=4.0, least=0.05)
+    amount: ClassVar[Amount] = Amount(
+        "density", most=4.0, least=0.05, beyond=(("floor", 0.0), ("cap", 40.0))
+    )
     in_plane: ClassVar[bool] = True
     variants: ClassVar[Mapping[str, Mapping[str, Any]]] = {
         "literal": _LITERAL,
