@@ -353,9 +353,9 @@ class _Search:
 
     def off(self, wanted: float) -> Planned:
         """Return the extreme that is nearest to a length that the strategy does not reach."""
-        plans = list(self.tried.values())
-        much = min(_length(one) for one in plans) > wanted
-        best = (min if much else max)(plans, key=_length)
+        plans = [self.tried[turn] for turn in sorted(self.tried)]
+        much = min(map(_length, plans)) > wanted
+        best = min(plans, key=_length) if much else max(plans[::-1], key=_length)
         end = "least" if much else "most"
         note = (
             f"lays {best.length_per_layer:.0f} of {wanted:.0f} mm per layer: its {end}, at "

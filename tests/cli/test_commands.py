@@ -287,7 +287,8 @@ def test_every_parameter_of_a_strategy_is_explained(ccfem, monkeypatch, name):
     found = {row[0]: row[1:] for row in rows if len(row) == 4}
     for field in dataclasses.fields(named()[name]):
         default, kind, meaning = found[field.name]
-        assert default == repr(field.default)
+        made = field.default_factory is not dataclasses.MISSING
+        assert default == repr(field.default_factory() if made else field.default)
         assert kind
         assert len(meaning) > 15
         assert not meaning.startswith("As in")
