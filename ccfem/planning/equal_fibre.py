@@ -47,6 +47,8 @@ _FINEST = 1e-5
 """Turn of the dial below which a step in length is taken for what it is."""
 _BEYOND = 0.05
 """How much further than by proportion these go while the length is known on one side only."""
+_HALVINGS = 6
+"""Plans of the whole stack for the least that leaves no layer empty."""
 _FEW = 4
 """Stacks of at most this many layers are searched as they are."""
 
@@ -171,9 +173,8 @@ def extremes(
     """Plan the least and the most that a strategy lays; parameters as in `plan_to_lengths`."""
     search = _Search(Dial(strategy), layers, stress, machine)
     search.learn(known)
-    ends = [search.whole(0.0), search.whole(search.dial.end), *search.tried.values()]
-    full = [one for one in ends if search.filled(one)] or ends
-    return min(full, key=_length), max(full, key=_length)
+    most = max(search.whole(search.dial.end), *search.tried.values(), key=_length)
+    return search.least_filled(), most
 
 
 def _length(planned: Planned) -> float:
@@ -255,6 +256,17 @@ class _Search:
             (~laid & (layer_lengths(other.toolpaths, self.layers) > 0.0)).any()
             for other in self.tried.values()
         )
+
+    def least_filled(self) -> Planned:
+        """Plan with the least fibre that leaves no layer empty that another amount fills."""
+        self.whole(0.0)
+        full = [turn for turn in self.tried if self.filled(self.tried[turn])]
+        low, high = 0.0, min(full, default=self.dial.end)
+        for _ in range(_HALVINGS if high > 0.0 else 0):
+            middle = 0.5 * (low + high)
+            low, high = (low, middle) if self.filled(self.whole(middle)) else (middle, high)
+        plans = list(self.tried.values())
+        return min([one for one in plans if self.filled(one)] or plans, key=_length)
 
     def to(self, wanted: float) -> Planned:
         """Plan to a length per layer, mm."""
