@@ -275,7 +275,7 @@ def compare(
                 _as_asked(runs, asked_for),
                 part,
                 wanted,
-                lambda some: all_tested(some, field, case.machine, strand, backend, tell),
+                lambda some: all_tested(some, field, case.machine, strand, backend, tell, ()),
                 tell,
             )
     equal = [run for run in runs if run.tested is not None and not off_length(run, wanted)]

@@ -22,7 +22,7 @@ from ccfem.planning.strategy import LengthStrategy
 from ccfem.toolpaths import FIBRE, MATRIX, Toolpaths
 from ccfem.virtual_testing.equilibrium import BONDED, TENSION
 from ccfem.virtual_testing.specimen import Specimen
-from ccfem.virtual_testing.strand import Strand
+from ccfem.virtual_testing.strand import RHO_SPAN, Strand
 from ccfem.virtual_testing.strands import cut_strands
 from ccfem.virtual_testing.strength import first_failure, matrix_peak
 from ccfem.virtual_testing.virtual_test import Bracket, virtual_test
@@ -204,6 +204,7 @@ def all_tested(
     strand: Strand,
     backend: str,
     tell: Tell,
+    span: Sequence[float] = RHO_SPAN,
 ) -> list[Run]:
     """Test every run that did not fail virtually, all on one factorisation."""
     try:
@@ -214,11 +215,17 @@ def all_tested(
         before, _ = matrix_peak(stress)
     except InputError:
         before = float("nan")
-    return [_tested(run, specimen, strand, machine, before, tell) for run in runs]
+    return [_tested(run, specimen, strand, machine, before, tell, span) for run in runs]
 
 
 def _tested(
-    run: Run, specimen: Specimen, strand: Strand, machine: Machine, before: float, tell: Tell
+    run: Run,
+    specimen: Specimen,
+    strand: Strand,
+    machine: Machine,
+    before: float,
+    tell: Tell,
+    span: Sequence[float],
 ) -> Run:
     """Test a run virtually, or say why it cannot be tested."""
     tell(f"testing {run.name}")
@@ -228,7 +235,7 @@ def _tested(
     def work() -> Run:
         mesh = specimen.unreinforced.mesh
         strands = cut_strands(run.toolpaths, mesh, machine=machine)
-        tension = virtual_test(strands, specimen, strand, TENSION)
+        tension = virtual_test(strands, specimen, strand, TENSION, span)
         bracket = Bracket(tension, virtual_test(strands, specimen, strand, BONDED, span=()))
         try:
             test = Tested(bracket, first_failure(tension, strand), matrix_before=before)
