@@ -19,7 +19,7 @@ def cut_to_length(toolpaths: Toolpaths, length: float, minimum: float) -> Toolpa
     """Leave out and shorten fibre until no more than a length is left.
 
     The shortest paths go as a whole, and what is then still too much is cut from the end of the
-    shortest path that stays long enough, or from the ends of several.
+    shortest path that stays long enough, or from the ends of several. No path ends in a link.
 
     Parameters
     ----------
@@ -38,7 +38,7 @@ def cut_to_length(toolpaths: Toolpaths, length: float, minimum: float) -> Toolpa
     size = np.where(toolpaths.kind == FIBRE, toolpaths.lengths, 0.0)
     left = _lengths(size, length, minimum)
     changed = np.flatnonzero(left < size - _ENOUGH)
-    return _shortened(toolpaths, {int(k): float(left[k]) for k in changed})
+    return _shortened(toolpaths, {int(k): float(left[k]) for k in changed}, minimum)
 
 
 def _lengths(size: FloatArray, length: float, minimum: float) -> FloatArray:
@@ -60,7 +60,7 @@ def _lengths(size: FloatArray, length: float, minimum: float) -> FloatArray:
     return left
 
 
-def _shortened(toolpaths: Toolpaths, wanted: dict[int, float]) -> Toolpaths:
+def _shortened(toolpaths: Toolpaths, wanted: dict[int, float], minimum: float) -> Toolpaths:
     """Toolpaths of which some, by number, keep so much of their beginning; 0 for none."""
     if not wanted:
         return toolpaths
@@ -69,14 +69,19 @@ def _shortened(toolpaths: Toolpaths, wanted: dict[int, float]) -> Toolpaths:
     stays, sizes = np.ones(len(toolpaths), dtype=bool), np.diff(toolpaths.offsets)
     for k, length in wanted.items():
         first, end = toolpaths.offsets[k], toolpaths.offsets[k + 1]
-        if length <= 0.0:
-            keep[first:end], stays[k] = False, False
-            continue
         line = toolpaths.points[first:end]
         along = np.concatenate([[0.0], np.cumsum(np.linalg.norm(np.diff(line, axis=0), axis=1))])
         last = max(int(np.searchsorted(along, length - _SAME)), 1)
         share = min((length - along[last - 1]) / (along[last] - along[last - 1]), 1.0)
-        points[first + last] = line[last - 1] + share * (line[last] - line[last - 1])
+        if toolpaths.link[first + last - 1]:
+            while last > 0 and toolpaths.link[first + last - 1]:
+                last -= 1
+            length = along[last]
+        else:
+            points[first + last] = line[last - 1] + share * (line[last] - line[last - 1])
+        if length <= _SAME or length < minimum - _SAME:
+            keep[first:end], stays[k] = False, False
+            continue
         keep[first + last + 1 : end], link[first + last], closed[k] = False, False, False
         sizes[k] = last + 1
     return replace(

@@ -16,6 +16,7 @@ from ccfem.comparison.headline import HEADLINE, headline_values
 from ccfem.comparison.pictures import caption
 from ccfem.comparison.ranking import best_values
 from ccfem.elasticity.problem import Force, Problem, Support
+from ccfem.elasticity.system import System
 from ccfem.errors import InputError
 from ccfem.evaluation import evaluate
 from ccfem.layers.slicing import Planar
@@ -213,6 +214,27 @@ def test_more_fibre_than_wanted_comes_last():
     )
     assert "stiffness_ratio_tension" not in best_values(result.runs, result.fibre_per_layer)
     assert result.verdict == ""
+
+
+def test_all_runs_share_one_factorisation(monkeypatch):
+    """One for the solve, one for tests and pruning, one for the design and the bound."""
+    made = []
+    factorise = System.factorise
+
+    def counted(self, *arguments, **options):
+        made.append(self)
+        return factorise(self, *arguments, **options)
+
+    monkeypatch.setattr(System, "factorise", counted)
+    strategies = {
+        "designed": create("stream_function", {"evaluations": 3}),
+        "pruned": create("pruned", {"of": "zigzag"}),
+        "zigzag": create("zigzag"),
+        "rings": create("concentric"),
+    }
+    result = compare(strip(), strategies, layers=1, fibre_per_layer=300.0)
+    assert all(run.tested is not None for run in result.runs)
+    assert len(made) == 3
 
 
 def test_unequal_fibre_is_no_verdict():

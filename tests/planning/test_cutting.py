@@ -56,3 +56,21 @@ def test_a_ring_is_opened_and_keeps_its_way():
     end = 100.0 / 20.0
     assert found.points[-1, :2] == pytest.approx([20 * np.cos(end), 20 * np.sin(end)], abs=0.01)
     assert cut_to_length(paths, 1000.0, 42.0) is paths
+
+
+@pytest.mark.parametrize(
+    ("length", "left"), [(90.0, 90.0), (75.0, 60.0), (55.0, 55.0), (99.0, 99.0)]
+)
+def test_no_path_ends_in_a_link(length, left):
+    """One strand of 100 mm, of which a link takes the way from 60 to 80 mm."""
+    points = np.array([[x, 0.0, 0.0] for x in (0.0, 30.0, 60.0, 70.0, 80.0, 100.0)])
+    none = np.zeros(1, dtype=int)
+    link = np.array([False, False, True, True, False, False])
+    flat = np.broadcast_to([0.0, 0.0, 1.0], points.shape)
+    offsets = np.array([0, len(points)])
+    paths = Toolpaths(points, flat, offsets, none, none, none.astype(bool), link)
+    found = cut_to_length(paths, length, 42.0)
+    assert found.lengths == pytest.approx([left])
+    assert not found.link[-1]
+    assert found.link.any() == (left > 60.0)
+    assert len(cut_to_length(paths, 75.0, 70.0)) == 0
