@@ -284,13 +284,12 @@ class _Search:
     def searched(self, wanted: float) -> Planned:
         """Search on the few layers, check on the stack, and again with the ratio of the two."""
         for _ in range(1 if self.few is self.layers else _ROUNDS):
-            low, high = self.bracket(wanted / self.ratio(wanted))
-            for turn in (low, high):
+            for turn in self.bracket(wanted / self.ratio(wanted)):
                 if turn is not None:
                     self.whole(turn)
-            found = self.between(wanted, _CLOSE)
-            if found is not None:
-                return found
+                    found = self.between(wanted, _CLOSE)
+                    if found is not None:
+                        return found
         if not any(one.length_per_layer <= wanted for one in self.tried.values()):
             self.whole(0.0)
         if not any(one.length_per_layer >= wanted for one in self.tried.values()):
