@@ -9,6 +9,7 @@ from ccfem.layers.slicing.planar import Planar
 from ccfem.machine import Machine
 from ccfem.materials import isotropic
 from ccfem.mesh.box import box_mesh
+from ccfem.planning import plan
 from ccfem.planning.equal_fibre import extremes, plan_to_lengths
 from ccfem.planning.mixing import layer_lengths
 from ccfem.planning.strategy import LengthStrategy
@@ -58,3 +59,28 @@ def test_any_length_between_the_least_and_the_most_is_laid(cantilever, name):
         assert "its most" in long.note
         assert not short.reached
         assert not long.reached
+
+
+@pytest.mark.parametrize("name", ["grid", "mat", "mps", "contour_zigzag"])
+def test_thin_infill_leaves_the_shells_where_they_are(cantilever, name):
+    """Rings half a width inside the border and at every width further in; the rest is thinned."""
+    stress, layers = cantilever
+    width = MACHINE.fibre_width
+    shells = 2 if name == "contour_zigzag" else 3
+    single = {"joined": False} if name == "contour_zigzag" else {}
+    dense, thin = (
+        plan(create(name, {"spacing": spacing, **single}), layers, stress, MACHINE)
+        for spacing in (1.0, 5.0)
+    )
+    depths = np.array([_depth(path) for path in thin]) / width
+    rings = depths < shells - 0.25
+    assert sorted(set(np.round(depths[rings], 2))) == [0.5 + k for k in range(shells)]
+    assert (depths[~rings] > shells - 0.01).all()
+    assert 0.0 < thin.lengths[~rings].sum() < 0.4 * dense.lengths.sum()
+    assert thin.closed[rings].all()
+
+
+def _depth(path):
+    """Least distance of a path from the border of the cantilever."""
+    x, y = path[:, 0], path[:, 1]
+    return min(x.min(), 60.0 - x.max(), y.min(), 30.0 - y.max())
