@@ -166,7 +166,9 @@ class Isocurve:
     inset: float = 0.5
     smooth: bool = True
 
-    amount: ClassVar[Amount] = Amount("density", most=4.0, least=0.05)
+    amount: ClassVar[Amount] = Amount(
+        "density", most=4.0, least=0.05, beyond=(("floor", 0.0), ("cap", 40.0))
+    )
     in_plane: ClassVar[bool] = True
     variants: ClassVar[Mapping[str, Mapping[str, Any]]] = {
         "literal": _LITERAL,
