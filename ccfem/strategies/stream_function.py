@@ -154,8 +154,8 @@ class StreamFunction:
     ) -> list[tuple["StreamFunction", LayerPlanner]]:
         """Design for the largest of some lengths, mm per layer, and cut that to each.
 
-        Lengths above the most of the coverage are taken for that. Where the paths of the design are too short in all it is made once more, with as much more
-        fibre.
+        Lengths above the most of the coverage are taken for that. Where the paths of the design
+        are too short in all it is made once more, with as much more fibre.
 
         Raises
         ------
@@ -170,10 +170,10 @@ class StreamFunction:
         found = told._cut(stress, layers, machine, lengths)
         laid = max(float(paths.lengths.sum()) for paths in found) / len(layers)
         if 0.0 < laid < _ENOUGH * longest and self.overfill * told.coverage < DENSEST:
-            told = replace(told, overfill=min(_MORE * longest / laid, 2.0) * self.overfill)
-            again = told._cut(stress, layers, machine, lengths)
+            more = replace(told, overfill=min(_MORE * longest / laid, 2.0) * self.overfill)
+            again = more._cut(stress, layers, machine, lengths)
             if max(float(paths.lengths.sum()) for paths in again) > laid * len(layers):
-                found = again
+                told, found = more, again
         designed = told.overfill * told.coverage
         return [
             (_designed_for(told, length / full, designed), _Planned(paths))
