@@ -92,12 +92,14 @@ class StreamFunction:
         Percentile of the stress above which the density of the first field grows no more.
     phases : int, default 5
         Positions of the levels of which the best is taken, layer by layer.
-    link_limit : float, default 7
-        Longest link between two ends, in strand widths.
-    inset : float, default 0
-        Least distance of strands from the boundary, in strand widths. At 0, as in the other
-        strategies of isocurves, strands may run along the boundary with half of their width
-        outside; 0.5 keeps them in, and their ends still meet the links along the boundary.
+    link_limit : float, default 10
+        Largest distance of two ends that are linked, in strand widths. Links keep the machine's
+        minimum radius; those with corners join only what is too short to be cut alone, and are
+        marked as links.
+    inset : float, default 0.5
+        Least distance of strands from the boundary, in strand widths. 0.5 keeps them in, and their
+        ends still meet the links along the boundary; at 0 they may run along it with half of their
+        width outside.
     """
 
     coverage: float = 0.45
@@ -108,13 +110,13 @@ class StreamFunction:
     grid: float = 2.0
     cap: float = 90.0
     phases: int = 5
-    link_limit: float = 7.0
-    inset: float = 0.0
+    link_limit: float = 10.0
+    inset: float = 0.5
 
     amount: ClassVar[Amount] = Amount("coverage", most=0.85, least=0.1)
     flat_layers_only: ClassVar[bool] = True
     variants: ClassVar[Mapping[str, Mapping[str, Any]]] = {
-        "inset": {"inset": 0.5, "evaluations": 5},
+        "border": {"inset": 0.0, "evaluations": 5},
         "groups": {"groups": 2, "evaluations": 5},
     }
 
@@ -327,7 +329,9 @@ class _Extraction:
         lines = keep_off_border(curves.lines(), section, self.strategy.inset * width)
         lines = trim_to_clearance(lines, _CLEARANCE * width, _SHORTEST * width)
         limit, least = self.strategy.link_limit * width, self.machine.minimum_length
-        return Toolpaths.from_plane(linked_paths(lines, section, width, limit, least), layer)
+        radius = self.machine.minimum_radius
+        found = linked_paths(lines, section, width, limit, least, radius=radius)
+        return Toolpaths.from_plane(found.lines, layer, link=found.link)
 
     def profiles(self, toolpaths: Toolpaths) -> list[Profile]:
         """Value of the paths at the strains of the designed part."""
