@@ -106,21 +106,25 @@ class Pruned:
     ) -> list[tuple["Pruned", LayerPlanner]]:
         """Plan once for the largest of some lengths, mm per layer, and prune that to each.
 
+        Lengths above the most of the coverage are taken for that.
+
         Raises
         ------
         InputError
             As `for_part`.
         """
+        full = _mean_area(layers) / machine.fibre_width
+        most = max(self.amount.most, self.coverage) * full
+        lengths = [min(length, most) for length in lengths]
         planned = self.overfill * max(lengths)
         paths = plan_to_length(self._planner(), layers, stress, machine, planned).toolpaths
-        full = _mean_area(layers) / machine.fibre_width
         found: list[tuple[Pruned, LayerPlanner]] = []
         for length in lengths:
             kept = paths
             if len(paths):
                 part, strand = Specimen.of(solved(stress, "pruned")), Strand(self.rho)
                 kept = prune(paths, part, length * len(layers), machine, strand, self.rounds)
-            coverage = min(length / full, 1.0)
+            coverage = length / full
             overfill = max(planned / full / coverage, 1.0)
             found.append((replace(self, coverage=coverage, overfill=overfill), _Planned(kept)))
         return found
