@@ -257,7 +257,7 @@ def compare(
     if print_plans:
         runs = [with_print(run, part, tell) for run in runs]
     if strand is not None:
-        runs = all_tested(runs, field, case.machine, strand, backend, tell)
+        runs = all_tested(runs, field, part, strand, backend, tell)
     lengths = [float(run.toolpaths.lengths.sum()) for run in runs if run.tested is not None]
     bound = None
     # The bound is one for flat layers.

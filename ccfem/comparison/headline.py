@@ -7,6 +7,7 @@ import numpy as np
 
 from ccfem.comparison.runs import Run
 from ccfem.evaluation.column import Column
+from ccfem.virtual_testing.strength import FirstFailure
 
 __all__ = ["HEADLINE", "TEST_COLUMNS", "Headline", "cell_text", "headline_values"]
 
@@ -79,9 +80,57 @@ TEST_COLUMNS = (
         "first_failure_load",
         "N",
         "Load at which the matrix (von Mises stress averaged over a 2 mm ball, away from loads and "
-        "supports) or the fibre (99th percentile of the axial force by length) first reaches its "
-        "strength, fibres carrying tension only.",
+        "supports), the fibre (99th percentile of the axial force by length) or the bond between "
+        "layers (interlayer_load) first reaches its strength, fibres carrying tension only.",
         "> 0, higher is better; missing where a strength is unknown",
+    ),
+    Column(
+        "interlayer_load",
+        "N",
+        "Load at which printed layers come apart: the stress tensor averaged over a 2 mm ball, its "
+        "traction on the layer against tensile and shear strength of the bond (quadratic "
+        "criterion), from 3 mm on from loads and supports.",
+        "> 0, infinite where nothing opens; missing where the bond's strength is unknown; of use "
+        "for comparing layers of one part, not as a load",
+    ),
+    Column(
+        "interlayer_load_near",
+        "N",
+        "As interlayer_load, from 1.5 mm on from loads and supports.",
+        "<= interlayer_load; how much of it is the zone's",
+    ),
+    Column(
+        "interlayer_load_everywhere",
+        "N",
+        "As interlayer_load, in all cells.",
+        "<= interlayer_load_near",
+    ),
+    Column(
+        "interlayer_index",
+        "1",
+        "f of that criterion under the load of the test, at its peak.",
+        ">= 0, 1 at failure, lower is better; missing as interlayer_load",
+    ),
+    *(
+        Column(
+            f"interlayer_{axis}",
+            "mm",
+            f"Coordinate {axis} of the place where layers first come apart.",
+            "in the frame of the mesh",
+        )
+        for axis in "xyz"
+    ),
+    Column(
+        "interlayer_opening",
+        "MPa",
+        "Averaged traction across the layer at that place.",
+        "negative where it presses",
+    ),
+    Column(
+        "interlayer_sliding",
+        "MPa",
+        "Averaged traction in the layer at that place.",
+        ">= 0",
     ),
 )
 """Indices of the virtual test, described as those of the evaluator are."""
@@ -116,6 +165,7 @@ HEADLINE = (
     Headline("stiffness_ratio_bonded", "stiffness ×, bonded", "high", "{:.2f}"),
     Headline("displacement", "displacement, mm", "low", "{:.3g}"),
     Headline("first_failure_load", "first failure, N", "high", "{:.0f}"),
+    Headline("interlayer_load", "layers part, N", "", "{:.0f}"),
     Headline("fibre_per_layer", "fibre, mm a layer", "", "{:.0f}"),
     Headline("fibre_mass", "fibre, g", "", "{:.3g}"),
     Headline("print_time_nearest", "print time, min", "low", "{:.0f}"),
@@ -168,7 +218,24 @@ def _test_values(run: Run) -> dict[str, float]:
         values["matrix_stress_change"] = (
             run.tested.failure.matrix_index / run.tested.matrix_before - 1.0
         )
+        values |= _between_layers(run.tested.failure)
     return values
+
+
+def _between_layers(failure: FirstFailure) -> dict[str, float]:
+    """Values of the bond between layers; none where it was not judged."""
+    if not failure.interlayer_zones:
+        return {}
+    away, near, everywhere = failure.interlayer_zones
+    return {
+        "interlayer_load": away,
+        "interlayer_load_near": near,
+        "interlayer_load_everywhere": everywhere,
+        "interlayer_index": failure.interlayer_index,
+        **{f"interlayer_{c}": failure.interlayer_where[k] for k, c in enumerate("xyz")},
+        "interlayer_opening": failure.opening,
+        "interlayer_sliding": failure.sliding,
+    }
 
 
 def cell_text(run: Run, head: Headline) -> tuple[str, str]:

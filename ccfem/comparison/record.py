@@ -44,6 +44,7 @@ def results_frame(comparison: Comparison) -> "pd.DataFrame":
             for column in TEST_COLUMNS:
                 if column.name in extra:
                     frame.loc[frame.index[-1], column.name] = extra[column.name]
+            frame.loc[frame.index[-1], "fails_in"] = run.fails_in
             frames.append(frame)
         frames[-1].insert(0, "strategy", run.name)
     frame = pd.concat(frames, ignore_index=True)

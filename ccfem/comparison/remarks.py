@@ -45,6 +45,8 @@ def _about(run: Run, wanted: float | None, bounded: bool) -> list[str]:
         "no first-failure load": run.tested.note if run.tested is not None else "",
     }
     lines = [f"{what}: {reason}" for what, reason in reasons.items() if reason]
+    if run.tested is not None and run.tested.failure is not None and run.tested.failure.note:
+        lines.append(run.tested.failure.note)
     if run.evaluation is not None:
         lines += _about_links(run.evaluation.total)
         if getattr(run.strategy, "crosses", False):

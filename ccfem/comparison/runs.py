@@ -104,6 +104,12 @@ class Run:
         return self.evaluation is not None and not self.why_not
 
     @property
+    def fails_in(self) -> str:
+        """What fails first, "matrix", "fibre" or "interlayer"; empty where that is not known."""
+        failure = None if self.tested is None else self.tested.failure
+        return "" if failure is None else failure.what
+
+    @property
     def empty_layers(self) -> int:
         """Layers on which the run lays no fibre."""
         if self.evaluation is None:

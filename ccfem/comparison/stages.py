@@ -149,7 +149,7 @@ def _volume(print_plan: PrintPlan, machine: Machine) -> float:
 def all_tested(
     runs: Sequence[Run],
     stress: StressField,
-    machine: Machine,
+    part: Part,
     strand: Strand,
     backend: str,
     tell: Tell,
@@ -163,11 +163,11 @@ def all_tested(
         before, _ = matrix_peak(stress)
     except InputError:
         before = float("nan")
-    return [_tested(run, specimen, strand, machine, before, tell) for run in runs]
+    return [_tested(run, specimen, strand, part, before, tell) for run in runs]
 
 
 def _tested(
-    run: Run, specimen: Specimen, strand: Strand, machine: Machine, before: float, tell: Tell
+    run: Run, specimen: Specimen, strand: Strand, part: Part, before: float, tell: Tell
 ) -> Run:
     """Test a run virtually, or say why it cannot be tested."""
     tell(f"testing {run.name}")
@@ -176,11 +176,12 @@ def _tested(
 
     def work() -> Run:
         mesh = specimen.unreinforced.mesh
-        strands = cut_strands(run.toolpaths, mesh, machine=machine)
+        strands = cut_strands(run.toolpaths, mesh, machine=part.machine)
         tension = virtual_test(strands, specimen, strand, TENSION)
         bracket = Bracket(tension, virtual_test(strands, specimen, strand, BONDED, span=()))
         try:
-            test = Tested(bracket, first_failure(tension, strand), matrix_before=before)
+            failure = first_failure(tension, strand, layers=part.layers)
+            test = Tested(bracket, failure, matrix_before=before)
         except InputError as error:
             test = Tested(bracket, None, str(error))
         return replace(run, tested=test)
