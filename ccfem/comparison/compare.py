@@ -28,6 +28,7 @@ from ccfem.comparison.stages import (
 from ccfem.elasticity.part_stress import GivenStress
 from ccfem.elasticity.solve import solve
 from ccfem.elasticity.stress_field import StressField
+from ccfem.elasticity.support_kinds import PressingSupport
 from ccfem.errors import InputError, known_names
 from ccfem.export.print_plan import check_machine
 from ccfem.fibre_aware.upper_bound import upper_bound
@@ -260,8 +261,9 @@ def compare(
         runs = all_tested(runs, field, part, strand, backend, tell)
     lengths = [float(run.toolpaths.lengths.sum()) for run in runs if run.tested is not None]
     bound = None
-    # The bound is one for flat layers.
-    if lengths and all(layer.flat is not None for layer in stack):
+    # The bound is one for flat layers, and for supports that hold both ways.
+    pressing = any(isinstance(each, PressingSupport) for each in field.problem.supports)
+    if lengths and not pressing and all(layer.flat is not None for layer in stack):
         tell("bounding what any paths could reach")
         with timed(seconds, "bound"):
             bound = upper_bound(
