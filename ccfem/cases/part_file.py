@@ -95,6 +95,10 @@ them with a minus ("-z"), or three numbers.
                                       # lift off and not sink in: patch, and optionally normal, out
                                       # of the part; "held" is the default
 
+    [[alternative_supports]]          # another model of how the part is held, keys as of supports:
+    patch = "foot"                    # strategies are tested under both, and no order is told that
+    kind = "pressing"                 # the two do not agree on
+
     [[loads.pull]]                    # at least one load of one load case, here "pull"
     kind = "bearing"                  # total force, N, that a pin presses on a cylinder
     patch = "pin"
@@ -196,6 +200,7 @@ class _Part(Body):
     material: str | dict[str, Any]
     supports: tuple[dict[str, Any], ...]
     loads: dict[str, Any]
+    alternative_supports: tuple[dict[str, Any], ...] = ()
     name: str = ""
     title: str = ""
     source: str = ""
@@ -247,6 +252,7 @@ def _case(content: Mapping[str, Any], path: Path) -> Case:
     slicing = _slicing(part)
     build = unit_vector(part.build, "build")
     supports = _supports(part.supports, "supports")
+    others = _supports(part.alternative_supports, "alternative_supports")
     loads = _loads(part.loads)
     rules = {name: _rule(table, f"patches.{name}") for name, table in part.patches.items()}
     machine = from_table(Machine, part.machine, "machine")
@@ -255,7 +261,7 @@ def _case(content: Mapping[str, Any], path: Path) -> Case:
     mesh, findings = part.read(path.parent)
     mesh = patches_from_rules(mesh, rules)
     findings = (*findings, *about_patches(mesh, rules))
-    mesh = without_faces(mesh, (*rules, *patches_in_use(supports, loads)))
+    mesh = without_faces(mesh, (*rules, *patches_in_use((*supports, *others), loads)))
     name = part.name or path.stem
     return Case(
         name=name,
@@ -267,6 +273,7 @@ def _case(content: Mapping[str, Any], path: Path) -> Case:
         parameters=part.strategies,
         source=part.source,
         findings=findings,
+        alternative_supports=others,
     )
 
 

@@ -8,7 +8,7 @@ from tempfile import TemporaryDirectory
 import numpy as np
 import shapely
 
-from ccfem.arrays import FloatArray
+from ccfem.arrays import FloatArray, IntArray
 from ccfem.cases.case import Case
 from ccfem.cases.stored import mesh_of_case
 from ccfem.elasticity.problem import Bearing, Force, Order, Problem, Support
@@ -19,12 +19,16 @@ from ccfem.mesh.patches import Cylinder, patches_from_rules
 from ccfem.mesh.tet_mesh import TetMesh
 from ccfem.meshing import extrude
 
-__all__ = ["t_bracket", "t_bracket_front", "t_bracket_mesh", "t_bracket_top"]
+__all__ = ["bolt_heads", "t_bracket", "t_bracket_front", "t_bracket_mesh", "t_bracket_top"]
 
 ELEMENT_SIZE = 3.0
 HOLE_RADIUS = 5.5
 _DEPTH = 15.0
 """Half of the thickness of the head, along z, and of the width of the base, mm."""
+HEAD_RADIUS = 9.5
+"""Radius of the heads of the bolts in the base, mm."""
+_HEAD_LEVEL, _UP = 15.0, 0.9
+"""Height, mm, above which the top of the base lies, and least y of its outward normal."""
 _TOLERANCE = 5e-4
 """Of the mesher, in the diagonal of the part."""
 HOLES = {
@@ -67,6 +71,18 @@ def t_bracket_top() -> shapely.Polygon:
     outline = shapely.LineString([(-50.0, 0.0), (50.0, 0.0)]).buffer(_DEPTH, quad_segs=16)
     holes = [shapely.Point(x, 0.0).buffer(HOLE_RADIUS, quad_segs=16) for x in (-50.0, 50.0)]
     return outline.difference(shapely.union_all(holes))
+
+
+def bolt_heads(mesh: TetMesh) -> dict[str, IntArray]:
+    """Facets (k, 3) on top of the base under the heads of its bolts, as patches."""
+    corners = mesh.points[mesh.boundary]
+    up = mesh.facet_areas(mesh.boundary)[1][:, 1] > _UP
+    top = up & (corners[:, :, 1].min(axis=1) > _HEAD_LEVEL)
+    found = {}
+    for name, x in (("head_left", -50.0), ("head_right", 50.0)):
+        radius = np.hypot(corners[:, :, 0] - x, corners[:, :, 2]).max(axis=1)
+        found[name] = mesh.boundary[top & (radius < HEAD_RADIUS)]
+    return found
 
 
 def t_bracket_mesh(element_size: float) -> TetMesh:

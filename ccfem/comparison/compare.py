@@ -6,7 +6,7 @@ print, test, bound.
 
 import os
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from itertools import count
 from typing import Any
 
@@ -258,7 +258,11 @@ def compare(
     if print_plans:
         runs = [with_print(run, part, tell) for run in runs]
     if strand is not None:
-        runs = all_tested(runs, field, part, strand, backend, tell)
+        alternative = None
+        if case.alternative_supports:
+            with timed(seconds, "solve, alternative supports"):
+                alternative = _otherwise_held(case, field, backend)
+        runs = all_tested(runs, field, part, strand, backend, tell, alternative)
     lengths = [float(run.toolpaths.lengths.sum()) for run in runs if run.tested is not None]
     bound = None
     # The bound is one for flat layers, and for supports that hold both ways.
@@ -270,6 +274,17 @@ def compare(
                 field, stack, max(lengths), case.machine, strand, iterations=_BOUND_ITERATIONS
             )
     return Comparison(case, field, stack, tuple(runs), wanted, seconds, bound, given)
+
+
+def _otherwise_held(case: Case, field: StressField, backend: str) -> StressField:
+    """Solution of the same load case under the alternative supports."""
+    loads = {field.case: field.problem.loads[field.case]}
+    supports = case.alternative_supports
+    try:
+        problem = replace(field.problem, supports=supports, loads=loads, combinations={})
+        return solve(problem, backend)[field.case]
+    except InputError as error:
+        raise InputError(f"alternative supports: {error}") from None
 
 
 def _load_case(case: Case, name: str | None) -> str:

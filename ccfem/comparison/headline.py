@@ -5,7 +5,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from ccfem.comparison.runs import Run
+from ccfem.comparison.runs import Run, Tested
 from ccfem.evaluation.column import Column
 from ccfem.virtual_testing.strength import FirstFailure
 
@@ -132,6 +132,21 @@ TEST_COLUMNS = (
         "Averaged traction in the layer at that place.",
         ">= 0",
     ),
+    *(
+        Column(
+            f"{name}_alternative",
+            unit,
+            f"{name} under the alternative supports of the part.",
+            f"as {name}; missing where the part has none",
+        )
+        for name, unit in (
+            ("stiffness_ratio_tension", "1"),
+            ("stiffness_ratio_bonded", "1"),
+            ("stiffness", "N/mm"),
+            ("first_failure_load", "N"),
+            ("interlayer_load", "N"),
+        )
+    ),
 )
 """Indices of the virtual test, described as those of the evaluator are."""
 
@@ -163,8 +178,10 @@ HEADLINE = (
     Headline("stiffness", "stiffness, N/mm", "high", "{:.4g}"),
     Headline("stiffness_ratio_tension", "stiffness ×, tension only", "high", "{:.2f}"),
     Headline("stiffness_ratio_bonded", "stiffness ×, bonded", "high", "{:.2f}"),
+    Headline("stiffness_ratio_tension_alternative", "stiffness ×, other supports", "", "{:.2f}"),
     Headline("displacement", "displacement, mm", "low", "{:.3g}"),
     Headline("first_failure_load", "first failure, N", "high", "{:.0f}"),
+    Headline("first_failure_load_alternative", "first failure, other supports, N", "", "{:.0f}"),
     Headline("interlayer_load", "layers part, N", "", "{:.0f}"),
     Headline("fibre_per_layer", "fibre, mm a layer", "", "{:.0f}"),
     Headline("fibre_mass", "fibre, g", "", "{:.3g}"),
@@ -198,9 +215,20 @@ def headline_values(run: Run) -> Mapping[str, float]:
 
 
 def _test_values(run: Run) -> dict[str, float]:
+    """Values of the virtual test, and of that under the alternative supports."""
     if run.tested is None:
         return {}
-    tension, bonded = run.tested.bracket.tension, run.tested.bracket.bonded
+    values, other = _values_of(run.tested), run.tested.alternative
+    if other is not None:
+        found = _values_of(other)
+        ends = [column.name for column in TEST_COLUMNS if column.name.endswith("_alternative")]
+        names = {name: name.removesuffix("_alternative") for name in ends}
+        values |= {name: found[own] for name, own in names.items() if own in found}
+    return values
+
+
+def _values_of(tested: Tested) -> dict[str, float]:
+    tension, bonded = tested.bracket.tension, tested.bracket.bonded
     values = {
         "stiffness_ratio_tension": tension.ratio,
         "stiffness_ratio_bonded": bonded.ratio,
@@ -213,12 +241,10 @@ def _test_values(run: Run) -> dict[str, float]:
         ratios = [ratio for _, ratio in tension.span]
         values["stiffness_ratio_low"] = min(ratios)
         values["stiffness_ratio_high"] = max(ratios)
-    if run.tested.failure is not None:
-        values["first_failure_load"] = run.tested.failure.load
-        values["matrix_stress_change"] = (
-            run.tested.failure.matrix_index / run.tested.matrix_before - 1.0
-        )
-        values |= _between_layers(run.tested.failure)
+    if tested.failure is not None:
+        values["first_failure_load"] = tested.failure.load
+        values["matrix_stress_change"] = tested.failure.matrix_index / tested.matrix_before - 1.0
+        values |= _between_layers(tested.failure)
     return values
 
 
@@ -252,4 +278,7 @@ def cell_text(run: Run, head: Headline) -> tuple[str, str]:
         extra = f"{values['stiffness_ratio_low']:.2f}–{values['stiffness_ratio_high']:.2f}"
     if head.column == "first_failure_load" and run.tested is not None and run.tested.failure:
         extra = run.tested.failure.what
+    if head.column == "first_failure_load_alternative":
+        other = None if run.tested is None else run.tested.alternative
+        extra = other.failure.what if other is not None and other.failure is not None else ""
     return head.pattern.format(value), extra

@@ -30,12 +30,15 @@ class Tested:
         Why there is no first-failure load; else empty.
     matrix_before : float, MPa
         Peak of the averaged von Mises stress without fibre; NaN where it cannot be judged.
+    alternative : Tested, optional
+        The same under the alternative supports of the case, where it has some.
     """
 
     bracket: Bracket
     failure: FirstFailure | None
     note: str = ""
     matrix_before: float = float("nan")
+    alternative: "Tested | None" = None
 
 
 @dataclass(frozen=True)

@@ -15,6 +15,7 @@ from ccfem.comparison.headline import HEADLINE, headline_values
 from ccfem.comparison.pictures import caption
 from ccfem.comparison.ranking import best_values
 from ccfem.elasticity.problem import Force, Problem, Support
+from ccfem.elasticity.support_kinds import PressingSupport
 from ccfem.errors import InputError
 from ccfem.evaluation import evaluate
 from ccfem.layers.slicing import Planar
@@ -144,6 +145,25 @@ def test_the_bond_between_layers_is_judged_where_its_strength_is_known(compared,
     unknown = compare(replace(case, problem=weak), ["concentric"])
     assert any("bond between layers not judged: material" in line for line in unknown.remarks)
     assert "interlayer_load" not in unknown.frame
+
+
+def test_alternative_supports_are_tested_too():
+    """Pushed against a wall it is held as by one that cannot lift off."""
+    case = strip()
+    wall = (PressingSupport("x_min"), Support("y_min", "y"), Support("z_min", "z"))
+    found = compare(
+        replace(case, alternative_supports=wall), ["concentric", "zigzag"], load_case="push"
+    )
+    table = found.frame
+    for name in ("stiffness", "stiffness_ratio_tension", "stiffness_ratio_bonded"):
+        np.testing.assert_allclose(table[f"{name}_alternative"], table[name], rtol=1e-6)
+    # By the wall nothing is judged, by a plane of symmetry it is.
+    for name in ("first_failure_load", "interlayer_load"):
+        assert (table[f"{name}_alternative"] >= (1.0 - 1e-6) * table[name]).all()
+    assert "solve, alternative supports" in found.seconds
+    # Pulled it would come off.
+    with pytest.raises(InputError, match="alternative supports: the load lifts"):
+        compare(replace(case, alternative_supports=wall), ["concentric"])
 
 
 def test_what_cannot_be_thinned_leaves_layers_out():
