@@ -12,6 +12,7 @@ from ccfem.arrays import FloatArray, IntArray
 from ccfem.cases.case import Case
 from ccfem.cases.stored import mesh_of_case
 from ccfem.elasticity.problem import Bearing, Force, Order, Problem, Support
+from ccfem.elasticity.support_kinds import PressingSupport
 from ccfem.layers.slicing.spatial import Spatial
 from ccfem.materials import printed_pla
 from ccfem.mesh.check import check_mesh
@@ -74,13 +75,13 @@ def t_bracket_top() -> shapely.Polygon:
 
 
 def bolt_heads(mesh: TetMesh) -> dict[str, IntArray]:
-    """Facets (k, 3) on top of the base under the heads of its bolts, as patches."""
-    corners = mesh.points[mesh.boundary]
+    """Find the facets (k, 3) on top of the base with their middles under the heads of its bolts."""
+    middle = mesh.points[mesh.boundary].mean(axis=1)
     up = mesh.facet_areas(mesh.boundary)[1][:, 1] > _UP
-    top = up & (corners[:, :, 1].min(axis=1) > _HEAD_LEVEL)
+    top = up & (middle[:, 1] > _HEAD_LEVEL)
     found = {}
     for name, x in (("head_left", -50.0), ("head_right", 50.0)):
-        radius = np.hypot(corners[:, :, 0] - x, corners[:, :, 2]).max(axis=1)
+        radius = np.hypot(middle[:, 0] - x, middle[:, 2])
         found[name] = mesh.boundary[top & (radius < HEAD_RADIUS)]
     return found
 
@@ -121,7 +122,12 @@ def _write_surface(name: str, points: FloatArray, mesh: TetMesh) -> None:
     pyvista.PolyData(points, faces.ravel()).save(name)
 
 
-def t_bracket(element_size: float = ELEMENT_SIZE, order: Order = 2, force: float = 1000.0) -> Case:
+def t_bracket(
+    element_size: float = ELEMENT_SIZE,
+    order: Order = 2,
+    force: float = 1000.0,
+    bolts: bool = False,
+) -> Case:
     """T-bracket of 130 x 60 x 30 mm: bolted down at its base, pulled by a bolt through its head.
 
     The shape is recovered from the layers that the authors published (GuoxinFang/
@@ -136,8 +142,17 @@ def t_bracket(element_size: float = ELEMENT_SIZE, order: Order = 2, force: float
         Linear or quadratic cells, or what their estimated error calls for.
     force : float, N
         Of the pull; a quarter of it sideways.
+    bolts : bool
+        Whether strategies are tested a second time with the base's bolts as they are: walls and
+        heads that only press.
     """
     mesh = mesh_of_case("t_bracket", element_size, order, t_bracket_mesh)
+    alternative: tuple[PressingSupport, ...] = ()
+    if bolts:
+        heads = bolt_heads(mesh)
+        mesh = mesh.with_patches(heads)
+        pressed = ("base_left", "base_right", *heads)
+        alternative = tuple(PressingSupport(name) for name in pressed)
     return Case(
         name="t_bracket",
         title="T-bracket 130 x 60 x 30 mm, bolts through base and head at right angles",
@@ -155,4 +170,5 @@ def t_bracket(element_size: float = ELEMENT_SIZE, order: Order = 2, force: float
         slicing=Spatial(),
         source="shape recovered from the layers published by Fang et al., Additive Manufacturing "
         "79 (2024) 103903; load in the direction of theirs",
+        alternative_supports=alternative,
     )

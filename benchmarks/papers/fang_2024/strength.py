@@ -24,7 +24,7 @@ from ccfem.layers import Layer
 from ccfem.layers.slicing import Planar
 from ccfem.machine import Machine
 from ccfem.materials import isotropic
-from ccfem.planning import plan
+from ccfem.planning.equal_fibre import plan_to_length
 from ccfem.strategies import create
 from ccfem.toolpaths import Toolpaths
 from ccfem.virtual_testing.interlayer import interlayer
@@ -38,6 +38,9 @@ HOLES, HEADS = ("base_left", "base_right"), ("head_left", "head_right")
 
 COUNTS = {"x": 131, "y": 61, "z": 32}
 """Layers with fibre of each planar slicing."""
+
+FIBRE = 33.5e3
+"""Length of the rings of each planar slicing, mm: that of the authors' strands."""
 
 COLUMNS = ("stiffness ratio", "without fibre", "interlayer", "matrix", "fibre")
 
@@ -59,7 +62,7 @@ _CLOSE = 0.03
 def study() -> dict[tuple[str, str], tuple[float, ...]]:
     """Print the table; its figures by layers and supports."""
     mesh = authors_mesh()
-    mesh = mesh.with_patches({**mesh.patches, **bolt_heads(mesh)})
+    mesh = mesh.with_patches(bolt_heads(mesh))
     pla = isotropic(3000.0, 0.35, tensile_strength=33.0, interlayer_tensile=18.0)
     models = {
         "fixed": tuple(Support(name) for name in HOLES),
@@ -89,7 +92,8 @@ def _slicings(stress: StressField) -> dict[str, tuple[Sequence[Layer], Toolpaths
     for name, count in COUNTS.items():
         build = tuple(float(name == axis) for axis in "xyz")
         layers = Planar(count=count).cut(stress.mesh, build)
-        found[name] = layers, plan(rings, layers, stress, machine)
+        wanted = FIBRE / len(layers)
+        found[name] = layers, plan_to_length(rings, layers, stress, machine, wanted).toolpaths
     theirs = authors_layers(stress)
     return {**found, "authors": (theirs, authors_strands(theirs))}
 
