@@ -91,6 +91,13 @@ them with a minus ("-z"), or three numbers.
     patch = "foot"
     components = "xyz"                # which are held; default all
     value = [0, 0, 0]                 # displacement they take, mm; default none
+    kind = "pressing"                 # optional: the patch lies on something rigid, may slide and
+                                      # lift off and not sink in: patch, and optionally normal, out
+                                      # of the part; "held" is the default
+
+    [[alternative_supports]]          # another model of how the part is held, keys as of supports:
+    patch = "foot"                    # strategies are tested under both, and no order is told that
+    kind = "pressing"                 # the two do not agree on
 
     [[loads.pull]]                    # at least one load of one load case, here "pull"
     kind = "bearing"                  # total force, N, that a pin presses on a cylinder
@@ -124,7 +131,7 @@ them with a minus ("-z"), or three numbers.
 
 import os
 import tomllib
-from collections.abc import Callable, Mapping
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Any
@@ -142,6 +149,7 @@ from ccfem.elasticity.problem import (
     Support,
     Traction,
 )
+from ccfem.elasticity.support_kinds import AnySupport, PressingSupport
 from ccfem.errors import InputError
 from ccfem.io.toml import from_table
 from ccfem.io.whole import existing_file
@@ -175,6 +183,7 @@ _RULES: dict[str, Callable[..., PatchRule]] = {
     "face": Faces,
     "holes": Holes,
 }
+_SUPPORTS: dict[str, Callable[..., AnySupport]] = {"held": Support, "pressing": PressingSupport}
 _LOADS: dict[str, Callable[..., Load]] = {
     "force": Force,
     "traction": Traction,
@@ -191,6 +200,7 @@ class _Part(Body):
     material: str | dict[str, Any]
     supports: tuple[dict[str, Any], ...]
     loads: dict[str, Any]
+    alternative_supports: tuple[dict[str, Any], ...] = ()
     name: str = ""
     title: str = ""
     source: str = ""
@@ -241,9 +251,8 @@ def _case(content: Mapping[str, Any], path: Path) -> Case:
         raise InputError("a part needs a support: add [[supports]] with its patch")
     slicing = _slicing(part)
     build = unit_vector(part.build, "build")
-    supports = tuple(
-        from_table(Support, table, f"supports[{k}]") for k, table in enumerate(part.supports)
-    )
+    supports = _supports(part.supports, "supports")
+    others = _supports(part.alternative_supports, "alternative_supports")
     loads = _loads(part.loads)
     rules = {name: _rule(table, f"patches.{name}") for name, table in part.patches.items()}
     machine = from_table(Machine, part.machine, "machine")
@@ -252,7 +261,7 @@ def _case(content: Mapping[str, Any], path: Path) -> Case:
     mesh, findings = part.read(path.parent)
     mesh = patches_from_rules(mesh, rules)
     findings = (*findings, *about_patches(mesh, rules))
-    mesh = without_faces(mesh, (*rules, *patches_in_use(supports, loads)))
+    mesh = without_faces(mesh, (*rules, *patches_in_use((*supports, *others), loads)))
     name = part.name or path.stem
     return Case(
         name=name,
@@ -264,6 +273,7 @@ def _case(content: Mapping[str, Any], path: Path) -> Case:
         parameters=part.strategies,
         source=part.source,
         findings=findings,
+        alternative_supports=others,
     )
 
 
@@ -287,6 +297,16 @@ def _rule(table: object, where: str) -> PatchRule:
     if name == "plane" and "point" in rest:
         make = Plane.through
     return from_table(make, rest, where, infinite=name == "box")
+
+
+def _supports(tables: Sequence[Mapping[str, Any]], key: str) -> tuple[AnySupport, ...]:
+    """Read the supports under a key."""
+    found = []
+    for k, table in enumerate(tables):
+        where = f"{key}[{k}]"
+        kind, rest = _named({"kind": "held", **table}, "kind", _SUPPORTS, where)
+        found.append(from_table(_SUPPORTS[kind], rest, where))
+    return tuple(found)
 
 
 def _loads(cases: Mapping[str, Any]) -> dict[str, tuple[Load, ...]]:
