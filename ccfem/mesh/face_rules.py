@@ -8,7 +8,7 @@ import numpy as np
 from ccfem.arrays import IntArray
 from ccfem.checks import check_fields
 from ccfem.errors import InputError
-from ccfem.mesh.patches import Vector, match_boundary, unit_vector
+from ccfem.mesh.patches import Bounded, Vector, match_boundary, unit_vector
 from ccfem.mesh.smooth_faces import FEATURE_ANGLE, Face, smooth_faces
 from ccfem.mesh.tet_mesh import TetMesh
 
@@ -46,7 +46,7 @@ class Faces:
     def _numbers(self) -> tuple[int, ...]:
         return (self.number,) if isinstance(self.number, int) else self.number
 
-    def __call__(self, mesh: TetMesh) -> IntArray:
+    def __call__(self, mesh: Bounded) -> IntArray:
         """Boundary facets (k, 3) of the faces.
 
         Where the mesh was made from a surface whose faces came with it as groups, of these.
@@ -90,7 +90,7 @@ class Holes:
         if self.axis is not None:
             unit_vector(self.axis, "holes axis")
 
-    def __call__(self, mesh: TetMesh) -> IntArray:
+    def __call__(self, mesh: Bounded) -> IntArray:
         """Boundary facets (k, 3) of the walls."""
         faces = smooth_faces(mesh.points, mesh.boundary, self.angle)
         walls = [face for face in faces if face.kind == "cylinder" and face.hollow]
