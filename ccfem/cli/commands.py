@@ -96,7 +96,10 @@ def _list(kind: str, name: str | None) -> None:
 def faces(
     body: Annotated[
         Path,
-        typer.Argument(metavar="BODY", help="Surface (.stl ...), mesh, part file or case."),
+        typer.Argument(
+            metavar="BODY",
+            help="Surface (.stl), CAD file (.step), mesh, part file or case.",
+        ),
     ],
     angle: Annotated[
         float, typer.Option(metavar="DEGREES", help="Angle from which an edge separates faces.")
@@ -112,6 +115,50 @@ def faces(
     from ccfem.cli.faces import list_faces
 
     list_faces(body, angle, scale, out)
+
+
+@app.command()
+def check(
+    case: CasePath,
+    set_case: SetCase = None,
+    out: Annotated[
+        Path | None,
+        typer.Option(
+            "--out",
+            metavar="PICTURE",
+            help="Picture (.png, .pdf, .svg), beside it a page that turns; default NAME-check.png.",
+        ),
+    ] = None,
+) -> None:
+    """Say and draw all that is known of a part before it is solved; all mistakes at once."""
+    from ccfem.cli.check import check_part
+
+    code = check_part(case, set_case, out)
+    if code:
+        raise typer.Exit(code)
+
+
+@app.command()
+def mesh(
+    body: Annotated[
+        Path,
+        typer.Argument(metavar="BODY", help="Surface (.stl, .obj, .ply) or CAD file (.step ...)."),
+    ],
+    size: Annotated[float, typer.Option("--size", metavar="MM", help="Edge length of the cells.")],
+    out: Annotated[
+        Path, typer.Option("-o", "--out", metavar="MESH", help="Mesh (.vtu, .npz, .tet).")
+    ],
+    scale: Annotated[
+        float, typer.Option(metavar="S", help="Factor that makes a file's coordinates mm.")
+    ] = 1.0,
+    mesher: Annotated[
+        str, typer.Option(metavar="auto|gmsh|ftetwild", help="What meshes a surface.")
+    ] = "auto",
+) -> None:
+    """Mesh a surface or a CAD file, its faces as patches: face_1, face_2, or their names."""
+    from ccfem.cli.mesh import mesh_file
+
+    mesh_file(body, size, out, scale, mesher)
 
 
 @app.command()

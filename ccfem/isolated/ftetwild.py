@@ -1,4 +1,4 @@
-"""Meshing by fTetWild, on one core, so that equal input gives equal meshes."""
+"""Meshing by fTetWild."""
 
 from typing import Any
 
@@ -19,6 +19,5 @@ def fill(points: NDArray[Any], triangles: NDArray[Any], size: float) -> dict[str
         optimize=True,
         vtk_ordering=True,
         quiet=True,
-        num_threads=1,
     )
     return {"points": points, "cells": np.asarray(cells, dtype=np.int64)}

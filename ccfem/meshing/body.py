@@ -39,8 +39,8 @@ def mesh_body(
     Returns
     -------
     mesh : TetMesh
-        With the faces as patches ``face_1``, ``face_2``, ...; the same for equal input on any
-        number of cores. It is kept in the user's cache (the variable CCFEM_CACHE names another
+        With the faces as patches ``face_1``, ``face_2``, ...; by Gmsh the same for equal input on
+        any number of cores. It is kept in the user's cache (the variable CCFEM_CACHE names another
         folder, or none where it is empty), and not made again.
     findings : tuple of str
         Who made it, its volume and its distance from the surface.
@@ -61,7 +61,10 @@ def mesh_body(
         if before is not None:
             before(surface)
         mesh, fit, who = fill(surface, edge_length, mesher)
-        return with_faces_of(surface, mesh), (fit.about(who),)
+        about = fit.about(who)
+        if who != "Gmsh":  # it takes its random numbers from the hardware
+            about += "; fTetWild makes another mesh each time: this one is kept on this machine"
+        return with_faces_of(surface, mesh), (about,)
 
     asked: dict[str, object] = {
         "edge_length": float(edge_length),

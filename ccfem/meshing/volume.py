@@ -26,7 +26,7 @@ _PATIENCE = 120.0
 
 
 def tetrahedralise(surface: Surface, edge_length: float, mesher: Mesher = "auto") -> TetMesh:
-    """Fill a closed surface with tetrahedra; equal input gives equal meshes.
+    """Fill a closed surface with tetrahedra.
 
     Parameters
     ----------
@@ -34,10 +34,11 @@ def tetrahedralise(surface: Surface, edge_length: float, mesher: Mesher = "auto"
     edge_length : float, mm
         Target edge length.
     mesher : {"auto", "gmsh", "ftetwild"}, default "auto"
-        Gmsh meshes the smooth faces of the surface anew, which takes a clean surface in one piece.
-        fTetWild (Hu et al., Fast Tetrahedral Meshing in the Wild) takes any closed one, is slower,
-        and stays within 1e-3 of the part's diagonal of it. "auto" takes Gmsh where it is installed,
-        and fTetWild where that fails or loses 2 % of the volume.
+        Gmsh meshes the smooth faces of the surface anew, which takes a clean surface in one piece;
+        equal input gives equal meshes. fTetWild (Hu et al., Fast Tetrahedral Meshing in the Wild)
+        takes any closed surface and stays within 1e-3 of the part's diagonal of it; it is slower,
+        and makes another mesh each time. "auto" takes Gmsh where it is installed, and fTetWild
+        where that fails or loses 2 % of the volume.
 
     Returns
     -------
