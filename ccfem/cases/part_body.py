@@ -20,6 +20,9 @@ from ccfem.meshing.volume import Mesher
 
 __all__ = ["Body"]
 
+_SMALLEST, _LARGEST = 0.1, 1e5
+"""Diagonals, mm, beyond which a unit is wrong."""
+
 
 @dataclass(frozen=True, kw_only=True)
 class Body:
@@ -80,6 +83,12 @@ class Body:
             mesh, report = check_mesh(mesh)
         else:
             mesh, report = check_mesh(_extruded(self))
+        size = report.diagonal
+        if not _SMALLEST <= size <= _LARGEST:
+            raise InputError(
+                f"the part measures {size:.3g} mm across; expected {_SMALLEST:g} to {_LARGEST:g} "
+                "mm: correct scale, which makes the coordinates mm"
+            )
         found = (*made, *report.findings, *self._about_edge_length(mesh))
         return mesh.quadratic() if self.order == 2 else mesh, found
 

@@ -3,6 +3,7 @@
 Everything heavy is imported by the command that needs it, so that ``ccfem --help`` answers at once.
 """
 
+import io
 import os
 import signal
 import sys
@@ -12,7 +13,7 @@ from typing import Annotated, Any
 
 import typer
 
-from ccfem.cli.arguments import names_of, parameters_by_strategy
+from ccfem.cli.arguments import names_of, parameters_by_strategy, path_of
 from ccfem.cli.options import (
     Backend,
     Calibration,
@@ -108,7 +109,10 @@ def faces(
         float, typer.Option(metavar="S", help="Factor that makes a file's coordinates mm.")
     ] = 1.0,
     out: Annotated[
-        Path, typer.Option("--out", metavar="PICTURE", help="Picture (.png, .pdf, .svg).")
+        Path,
+        typer.Option(
+            "--out", metavar="PICTURE", parser=path_of, help="Picture (.png, .pdf, .svg)."
+        ),
     ] = Path("faces.png"),
 ) -> None:
     """List the smooth faces of a body with numbers to choose patches by, and draw them."""
@@ -126,6 +130,7 @@ def check(
         typer.Option(
             "--out",
             metavar="PICTURE",
+            parser=path_of,
             help="Picture (.png, .pdf, .svg), beside it a page that turns; default NAME-check.png.",
         ),
     ] = None,
@@ -146,7 +151,10 @@ def mesh(
     ],
     size: Annotated[float, typer.Option("--size", metavar="MM", help="Edge length of the cells.")],
     out: Annotated[
-        Path, typer.Option("-o", "--out", metavar="MESH", help="Mesh (.vtu, .npz, .tet).")
+        Path,
+        typer.Option(
+            "-o", "--out", metavar="MESH", parser=path_of, help="Mesh (.vtu, .npz, .tet)."
+        ),
     ],
     scale: Annotated[
         float, typer.Option(metavar="S", help="Factor that makes a file's coordinates mm.")
@@ -274,7 +282,9 @@ def solve(
     case: CasePath,
     out: Annotated[
         Path,
-        typer.Option("-o", "--out", metavar="RESULT.vtu", help="File that is written."),
+        typer.Option(
+            "-o", "--out", metavar="RESULT.vtu", parser=path_of, help="File that is written."
+        ),
     ],
     set_case: SetCase = None,
     load_case: Annotated[
@@ -331,7 +341,10 @@ def calibrate(
     fibre_per_layer: Fibre = None,
     load_case: LoadCase = None,
     out: Annotated[
-        Path, typer.Option("--out", metavar="MATERIAL.toml", help="File that is written.")
+        Path,
+        typer.Option(
+            "--out", metavar="MATERIAL.toml", parser=path_of, help="File that is written."
+        ),
     ] = Path("calibrated.toml"),
 ) -> None:
     """Fit modulus, matrix strength and strand stiffness to force-displacement curves (CSV).
@@ -371,6 +384,9 @@ def main() -> None:
     # The base class of a wrong option or argument, wherever typer keeps it.
     usage_error: Any = typer.BadParameter.__mro__[1]
     signal.signal(signal.SIGTERM, signal.default_int_handler)
+    for stream in (sys.stdout, sys.stderr):
+        if isinstance(stream, io.TextIOWrapper):  # a title outside ASCII on an ASCII terminal
+            stream.reconfigure(errors="replace")
     try:
         code = typer.main.get_command(app)(standalone_mode=False)
     except (InputError, SolveError) as error:

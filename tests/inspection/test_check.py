@@ -16,7 +16,10 @@ from ccfem.plot.part_picture import part_page, part_picture
 PLA = isotropic(3500.0, 0.35)
 
 
-def checked(loads, supports=(Support("x_min"),), patches=None):
+HELD = (Support("x_min"),)
+
+
+def checked(loads, supports=HELD, patches=None):
     mesh = box_mesh((40.0, 20.0, 10.0), (8, 4, 2))
     mesh = mesh.with_patches(patches(mesh) if patches else {})
     problem = Problem(mesh, PLA, supports, {"pull": tuple(loads)}, order=1)
