@@ -9,9 +9,9 @@ from ccfem.elasticity.problem import Problem
 
 __all__ = ["Cost", "solve_costs"]
 
-_SECONDS = {1: 60e-6, 2: 110e-6}
+_SECONDS = {1: 40e-6, 2: 30e-6}
 """CPU time for each unknown of linear and quadratic cells (benchmarks/speed/solve_cost.py)."""
-_BYTES = {1: 4.0e3, 2: 7.0e3}
+_BYTES = {1: 2.8e3, 2: 2.5e3}
 """Memory for each unknown, likewise."""
 _PROGRAM = 0.4e9
 """Memory of the program itself, bytes."""

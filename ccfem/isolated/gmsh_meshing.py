@@ -14,6 +14,10 @@ __all__ = ["cad_surface", "cad_volume", "fill"]
 
 _ROUND = 12
 """Edges on a full turn of a round wall, where the size that is asked for would give fewer."""
+_FINEST = 0.15
+"""Shortest edge there, over that size."""
+_GROWTH = 0.4
+"""Growth of the edges with the distance from a round wall."""
 
 
 def cad_volume(path: str, size: float, scale: float) -> dict[str, Any]:
@@ -43,11 +47,16 @@ def cad_surface(path: str, size: float, scale: float) -> dict[str, Any]:
 
 
 def fill(
-    points: NDArray[Any], triangles: NDArray[Any], size: float, angle: float
+    points: NDArray[Any],
+    triangles: NDArray[Any],
+    size: float,
+    angle: float,
+    walls: NDArray[Any],
 ) -> dict[str, Any]:
     """Tetrahedra in a closed surface, its smooth faces meshed anew; ``points`` and ``cells``.
 
-    `angle`, degrees, is that from which an edge between triangles stays.
+    `angle`, degrees, is that from which an edge between triangles stays. `walls` (k, 8) are round
+    walls, meshed finer: middle of the axis, its direction, radius and half its length.
     """
     with _model() as gmsh:
         surface = gmsh.model.addDiscreteEntity(2)
@@ -60,6 +69,10 @@ def fill(
         gmsh.model.geo.addVolume([gmsh.model.geo.addSurfaceLoop(pieces)])
         gmsh.model.geo.synchronize()
         _sizes(gmsh, size, turn=0)
+        if len(walls):
+            gmsh.model.mesh.setSizeCallback(
+                lambda _dim, _tag, x, y, z, _size: _size_at(np.array([x, y, z]), size, walls)
+            )
         gmsh.model.mesh.generate(3)
         return _mesh(gmsh, 1.0)
 
@@ -118,12 +131,23 @@ def _above(gmsh: Any, entity: tuple[int, int]) -> Any:
 def _sizes(gmsh: Any, size: float, turn: int = _ROUND) -> None:
     for option, value in (
         ("MeshSizeMax", size),
-        ("MeshSizeMin", 0.25 * size),
+        ("MeshSizeMin", _FINEST * size),
         ("MeshSizeFromCurvature", turn),
         ("MeshSizeFromPoints", 0),
         ("MeshSizeExtendFromBoundary", int(turn > 0)),
     ):
         gmsh.option.setNumber(f"Mesh.{option}", value)
+
+
+def _size_at(point: NDArray[Any], size: float, walls: NDArray[Any]) -> float:
+    """Edge length at a point: shorter on round walls, growing away from them."""
+    arm = point - walls[:, :3]
+    along = np.einsum("ij,ij->i", arm, walls[:, 3:6])
+    across = np.linalg.norm(arm - along[:, None] * walls[:, 3:6], axis=1)
+    beyond = np.maximum(np.abs(along) - walls[:, 7], 0.0)
+    away = np.hypot(across - walls[:, 6], beyond)
+    wanted = np.maximum(2.0 * math.pi * walls[:, 6] / _ROUND, _FINEST * size) + _GROWTH * away
+    return min(size, float(wanted.min()))
 
 
 def _mesh(gmsh: Any, scale: float) -> dict[str, Any]:

@@ -338,10 +338,10 @@ def unit_vector(value: str | ArrayLike, what: str) -> FloatArray:
         sign = -1.0 if value.startswith("-") else 1.0
         return sign * np.array(_AXES[value.removeprefix("-")])
     vector = _vector(value, what)
-    length = np.linalg.norm(vector)
-    if not 0.0 < length < np.inf:
+    largest = float(np.abs(vector).max())
+    if not 0.0 < largest < np.inf:
         raise InputError(f"{what} must have a finite length above 0; got {value}: correct it")
-    return vector / length
+    return np.asarray(vector / largest / np.linalg.norm(vector / largest))
 
 
 def _vector(value: ArrayLike, what: str) -> FloatArray:

@@ -92,7 +92,7 @@ class Face:
             cosine = float(self.direction @ axis)
             if abs(cosine) > 1.0 - 1e-6:
                 return name if cosine > 0.0 else f"-{name}"
-        return "[" + ", ".join(f"{x:.4g}" for x in self.direction + 0.0) + "]"
+        return "[" + ", ".join(f"{x:.4g}" for x in np.round(self.direction, 5) + 0.0) + "]"
 
 
 def smooth_faces(
@@ -267,4 +267,4 @@ def _cylinder(surface: _Surface, rows: IntArray) -> Face | None:
 
 def _numbers(place: FloatArray) -> str:
     """Write a place, mm, as a part file has it."""
-    return "[" + ", ".join(f"{x:.4g}" for x in np.round(place, 9) + 0.0) + "]"
+    return "[" + ", ".join(f"{x:.4g}" for x in np.round(place, 4) + 0.0) + "]"

@@ -5,13 +5,14 @@ from typing import Literal, get_args
 
 import numpy as np
 
+from ccfem.arrays import FloatArray
 from ccfem.checks import check_known, check_number
 from ccfem.errors import InputError
 from ccfem.io.surface import Surface
 from ccfem.isolated.process import ChildError, in_own_process
 from ccfem.mesh.check import check_mesh
 from ccfem.mesh.measures import connected
-from ccfem.mesh.smooth_faces import FEATURE_ANGLE
+from ccfem.mesh.smooth_faces import FEATURE_ANGLE, smooth_faces
 from ccfem.mesh.tet_mesh import TetMesh
 from ccfem.meshing.fidelity import Fidelity, fidelity
 
@@ -101,6 +102,17 @@ def check_edge_length(surface: Surface, edge_length: float) -> None:
         )
 
 
+def _walls(surface: Surface) -> FloatArray:
+    """Round walls of a surface, (k, 8): middle of the axis, direction, radius, half the length."""
+    found: list[FloatArray] = []
+    for face in smooth_faces(surface.points, surface.triangles):
+        if face.kind == "cylinder":
+            nodes = surface.points[np.unique(surface.triangles[face.facets])]
+            half = 0.5 * float(np.ptp(nodes @ face.direction))
+            found.append(np.array([*face.centre, *face.direction, face.radius, half]))
+    return np.array(found).reshape(-1, 8)
+
+
 def _by_gmsh(surface: Surface, edge_length: float, seconds: float | None) -> TetMesh:
     """Mesh by Gmsh of a surface in one piece."""
     edges = surface.triangles[:, [[0, 1], [1, 2]]].reshape(-1, 2)
@@ -114,6 +126,7 @@ def _by_gmsh(surface: Surface, edge_length: float, seconds: float | None) -> Tet
         triangles=surface.triangles,
         size=edge_length,
         angle=FEATURE_ANGLE,
+        walls=_walls(surface),
     )
     if not len(made["cells"]):
         raise InputError("it left no cells")
