@@ -45,6 +45,11 @@ class Surface:
             )
         if not np.isfinite(self.points).all():
             raise InputError("surface points must be finite; got NaN or infinity: repair the file")
+        if self.triangles.min() < 0 or self.triangles.max() >= len(self.points):
+            raise InputError(
+                f"triangles must name points 0 to {len(self.points) - 1}; got "
+                f"{self.triangles.min()} to {self.triangles.max()}: repair the file"
+            )
         _check_closed(self.points, self.triangles)
         if self.volume < 0.0:
             object.__setattr__(self, "triangles", read_only(self.triangles[:, ::-1], np.int64))

@@ -70,8 +70,9 @@ def fill(
         gmsh.model.geo.synchronize()
         _sizes(gmsh, size, turn=0)
         if len(walls):
+            rows = walls.tolist()
             gmsh.model.mesh.setSizeCallback(
-                lambda _dim, _tag, x, y, z, _size: _size_at(np.array([x, y, z]), size, walls)
+                lambda _dim, _tag, x, y, z, _size: _size_at(x, y, z, float(size), rows)
             )
         gmsh.model.mesh.generate(3)
         return _mesh(gmsh, 1.0)
@@ -139,15 +140,19 @@ def _sizes(gmsh: Any, size: float, turn: int = _ROUND) -> None:
         gmsh.option.setNumber(f"Mesh.{option}", value)
 
 
-def _size_at(point: NDArray[Any], size: float, walls: NDArray[Any]) -> float:
-    """Edge length at a point: shorter on round walls, growing away from them."""
-    arm = point - walls[:, :3]
-    along = np.einsum("ij,ij->i", arm, walls[:, 3:6])
-    across = np.linalg.norm(arm - along[:, None] * walls[:, 3:6], axis=1)
-    beyond = np.maximum(np.abs(along) - walls[:, 7], 0.0)
-    away = np.hypot(across - walls[:, 6], beyond)
-    wanted = np.maximum(2.0 * math.pi * walls[:, 6] / _ROUND, _FINEST * size) + _GROWTH * away
-    return min(size, float(wanted.min()))
+def _size_at(x: float, y: float, z: float, size: float, walls: list[list[float]]) -> float:
+    """Edge length at a point: shorter on round walls, growing away from them.
+
+    Gmsh asks for it at every point: plain numbers are ten times quicker here than arrays.
+    """
+    least = size
+    for cx, cy, cz, ax, ay, az, radius, half in walls:
+        u, v, w = x - cx, y - cy, z - cz
+        along = u * ax + v * ay + w * az
+        across = math.sqrt(max(u * u + v * v + w * w - along * along, 0.0))
+        away = math.hypot(across - radius, max(abs(along) - half, 0.0))
+        least = min(least, max(2.0 * math.pi * radius / _ROUND, _FINEST * size) + _GROWTH * away)
+    return least
 
 
 def _mesh(gmsh: Any, scale: float) -> dict[str, Any]:

@@ -80,6 +80,8 @@ def read_surface(path: str) -> dict[str, Any]:
     if surface.GetPoints() is None or not surface.GetNumberOfPolys():
         raise ValueError("it holds no triangles")
     triangles = vtk_to_numpy(surface.GetPolys().GetConnectivityArray()).reshape(-1, 3)
+    if triangles.min() < 0 or triangles.max() >= surface.GetNumberOfPoints():
+        raise ValueError("a triangle names a point that is not there")
     return {
         "points": vtk_to_numpy(surface.GetPoints().GetData()).astype(np.float64),
         "triangles": triangles.astype(np.int64),
