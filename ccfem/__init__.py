@@ -30,7 +30,7 @@ if TYPE_CHECKING:
     from ccfem.comparison.result import Comparison
     from ccfem.elasticity import Problem, solve
     from ccfem.evaluation import evaluate
-    from ccfem.inspection.check import check
+    from ccfem.inspection.part_check import check
     from ccfem.layers.slicing import slice
     from ccfem.machine import Machine
     from ccfem.planning import plan

@@ -7,6 +7,7 @@ import io
 import os
 import signal
 import sys
+import warnings
 from importlib import metadata
 from pathlib import Path
 from typing import Annotated, Any
@@ -136,7 +137,7 @@ def check(
     ] = None,
 ) -> None:
     """Say and draw all that is known of a part before it is solved; all mistakes at once."""
-    from ccfem.cli.check import check_part
+    from ccfem.cli.check_part import check_part
 
     code = check_part(case, set_case, out)
     if code:
@@ -164,7 +165,7 @@ def mesh(
     ] = "auto",
 ) -> None:
     """Mesh a surface or a CAD file, its faces as patches: face_1, face_2, or their names."""
-    from ccfem.cli.mesh import mesh_file
+    from ccfem.cli.mesh_body import mesh_file
 
     mesh_file(body, size, out, scale, mesher)
 
@@ -352,31 +353,16 @@ def calibrate(
     The paths of the reinforced part are planned again as they were printed: give the strategy, its
     parameters and the amount of fibre of that print.
     """
-    from ccfem.comparison.compare import compare, create_all
-    from ccfem.io.whole import check_writable
-    from ccfem.virtual_testing.calibration import calibrate as fit
-    from ccfem.virtual_testing.force_displacement import read_curve
+    from ccfem.cli.fitting import fit_material
 
-    check_writable(out)
-    without = read_curve(unreinforced)
-    with_fibre = None if reinforced is None else read_curve(reinforced)
-    if (reinforced is None) != (strategy is None):
-        raise InputError("--reinforced and --strategy belong together; got only one of them")
-    loaded, paths = load(case, set_case), None
-    if strategy is not None:
-        chosen = create_all(loaded, (strategy,), parameters_by_strategy(set_ or (), strategy))
-        options = options_of(layers, fibre_per_layer, False, load_case, "auto")
-        (planned,) = compare(loaded, chosen, natural=fibre_per_layer is None, **options).runs
-        if not len(planned.toolpaths):
-            raise InputError(f"{strategy} could not plan the part: {planned.failure}")
-        paths = planned.toolpaths
-    found = fit(loaded.problem, without, with_fibre, paths, load_case, out.stem)
-    found.write(out)
-    rho = "" if found.rho is None else f", rho {found.rho:.3g} mm^2"
-    print(
-        f"{out}: modulus {found.modulus:.4g} MPa, matrix strength {found.tensile_strength:.3g} MPa"
-        f"{rho}; use it with --calibration {out}"
-    )
+    parameters = parameters_by_strategy(set_ or (), strategy) if strategy is not None else {}
+    options = options_of(layers, fibre_per_layer, False, load_case, "auto")
+    options["natural"] = fibre_per_layer is None
+
+    def read() -> Any:
+        return load(case, set_case)
+
+    fit_material(read, unreinforced, reinforced, strategy, parameters, options, out)
 
 
 def main() -> None:
@@ -387,6 +373,8 @@ def main() -> None:
     for stream in (sys.stdout, sys.stderr):
         if isinstance(stream, io.TextIOWrapper):  # a title outside ASCII on an ASCII terminal
             stream.reconfigure(errors="replace")
+    # A title in letters that the font of pictures lacks is drawn as boxes; no more to say.
+    warnings.filterwarnings("ignore", message="Glyph .* missing from")
     try:
         code = typer.main.get_command(app)(standalone_mode=False)
     except (InputError, SolveError) as error:

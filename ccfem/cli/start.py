@@ -9,11 +9,14 @@ __all__ = ["start"]
 
 def start() -> None:
     """Run the command line; Ctrl-C before it is there ends without a word, with code 130."""
-    signal.signal(signal.SIGINT, _end)
+    heeded = signal.getsignal(signal.SIGINT) is not signal.SIG_IGN  # as behind nohup
     signal.signal(signal.SIGTERM, _end)
+    if heeded:
+        signal.signal(signal.SIGINT, _end)
     from ccfem.cli.commands import main
 
-    signal.signal(signal.SIGINT, signal.default_int_handler)
+    if heeded:
+        signal.signal(signal.SIGINT, signal.default_int_handler)
     main()
 
 

@@ -13,7 +13,7 @@ from ccfem.elasticity.stress_field import StressField
 from ccfem.evaluation.matching import THRESHOLDS, along_fibre, matching_curve
 from ccfem.evaluation.plane_paths import pool
 from ccfem.fields.chart import chart_of, flat_view, in_charts
-from ccfem.inspection.check import check
+from ccfem.inspection.part_check import check
 from ccfem.layers import Layer
 from ccfem.layers.layer_stress import LayerStress, stress_on
 from ccfem.plot.canvas import png

@@ -10,8 +10,8 @@ from ccfem.arrays import FloatArray, IntArray, freeze, read_only
 from ccfem.checks import check_number
 from ccfem.errors import InputError
 from ccfem.io.whole import existing_file
+from ccfem.isolated.limited import read_isolated
 from ccfem.isolated.process import ChildError
-from ccfem.isolated.reading import read_isolated
 
 __all__ = ["Surface", "is_surface", "read_surface"]
 

@@ -9,8 +9,8 @@ import numpy as np
 from ccfem.arrays import FloatArray, IntArray
 from ccfem.errors import InputError
 from ccfem.io.cells import tetrahedra
+from ccfem.isolated.limited import read_isolated
 from ccfem.isolated.process import ChildError
-from ccfem.isolated.reading import read_isolated
 from ccfem.mesh.patches import with_groups
 from ccfem.mesh.tet_mesh import TetMesh
 

@@ -55,7 +55,7 @@ def in_own_process(
         environment[f"{library}_NUM_THREADS"] = "1"
     with TemporaryDirectory(prefix="ccfem-", ignore_cleanup_errors=True) as folder:
         np.savez(Path(folder) / "in.npz", function=function, memory=memory, **arguments)
-        command = [sys.executable, "-P", "-m", "ccfem.isolated", folder]
+        command = [sys.executable, "-P", "-m", "ccfem.isolated.child", folder]
         try:
             done = subprocess.run(
                 command,

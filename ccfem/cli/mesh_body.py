@@ -7,8 +7,8 @@ from ccfem.errors import InputError
 from ccfem.io.mesh_file import check_mesh_name, write_mesh
 from ccfem.io.surface import is_surface
 from ccfem.io.whole import check_writable
-from ccfem.meshing.body import mesh_body
 from ccfem.meshing.cad import is_cad
+from ccfem.meshing.meshed_body import mesh_body
 
 __all__ = ["mesh_file"]
 
