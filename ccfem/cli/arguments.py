@@ -25,9 +25,9 @@ __all__ = [
 ]
 
 
-def path_of(text: str) -> Path:
+def path_of(text: str | Path) -> Path:
     """Path of an option; an empty text would be the current folder."""
-    if not text.strip():
+    if not str(text).strip():
         raise typer.BadParameter("it must not be empty: name one, or . for here")
     return Path(text)
 

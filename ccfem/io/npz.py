@@ -57,7 +57,7 @@ def _check_sizes(path: Path) -> None:
     """Raise on an archive that says it unpacks to far more than any mesh does."""
     size = path.stat().st_size
     if not zipfile.is_zipfile(path):
-        raise InputError(f"{path} is not a NumPy archive: write it with write_mesh")
+        raise InputError(f"{path} is not a mesh in a NumPy archive: write it with write_mesh")
     with zipfile.ZipFile(path) as archive:
         unpacked = sum(entry.file_size for entry in archive.infolist())
     if unpacked > _SMALL + _PACKED * size:

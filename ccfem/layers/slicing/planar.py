@@ -65,10 +65,12 @@ class Planar:
             )
         if not given:
             object.__setattr__(self, "count", _COUNT)
-        if self.count is not None and not 1 <= self.count <= _MOST:
+        if self.count is not None and self.count < 1:
+            raise InputError(f"the number of layers must be at least 1; got {self.count}")
+        if self.count is not None and self.count > _MOST:
             raise InputError(
-                f"the number of layers must be at least 1 and at most {_MOST:,}; got "
-                f"{shown(self.count)}: correct it"
+                f"the number of layers must be at most {_MOST:,}; got {shown(self.count)}: correct "
+                "it"
             )
         if self.heights is not None:
             heights = tuple(sorted(float(height) for height in self.heights))
