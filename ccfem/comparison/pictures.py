@@ -7,6 +7,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from ccfem.arrays import FloatArray
+from ccfem.comparison.ranking import stiffness_ratio
 from ccfem.comparison.result import Comparison
 from ccfem.comparison.runs import Run
 from ccfem.elasticity.stress_field import StressField
@@ -30,6 +31,7 @@ from ccfem.plot.paths import (
     mark_failure,
     tension_limit,
 )
+from ccfem.plot.stiffness_curves import StiffnessPoint, stiffness_curves
 from ccfem.progress import Progress, silent
 
 if TYPE_CHECKING:
@@ -61,6 +63,8 @@ class Pictures:
         Page on which it turns, HTML.
     middle : int
         Index of the middle layer.
+    curve : bytes
+        Stiffness over the length of fibre; empty without a curve.
     """
 
     paths: dict[tuple[str, int], bytes]
@@ -73,6 +77,7 @@ class Pictures:
     part: bytes
     part_page: str
     middle: int
+    curve: bytes = b""
 
 
 def draw_pictures(comparison: Comparison, progress: Progress = silent) -> Pictures:
@@ -102,7 +107,24 @@ def draw_pictures(comparison: Comparison, progress: Progress = silent) -> Pictur
         png(part_picture(checked)),
         part_page(checked),
         middle.layer.index,
+        _curve(comparison, colours),
     )
+
+
+def _curve(comparison: Comparison, colours: Mapping[str, str]) -> bytes:
+    """Picture of stiffness over the length of fibre; empty where there is no curve."""
+    if comparison.curve is None:
+        return b""
+    curves = {
+        name: [
+            StiffnessPoint(run.length_per_layer, stiffness_ratio(run), run.printable)
+            for run in runs
+        ]
+        for name, runs in comparison.curve.runs.items()
+        if runs
+    }
+    heading = "stiffness over length of fibre, tension only"
+    return png(stiffness_curves(curves, comparison.curve.common, heading, colours))
 
 
 def _drawn(comparison: Comparison) -> list[Layer]:
