@@ -309,24 +309,9 @@ def solve(
     backend: Backend = "auto",
 ) -> None:
     """Solve a part and write displacement, strain, stress, reactions and error for ParaView."""
-    from ccfem.checks import check_known
-    from ccfem.cli.screen import print_solution
-    from ccfem.elasticity.solve import solve as solved
-    from ccfem.export.vtu_result import result_path, write_result
-    from ccfem.io.whole import check_writable
+    from ccfem.cli.solving import solve_part
 
-    loaded = load(case, set_case)
-    names = loaded.problem.cases
-    if load_case is not None:
-        check_known("load case", load_case, names)
-        names = (load_case,)
-    files = {name: out if len(names) == 1 else result_path(out, name) for name in names}
-    for file in files.values():
-        check_writable(result_path(file))
-    fields = solved(loaded.problem, backend=backend)
-    for name, file in files.items():
-        write_result(fields[name], file)
-        print_solution(fields[name], loaded.findings, file)
+    solve_part(load(case, set_case), out, load_case, backend)
 
 
 @app.command()
