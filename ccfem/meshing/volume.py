@@ -22,6 +22,8 @@ Mesher = Literal["auto", "gmsh", "ftetwild"]
 
 _MOST = 2e7
 """Number of cells above which an edge length is taken for a mistake of units."""
+_LOST = 0.2
+"""Share of the volume that no mesh may lose or gain."""
 _PATIENCE = 120.0
 """Seconds after which fTetWild is tried in place of Gmsh."""
 
@@ -49,8 +51,8 @@ def tetrahedralise(surface: Surface, edge_length: float, mesher: Mesher = "auto"
     Raises
     ------
     InputError
-        When the edge length is too long or too short for the part, no cells are left, the mesher
-        is not installed, or it fails.
+        When the edge length is too long or too short for the part, no cells are left or a fifth of
+        the volume is lost, the mesher is not installed, or it fails.
     """
     return fill(surface, edge_length, mesher)[0]
 
@@ -87,7 +89,13 @@ def fill(
             "itself, and that the edge length suits its thickness"
         )
     mesh = check_mesh(TetMesh(made["points"], made["cells"]))[0]
-    return mesh, fidelity(surface, mesh), "fTetWild"
+    found = fidelity(surface, mesh)
+    if abs(found.volume) > _LOST:
+        raise InputError(
+            f"the mesh of the surface has {1.0 + found.volume:.1%} of its volume: shorten "
+            "edge_length, or mesh the part in another program"
+        )
+    return mesh, found, "fTetWild"
 
 
 def check_edge_length(surface: Surface, edge_length: float) -> None:
