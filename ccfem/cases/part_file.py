@@ -33,8 +33,10 @@ them with a minus ("-z"), or three numbers.
     [material]                        # isotropic ...
     modulus = 3500.0
     poisson = 0.35
-    name = "PLA+"                     # optional; so are source, tensile_strength and
-                                      # compressive_strength
+    name = "PLA+"                     # optional; so are source, tensile_strength,
+                                      # compressive_strength, ...
+    mass_density = 1.24               # ... g/cm^3, for gravity, and the strain by heat, 1/K: ...
+    expansion = 7e-5                  # ... or expansion_fibre and expansion_transverse
     [material]                        # ... or transversely isotropic, the fibre along x
     modulus_fibre = 60000.0
     modulus_transverse = 4100.0
@@ -87,10 +89,58 @@ them with a minus ("-z"), or three numbers.
     radius = 2.75
     axis = "z"                        # optional: only those along it
 
+    [regions.insert]                  # cells of another material, by a rule for their centres
+    rule = "cylinder"                 # point, axis, radius; or "box": lower, upper
+    point = [15, 15, 0]
+    axis = "z"
+    radius = 8.0
+    material = "pa6"                  # a name or a table, as above
+
     [[supports]]                      # at least one
+    kind = "held"                     # default: components of the displacement of a patch
     patch = "foot"
     components = "xyz"                # which are held; default all
     value = [0, 0, 0]                 # displacement they take, mm; default none
+
+    [[supports]]
+    kind = "edge"                     # the nodes that two patches share
+    patches = ["foot", "pin"]         # components, value
+
+    [[supports]]
+    kind = "point"                    # the node nearest to a point: point, components, value
+    point = [0, 0, 0]
+
+    [[supports]]
+    kind = "sliding"                  # a patch of any slope that slides without friction:
+    patch = "corner"                  # only what goes across it is held
+    normal = [0, 1, 1]                # optional: the direction that is held
+    value = 0.0                       # optional: displacement along it, mm
+
+    [[supports]]
+    kind = "rigid"                    # a patch that a stiff plate is glued to
+    patch = "grip"
+    components = "z"                  # of its centre that are held, may be "" ...
+    rotations = ""                    # ... and the axes about which it cannot turn
+    angle = [0, 0, 0]                 # optional: rotation that it takes, degrees; value as above
+    centre = [80, 15, 3]              # optional
+
+    [[supports]]
+    kind = "pin"                      # a rigid pin in a hole; turns freely about its own axis
+    patch = "bore"
+    point = [15, 15, 0]               # on the axis
+    axis = "z"
+    slides = true                     # optional: moves along its axis too; value as above
+
+    [[supports]]
+    kind = "spring"                   # springs to the ground, spread evenly over a patch
+    patch = "tip"                     # ("point_spring": at the node nearest to a point)
+    stiffness = [10, 0, 0]            # N/mm along x, y, z, all together
+
+    [[supports]]
+    kind = "foundation"               # an elastic bed, MPa/mm across the patch and along it
+    patch = "foot"
+    normal = 5.0
+    tangential = 0.0                  # optional
 
     [[loads.pull]]                    # at least one load of one load case, here "pull"
     kind = "bearing"                  # total force, N, that a pin presses on a cylinder
@@ -102,6 +152,25 @@ them with a minus ("-z"), or three numbers.
     patch = "tip"                     # "traction", MPa: patch, vector
     vector = [0, 0, -10]              # "pressure", MPa, inward: patch, magnitude
                                       # "point", N at the nearest node: point, vector
+                                      # "body_force", N/mm^3: vector
+
+    [[loads.weight]]
+    kind = "gravity"                  # all keys optional
+    acceleration = [0, 0, -9.81]      # m/s^2, the way in which the weight pulls
+    mass_density = 1.24               # g/cm^3, of the whole part; default that of its materials
+
+    [[loads.heat]]
+    kind = "temperature"              # of the whole part
+    change = 40.0                     # K
+
+    [[loads.moved]]
+    kind = "displacement"             # what the supports on a patch take in this load case, mm
+    patch = "foot"
+    vector = [0, 0, 0.1]
+
+    [combinations.hot_pull]           # a load case more: the sum of others times factors
+    pull = 1.5
+    heat = 1.0
 
     [machine]                         # what differs from ccfem.machine.machine.Machine
     minimum_length = 45.0
@@ -131,17 +200,11 @@ from typing import Any
 
 from ccfem.cases.case import Case
 from ccfem.cases.part_body import Body
+from ccfem.cases.part_loads import read_combinations, read_loads, read_supports
+from ccfem.cases.part_regions import read_regions, regions_of
+from ccfem.cases.part_tables import read_material, split
 from ccfem.elasticity.load_kinds import patches_in_use
-from ccfem.elasticity.problem import (
-    Bearing,
-    Force,
-    Load,
-    PointForce,
-    Pressure,
-    Problem,
-    Support,
-    Traction,
-)
+from ccfem.elasticity.problem import Problem
 from ccfem.errors import InputError
 from ccfem.io.toml import from_table
 from ccfem.io.whole import existing_file
@@ -149,7 +212,6 @@ from ccfem.layers import slicing as slicers
 from ccfem.layers.slicer import Slicer
 from ccfem.layers.slicing.planar import Planar
 from ccfem.machine.machine import Machine
-from ccfem.materials import Material, isotropic, named_material, transversely_isotropic
 from ccfem.mesh.face_rules import Faces, Holes, without_faces
 from ccfem.mesh.patch_findings import about_patches
 from ccfem.mesh.patches import (
@@ -175,13 +237,6 @@ _RULES: dict[str, Callable[..., PatchRule]] = {
     "face": Faces,
     "holes": Holes,
 }
-_LOADS: dict[str, Callable[..., Load]] = {
-    "force": Force,
-    "traction": Traction,
-    "pressure": Pressure,
-    "bearing": Bearing,
-    "point": PointForce,
-}
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -191,6 +246,8 @@ class _Part(Body):
     material: str | dict[str, Any]
     supports: tuple[dict[str, Any], ...]
     loads: dict[str, Any]
+    combinations: dict[str, Any] = field(default_factory=dict)
+    regions: dict[str, Any] = field(default_factory=dict)
     name: str = ""
     title: str = ""
     source: str = ""
@@ -237,17 +294,15 @@ def read_part(path: str | os.PathLike[str]) -> Case:
 def _case(content: Mapping[str, Any], path: Path) -> Case:
     """Case of a part file's content."""
     part = from_table(_Part, content, "the part file")
-    if not part.supports:
-        raise InputError("a part needs a support: add [[supports]] with its patch")
+    supports = read_supports(part.supports)
     slicing = _slicing(part)
     build = unit_vector(part.build, "build")
-    supports = tuple(
-        from_table(Support, table, f"supports[{k}]") for k, table in enumerate(part.supports)
-    )
-    loads = _loads(part.loads)
+    loads = read_loads(part.loads)
+    combinations = read_combinations(part.combinations, loads)
+    regions = read_regions(part.regions)
     rules = {name: _rule(table, f"patches.{name}") for name, table in part.patches.items()}
     machine = from_table(Machine, part.machine, "machine")
-    material = _material(part.material)
+    material = read_material(part.material)
     _check_strategies(part.strategies)
     mesh, findings = part.read(path.parent)
     mesh = patches_from_rules(mesh, rules)
@@ -257,7 +312,15 @@ def _case(content: Mapping[str, Any], path: Path) -> Case:
     return Case(
         name=name,
         title=part.title or name,
-        problem=Problem(mesh, material, supports, loads, order=part.order),
+        problem=Problem(
+            mesh,
+            material,
+            supports,
+            loads,
+            regions=regions_of(mesh, regions),
+            combinations=combinations,
+            order=part.order,
+        ),
         build=(float(build[0]), float(build[1]), float(build[2])),
         slicing=slicing,
         machine=machine,
@@ -276,57 +339,17 @@ def _slicing(part: _Part) -> Slicer:
             "one"
         )
     if part.slicing is not None:
-        return slicers.create(*_named(part.slicing, "method", slicers.named(), "slicing"))
+        return slicers.create(*split(part.slicing, "method", slicers.named(), "slicing"))
     return Planar(count=part.layers, heights=part.heights)
 
 
 def _rule(table: object, where: str) -> PatchRule:
     """Rule of a table with the key rule."""
-    name, rest = _named(table, "rule", _RULES, where)
+    name, rest = split(table, "rule", _RULES, where)
     make = _RULES[name]
     if name == "plane" and "point" in rest:
         make = Plane.through
     return from_table(make, rest, where, infinite=name == "box")
-
-
-def _loads(cases: Mapping[str, Any]) -> dict[str, tuple[Load, ...]]:
-    """Read the loads of every load case."""
-    if not cases:
-        raise InputError("a part needs a load: add [[loads.NAME]] with its kind")
-    found = {}
-    for name, tables in cases.items():
-        if not isinstance(tables, list) or not tables:
-            raise InputError(
-                f"loads.{name} must be a list of tables; got {tables!r}: write [[loads.{name}]]"
-            )
-        loads = []
-        for k, table in enumerate(tables):
-            where = f"loads.{name}[{k}]"
-            kind, rest = _named(table, "kind", _LOADS, where)
-            loads.append(from_table(_LOADS[kind], rest, where))
-        found[name] = tuple(loads)
-    return found
-
-
-def _named(
-    table: object, key: str, known: Mapping[str, Any], where: str
-) -> tuple[str, dict[str, Any]]:
-    """Split a table into the name under a key, which must be known, and the rest."""
-    name = table.get(key) if isinstance(table, Mapping) else None
-    if not isinstance(table, Mapping) or not isinstance(name, str) or name not in known:
-        raise InputError(
-            f"{where} must be a table with {key} one of {', '.join(known)}; got "
-            f"{name if name is not None else table!r}: correct it"
-        )
-    return name, {k: value for k, value in table.items() if k != key}
-
-
-def _material(given: str | dict[str, Any]) -> Material:
-    """Material by name, or of its moduli."""
-    if isinstance(given, str):
-        return named_material(given)
-    make = transversely_isotropic if "modulus_fibre" in given else isotropic
-    return from_table(make, given, "material")
 
 
 def _check_strategies(tables: Mapping[str, Any]) -> None:
