@@ -8,6 +8,7 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
+from ccfem.elasticity import Displacement
 from ccfem.elasticity.problem import Force, PointForce, Problem, Support
 from ccfem.elasticity.solve import solve
 from ccfem.errors import InputError, SolveError
@@ -103,6 +104,23 @@ def test_bar_with_straight_fibres_is_a_rod_in_a_matrix(mode, order):
     np.testing.assert_allclose(test.solution.stress[:, 0, 0], MODULUS * 0.01 / SIZE[0], rtol=1e-9)
     assert test.force == pytest.approx((matrix + fibre) * 0.01, rel=1e-10)
     assert test.strands.total == pytest.approx(6 * SIZE[0])
+
+
+def test_combination_is_tested_as_a_load_case():
+    half = (Force("x_max", (150.0, 0.0, 0.0)),)
+    problem = dataclasses.replace(
+        stretched(length=0.0),
+        loads={"pull": half, "move": (Displacement("x_max", (0.005, 0.0, 0.0)),)},
+        combinations={"both": {"move": 2.0}},
+    )
+    test = virtual_test(toolpaths(*grid_lines()), solve(problem)["both"], Strand(900.0 / MODULUS))
+    matrix, fibre = MODULUS * SIZE[1] * SIZE[2] / SIZE[0], 6 * 900.0 / SIZE[0]
+    assert test.unreinforced_stiffness == pytest.approx(matrix, rel=1e-10)
+    assert test.stiffness == pytest.approx(matrix + fibre, rel=1e-10)
+    free = dataclasses.replace(bar(half), combinations={"twice": {"load": 2.0}})
+    test = virtual_test(toolpaths(*grid_lines()), solve(free)["twice"], Strand(900.0 / MODULUS))
+    assert test.force == pytest.approx(300.0)
+    assert test.unreinforced_stiffness == pytest.approx(matrix, rel=1e-10)
 
 
 @pytest.mark.parametrize("mode", MODES)
