@@ -4,6 +4,7 @@ from collections.abc import Callable
 from dataclasses import dataclass, replace
 from functools import cached_property, partial
 from importlib.util import find_spec
+from typing import Any
 
 import numpy as np
 import scipy.sparse as sp
@@ -160,7 +161,7 @@ class Solver:
 
 
 def preconditioned_cg(
-    matrix: sp.bsr_array,
+    matrix: Any,
     rhs: FloatArray,
     solver: Solver,
     x0: FloatArray | None = None,
@@ -170,7 +171,7 @@ def preconditioned_cg(
 
     Parameters
     ----------
-    matrix : bsr_array (n, n)
+    matrix : bsr_array (n, n), or anything that ``@`` applies to an (n,) array
     rhs : (n,) array
     solver : Solver
         Of this matrix or of one like it (another stiffness on the same mesh and supports).
