@@ -7,6 +7,7 @@ corner gradients.
 """
 
 from dataclasses import dataclass
+from typing import Any
 
 import numpy as np
 import scipy.sparse as sp
@@ -53,9 +54,10 @@ def pattern(mesh: CellMesh) -> Pattern:
     """Find the pattern of the stiffness matrix of a mesh."""
     n = len(mesh.points)
     order = _grouped(_lowest(mesh.cells), np.zeros(n + 1, dtype=np.int32))
-    cells, start = mesh.cells[order].astype(np.int32), np.zeros(n + 1, dtype=np.int32)
+    cells = mesh.cells[order].astype(np.int32)
+    start: Any = np.zeros(n + 1, dtype=np.int32)
     touching = _grouped(cells, start)
-    indptr = np.zeros(n + 1, dtype=np.int32)
+    indptr: Any = np.zeros(n + 1, dtype=np.int32)
     indices = _neighbours(cells, start, touching, indptr)
     return Pattern(indptr, indices, order, start, touching)
 
@@ -186,9 +188,9 @@ def _mark(indptr, indices, i, slot):  # type: ignore[no-untyped-def]
 
 
 @njit(cache=True)
-def _gather_linear(
+def _gather_linear(  # type: ignore[no-untyped-def]
     indptr, indices, start, touching, cells, which, gradients, scale, stiffness, data
-):  # type: ignore[no-untyped-def]
+):
     slot = np.empty(indptr.size - 1, np.int32)
     t = np.empty((6, 3))
     for i in range(indptr.size - 1):

@@ -133,6 +133,7 @@ def solve_system(
     assembled = perf_counter()
     solver = system.factorise(matrix, backend, len(system.forces))
     record = SolveRecord(solver.backend, 0, 0.0, assembled - started, 0.0, system.held.unknowns)
+    because = solver.because
     fields, found = {}, {}
     started = assembled
     for case, forces in system.forces.items():
@@ -143,6 +144,7 @@ def solve_system(
         except SolveError:
             if backend != "auto" or solver.exact or record.unknowns > LARGEST_DIRECT:
                 raise
+            because = f"{solver.backend} failed"
             solver = system.factorise(matrix, direct_backend())
             solution, energy = _solved(solver, rhs, tolerance)
         found[case] = held.expand(solution.values)
@@ -150,6 +152,7 @@ def solve_system(
         record = replace(
             record,
             backend=solver.backend,
+            backend_because=because,
             iterations=solution.iterations,
             residual=solution.residual,
             backward_error=solution.backward_error,
