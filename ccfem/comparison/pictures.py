@@ -24,6 +24,7 @@ from ccfem.plot.paths import (
     compare_layer,
     force_on_paths,
     layer_picture,
+    layer_pictures,
     mark_failure,
     tension_limit,
 )
@@ -113,18 +114,10 @@ def _layers(
     for k, stress in enumerate(stresses):
         layer = stress.layer
         progress("drawing pictures", k / len(stresses))
-        for run in runs:
-            figure = layer_picture(
-                layer,
-                stress,
-                run.toolpaths,
-                width,
-                f"{run.name}, layer {layer.index}",
-                caption(run, layer),
-                limit,
-                colour=colours[run.name],
-            )
-            drawn[run.name, layer.index] = png(figure)
+        paths = {run.name: run.toolpaths for run in runs}
+        captions = {run.name: caption(run, layer) for run in runs}
+        files = layer_pictures(layer, stress, paths, width, captions, limit, colours)
+        drawn.update({(name, layer.index): file for name, file in files.items()})
     return drawn
 
 

@@ -184,8 +184,11 @@ def _fit(  # type: ignore[no-untyped-def]
                     place[s, d] = x
                     extent = max(extent, abs(x))
                 s += 1
-        gram[:] = 0.0
-        right[:] = 0.0
+        for i in range(terms):
+            for j in range(i + 1):
+                gram[i, j] = 0.0
+            for j in range(6):
+                right[i, j] = 0.0
         for s in range(count * len(at)):
             _terms(place[s, 0] / extent, place[s, 1] / extent, place[s, 2] / extent, p)
             cell, q = found[s // len(at)], s % len(at)
@@ -198,7 +201,9 @@ def _fit(  # type: ignore[no-untyped-def]
             gram[i, i] += ridge[0 if i < 4 else 1] * gram[0, 0]
         _cholesky(gram, right)
         size[group] = extent
-        coefficients[group] = right
+        for i in range(terms):
+            for j in range(6):
+                coefficients[group, i, j] = right[i, j]
 
 
 @njit(cache=True)

@@ -142,7 +142,7 @@ def _gaps(free: BoolArray) -> float:
     return float(np.count_nonzero(free & ~opened))
 
 
-@njit(cache=True)
+@njit(cache=True, nogil=True)
 def _paint_section(
     tension: FloatArray,
     origin: FloatArray,
@@ -176,7 +176,7 @@ def _paint_section(
                 tension[i, j] = max(largest, 0.0)
 
 
-@njit(cache=True)
+@njit(cache=True, nogil=True)
 def _paint_paths(
     covered: BoolArray,
     origin: FloatArray,

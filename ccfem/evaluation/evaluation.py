@@ -1,6 +1,8 @@
 """The evaluator: every index of a set of paths, for each layer and in total."""
 
+import os
 from collections.abc import Mapping, Sequence
+from concurrent.futures import ThreadPoolExecutor
 from dataclasses import dataclass, replace
 from typing import TYPE_CHECKING, NamedTuple
 
@@ -68,6 +70,8 @@ COLUMNS: tuple[Column, ...] = (
 
 _ROUNDING = 1e-3
 """Rounding, mm, of coordinates in path files."""
+_MOST_THREADS = 4
+"""Layers that are evaluated at a time; much of the work waits for the interpreter's lock."""
 
 
 @dataclass(frozen=True)
@@ -181,17 +185,14 @@ def evaluate(
     _check_layers(toolpaths, layers)
     fibre = toolpaths.of_kind(FIBRE).layer
     late = fibre[fibre < np.maximum.accumulate(fibre)]
-    samples = [
-        _sample(
-            toolpaths.on_layer(k.index),
-            k,
-            stress,
-            machine,
-            _below(k, layers),
-            int(np.count_nonzero(late == k.index)),
-        )
-        for k in layers
-    ]
+
+    def sampled(layer: Layer) -> _Samples:
+        behind = int(np.count_nonzero(late == layer.index))
+        on_layer = toolpaths.on_layer(layer.index)
+        return _sample(on_layer, layer, stress, machine, _below(layer, layers), behind)
+
+    with ThreadPoolExecutor(min(os.cpu_count() or 1, _MOST_THREADS)) as pool:
+        samples = list(pool.map(sampled, layers))
     rows = [_indices(each, machine) for each in samples]
     rows.append(_indices(_pooled(samples), machine))
     return Evaluation(

@@ -9,6 +9,7 @@ from scipy.spatial import cKDTree
 from ccfem.arrays import BoolArray, FloatArray, IntArray, read_only
 from ccfem.elasticity.part_stress import PartStress
 from ccfem.evaluation.column import Column
+from ccfem.geometry.locate import locate
 from ccfem.geometry.nearest_on_triangles import nearest_on_triangles
 from ccfem.geometry.polylines import (
     inner_points,
@@ -135,9 +136,9 @@ def sample_space(fibre: Toolpaths, layer: Layer, stress: PartStress, step: float
     cells = stress.stress[layer.cell]
     angle, size = np.zeros(0), np.zeros(0)
     if len(middle):
-        found = nearest_on_triangles(layer.points, layer.triangles, middle)
-        corners = layer.interpolate(stress.nodal)[layer.triangles[found.triangle]]
-        strongest = strongest_stress(np.einsum("sk,skij->sij", found.weights, corners))
+        triangle, weights = _on_layer(layer, middle)
+        corners = layer.interpolate(stress.nodal)[layer.triangles[triangle]]
+        strongest = strongest_stress(np.einsum("sk,skij->sij", weights, corners))
         cosine = np.abs(np.einsum("sd,sd->s", tangent, strongest.direction))
         angle = np.degrees(np.arccos(np.clip(cosine, 0.0, 1.0)))
         size = np.abs(strongest.value)
@@ -155,6 +156,20 @@ def sample_space(fibre: Toolpaths, layer: Layer, stress: PartStress, step: float
         np.maximum(normal, 0.0),
         np.maximum(np.linalg.eigvalsh(cells)[:, 2], 0.0),
     )
+
+
+def _on_layer(layer: Layer, points: FloatArray) -> tuple[IntArray, FloatArray]:
+    """Triangle of a layer nearest to each point, and barycentric coordinates there."""
+    triangle = np.full(len(points), -1, dtype=np.int64)
+    weights = np.zeros((len(points), 3))
+    if layer.flat is not None:
+        plane = layer.plane
+        triangle, weights = locate(plane.points, layer.triangles, plane.project(points))
+    left = np.flatnonzero(triangle < 0)
+    if len(left):
+        found = nearest_on_triangles(layer.points, layer.triangles, points[left])
+        triangle[left], weights[left] = found.triangle, found.weights
+    return triangle, weights
 
 
 def _curvature(points: FloatArray, offsets: IntArray, closed: BoolArray, step: float) -> FloatArray:

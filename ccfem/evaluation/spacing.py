@@ -80,7 +80,7 @@ def sample_spacing(paths: PlanePaths, width: float) -> SpacingSamples:
     return SpacingSamples(distance, length)
 
 
-@njit(cache=True)
+@njit(cache=True, nogil=True)
 def _nearest(
     origin: FloatArray,
     cell: float,

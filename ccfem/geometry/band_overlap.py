@@ -66,7 +66,7 @@ def share_room(
     )  # fmt: skip
 
 
-@njit(cache=True)
+@njit(cache=True, nogil=True)
 def _shared(  # type: ignore[no-untyped-def]
     origin, cell, shape, starts, items, middle, direction, normal, across, ahead, often, fold,
     layer, line, apart, ring, width, height, same_cosine
@@ -76,7 +76,7 @@ def _shared(  # type: ignore[no-untyped-def]
     reach = (half + np.sqrt(half * half + 0.25 * ahead.max() ** 2)) * (1.0 + 1e-9)
     found = np.ones((len(middle), 4))
     room = 64
-    at, change = np.empty(room), np.empty((room, 4))
+    at, change, order = np.empty(room), np.empty((room, 4)), np.empty(room, np.int64)
     low, high = np.empty(3, np.int64), np.empty(3, np.int64)
     current = np.empty(4)
     for k in range(len(middle)):
@@ -119,20 +119,22 @@ def _shared(  # type: ignore[no-untyped-def]
                         if end - begin <= _SLIVER * width:
                             continue
                         if events + 2 > room:
-                            at, change = _longer(at, change, room)
                             room *= 2
+                            at, change, order = _longer(at, change, order, room)
                         beside = often[other] if abs(cosine) >= same_cosine else 0.0
-                        for sign, place in ((1.0, begin), (-1.0, end)):
-                            at[events] = place
+                        for i in range(2):
+                            sign = 1.0 - 2.0 * i
+                            at[events] = end if i else begin
                             change[events, 0] = sign * beside
                             change[events, 1] = sign * often[other]
                             change[events, 2] = sign * fold[other]
                             change[events, 3] = sign
+                            order[events] = events
                             events += 1
         if events == 0:
             found[k, 0], found[k, 1], found[k, 2] = 1.0 / often[k], 1.0 / often[k], fold[k]
             continue
-        order = np.argsort(at[:events])
+        _sort(order, at, events)
         current[0], current[1], current[2], current[3] = often[k], often[k], fold[k], 1.0
         alone, every, fill, most, here = 0.0, 0.0, 0.0, 1.0, -half
         for e in range(events + 1):
@@ -153,7 +155,7 @@ def _shared(  # type: ignore[no-untyped-def]
     return found
 
 
-@njit(cache=True)
+@njit(cache=True, nogil=True)
 def _clipped(low, high, value, slope, limit):  # type: ignore[no-untyped-def]  # pragma: no cover
     """Part of [low, high] where ``|value + x slope| < limit``; empty where low is not below."""
     if abs(slope) < 1e-12:
@@ -162,8 +164,24 @@ def _clipped(low, high, value, slope, limit):  # type: ignore[no-untyped-def]  #
     return max(low, min(a, b)), min(high, max(a, b))
 
 
-@njit(cache=True)
-def _longer(at, change, room):  # type: ignore[no-untyped-def]  # pragma: no cover
-    longer, wider = np.empty(2 * room), np.empty((2 * room, 4))
-    longer[:room], wider[:room] = at, change
-    return longer, wider
+@njit(cache=True, nogil=True)
+def _sort(order, at, count):  # type: ignore[no-untyped-def]  # pragma: no cover
+    """Sort the first indices by what they point at, by insertion: there are few, nearly sorted."""
+    for e in range(1, count):
+        index = order[e]
+        place = e
+        while place > 0 and at[order[place - 1]] > at[index]:
+            order[place] = order[place - 1]
+            place -= 1
+        order[place] = index
+
+
+@njit(cache=True, nogil=True)
+def _longer(at, change, order, room):  # type: ignore[no-untyped-def]  # pragma: no cover
+    longer, wider = np.empty(room), np.empty((room, 4))
+    more = np.empty(room, np.int64)
+    for e in range(len(at)):
+        longer[e], more[e] = at[e], order[e]
+        for i in range(4):
+            wider[e, i] = change[e, i]
+    return longer, wider, more

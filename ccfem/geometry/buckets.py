@@ -64,7 +64,7 @@ def bucket(low: FloatArray, high: FloatArray, cell: float | None = None) -> Buck
     return Buckets(origin, cell, shape, starts, items)
 
 
-@njit(cache=True)
+@njit(cache=True, nogil=True)
 def _fill(first: IntArray, last: IntArray, shape: IntArray) -> tuple[IntArray, IntArray]:
     """Items of each grid cell: boxes of cells from `first` to `last`, counted, then written."""
     starts = np.zeros(shape[0] * shape[1] * shape[2] + 1, np.int64)

@@ -82,14 +82,20 @@ def _needed(points, offsets, fixed, tolerance):  # type: ignore[no-untyped-def]
                 count, begin = count + 1, p
         while count > 0:
             count -= 1
-            a, b = stack[count]
+            a, b = stack[count, 0], stack[count, 1]
             farthest, most = -1, tolerance * tolerance
-            chord = points[b] - points[a]
-            size = (chord**2).sum()
+            size = 0.0
+            for i in range(points.shape[1]):
+                size += (points[b, i] - points[a, i]) ** 2
             for p in range(a + 1, b):
-                way = points[p] - points[a]
-                share = min(max((way * chord).sum() / size, 0.0), 1.0) if size > 0.0 else 0.0
-                off = ((way - share * chord) ** 2).sum()
+                share = 0.0
+                for i in range(points.shape[1]):
+                    share += (points[p, i] - points[a, i]) * (points[b, i] - points[a, i])
+                share = min(max(share / size, 0.0), 1.0) if size > 0.0 else 0.0
+                off = 0.0
+                for i in range(points.shape[1]):
+                    chord = points[b, i] - points[a, i]
+                    off += (points[p, i] - points[a, i] - share * chord) ** 2
                 if off > most:
                     farthest, most = p, off
             if farthest >= 0:

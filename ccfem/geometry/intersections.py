@@ -49,7 +49,7 @@ def find_crossings(points: FloatArray, offsets: IntArray, closed: BoolArray) -> 
     return pairs[_crosses(pairs[:, 0], pairs[:, 1], points, following)]
 
 
-@njit(cache=True)
+@njit(cache=True, nogil=True)
 def _near(
     starts: IntArray, items: IntArray, segment: IntArray, points: FloatArray, touch: float
 ) -> IntArray:
@@ -77,7 +77,8 @@ def _near(
                     continue
                 if found == len(pairs):
                     longer = np.empty((2 * found, 2), np.int64)
-                    longer[:found] = pairs
+                    for k in range(found):
+                        longer[k, 0], longer[k, 1] = pairs[k, 0], pairs[k, 1]
                     pairs = longer
                 pairs[found, 0], pairs[found, 1] = min(i, j), max(i, j)
                 found += 1

@@ -106,7 +106,7 @@ def _crossings(scaled, edges, low, start):  # type: ignore[no-untyped-def]
     level = np.empty(start[-1], np.int64)
     weights = np.empty(start[-1])
     for e in range(len(edges)):
-        a, b = edges[e]
+        a, b = edges[e, 0], edges[e, 1]
         for k in range(start[e], start[e + 1]):
             edge[k] = e
             level[k] = low[e] + k - start[e]

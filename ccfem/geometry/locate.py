@@ -76,7 +76,7 @@ def _barycentric_maps(corners: FloatArray) -> tuple[FloatArray, FloatArray, Floa
     return np.ascontiguousarray(corners[:, 0]), gradients, heights
 
 
-@njit(cache=True)
+@njit(cache=True, nogil=True)
 def _search(
     origin: FloatArray,
     cell: float,

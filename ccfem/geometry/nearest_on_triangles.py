@@ -58,46 +58,51 @@ def _nearest(points, triangles, queries, near):  # type: ignore[no-untyped-def]
     """Ericson, Real-Time Collision Detection (2005), section 5.1.5."""
     triangle = np.empty(len(queries), np.int64)
     weights = np.empty((len(queries), 3))
-    w = np.empty(3)
     for q in range(len(queries)):
         best = np.inf
-        p = queries[q]
-        for t in near[q]:
-            a, b, c = points[triangles[t, 0]], points[triangles[t, 1]], points[triangles[t, 2]]
-            ab, ac, ap = b - a, c - a, p - a
-            d1, d2 = (ab * ap).sum(), (ac * ap).sum()
-            bp, cp = p - b, p - c
-            d3, d4 = (ab * bp).sum(), (ac * bp).sum()
-            d5, d6 = (ab * cp).sum(), (ac * cp).sum()
+        for k in range(near.shape[1]):
+            t = near[q, k]
+            a, b, c = triangles[t, 0], triangles[t, 1], triangles[t, 2]
+            d1, d2, d3, d4, d5, d6 = 0.0, 0.0, 0.0, 0.0, 0.0, 0.0
+            for i in range(3):
+                ab, ac = points[b, i] - points[a, i], points[c, i] - points[a, i]
+                d1 += ab * (queries[q, i] - points[a, i])
+                d2 += ac * (queries[q, i] - points[a, i])
+                d3 += ab * (queries[q, i] - points[b, i])
+                d4 += ac * (queries[q, i] - points[b, i])
+                d5 += ab * (queries[q, i] - points[c, i])
+                d6 += ac * (queries[q, i] - points[c, i])
             va, vb, vc = d3 * d6 - d5 * d4, d5 * d2 - d1 * d6, d1 * d4 - d3 * d2
+            w1, w2 = 0.0, 0.0
             if d1 <= 0.0 and d2 <= 0.0:
-                w[0], w[1], w[2] = 1.0, 0.0, 0.0
+                pass
             elif d3 >= 0.0 and d4 <= d3:
-                w[0], w[1], w[2] = 0.0, 1.0, 0.0
+                w1 = 1.0
             elif d6 >= 0.0 and d5 <= d6:
-                w[0], w[1], w[2] = 0.0, 0.0, 1.0
+                w2 = 1.0
             elif vc <= 0.0 and d1 >= 0.0 and d3 <= 0.0:
-                s = d1 / (d1 - d3)
-                w[0], w[1], w[2] = 1.0 - s, s, 0.0
+                w1 = d1 / (d1 - d3)
             elif vb <= 0.0 and d2 >= 0.0 and d6 <= 0.0:
-                s = d2 / (d2 - d6)
-                w[0], w[1], w[2] = 1.0 - s, 0.0, s
+                w2 = d2 / (d2 - d6)
             elif va <= 0.0 and d4 - d3 >= 0.0 and d5 - d6 >= 0.0:
-                s = (d4 - d3) / ((d4 - d3) + (d5 - d6))
-                w[0], w[1], w[2] = 0.0, 1.0 - s, s
+                w2 = (d4 - d3) / ((d4 - d3) + (d5 - d6))
+                w1 = 1.0 - w2
             else:
                 total = va + vb + vc
                 if total <= 0.0:
                     continue
-                w[1], w[2] = vb / total, vc / total
-                w[0] = 1.0 - w[1] - w[2]
-            away = a * w[0] + b * w[1] + c * w[2] - p
-            square = (away * away).sum()
+                w1, w2 = vb / total, vc / total
+            w0 = 1.0 - w1 - w2
+            square = 0.0
+            for i in range(3):
+                away = w0 * points[a, i] + w1 * points[b, i] + w2 * points[c, i] - queries[q, i]
+                square += away * away
             if square < best:
                 best = square
                 triangle[q] = t
-                weights[q] = w
+                weights[q, 0], weights[q, 1], weights[q, 2] = w0, w1, w2
         if best == np.inf:
             triangle[q] = near[q, 0]
-            weights[q] = 1.0 / 3.0
+            for i in range(3):
+                weights[q, i] = 1.0 / 3.0
     return triangle, weights

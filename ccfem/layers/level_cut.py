@@ -72,15 +72,15 @@ def _cut_cells(
     found = 0
     key = np.empty(4, np.int64)
     for row in range(len(cells)):
-        cell = cells[row]
         corners = 0
         below = 0
         above = 0
         for i in range(4):
-            if signed[cell[i]] == 0.0:
-                key[corners] = cell[i] * n + cell[i]
+            p = cells[row, i]
+            if signed[p] == 0.0:
+                key[corners] = p * n + p
                 corners += 1
-            elif signed[cell[i]] < 0.0:
+            elif signed[p] < 0.0:
                 below += 1
             else:
                 above += 1
@@ -92,20 +92,26 @@ def _cut_cells(
         on = corners
         for i in range(4):
             for j in range(i + 1, 4):
-                p, q = cell[i], cell[j]
+                p, q = cells[row, i], cells[row, j]
                 if signed[p] * signed[q] < 0.0:
                     key[corners] = min(p, q) * n + max(p, q)
                     w = signed[p] / (signed[p] - signed[q])
-                    where[corners] = (1.0 - w) * points[p] + w * points[q]
+                    for d in range(3):
+                        where[corners, d] = (1.0 - w) * points[p, d] + w * points[q, d]
                     corners += 1
         if corners == 3:
-            lines[found] = key[:3]
+            for i in range(3):
+                lines[found, i] = key[i]
             source[found] = row
             found += 1
         elif on == 0:
             # Four crossings in the order (i, j) of a 2-2 split: 0-1-3-2 is the cyclic order. The
             # quad is split along its shorter diagonal [Chen et al. 2021, section 5].
-            if ((where[0] - where[3]) ** 2).sum() <= ((where[1] - where[2]) ** 2).sum():
+            one, other = 0.0, 0.0
+            for d in range(3):
+                one += (where[0, d] - where[3, d]) ** 2
+                other += (where[1, d] - where[2, d]) ** 2
+            if one <= other:
                 a, b, c, d = key[0], key[1], key[3], key[2]
             else:
                 a, b, c, d = key[1], key[3], key[2], key[0]

@@ -68,9 +68,9 @@ def _lay(points, offsets, clearance, least_length):  # type: ignore[no-untyped-d
         for p in range(first, last):
             line[p] = k
             if p > first:
-                step = points[p] - points[p - 1]
-                along[p] = along[p - 1] + np.sqrt((step**2).sum())
-        closed = (points[first] == points[last - 1]).all()
+                dx, dy = points[p, 0] - points[p - 1, 0], points[p, 1] - points[p - 1, 1]
+                along[p] = along[p - 1] + np.sqrt(dx * dx + dy * dy)
+        closed = points[first, 0] == points[last - 1, 0] and points[first, 1] == points[last - 1, 1]
         whole = along[last - 1]
         # Points are added to the grid only once the line has moved on by two clearances, so that
         # a line is not in its own way.
@@ -120,5 +120,6 @@ def _drop_short(keep, along, first, last, least_length, closed):  # type: ignore
         elif start >= 0:
             joins_round = closed and (start == first or p == last)
             if along[p - 1] - along[start] < least_length and not joins_round:
-                keep[start:p] = False
+                for q in range(start, p):
+                    keep[q] = False
             start = -1

@@ -1,7 +1,8 @@
 """Figures of sections: size, scale bar, colour bar, and files. Pyplot's state is left alone."""
 
 import io
-from collections.abc import Sequence
+from collections.abc import Iterable, Sequence
+from itertools import chain
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
@@ -13,6 +14,7 @@ from ccfem.io.whole import check_writable, whole_file
 from ccfem.plot.colours import INK, OUTLINE
 
 if TYPE_CHECKING:
+    from matplotlib.artist import Artist
     from matplotlib.axes import Axes
     from matplotlib.figure import Figure
 
@@ -23,6 +25,7 @@ __all__ = [
     "inches_per_mm",
     "new_figure",
     "png",
+    "png_series",
     "save",
     "scale_bar",
     "title",
@@ -72,11 +75,14 @@ def new_figure(extents: Sequence[float], columns: int = 1) -> tuple["Figure", li
     return figure, axes
 
 
-def title(axes: "Axes", heading: str, caption: str = "", colour: str | None = None) -> None:
-    """Write a heading and one line of key numbers above a picture.
+def title(
+    axes: "Axes", heading: str, caption: str = "", colour: str | None = None
+) -> list["Artist"]:
+    """Write a heading and one line of key numbers above a picture; returns what was drawn.
 
     With a colour, that of the strategy, there is a mark of it before the heading.
     """
+    drawn: list[Artist] = []
     figure = _figure(axes)
     box, wide, high = axes.get_position(), figure.get_figwidth(), figure.get_figheight()
     x = start = box.x0 + 0.12 / wide
@@ -84,10 +90,12 @@ def title(axes: "Axes", heading: str, caption: str = "", colour: str | None = No
         from matplotlib.patches import Rectangle
 
         place, size = (x, box.y1 + 0.275 / high), (0.10 / wide, 0.13 / high)
-        figure.add_artist(Rectangle(place, *size, color=colour, transform=figure.transFigure))
+        mark = Rectangle(place, *size, color=colour, transform=figure.transFigure)
+        drawn.append(figure.add_artist(mark))
         x += 0.17 / wide
-    figure.text(x, box.y1 + 0.27 / high, heading, size=10, weight="bold", **_FONT)
-    figure.text(start, box.y1 + 0.08 / high, caption, size=7.5, **_FONT)
+    drawn.append(figure.text(x, box.y1 + 0.27 / high, heading, size=10, weight="bold", **_FONT))
+    drawn.append(figure.text(start, box.y1 + 0.08 / high, caption, size=7.5, **_FONT))
+    return drawn
 
 
 def _figure(axes: "Axes") -> Any:
@@ -157,10 +165,34 @@ def png(figure: "Figure", dpi: float = _DPI) -> bytes:
 
     The colours are reduced to 128, which makes reports with many pictures several times smaller.
     """
-    from PIL import Image
-
     figure.set_dpi(dpi)
     figure.canvas.draw()
+    return _encoded(figure)
+
+
+def png_series(figure: "Figure", pictures: Iterable[Sequence["Artist"]]) -> list[bytes]:
+    """Return PNG files of a figure with other artists on top each time; it is drawn once."""
+    canvas: Any = figure.canvas
+    figure.set_dpi(_DPI)
+    above = [list(artists) for artists in pictures]
+    for artist in chain.from_iterable(above):
+        artist.set_animated(True)  # left out where the whole figure is drawn
+    canvas.draw()
+    background = canvas.copy_from_bbox(figure.bbox)
+    files = []
+    for artists in above:
+        canvas.restore_region(background)
+        for artist in artists:
+            artist.draw(canvas.get_renderer())
+        files.append(_encoded(figure))
+    return files
+
+
+def _encoded(figure: "Figure") -> bytes:
+    """Bytes of a PNG file with what a figure's canvas shows."""
+    from PIL import Image
+
+    dpi = figure.dpi
     image = Image.fromarray(np.asarray(figure.canvas.buffer_rgba())[..., :3])  # type: ignore[attr-defined]
     reduced = image.quantize(_COLOURS, method=Image.Quantize.FASTOCTREE, dither=Image.Dither.NONE)
     background: Any = reduced.getpixel((0, 0))

@@ -10,12 +10,21 @@ import numpy as np
 from ccfem.arrays import FloatArray
 from ccfem.layers.layer import Layer
 from ccfem.layers.layer_stress import LayerStress
-from ccfem.plot.canvas import colour_bar, extents_of, inches_per_mm, new_figure, scale_bar, title
+from ccfem.plot.canvas import (
+    colour_bar,
+    extents_of,
+    inches_per_mm,
+    new_figure,
+    png_series,
+    scale_bar,
+    title,
+)
 from ccfem.plot.colours import INK, LINK, OUTLINE, SECTION, palette, scale
 from ccfem.tensor import in_plane, largest_in_plane
 from ccfem.toolpaths import FIBRE, Toolpaths
 
 if TYPE_CHECKING:
+    from matplotlib.artist import Artist
     from matplotlib.axes import Axes
     from matplotlib.figure import Figure
 
@@ -26,6 +35,7 @@ __all__ = [
     "draw_stress",
     "force_on_paths",
     "layer_picture",
+    "layer_pictures",
     "mark_failure",
     "picture_extents",
     "tension_limit",
@@ -137,24 +147,26 @@ def draw_stress(axes: "Axes", stress: LayerStress, limit: float) -> Any:
     return colours
 
 
-def _draw_paths(axes: "Axes", layer: Layer, paths: Toolpaths, width: float) -> None:
-    """Draw the fibre paths of a layer in one colour, and their links in another."""
+def _draw_paths(axes: "Axes", layer: Layer, paths: Toolpaths, width: float) -> list["Artist"]:
+    """Draw the fibre paths of a layer in one colour, and their links, below them, in another."""
     from matplotlib.collections import LineCollection
+
+    drawn: list[Artist] = []
 
     wanted = paths.select((paths.layer == layer.index) & (paths.kind == FIBRE))
     strands, links = _strands_and_links(wanted, layer)
-    for lines, shown, order in ((strands, INK, 2.0), (links, LINK, 1.9)):
-        axes.add_collection(
-            LineCollection(
-                lines,
-                colors=shown,
-                linewidths=_points(axes, _LINE * width),
-                capstyle="round",
-                joinstyle="round",
-                zorder=order,
-            ),
-            autolim=False,
+    for lines, shown, order in ((links, LINK, 1.9), (strands, INK, 2.0)):
+        shape = LineCollection(
+            lines,
+            colors=shown,
+            linewidths=_points(axes, _LINE * width),
+            capstyle="round",
+            joinstyle="round",
+            zorder=order,
         )
+        axes.add_collection(shape, autolim=False)
+        drawn.append(shape)
+    return drawn
 
 
 def _strands_and_links(paths: Toolpaths, layer: Layer) -> tuple[list[FloatArray], list[FloatArray]]:
@@ -250,6 +262,48 @@ def layer_picture(
     return figure
 
 
+def layer_pictures(
+    layer: Layer,
+    stress: LayerStress,
+    paths: Mapping[str, Toolpaths],
+    width: float,
+    captions: Mapping[str, str],
+    limit: float,
+    colours: Mapping[str, str],
+) -> dict[str, bytes]:
+    """Pictures of the paths of several strategies on one layer, as PNG files.
+
+    All show the same part of the plane; what lies under the paths is drawn once.
+
+    Parameters
+    ----------
+    layer, stress, width, limit
+        As in `layer_picture`.
+    paths : mapping of strategy name to Toolpaths
+    captions, colours : mappings of strategy name to str
+        Lines with key numbers, and marks.
+    """
+    figure, (axes,) = new_figure(picture_extents(layer, paths.values()))
+    _draw_background(axes, layer, stress, limit)
+    scale_bar(axes)
+    above = []
+    for name, lines in paths.items():
+        heading = f"{name}, layer {layer.index}"
+        drawn = _draw_paths(axes, layer, lines, width)
+        above.append(drawn + title(axes, heading, captions[name], colours[name]))
+    return dict(zip(paths, png_series(figure, above), strict=True))
+
+
+def _draw_background(
+    axes: "Axes", layer: Layer, stress: LayerStress | None, limit: float | None
+) -> None:
+    """Draw the section, and the tension in it where it is given."""
+    draw_section(axes, layer, filled=stress is None)
+    if stress is not None:
+        end = tension_limit(stress) if limit is None else limit
+        colour_bar(axes, draw_stress(axes, stress, end), (0.0, end), "MPa tension")
+
+
 def compare_layer(
     layer: Layer,
     stress: LayerStress | None,
@@ -286,14 +340,10 @@ def _draw(
     coloured: Coloured | None = None,
 ) -> None:
     """One picture without its title."""
-    draw_section(axes, layer, filled=stress is None or coloured is not None)
+    _draw_background(axes, layer, stress if coloured is None else None, limit)
     if coloured is not None:
         colours = _draw_segments(axes, coloured, width)
         colour_bar(axes, colours, coloured.limits, coloured.label)
     else:
-        if stress is not None:
-            end = tension_limit(stress) if limit is None else limit
-            colours = draw_stress(axes, stress, end)
-            colour_bar(axes, colours, (0.0, end), "MPa tension")
         _draw_paths(axes, layer, paths, width)
     scale_bar(axes)
