@@ -23,6 +23,7 @@ from ccfem.cli.options import (
     Layers,
     LoadCase,
     Out,
+    Refine,
     SetCase,
     Slicing,
     StressFile,
@@ -154,6 +155,7 @@ def compare(
     ] = None,
     virtual_test: VirtualTest = True,
     load_case: LoadCase = None,
+    refine: Refine = False,
     calibration: Calibration = None,
     backend: Backend = "auto",
     stress: StressFile = None,
@@ -182,6 +184,7 @@ def compare(
         paths=files,
         frame=paths_frame,
         force=force,
+        refine=refine,
     )
 
 
@@ -200,6 +203,7 @@ def plan(
     fibre_per_layer: Fibre = None,
     virtual_test: VirtualTest = True,
     load_case: LoadCase = None,
+    refine: Refine = False,
     calibration: Calibration = None,
     backend: Backend = "auto",
     gcode: Annotated[
@@ -218,8 +222,19 @@ def plan(
     options["natural"] = fibre_per_layer is None
     options["print_plans"] = gcode
     options["stress"] = foreign_stress(stress, stress_unit)
-    suffix = f"-{strategy}"
-    run(case, set_case, (strategy,), parameters, options, calibration, out, suffix, force=force)
+    alone, suffix = (strategy,), f"-{strategy}"
+    run(
+        case,
+        set_case,
+        alone,
+        parameters,
+        options,
+        calibration,
+        out,
+        suffix,
+        force=force,
+        refine=refine,
+    )
 
 
 @app.command()
@@ -240,6 +255,7 @@ def solve(
         ),
     ] = None,
     backend: Backend = "auto",
+    refine: Refine = False,
 ) -> None:
     """Solve a part and write displacement, strain, stress, reactions and error for ParaView."""
     from ccfem.checks import check_known
@@ -248,7 +264,7 @@ def solve(
     from ccfem.export.vtu_result import result_path, write_result
     from ccfem.io.whole import check_writable
 
-    loaded = load(case, set_case)
+    loaded = load(case, set_case, refine)
     names = loaded.problem.cases
     if load_case is not None:
         check_known("load case", load_case, names)
