@@ -50,6 +50,8 @@ def parameters_by_strategy(
 ) -> dict[str, dict[str, Any]]:
     """Parameters of strategies, each as ``strategy.name=value``; of one alone, also ``name=value``.
 
+    A parameter that is a table takes one entry at a time: ``pruned.base.floor=0.3``.
+
     Parameters
     ----------
     texts : sequence of str
@@ -59,16 +61,23 @@ def parameters_by_strategy(
     found: dict[str, dict[str, Any]] = {} if only is None else {only: {}}
     for text in texts:
         path, value = assignment(text)
-        owner, _, name = path.rpartition(".")
-        owner = owner or only or ""
-        if not owner:
+        owner, dot, name = path.partition(".")
+        if not dot:
+            owner, name = only or "", path
+        if not owner or not name:
             raise InputError(f"--set expects STRATEGY.NAME=VALUE; got '{text}'")
         if only not in (None, owner):
             raise InputError(
                 f"--set expects a parameter of {only}, the one strategy here; got '{text}': "
                 f"write {name}=VALUE or {only}.{name}=VALUE"
             )
-        found.setdefault(owner, {})[name] = value
+        table = found.setdefault(owner, {})
+        *outer, last = name.split(".")
+        for key in outer:
+            table = table.setdefault(key, {})
+            if not isinstance(table, dict):
+                raise InputError(f"--set {text}: {owner}.{key} has a value already: give one only")
+        table[last] = value
     return found
 
 

@@ -153,6 +153,14 @@ def compare(
             "waypoints.",
         ),
     ] = None,
+    curve: Annotated[
+        bool | None,
+        typer.Option(
+            "--curve/--no-curve",
+            help="Test every strategy at three to five lengths of fibre and draw stiffness over "
+            "length; by default only where one cannot lay the length of the others.",
+        ),
+    ] = None,
     virtual_test: VirtualTest = True,
     load_case: LoadCase = None,
     refine: Refine = False,
@@ -171,6 +179,7 @@ def compare(
     chosen = layers_of(layers, heights, slicing)
     options = options_of(chosen, fibre_per_layer, virtual_test, load_case, backend)
     options["natural"] = natural
+    options["curve"] = curve
     options["stress"] = foreign_stress(stress, stress_unit)
     files = names_of(paths) if paths is not None else ()
     run(

@@ -57,7 +57,7 @@ def print_members(kind: str) -> None:
         hints = typing.get_type_hints(member)
         for field in dataclasses.fields(member):
             note = _amount(member, field.name) or _choices(hints[field.name])
-            table.add_row(field.name, repr(field.default), note)
+            table.add_row(field.name, _default(field), note)
         console.print(table)
 
 
@@ -85,7 +85,7 @@ def print_member(kind: str, name: str) -> None:
         note = _amount(member, field.name)
         meaning = _meaning(member, field.name, by_class)
         text = f"{meaning} {note and f'It {note}.'}".strip()
-        table.add_row(*map(escape, (field.name, repr(field.default), what, text)))
+        table.add_row(*map(escape, (field.name, _default(field), what, text)))
     console.print(table)
 
 
@@ -111,9 +111,21 @@ def _meaning(of: type, parameter: str, by_class: Mapping[str, type]) -> str:
 def _amount(member: typing.Any, parameter: str) -> str:
     """Say that a parameter of a strategy sets the amount of fibre, where it does."""
     amount = getattr(member, "amount", None)
-    if amount is None or parameter != amount.parameter:
+    if amount is None:
+        return ""
+    for name, most in amount.beyond:
+        if name == parameter:
+            return f"follows where {amount.parameter} lays too little: {most:g} most"
+    if parameter != amount.parameter:
         return ""
     return f"sets the amount of fibre: {amount.most:g} most, {amount.least:g} least"
+
+
+def _default(field: "dataclasses.Field[typing.Any]") -> str:
+    """Write the default of a parameter."""
+    if field.default_factory is not dataclasses.MISSING:
+        return repr(field.default_factory())
+    return repr(field.default)
 
 
 def _choices(hint: object) -> str:
@@ -140,8 +152,7 @@ def print_comparison(comparison: Comparison, where: Path, seconds: float) -> Non
     console.print(about_cells(comparison.stress), style="dim", markup=False)
     for line in comparison.remarks:
         console.print(line, style="dim", markup=False)
-    said = comparison.verdict
-    if said:
+    for said in comparison.verdicts:
         console.print(said, style="bold", markup=False)
     if any(run.tested is not None for run in runs):
         console.print(HONEST_PROMISE, style="dim", markup=False)

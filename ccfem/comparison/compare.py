@@ -6,13 +6,15 @@ print, test, bound.
 
 import os
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from itertools import count
 from typing import Any
 
 from ccfem.cases.case import Case
 from ccfem.cases.reading import read
 from ccfem.checks import check_known, member_name
+from ccfem.comparison.curve_stages import along_curve
+from ccfem.comparison.ranking import off_length
 from ccfem.comparison.result import Comparison
 from ccfem.comparison.runs import Run
 from ccfem.comparison.stages import (
@@ -178,6 +180,7 @@ def compare(
     backend: str = "auto",
     print_plans: bool = False,
     stress: ForeignStress | None = None,
+    curve: bool | None = None,
     progress: Progress = silent,
 ) -> Comparison:
     """Solve a case once, and plan and evaluate each strategy on it.
@@ -187,7 +190,8 @@ def compare(
     it, each by its own parameter (`LayerStrategy.amount`). Paths of another program (`GivenPaths`)
     stay as they are: the least of their lengths is then the one for all, and their heights are
     those of the layers where no others are given. A strategy that fails stays in the result, with
-    the reason.
+    the reason. Where one cannot lay the length, the comparison is made along a curve too: stiffness
+    over length of fibre.
 
     Parameters
     ----------
@@ -213,6 +217,9 @@ def compare(
     stress : ForeignStress, optional
         File of another program with the stress, on the same mesh, to plan and evaluate on. Virtual
         tests and the bound solve the part themselves all the same.
+    curve : bool, optional
+        Test every strategy at three to five lengths of fibre (`Comparison.curve`). By default only
+        where a strategy lays neither more nor less than its own, which is not the wanted length.
     progress : callable, optional
         Told what is being done, and the share that is done.
 
@@ -231,6 +238,8 @@ def compare(
     case = read(case)
     if natural and fibre_per_layer is not None:
         raise InputError("give either a fibre length per layer or the natural amount, not both")
+    if curve and strand is None:
+        raise InputError("the curve is one of stiffness: leave the virtual test in, or it out")
     if fibre_per_layer is not None:
         check_wanted(fibre_per_layer)
     if print_plans:
@@ -249,16 +258,28 @@ def compare(
         Run(name, one.on(stack) if isinstance(one, GivenPaths) else one, Toolpaths.empty(), None)
         for name, one in strategies.items()
     ]
-    runs = [planned(run, part, fibre_per_layer, tell) for run in runs]
-    wanted = fibre_per_layer
+    asked_for, wanted = runs, fibre_per_layer
     if wanted is None and not natural:
         runs, wanted = levelled(runs, part, tell)
+    else:
+        runs = [planned(run, part, wanted, tell) for run in runs]
     runs = [evaluated(run, part, tell) for run in runs]
     if print_plans:
         runs = [with_print(run, part, tell) for run in runs]
     if strand is not None:
         runs = all_tested(runs, field, case.machine, strand, backend, tell)
-    lengths = [float(run.toolpaths.lengths.sum()) for run in runs if run.tested is not None]
+    along = None
+    if strand is not None and (curve or (curve is None and _misses(runs, wanted))):
+        with timed(seconds, "curve"):
+            along = along_curve(
+                _as_asked(runs, asked_for),
+                part,
+                wanted,
+                lambda some: all_tested(some, field, case.machine, strand, backend, tell, ()),
+                tell,
+            )
+    equal = [run for run in runs if run.tested is not None and not off_length(run, wanted)]
+    lengths = [float(run.toolpaths.lengths.sum()) for run in equal]
     bound = None
     # The bound is one for flat layers.
     if lengths and all(layer.flat is not None for layer in stack):
@@ -267,7 +288,23 @@ def compare(
             bound = upper_bound(
                 field, stack, max(lengths), case.machine, strand, iterations=_BOUND_ITERATIONS
             )
-    return Comparison(case, field, stack, tuple(runs), wanted, seconds, bound, given)
+    return Comparison(case, field, stack, tuple(runs), wanted, seconds, bound, given, along)
+
+
+def _misses(runs: Sequence[Run], wanted: float | None) -> bool:
+    """Whether a strategy lays another length than the wanted one, since it cannot lay that."""
+    return any(
+        off_length(run, wanted) and not isinstance(run.strategy, GivenPaths)
+        for run in runs
+        if run.evaluation is not None
+    )
+
+
+def _as_asked(runs: Sequence[Run], asked_for: Sequence[Run]) -> list[Run]:
+    """Give runs the strategies back that were asked for, before any was brought to a length."""
+    return [
+        replace(run, strategy=asked.strategy) for run, asked in zip(runs, asked_for, strict=True)
+    ]
 
 
 def _load_case(case: Case, name: str | None) -> str:

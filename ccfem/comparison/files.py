@@ -29,9 +29,9 @@ def write_results(
     """Write ``results.csv``, ``results.json``, ``report.html``, pictures and paths.
 
     Where layers are curved, also ``STRATEGY_space.png`` and a page that turns,
-    ``STRATEGY_space.html``. Runs with a print plan get ``STRATEGY.gcode`` too. In ``paths.vtp`` the
-    cell array "strategy" numbers the strategies that did not fail, in the order of
-    ``results.json``.
+    ``STRATEGY_space.html``; with a curve, ``curve.csv`` and ``curve.png``. Runs with a print plan
+    get ``STRATEGY.gcode`` too. In ``paths.vtp`` the cell array "strategy" numbers the strategies
+    that did not fail, in the order of ``results.json``.
 
     Parameters
     ----------
@@ -53,6 +53,8 @@ def write_results(
     progress("writing results", 0.9)
     _write_pictures(pictures, folder)
     results_frame(comparison).to_csv(folder / "results.csv", index=False)
+    if comparison.curve is not None:
+        comparison.curve.frame.to_csv(folder / "curve.csv", index=False)
     _write_paths(comparison, folder)
     if any(layer.flat is None for layer in comparison.layers):
         _write_in_space(comparison, folder)
@@ -72,6 +74,8 @@ def _write_pictures(pictures: "Pictures", folder: Path) -> None:
         (folder / f"{name}_force.png").write_bytes(image)
     (folder / "tension.png").write_bytes(pictures.tension)
     (folder / "overview.png").write_bytes(pictures.overview)
+    if pictures.curve:
+        (folder / "curve.png").write_bytes(pictures.curve)
 
 
 def _write_in_space(comparison: Comparison, folder: Path) -> None:

@@ -7,6 +7,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from ccfem.arrays import FloatArray
+from ccfem.comparison.ranking import stiffness_ratio
 from ccfem.comparison.result import Comparison
 from ccfem.comparison.runs import Run
 from ccfem.elasticity.stress_field import StressField
@@ -28,6 +29,7 @@ from ccfem.plot.paths import (
     mark_failure,
     tension_limit,
 )
+from ccfem.plot.stiffness_curves import StiffnessPoint, stiffness_curves
 from ccfem.progress import Progress, silent
 
 if TYPE_CHECKING:
@@ -55,6 +57,8 @@ class Pictures:
         Curves of all strategies over all layers.
     middle : int
         Index of the middle layer.
+    curve : bytes
+        Stiffness over the length of fibre; empty without a curve.
     """
 
     paths: dict[tuple[str, int], bytes]
@@ -65,6 +69,7 @@ class Pictures:
     matching: bytes
     curvature: bytes
     middle: int
+    curve: bytes = b""
 
 
 def draw_pictures(comparison: Comparison, progress: Progress = silent) -> Pictures:
@@ -91,7 +96,24 @@ def draw_pictures(comparison: Comparison, progress: Progress = silent) -> Pictur
         png(matching_curves(rates, THRESHOLDS, "fibre along the stress", colours)),
         png(curvature_curves(bends, machine.minimum_radius, "curvature", colours)),
         middle.layer.index,
+        _curve(comparison, colours),
     )
+
+
+def _curve(comparison: Comparison, colours: Mapping[str, str]) -> bytes:
+    """Picture of stiffness over the length of fibre; empty where there is no curve."""
+    if comparison.curve is None:
+        return b""
+    curves = {
+        name: [
+            StiffnessPoint(run.length_per_layer, stiffness_ratio(run), run.printable)
+            for run in runs
+        ]
+        for name, runs in comparison.curve.runs.items()
+        if runs
+    }
+    heading = "stiffness over length of fibre, tension only"
+    return png(stiffness_curves(curves, comparison.curve.common, heading, colours))
 
 
 def _drawn(comparison: Comparison) -> list[Layer]:

@@ -9,7 +9,17 @@ from ccfem.comparison.runs import Run
 from ccfem.planning.equal_fibre import TOLERANCE
 from ccfem.virtual_testing.stiffer import FIRST, RESOLUTION, SAME, UNDECIDED, stiffer
 
-__all__ = ["best_values", "order_of", "ranking", "stiffness_ratio", "stiffness_ratios", "too_long"]
+__all__ = [
+    "best_values",
+    "off_length",
+    "order_of",
+    "ranking",
+    "stiffness_ratio",
+    "stiffness_ratios",
+]
+
+_SAME = TOLERANCE * (1.0 + 1e-9)
+"""Share of the wanted length by which a run may differ and count as equal."""
 
 _STIFFNESSES = (
     "stiffness",
@@ -25,7 +35,7 @@ def ranking(runs: Sequence[Run], wanted: float | None) -> tuple[Run, ...]:
 
     By the predicted stiffness with fibres that carry tension only; those without a virtual test
     come after, by efficiency. Runs that cannot be printed as they are stand below all that can,
-    and among these a run that lays more than the wanted fibre below all that do not.
+    and among these a run that lays more or less than the wanted fibre below all that lay it.
 
     Parameters
     ----------
@@ -39,7 +49,7 @@ def ranking(runs: Sequence[Run], wanted: float | None) -> tuple[Run, ...]:
         return (
             run.evaluation is None,
             not run.printable,
-            too_long(run, wanted),
+            off_length(run, wanted),
             not np.isfinite(ratio),
             -np.nan_to_num(ratio),
             -np.nan_to_num(efficiency),
@@ -51,13 +61,15 @@ def ranking(runs: Sequence[Run], wanted: float | None) -> tuple[Run, ...]:
 def best_values(runs: Sequence[Run], wanted: float | None) -> dict[str, float]:
     """Best value of each headline column where a run is really better than another.
 
-    Runs that cannot be printed, lay too much fibre or leave layers empty have no best value. A
-    stiffness is best only where its run is stiffer than every other, by more than the test
-    resolves and whatever fibres in compression do; a load at first failure where it is the largest
-    by more than that.
+    Runs that cannot be printed, lay another length than the wanted one or leave layers empty have
+    no best value. A stiffness is best only where its run is stiffer than every other, by more than
+    the test resolves and whatever fibres in compression do; a load at first failure where it is
+    the largest by more than that.
     """
     equal = [
-        run for run in runs if run.printable and not too_long(run, wanted) and not run.empty_layers
+        run
+        for run in runs
+        if run.printable and not off_length(run, wanted) and not run.empty_layers
     ]
     order = ranking(equal, wanted)
     stiffest = len(order) > 1 and all(order_of(order[0], other) == FIRST for other in order[1:])
@@ -76,9 +88,11 @@ def best_values(runs: Sequence[Run], wanted: float | None) -> dict[str, float]:
     return best
 
 
-def too_long(run: Run, wanted: float | None) -> bool:
-    """Whether a run lays more fibre than all were held to."""
-    return wanted is not None and run.length_per_layer > (1.0 + TOLERANCE) * wanted
+def off_length(run: Run, wanted: float | None) -> bool:
+    """Whether a run lays more or less fibre than all were held to."""
+    return wanted is not None and not (
+        (1.0 - _SAME) * wanted <= run.length_per_layer <= (1.0 + _SAME) * wanted
+    )
 
 
 def stiffness_ratio(run: Run, mode: str = "tension") -> float:

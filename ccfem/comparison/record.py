@@ -99,6 +99,9 @@ def record(comparison: Comparison, command: str, seconds: Mapping[str, float]) -
             "strain_energy": stress.strain_energy,
             "fibre_per_layer": comparison.fibre_per_layer,
             "upper_bound": None if comparison.bound is None else comparison.bound.ratio,
+            "curve": None
+            if comparison.curve is None
+            else comparison.curve.frame.to_dict(orient="records"),
             "seconds": {**seconds, **comparison.seconds},
             "strategies": [_run_record(run) for run in comparison.runs],
         }

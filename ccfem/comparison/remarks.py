@@ -4,7 +4,7 @@ from collections.abc import Mapping, Sequence
 
 import numpy as np
 
-from ccfem.comparison.ranking import order_of, ranking, stiffness_ratio, too_long
+from ccfem.comparison.ranking import off_length, order_of, ranking, stiffness_ratio
 from ccfem.comparison.runs import Run
 from ccfem.evaluation.evaluation import Evaluation
 from ccfem.fibre_aware.upper_bound import UpperBound
@@ -31,7 +31,7 @@ def remarks(
         for line in _about(run, wanted, bound is not None):
             lines.setdefault(line, []).append(run.name)
     found = [f"{', '.join(names)}: {line}" for line, names in lines.items()]
-    tested = [run for run in order if run.tested is not None]
+    tested = [run for run in order if run.tested is not None and not off_length(run, wanted)]
     found += _about_orders(tested)
     return [*found, bound_remark(tested, bound)] if bound is not None and tested else found
 
@@ -54,7 +54,7 @@ def _about(run: Run, wanted: float | None, bounded: bool) -> list[str]:
     if run.empty_layers and run.evaluation is not None:
         lines.append(f"no fibre on {run.empty_layers} of {len(run.evaluation.layers)} layers")
     if run.note:
-        placed = ", so it is placed last" if too_long(run, wanted) else ""
+        placed = ", so it is placed below those that lay it" if off_length(run, wanted) else ""
         lines.append(f"{run.note}{placed}")
     return lines
 

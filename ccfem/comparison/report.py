@@ -1,13 +1,14 @@
 """The report of a comparison: one HTML file that holds everything, pictures included."""
 
-import base64
 from collections.abc import Mapping, Sequence
 from html import escape
 from typing import Any
 
 import numpy as np
 
+from ccfem.comparison.curve_section import curve_section
 from ccfem.comparison.headline import HEADLINE, TEST_COLUMNS, cell_text, headline_values
+from ccfem.comparison.html import figure, grid, number
 from ccfem.comparison.pictures import Pictures
 from ccfem.comparison.ranking import best_values, stiffness_ratios
 from ccfem.comparison.result import Comparison
@@ -81,6 +82,7 @@ def report_html(
     sections = [
         _header(comparison, record),
         _headline(comparison),
+        curve_section(comparison.curve, pictures.curve),
         _against_each_other(comparison),
         _pictures(comparison, pictures),
         _all_indices(comparison),
@@ -147,9 +149,9 @@ def _headline(comparison: Comparison) -> str:
     notes = f'<ul class="note">{notes}</ul>' if notes else ""
     if any(run.tested is not None for run in runs):
         notes += f'<p class="note"><b>{escape(HONEST_PROMISE)}</b></p>'
-    said = comparison.verdict
+    said = comparison.verdicts
     return (
-        (f'<p class="verdict">{escape(said)}</p>\n' if said else "")
+        "".join(f'<p class="verdict">{escape(line)}</p>\n' for line in said)
         + f'<div class="scroll"><table><tr><th>strategy</th>{titles}</tr>\n'
         + "\n".join(rows)
         + f"</table></div>\n{notes}"
@@ -196,12 +198,12 @@ def _pictures(comparison: Comparison, pictures: Pictures) -> str:
     every = ""
     if len(rows) > 1:
         every = f"<details><summary>All {len(rows)} layers</summary>\n{''.join(rows)}</details>\n"
-    tension = _figure(pictures.tension, "tension in the middle layer")
-    error = _figure(pictures.error, "estimated error of the cells in the middle layer")
+    tension = figure(pictures.tension, "tension in the middle layer")
+    error = figure(pictures.error, "estimated error of the cells in the middle layer")
     return (
         f"<h2>Paths</h2>\n{_layer(pictures.middle, places[pictures.middle], runs, pictures)}"
         f"{every}{_forces(runs, pictures)}{_curves(pictures)}"
-        f"<h2>Tension without fibres</h2>\n{_grid([tension, error, '', ''])}\n"
+        f"<h2>Tension without fibres</h2>\n{grid([tension, error, '', ''])}\n"
     )
 
 
@@ -215,17 +217,17 @@ def _place(layer: Layer) -> str:
 def _layer(index: int, place: str, runs: Sequence[Run], pictures: Pictures) -> str:
     """One layer of every run side by side."""
     figures = [
-        _figure(pictures.paths[run.name, index], f"{run.name}, layer {index}") for run in runs
+        figure(pictures.paths[run.name, index], f"{run.name}, layer {index}") for run in runs
     ]
     title = f"<h3>Layer {index}, {place}</h3>"
-    return f"{title}{_grid(figures)}\n"
+    return f"{title}{grid(figures)}\n"
 
 
 def _forces(runs: Sequence[Run], pictures: Pictures) -> str:
     if not pictures.forces:
         return ""
     figures = [
-        _figure(pictures.forces[run.name], f"{run.name}, force in the fibres")
+        figure(pictures.forces[run.name], f"{run.name}, force in the fibres")
         for run in runs
         if run.name in pictures.forces
     ]
@@ -233,34 +235,21 @@ def _forces(runs: Sequence[Run], pictures: Pictures) -> str:
         "<h2>Force in the fibres</h2>\n"
         '<p class="note">Predicted axial force, fibres carrying tension only, in layer '
         f"{pictures.middle}; the mark is where the part first fails, on whatever layer.</p>\n"
-        f"{_grid(figures)}\n"
+        f"{grid(figures)}\n"
     )
 
 
 def _curves(pictures: Pictures) -> str:
     curves = [
-        _figure(pictures.matching, "share of the fibre within an angle of the stress"),
-        _figure(pictures.curvature, "share of the fibre below a curvature"),
+        figure(pictures.matching, "share of the fibre within an angle of the stress"),
+        figure(pictures.curvature, "share of the fibre below a curvature"),
         "",
     ]
     return (
         "<h2>Direction and curvature</h2>\n"
         '<p class="note">Share of the fibre\'s length within an angle of the in-plane principal '
         "stress of the larger size, and share of it that is straighter than a curvature; all "
-        f"layers.</p>\n{_grid(curves)}\n"
-    )
-
-
-def _grid(figures: Sequence[str]) -> str:
-    columns = f"grid-template-columns: repeat({max(len(figures), 2)}, 1fr)"
-    return f'<div class="pictures" style="{columns}">{"".join(figures)}</div>'
-
-
-def _figure(image: bytes, about: str) -> str:
-    source = base64.b64encode(image).decode("ascii")
-    return (
-        f'<figure><img loading="lazy" alt="{escape(about)}" src="data:image/png;base64,{source}">'
-        "</figure>"
+        f"layers.</p>\n{grid(curves)}\n"
     )
 
 
@@ -270,7 +259,7 @@ def _all_indices(comparison: Comparison) -> str:
     rows = []
     values = [headline_values(run) for run in runs]
     for column in (*TEST_COLUMNS, *COLUMNS):
-        cells = "".join(f"<td>{_number(found.get(column.name, np.nan))}</td>" for found in values)
+        cells = "".join(f"<td>{number(found.get(column.name, np.nan))}</td>" for found in values)
         unit = "" if column.unit == "1" else f" ({escape(column.unit)})"
         rows.append(
             f'<tr><td title="{escape(column.formula)}">{escape(column.name)}{unit}</td>{cells}</tr>'
@@ -280,14 +269,6 @@ def _all_indices(comparison: Comparison) -> str:
         f'results.csv</summary><div class="scroll"><table class="narrow"><tr><th>index</th>{head}'
         f"</tr>\n{''.join(rows)}</table></div></details>\n"
     )
-
-
-def _number(value: float) -> str:
-    if not np.isfinite(value):
-        return "–"
-    if abs(value) < 1e-9:
-        return "0"
-    return f"{value:,.0f}" if abs(value) >= 1000.0 else f"{value:.4g}"
 
 
 def _parameters(comparison: Comparison) -> str:

@@ -6,6 +6,7 @@ from typing import TYPE_CHECKING
 
 from ccfem.arrays import freeze
 from ccfem.cases.case import Case
+from ccfem.comparison.curve import Curve
 from ccfem.comparison.ranking import ranking
 from ccfem.comparison.remarks import remarks
 from ccfem.comparison.runs import Run
@@ -43,6 +44,9 @@ class Comparison:
         Stress of another program, where paths are planned and evaluated on that.
     bound : UpperBound or None
         Stiffness that no paths exceed at the largest length of any run; None without virtual tests.
+    curve : Curve, optional
+        The strategies at several lengths of fibre, where that was asked for or one cannot lay the
+        length of the others.
     """
 
     case: Case
@@ -53,6 +57,7 @@ class Comparison:
     seconds: Mapping[str, float]
     bound: UpperBound | None = None
     given: GivenStress | None = None
+    curve: Curve | None = None
 
     @property
     def planned_on(self) -> PartStress:
@@ -71,10 +76,10 @@ class Comparison:
         )
 
     def __str__(self) -> str:
-        return summary_text(self.ranking, self.verdict)
+        return summary_text(self.ranking, " ".join(self.verdicts))
 
     def _repr_html_(self) -> str:
-        return summary_html(self.ranking, self.verdict)
+        return summary_html(self.ranking, " ".join(self.verdicts))
 
     @property
     def succeeded(self) -> tuple[Run, ...]:
@@ -90,6 +95,12 @@ class Comparison:
     def verdict(self) -> str:
         """One sentence on which strategy is best; empty where there is none to compare."""
         return verdict(self.runs, self.fibre_per_layer)
+
+    @property
+    def verdicts(self) -> tuple[str, ...]:
+        """The verdict, and those along the curve."""
+        along = () if self.curve is None else self.curve.verdicts
+        return tuple(dict.fromkeys(said for said in (self.verdict, *along) if said))
 
     @property
     def remarks(self) -> list[str]:

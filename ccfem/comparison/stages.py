@@ -18,15 +18,27 @@ from ccfem.machine.machine import Machine
 from ccfem.planning.equal_fibre import TOLERANCE, Planned, length_per_layer, plan_to_length
 from ccfem.planning.given_paths import GivenPaths
 from ccfem.planning.plan import plan
+from ccfem.planning.strategy import LengthStrategy
 from ccfem.toolpaths import FIBRE, MATRIX, Toolpaths
 from ccfem.virtual_testing.equilibrium import BONDED, TENSION
 from ccfem.virtual_testing.specimen import Specimen
-from ccfem.virtual_testing.strand import Strand
+from ccfem.virtual_testing.strand import RHO_SPAN, Strand
 from ccfem.virtual_testing.strands import cut_strands
 from ccfem.virtual_testing.strength import first_failure, matrix_peak
 from ccfem.virtual_testing.virtual_test import Bracket, virtual_test
 
-__all__ = ["Part", "Tell", "all_tested", "evaluated", "levelled", "planned", "timed", "with_print"]
+__all__ = [
+    "Part",
+    "Tell",
+    "all_tested",
+    "attempted",
+    "evaluated",
+    "levelled",
+    "planned",
+    "timed",
+    "with_plan",
+    "with_print",
+]
 
 Tell = Callable[[str], None]
 """Told what is done next."""
@@ -60,16 +72,26 @@ def planned(
             found = Planned(run.strategy, paths, length_per_layer(paths, layers))
         else:
             found = plan_to_length(run.strategy, layers, stress, machine, wanted, start=start)
-        return replace(
-            run,
-            strategy=found.strategy,
-            toolpaths=found.toolpaths,
-            length_per_layer=found.length_per_layer,
-            note=found.note,
-        )
+        return with_plan(run, found)
 
     bare = replace(run, toolpaths=Toolpaths.empty(), length_per_layer=0.0)
     return _stage(bare, "plan", work)
+
+
+def with_plan(run: Run, found: Planned) -> Run:
+    """Run with a plan."""
+    return replace(
+        run,
+        strategy=found.strategy,
+        toolpaths=found.toolpaths,
+        length_per_layer=found.length_per_layer,
+        note=found.note,
+    )
+
+
+def attempted(run: Run, work: Callable[[], Run]) -> Run:
+    """Run that planning makes of `run`; where it fails, `run` with the reason."""
+    return _stage(run, "plan", work)
 
 
 def _as_given(laid: float, wanted: float | None) -> str:
@@ -80,7 +102,9 @@ def _as_given(laid: float, wanted: float | None) -> str:
 
 
 def levelled(runs: Sequence[Run], part: Part, tell: Tell) -> tuple[list[Run], float | None]:
-    """Bring runs with their natural amounts to the smallest of them.
+    """Plan all runs to the smallest of their natural amounts.
+
+    Strategies that take the length itself are planned once that is known.
 
     Returns
     -------
@@ -88,20 +112,52 @@ def levelled(runs: Sequence[Run], part: Part, tell: Tell) -> tuple[list[Run], fl
     float, mm, or None
         The length per layer; None where nobody lays fibre.
     """
-    laid = [run for run in runs if len(run.toolpaths)]
-    if not laid:
-        return list(runs), None
-    given = [run for run in laid if isinstance(run.strategy, GivenPaths)]
-    setter = min(given or laid, key=lambda run: run.length_per_layer)
+    own = {
+        run.name: run
+        if isinstance(run.strategy, LengthStrategy)
+        else planned(run, part, None, tell)
+        for run in runs
+    }
+    setter = _setter(own, part, tell)
+    if setter is None:
+        return list(own.values()), None
+    length = own[setter].length_per_layer
+    given = isinstance(own[setter].strategy, GivenPaths)
 
     def level(run: Run) -> Run:
-        if run is setter:
+        if run.name == setter:
             how = "given" if given else "has the shortest natural length"
             return replace(run, note=f"{how}: sets the length")
-        own = Planned(run.strategy, run.toolpaths, run.length_per_layer)
-        return planned(run, part, setter.length_per_layer, tell, own)
+        start = Planned(run.strategy, run.toolpaths, run.length_per_layer)
+        return planned(run, part, length, tell, start if len(run.toolpaths) else None)
 
-    return [level(run) for run in runs], setter.length_per_layer
+    return [level(run) for run in own.values()], length
+
+
+def _setter(own: dict[str, Run], part: Part, tell: Tell) -> str | None:
+    """Name of the run whose natural length is that of all: it is planned after this."""
+    while True:
+        natural = {}
+        for name, run in own.items():
+            if len(run.toolpaths):
+                natural[name] = run.length_per_layer
+            elif isinstance(run.strategy, LengthStrategy) and not run.failure:
+                natural[name] = run.strategy.natural_length(part.layers, part.machine)
+        given = [name for name in natural if isinstance(own[name].strategy, GivenPaths)]
+        setter = min(given or natural, key=natural.__getitem__, default=None)
+        if setter is None or len(own[setter].toolpaths):
+            return setter
+        run = planned(own[setter], part, natural[setter], tell)
+        nothing = not run.failure and not len(run.toolpaths)
+        own[setter] = replace(run, failure=_no_fibre(part.machine)) if nothing else run
+
+
+def _no_fibre(machine: Machine) -> str:
+    return (
+        "laid no fibre: the sections, or what of them is under tension, are too small "
+        f"for the shortest strand (machine.minimum_length = {machine.minimum_length:g} mm): are "
+        "all lengths in mm?"
+    )
 
 
 def evaluated(run: Run, part: Part, tell: Tell) -> Run:
@@ -110,12 +166,7 @@ def evaluated(run: Run, part: Part, tell: Tell) -> Run:
     if run.failure:
         return run
     if not len(run.toolpaths):
-        return replace(
-            run,
-            failure="laid no fibre: the sections, or what of them is under tension, are too small "
-            "for the shortest strand (machine.minimum_length = "
-            f"{part.machine.minimum_length:g} mm): are all lengths in mm?",
-        )
+        return replace(run, failure=_no_fibre(part.machine))
 
     def work() -> Run:
         found = evaluate(run.toolpaths, part.layers, part.stress, part.machine)
@@ -153,6 +204,7 @@ def all_tested(
     strand: Strand,
     backend: str,
     tell: Tell,
+    span: Sequence[float] = RHO_SPAN,
 ) -> list[Run]:
     """Test every run that did not fail virtually, all on one factorisation."""
     try:
@@ -163,11 +215,17 @@ def all_tested(
         before, _ = matrix_peak(stress)
     except InputError:
         before = float("nan")
-    return [_tested(run, specimen, strand, machine, before, tell) for run in runs]
+    return [_tested(run, specimen, strand, machine, before, tell, span) for run in runs]
 
 
 def _tested(
-    run: Run, specimen: Specimen, strand: Strand, machine: Machine, before: float, tell: Tell
+    run: Run,
+    specimen: Specimen,
+    strand: Strand,
+    machine: Machine,
+    before: float,
+    tell: Tell,
+    span: Sequence[float],
 ) -> Run:
     """Test a run virtually, or say why it cannot be tested."""
     tell(f"testing {run.name}")
@@ -177,7 +235,7 @@ def _tested(
     def work() -> Run:
         mesh = specimen.unreinforced.mesh
         strands = cut_strands(run.toolpaths, mesh, machine=machine)
-        tension = virtual_test(strands, specimen, strand, TENSION)
+        tension = virtual_test(strands, specimen, strand, TENSION, span)
         bracket = Bracket(tension, virtual_test(strands, specimen, strand, BONDED, span=()))
         try:
             test = Tested(bracket, first_failure(tension, strand), matrix_before=before)

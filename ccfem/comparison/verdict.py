@@ -5,14 +5,11 @@ from collections.abc import Sequence
 import numpy as np
 
 from ccfem.comparison.headline import headline_values
-from ccfem.comparison.ranking import order_of, ranking, stiffness_ratio, too_long
+from ccfem.comparison.ranking import off_length, order_of, ranking, stiffness_ratio
 from ccfem.comparison.runs import Run
 from ccfem.virtual_testing.stiffer import RESOLUTION, SAME, UNDECIDED
 
 __all__ = ["verdict"]
-
-_EQUAL = 0.02
-"""Difference in length up to which two runs count as laying equally much."""
 
 
 def verdict(runs: Sequence[Run], wanted: float | None) -> str:
@@ -34,10 +31,17 @@ def verdict(runs: Sequence[Run], wanted: float | None) -> str:
         Empty where fewer than two runs are left.
     """
     order = [run for run in ranking(runs, wanted) if run.evaluation is not None]
-    kept = [run for run in order if run.printable and not too_long(run, wanted)]
+    kept = [run for run in order if run.printable and not off_length(run, wanted)]
     if len(kept) < 2:
         return ""
     said = _of_printable(kept, wanted)
+    off = [
+        f"{run.name} (lays {run.length_per_layer:.0f} mm)"
+        for run in order
+        if run.printable and off_length(run, wanted)
+    ]
+    if said and off:
+        said += f" Not at that length: {', '.join(off)}."
     left = [run.name for run in order if not run.printable]
     return f"{said} Not printable as planned: {', '.join(left)}." if said and left else said
 
@@ -52,20 +56,20 @@ def _of_printable(order: Sequence[Run], wanted: float | None) -> str:
     if unclear:
         group = [first, *(run for run in tested if run in unclear or run in same)]
         return (
-            f"Undecided between {_names(group)}, {_amounts(group, wanted)}: "
+            f"Undecided between {_names(group)}, {_amount(wanted)}: "
             f"{_ratios(group)} times the unreinforced stiffness where fibres carry tension only, "
             f"{_ratios(group, 'bonded')} where they are bonded."
         )
     if same:
         group = [first, *same]
         return (
-            f"No difference between {_names(group)}, {_amounts(group, wanted)}: "
+            f"No difference between {_names(group)}, {_amount(wanted)}: "
             f"{_ratios(group)} times the unreinforced stiffness, within {RESOLUTION:.0%}, the "
             "resolution of the test."
         )
     gain = stiffness_ratio(first) / stiffness_ratio(second)
     return (
-        f"{first.name} makes the stiffest part, {_amounts([first, second], wanted)}: "
+        f"{first.name} makes the stiffest part, {_amount(wanted)}: "
         f"{stiffness_ratio(first):.2f} times the unreinforced one, and {gain:.2f} times "
         f"{second.name} (predicted, fibres carrying tension only; no other is stiffer with bonded "
         "fibres)."
@@ -79,7 +83,7 @@ def _by_efficiency(first: Run, second: Run, wanted: float | None) -> str:
     then = f", then {second.name} with {following:.3f}" if np.isfinite(following) else ""
     return (
         f"By efficiency alone (no virtual test): {first.name} with {best:.3f}{then}, "
-        f"{_amounts([first, second], wanted)}."
+        f"{_amount(wanted)}."
     )
 
 
@@ -93,17 +97,8 @@ def _ratios(runs: Sequence[Run], mode: str = "tension") -> str:
     return f"{', '.join(ratios[:-1])} and {ratios[-1]}"
 
 
-def _amounts(runs: Sequence[Run], wanted: float | None) -> str:
+def _amount(wanted: float | None) -> str:
     """Say how much fibre runs lay, mm per layer, where they were held to a length."""
     if wanted is None:
         return "each with its own amount of fibre"
-    first = runs[0].length_per_layer
-    unequal = []
-    for run in runs[1:]:
-        more = first / run.length_per_layer - 1.0
-        if abs(more) > _EQUAL:
-            amount = f"{abs(more):.0%} {'more' if more > 0.0 else 'less'}"
-            unequal.append(f"{amount} fibre than {run.name}")
-    if not unequal:
-        return f"at {wanted:.0f} mm of fibre per layer"
-    return f"with {' and '.join(unequal)}"
+    return f"at {wanted:.0f} mm of fibre per layer"

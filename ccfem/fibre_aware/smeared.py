@@ -92,6 +92,8 @@ class SmearedPart:
     ) -> "SmearedPart":
         """Part of a solved problem; quadratic cells are replaced by linear ones.
 
+        The field keeps it, so that all who plan on it and bound it share one factorisation.
+
         Parameters
         ----------
         stress : StressField
@@ -103,7 +105,13 @@ class SmearedPart:
         if backend is None:
             small = 3 * len(stress.mesh.points) <= _DIRECT_UNKNOWNS
             backend = "superlu" if small else "amg"
-        return cls(Specimen.of(on_linear_cells(stress, backend), backend), read_only(frame))
+        known = stress.__dict__.setdefault("smeared", {})
+        key = backend, np.asarray(frame, dtype=np.float64).tobytes()
+        if key not in known:
+            linear = on_linear_cells(stress, backend)
+            known[key] = cls(Specimen.of(linear, backend), read_only(frame))
+        part: SmearedPart = known[key]
+        return part
 
     @property
     def mesh(self) -> TetMesh:

@@ -13,7 +13,7 @@ from numba import njit
 
 from ccfem.arrays import FloatArray, IntArray
 
-__all__ = ["WORDS", "advance", "curve_points", "word_sizes"]
+__all__ = ["WORDS", "advance", "curve_points", "shortest_curve", "word_sizes"]
 
 WORDS: IntArray = np.array(
     [[1, 0, 1], [-1, 0, -1], [1, 0, -1], [-1, 0, 1], [1, -1, 1], [-1, 1, -1]], dtype=np.int64
@@ -61,6 +61,14 @@ def curve_points(
     if len(line) > 1:
         line[-1] = end[:2]
     return line
+
+
+def shortest_curve(start: FloatArray, end: FloatArray, radius: float, step: float) -> FloatArray:
+    """Points (k, 2), mm, of the shortest curve of a radius from one pose (3,) to another."""
+    sizes = np.empty((6, 3))
+    word_sizes(start, end, radius, sizes)
+    best = int(np.argmin(np.abs(sizes).sum(axis=1)))
+    return curve_points(start, end, WORDS[best], np.maximum(sizes[best], 0.0), radius, step)
 
 
 @njit(cache=True, nogil=True)

@@ -22,13 +22,19 @@ _LEAST = 0.3
 
 def strips(lines: Sequence[FloatArray], pitch: float) -> Region:
     """Area that strands take, a pitch wide each, ends cut square: a (Multi)Polygon, mm."""
-    return shapely.buffer(
+    found = shapely.buffer(
         shapely.multilinestrings([shapely.LineString(line) for line in lines]),
         0.5 * pitch,
         cap_style="flat",
         join_style="mitre",
         mitre_limit=1.5,
     )
+    if shapely.is_valid(found):
+        return found
+    # Mitred corners may leave a border that touches itself; differences with it would fail.
+    parts = shapely.get_parts(shapely.make_valid(found))
+    areas = parts[shapely.get_dimensions(parts) == 2]
+    return shapely.union_all(areas)
 
 
 def extend_free_ends(

@@ -102,7 +102,7 @@ def _fitted(value: Any, hint: Any, infinite: bool) -> Any:
             return _UNFIT
         parts = [_fitted(v, option, infinite) for v, option in zip(value, options, strict=True)]
         return _UNFIT if any(part is _UNFIT for part in parts) else tuple(parts)
-    if origin is dict:
+    if origin in (dict, Mapping):
         return dict(value) if isinstance(value, Mapping) else _UNFIT
     if hint in (int, float, bool, str):
         return _plain(value, hint, infinite)

@@ -68,7 +68,7 @@ def lead_into(
         for side, point in ((0, piece[0]), (1, piece[-1]))
         if shapely.distance(ring, shapely.points(point)) < 1e-6 and not is_closed(piece)
     ]
-    return join(pieces, _pairing(sorted(ends), ring, section))
+    return join(pieces, _pairing(sorted(ends), ring, section)).lines
 
 
 def _pairing(

@@ -8,7 +8,7 @@ import shapely
 from ccfem.arrays import FloatArray
 from ccfem.geometry.polylines import along_line, is_closed, line_length, points_along
 from ccfem.geometry.shapes import Region, open_lines
-from ccfem.linking.joining import link_ends
+from ccfem.linking.joining import Joined, link_ends
 
 __all__ = ["close_short_ring", "keep_off_border", "linked_paths"]
 
@@ -53,7 +53,8 @@ def linked_paths(
     link_limit: float,
     least_length: float,
     along_boundary: bool = True,
-) -> list[FloatArray]:
+    radius: float = 0.0,
+) -> Joined:
     """Link the ends of strands, close short rings, and drop what is too short to be cut.
 
     Parameters
@@ -69,10 +70,19 @@ def linked_paths(
         Of a path (`Machine.minimum_length`).
     along_boundary : bool, default True
         Whether links may follow the boundary; otherwise all are straight.
+    radius : float, mm, default 0
+        Least radius of a turn: links with corners then join only what is too short to be cut
+        alone, and are marked. 0 for any.
     """
-    lines = link_ends(lines, section, link_limit, width, along_boundary=along_boundary)
-    lines = [close_short_ring(line, least_length) for line in lines]
-    return [line for line in lines if line_length(line) >= least_length]
+    joined = link_ends(lines, section, link_limit, width, 1.0, along_boundary, radius, least_length)
+    kept = Joined([], [])
+    for line, link in zip(*joined, strict=True):
+        closed = close_short_ring(line, least_length)
+        if line_length(closed) >= least_length:
+            again = len(closed) - len(line)
+            kept.lines.append(closed)
+            kept.link.append(np.concatenate([link, link[:again]]) if again else link)
+    return kept
 
 
 def close_short_ring(line: FloatArray, least_length: float) -> FloatArray:

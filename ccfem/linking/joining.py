@@ -2,17 +2,18 @@
 
 from collections.abc import Sequence
 from dataclasses import dataclass
-from typing import Any
+from typing import Any, NamedTuple
 
 import numpy as np
 import shapely
 from scipy.spatial import cKDTree
 
-from ccfem.arrays import FloatArray, IntArray
-from ccfem.geometry.polylines import along_line, is_closed, points_along
+from ccfem.arrays import BoolArray, FloatArray, IntArray
+from ccfem.geometry.polylines import along_line, is_closed, line_length, points_along
 from ccfem.geometry.shapes import Region, Shapes, strings
+from ccfem.linking.smooth_links import smooth_links
 
-__all__ = ["Joint", "join", "link_ends", "ring_arc"]
+__all__ = ["Joined", "Joint", "join", "link_ends", "ring_arc"]
 
 
 @dataclass(frozen=True)
@@ -27,14 +28,32 @@ class Joint:
         The ends.
     between : (n, 2) array, mm
         Points between them, from `first` to `second`, ends not included.
+    marked : bool, default False
+        Whether the path is marked as a link there.
     """
 
     first: int
     second: int
     between: FloatArray
+    marked: bool = False
 
 
-def join(lines: Sequence[FloatArray], joints: Sequence[Joint]) -> list[FloatArray]:
+class Joined(NamedTuple):
+    """Polylines joined to longer ones, and which steps of them are links.
+
+    Attributes
+    ----------
+    lines : list of (n, 2) arrays, mm
+        A chain of joints that returns to its start gives a closed polyline, first point repeated.
+    link : list of (n,) bool arrays
+        Whether the step from each point to the next is a link that is marked as one.
+    """
+
+    lines: list[FloatArray]
+    link: list[BoolArray]
+
+
+def join(lines: Sequence[FloatArray], joints: Sequence[Joint]) -> Joined:
     """Join polylines at their ends.
 
     Parameters
@@ -43,33 +62,33 @@ def join(lines: Sequence[FloatArray], joints: Sequence[Joint]) -> list[FloatArra
         Open polylines; closed ones simply have no joint.
     joints : sequence of Joint
         Each end in at most one of them.
-
-    Returns
-    -------
-    list of (n, 2) arrays
-        A chain of joints that returns to its start gives a closed polyline, first point repeated.
     """
-    partner: dict[int, tuple[int, FloatArray]] = {}
+    partner: dict[int, tuple[int, FloatArray, bool]] = {}
     for joint in joints:
-        partner[joint.first] = (joint.second, joint.between)
-        partner[joint.second] = (joint.first, joint.between[::-1])
-    joined = []
+        partner[joint.first] = (joint.second, joint.between, joint.marked)
+        partner[joint.second] = (joint.first, joint.between[::-1], joint.marked)
+    joined = Joined([], [])
     done = np.zeros(len(lines), dtype=bool)
     ends = [end for end in range(2 * len(lines)) if end not in partner]
     for start in [*ends, *range(0, 2 * len(lines), 2)]:
         if done[start // 2]:
             continue
-        parts = []
+        parts, link = [], []
         end: int | None = start
         while end is not None and not done[end // 2]:
             done[end // 2] = True
             parts.append(lines[end // 2] if end % 2 == 0 else lines[end // 2][::-1])
-            end, between = partner.get(end ^ 1, (None, np.zeros((0, 2))))
+            link.append(np.zeros(len(parts[-1]), dtype=bool))
+            end, between, marked = partner.get(end ^ 1, (None, np.zeros((0, 2)), False))
             if end is not None:
+                link[-1][-1] = marked  # the step off the strand
                 parts.append(between)
+                link.append(np.full(len(between), marked))
         if end is not None:  # back at the start
             parts.append(parts[0][:1])
-        joined.append(np.concatenate(parts))
+            link.append(np.zeros(1, dtype=bool))
+        joined.lines.append(np.concatenate(parts))
+        joined.link.append(np.concatenate(link))
     return joined
 
 
@@ -94,6 +113,7 @@ class _Link:
     first: int
     second: int
     path: FloatArray  # from the cut end of `first` to that of `second`
+    smooth: bool = False  # keeps the radius
 
 
 def link_ends(
@@ -103,13 +123,19 @@ def link_ends(
     width: float,
     turn_cost: float = 1.0,
     along_boundary: bool = True,
-) -> list[FloatArray]:
+    radius: float = 0.0,
+    enough: float = np.inf,
+) -> Joined:
     """Join ends that lie near each other by links inside the section.
 
     A link is straight, or it follows the boundary half a strand's width inside it, where two
     neighbouring ends lie on that boundary. Links are taken in the order of their cost: their
     length, and `turn_cost` mm for every right angle that the path turns at its ends. A link
     crosses nothing and stays 0.9 widths away from all strands but the two that it joins.
+
+    With a radius, curves that keep it (`smooth_links`) come first. Straight links and those along
+    the boundary have corners: they join only what is shorter than `enough` to something else, and
+    are marked as links.
 
     Parameters
     ----------
@@ -122,14 +148,14 @@ def link_ends(
     turn_cost : float, mm, default 1.0
     along_boundary : bool, default True
         Whether links may follow the boundary; otherwise all are straight.
-
-    Returns
-    -------
-    list of (n, 2) arrays
+    radius : float, mm, default 0
+        Least radius of a turn; 0 for any, and no links that keep one.
+    enough : float, mm, default inf
+        Length from which on a path needs no link with corners, where there is a radius.
     """
     opened = [k for k, line in enumerate(lines) if not is_closed(line)]
     if not opened or limit <= 0.0:
-        return list(lines)
+        return join(lines, [])
     ends = np.array([2 * k + side for k in opened for side in (0, 1)])
     points = np.array([lines[end // 2][-(end % 2)] for end in ends])
     outward = np.array([_outward(lines[end // 2], end % 2) for end in ends])
@@ -138,17 +164,26 @@ def link_ends(
         links += _boundary_links(
             lines, points, outward, ends, section, 0.5 * width, limit, turn_cost
         )
+    if radius > 0.0:
+        found = smooth_links(lines, ends, limit, width, radius)
+        links += [_Link(*link, smooth=True) for link in found]
     # Rounding orders no equal costs: a straight link comes before the same one along the boundary.
-    links.sort(key=lambda link: (round(link.cost, 6), link.first, link.second))
-    return _accept(list(lines), links, section, _CLEARANCE * width)
+    links.sort(key=lambda link: (not link.smooth, round(link.cost, 6), link.first, link.second))
+    needed = enough if radius > 0.0 else np.inf
+    return _accept(list(lines), links, section, _CLEARANCE * width, needed, radius > 0.0)
 
 
 def _accept(
-    lines: list[FloatArray], links: list[_Link], section: Region, clearance: float
-) -> list[FloatArray]:
+    lines: list[FloatArray],
+    links: list[_Link],
+    section: Region,
+    clearance: float,
+    enough: float,
+    mark: bool,
+) -> Joined:
     """Take links greedily, cheapest first, as long as they keep off everything else."""
     if not links:
-        return lines
+        return join(lines, [])
     paths = strings([link.path for link in links])
     owners = np.array([[link.first // 2, link.second // 2] for link in links])
     free = _free_links(lines, paths, owners, section, clearance)
@@ -156,9 +191,14 @@ def _accept(
     accepted: list[Any] = []
     joints = []
     chain = np.arange(len(lines))
-    for k in np.flatnonzero(free):
+    length = np.array([line_length(line) for line in lines])  # of chains, at their numbers
+    # Corners last: first between paths that are both too short, so that few of them do.
+    for k, most_long in [(k, long) for long in (0, 1) for k in np.flatnonzero(free).tolist()]:
         link, path = links[k], paths[k]
         if link.first in taken or link.second in taken:
+            continue
+        long = np.count_nonzero(length[chain[owners[k]]] >= enough)
+        if not link.smooth and long > most_long:
             continue
         closes = chain[link.first // 2] == chain[link.second // 2]
         if closes and link.turn > _CLOSING_TURN:
@@ -172,11 +212,15 @@ def _accept(
         if shapely.intersects(shortened, strings(list(cut.values()))).any():
             continue
         for owner, line in cut.items():
+            length[chain[owner]] += line_length(line) - line_length(lines[owner])
             lines[owner] = line
-        chain[chain == chain[link.second // 2]] = chain[link.first // 2]
+        into, gone = chain[owners[k]]
+        length[into] += float(path.length) + (0.0 if closes else length[gone])
+        chain[chain == gone] = into
         taken |= {link.first, link.second}
         accepted.append(path)
-        joints.append(Joint(link.first, link.second, link.path[1:-1]))
+        marked = mark and not link.smooth
+        joints.append(Joint(link.first, link.second, link.path[1:-1], marked))
     return join(lines, joints)
 
 

@@ -1,13 +1,13 @@
 """Planning to a wanted length of fibre, so that strategies are compared at equal cost.
 
-A strategy that lays more fibre wins almost any comparison. Every strategy therefore names the
-parameter that sets how much it lays (`Strategy.amount`), and `plan_to_length` searches its value.
+A strategy that lays more fibre wins almost any comparison. Every strategy therefore names what
+sets how much it lays (`Strategy.amount`), and `plan_to_length` searches it; a `LengthStrategy`
+takes the length itself.
 """
 
-from collections.abc import Callable, Mapping, Sequence
-from dataclasses import dataclass, field, replace
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, field
 from functools import cached_property
-from typing import Any
 
 import numpy as np
 
@@ -16,27 +16,39 @@ from ccfem.checks import check_number
 from ccfem.elasticity.part_stress import PartStress
 from ccfem.layers.layer import Layer
 from ccfem.machine.machine import Machine
-from ccfem.planning.plan import plan
-from ccfem.planning.strategy import Amount, Strategy
+from ccfem.planning.dial import Dial, around
+from ccfem.planning.mixing import layer_lengths, mixed
+from ccfem.planning.plan import check_layers, plan, plan_layers
+from ccfem.planning.strategy import LengthStrategy, Strategy
 from ccfem.toolpaths import FIBRE, Toolpaths
 
-__all__ = ["TOLERANCE", "Planned", "check_wanted", "length_per_layer", "plan_to_length"]
+__all__ = [
+    "TOLERANCE",
+    "Planned",
+    "check_wanted",
+    "extremes",
+    "length_per_layer",
+    "plan_to_length",
+    "plan_to_lengths",
+]
 
 TOLERANCE = 0.01
-"""Share by which the length may fall short before the search stops."""
+"""Share of a wanted length by which one that counts as equal may differ."""
 _GUESSES = 3
 """Plans of the whole stack from a known one, before anything is searched."""
 _CLOSE = 0.1
 """Difference of two plans on either side of the wanted length, as a share of it, up to which some
 layers may take the one and some the other without a further search."""
 _ROUNDS = 3
-"""Plans of the whole stack."""
+"""Plans of the whole stack after a search on few layers."""
 _STEPS = 8
 """Plans of the few layers that stand for the stack, in each round."""
 _FINEST = 1e-5
-"""Share of the parameter's range below which a step in length is taken for what it is."""
-_POWERS = (0.5, 3.0)
-"""Bounds of the power of the parameter that the length is taken to go with."""
+"""Turn of the dial below which a step in length is taken for what it is."""
+_BEYOND = 0.05
+"""How much further than by proportion these go while the length is known on one side only."""
+_HALVINGS = 6
+"""Plans of the whole stack for the least that leaves no layer empty."""
 _FEW = 4
 """Stacks of at most this many layers are searched as they are."""
 
@@ -48,18 +60,21 @@ class Planned:
     Attributes
     ----------
     strategy : Strategy
-        With the value of its amount parameter that was found (of most layers, see `note`).
+        With the values that were found (of most layers, see `note`).
     toolpaths : Toolpaths
     length_per_layer : float, mm
         Fibre length divided by the number of layers.
     note : str
         Empty, or one line: which layers have another value, or why the wanted length was missed.
+    reached : bool
+        Whether it lays the wanted length within `TOLERANCE`.
     """
 
     strategy: Strategy
     toolpaths: Toolpaths
     length_per_layer: float
     note: str = ""
+    reached: bool = True
 
     __repr__ = in_brief
 
@@ -82,16 +97,12 @@ def plan_to_length(
     wanted: float,
     start: Planned | None = None,
 ) -> Planned:
-    """Plan with the value of the amount parameter that lays at most the wanted fibre.
+    """Plan to a wanted length of fibre.
 
-    Where a plan of the whole stack is known, a few guesses are made from it. As soon as two plans
-    lie close on either side of the wanted length, some layers, evenly spread, take the one that
-    lays more. Otherwise the value is searched on the bottom, middle and top layer, then checked on
-    the whole stack; the ratio of the two lengths corrects the next search. Of the values tried on
-    the whole stack, the one that lays most without laying too much is kept. Where the length
-    changes in steps (one contour more or less) and that leaves too much missing, again some layers
-    take the next value that lays more; where even the least is too much, some layers stay without
-    fibre.
+    Plans are searched on both sides of the wanted length, on a few layers where none is known of
+    the whole stack. Some layers, evenly spread, then take the one that lays more, and where that
+    leaves room strands are cut to fit it: never below the shortest that can be printed. What any
+    of the plans fills no layer is left without.
 
     Parameters
     ----------
@@ -101,8 +112,9 @@ def plan_to_length(
     stress : PartStress
     machine : Machine
     wanted : float, mm
-        Fibre per layer: mean over the stack. The search stops within the share `TOLERANCE` below
-        it. A strategy may miss that: `Planned.note` says so.
+        Fibre per layer: mean over the stack. It is met within the share `TOLERANCE`, and not
+        exceeded, wherever the least that the strategy lays is no more and the most no less;
+        otherwise that is what it lays, and `Planned.reached` and `note` say so.
     start : Planned, optional
         The strategy's plan with its own value, where there is one already.
 
@@ -115,28 +127,92 @@ def plan_to_length(
     InputError
         When `wanted` is not a positive number, or whatever the strategy raises.
     """
-    check_wanted(wanted)
-    trials = _Trials(strategy, layers, stress, machine, wanted)
-    own = getattr(strategy, strategy.amount.parameter)
-    if start is not None and own is not None:
-        trials.tried[float(own)] = start
-        near = trials.guess()
-        if near is not None:
-            return near
-    return trials.search()
+    known = () if start is None else (start,)
+    return plan_to_lengths(strategy, layers, stress, machine, (wanted,), known)[0]
+
+
+def plan_to_lengths(
+    strategy: Strategy,
+    layers: Sequence[Layer],
+    stress: PartStress,
+    machine: Machine,
+    lengths: Sequence[float],
+    known: Sequence[Planned] = (),
+) -> list[Planned]:
+    """Plan to several lengths of fibre, mm per layer: what is planned for one serves the others.
+
+    Parameters
+    ----------
+    strategy, layers, stress, machine
+        As in `plan_to_length`.
+    lengths : sequence of float, mm
+    known : sequence of Planned
+        Plans of the strategy with its own value or at its extremes, where there are any.
+    """
+    for wanted in lengths:
+        check_wanted(wanted)
+    if isinstance(strategy, LengthStrategy):
+        check_layers(strategy, layers, machine)
+        found = strategy.to_lengths(stress, layers, machine, lengths)
+        return [
+            _told(told, plan_layers(planner, layers, layers, stress, machine), layers, wanted)
+            for (told, planner), wanted in zip(found, lengths, strict=True)
+        ]
+    search = _Search(Dial(strategy), layers, stress, machine)
+    search.learn(known)
+    return [search.to(wanted) for wanted in lengths]
+
+
+def extremes(
+    strategy: Strategy,
+    layers: Sequence[Layer],
+    stress: PartStress,
+    machine: Machine,
+    known: Sequence[Planned] = (),
+) -> tuple[Planned, Planned]:
+    """Plan the least and the most that a strategy lays; parameters as in `plan_to_lengths`."""
+    search = _Search(Dial(strategy), layers, stress, machine)
+    search.learn(known)
+    most = max(search.whole(search.dial.end), *search.tried.values(), key=_length)
+    return search.least_filled(), most
+
+
+def _length(planned: Planned) -> float:
+    return planned.length_per_layer
+
+
+def _told(
+    strategy: Strategy, toolpaths: Toolpaths, layers: Sequence[Layer], wanted: float
+) -> Planned:
+    """Plan of a strategy that was told the length."""
+    length = length_per_layer(toolpaths, layers)
+    if _meets(length, wanted):
+        return Planned(strategy, toolpaths, length)
+    note = f"lays {length:.0f} of {wanted:.0f} mm per layer: its most"
+    return Planned(strategy, toolpaths, length, note, reached=False)
+
+
+def _meets(length: float, wanted: float) -> bool:
+    return (1.0 - TOLERANCE) * wanted <= length <= wanted * (1.0 + 1e-9)
 
 
 @dataclass
-class _Trials:
-    """Plans of one strategy with several values of its parameter, on the way to a length."""
+class _Search:
+    """Plans of one strategy at several turns of its dial, on the way to a length."""
 
-    strategy: Strategy
+    dial: Dial
     layers: Sequence[Layer]
     stress: PartStress
     machine: Machine
-    wanted: float
     tried: dict[float, Planned] = field(default_factory=dict)
     sampled: dict[float, float] = field(default_factory=dict)
+
+    def learn(self, known: Sequence[Planned]) -> None:
+        """Take over plans that there are."""
+        for turn in (self.dial.own, 0.0, self.dial.end):
+            for one in known:
+                if one.strategy == self.dial.at(turn):
+                    self.tried.setdefault(turn, one)
 
     @cached_property
     def few(self) -> Sequence[Layer]:
@@ -144,208 +220,156 @@ class _Trials:
         layers = self.layers
         return layers if len(layers) <= _FEW else [layers[0], layers[len(layers) // 2], layers[-1]]
 
-    def planned(self, value: float, on: Sequence[Layer]) -> Planned:
-        changed = _with_value(self.strategy, self.strategy.amount, value)
-        toolpaths = plan(changed, on, self.stress, self.machine)
-        return Planned(changed, toolpaths, length_per_layer(toolpaths, on))
+    def whole(self, turn: float) -> Planned:
+        """Plan of the whole stack."""
+        if turn not in self.tried:
+            strategy = self.dial.at(turn)
+            same = [one for one in self.tried.values() if one.strategy == strategy]
+            if same:  # a parameter of whole numbers
+                self.tried[turn] = same[0]
+            else:
+                paths = plan(strategy, self.layers, self.stress, self.machine)
+                length = length_per_layer(paths, self.layers)
+                self.tried[turn] = Planned(strategy, paths, length)
+        return self.tried[turn]
 
-    def sample(self, value: float) -> float:
+    def sample(self, turn: float) -> float:
         """Length per layer on the few layers, mm."""
-        if value not in self.sampled:
-            result = self.tried.get(value) or self.planned(value, self.few)
-            if self.few is self.layers:
-                self.tried[value] = result
-            known = [result.toolpaths.on_layer(layer.index) for layer in self.few]
-            self.sampled[value] = length_per_layer(Toolpaths.concatenate(known), self.few)
-        return self.sampled[value]
+        if turn not in self.sampled:
+            known = self.tried.get(turn)
+            if known is None and self.few is self.layers:
+                known = self.whole(turn)
+            if known is None:
+                paths = plan(self.dial.at(turn), self.few, self.stress, self.machine)
+                self.sampled[turn] = length_per_layer(paths, self.few)
+            else:
+                self.sampled[turn] = float(layer_lengths(known.toolpaths, self.few).mean())
+        return self.sampled[turn]
 
-    def meets(self, length: float) -> bool:
-        return (1.0 - TOLERANCE) * self.wanted <= length <= self.wanted
+    def lengths(self) -> Mapping[float, float]:
+        return {turn: one.length_per_layer for turn, one in self.tried.items()}
 
-    def guess(self) -> Planned | None:
-        """Plan from one known plan of the stack, a few times at most; None where that fails."""
-        target = self.wanted * (1.0 - 0.5 * TOLERANCE)
-        for _ in range(_GUESSES):
-            lengths = {value: one.length_per_layer for value, one in self.tried.items()}
-            value = _by_power(lengths, self.strategy.amount, target)
-            if value in self.tried:
-                break
-            self.tried[value] = self.planned(value, self.layers)
-            reached = _between(list(self.tried.values()), self.layers, self.wanted)
-            if self.meets(reached.length_per_layer):
-                return reached
-        return None
+    def filled(self, one: Planned) -> bool:
+        """Whether a plan lays fibre on every layer that any known one does."""
+        laid = layer_lengths(one.toolpaths, self.layers) > 0.0
+        return not any(
+            (~laid & (layer_lengths(other.toolpaths, self.layers) > 0.0)).any()
+            for other in self.tried.values()
+        )
 
-    def search(self) -> Planned:
+    def least_filled(self) -> Planned:
+        """Plan with the least fibre that leaves no layer empty that another amount fills."""
+        self.whole(0.0)
+        full = [turn for turn in self.tried if self.filled(self.tried[turn])]
+        low, high = 0.0, min(full, default=self.dial.end)
+        for _ in range(_HALVINGS if high > 0.0 else 0):
+            middle = 0.5 * (low + high)
+            low, high = (low, middle) if self.filled(self.whole(middle)) else (middle, high)
+        plans = list(self.tried.values())
+        return min([one for one in plans if self.filled(one)] or plans, key=_length)
+
+    def to(self, wanted: float) -> Planned:
+        """Plan to a length per layer, mm."""
+        if self.tried:
+            for _ in range(_GUESSES):
+                found = self.between(wanted, _CLOSE)
+                if found is not None:
+                    return found
+                turn = self.dial.guess(self.lengths(), (1.0 - 0.5 * TOLERANCE) * wanted)
+                if turn in self.tried:
+                    break
+                self.whole(turn)
+        return self.between(wanted, _CLOSE) or self.searched(wanted)
+
+    def searched(self, wanted: float) -> Planned:
         """Search on the few layers, check on the stack, and again with the ratio of the two."""
-        amount, wanted, tried = self.strategy.amount, self.wanted, self.tried
-        own = getattr(self.strategy, amount.parameter)
-        value, margin = amount.most if own is None else float(own), 0.0
-        ratio = self._ratio()
         for _ in range(1 if self.few is self.layers else _ROUNDS):
-            target = wanted * (1.0 - margin) / ratio
-            value = _search(self.sample, self.sampled, value, amount, target)
-            if value in tried:
-                break
-            tried[value] = self.planned(value, self.layers)
-            length = tried[value].length_per_layer
-            if self.meets(length) or not self.sampled[value] > 0.0:
-                break
-            ratio, margin = length / self.sampled[value], 0.3 * TOLERANCE
-        best = _best(list(tried.values()), wanted)
-        if best.length_per_layer > wanted * (1.0 + 1e-9):
-            best = _mixed(replace(best, toolpaths=Toolpaths.empty()), best, self.layers, wanted)
-        elif best.length_per_layer < (1.0 - TOLERANCE) * wanted:
-            best = self._raised(best, ratio)
-        return replace(best, note=_note(best, amount, wanted))
+            for turn in self.bracket(wanted / self.ratio(wanted)):
+                if turn is not None:
+                    self.whole(turn)
+                    found = self.between(wanted, _CLOSE)
+                    if found is not None:
+                        return found
+        if not any(one.length_per_layer <= wanted for one in self.tried.values()):
+            self.whole(0.0)
+        if not any(one.length_per_layer >= wanted for one in self.tried.values()):
+            self.whole(self.dial.end)
+        return self.between(wanted, np.inf) or self.off(wanted)
 
-    def _ratio(self) -> float:
-        """Length on the stack over that on the few layers, where a plan is known."""
-        lengths = {value: self.sample(value) for value in self.tried}
-        if not any(lengths.values()):
+    def ratio(self, wanted: float) -> float:
+        """Length on the stack over that on the few layers, of the nearest plan that is known."""
+        off = {
+            turn: abs(one.length_per_layer - wanted)
+            for turn, one in self.tried.items()
+            if self.sample(turn) > 0.0 and one.length_per_layer > 0.0
+        }
+        if not off:
             return 1.0
-        off = {v: abs(self.tried[v].length_per_layer - self.wanted) for v in lengths if lengths[v]}
         nearest = min(off, key=off.__getitem__)
-        return self.tried[nearest].length_per_layer / lengths[nearest]
+        return self.tried[nearest].length_per_layer / self.sample(nearest)
 
-    def _raised(self, best: Planned, ratio: float) -> Planned:
-        """Plan that is too short, with layers of one that lays more where there is one."""
-        above = [one for one in self.tried.values() if one.length_per_layer > self.wanted]
-        if not above:
-            values = [v for v in self.sampled if self.sampled[v] * ratio > self.wanted]
-            nearest = min(values, key=self.sampled.__getitem__, default=None)
-            above = [] if nearest is None else [self.planned(nearest, self.layers)]
-        mixed = [best, *(_mixed(best, more, self.layers, self.wanted) for more in above)]
-        return max(mixed, key=lambda one: one.length_per_layer)
+    def bracket(self, target: float) -> tuple[float | None, float | None]:
+        """Find turns on either side of a length on the few layers, as near as a few steps come."""
+        known, enough = self.sampled, (1.0 - 0.5 * TOLERANCE) * target
+        turn = min(self.dial.own, 1.0)
+        low = high = None
+        for step in range(_STEPS):
+            self.sample(turn)
+            low, high = around(known, target)
+            if low is not None and known[low] >= enough:
+                break
+            if low is not None and high is not None and abs(high - low) <= _FINEST:
+                break
+            turn = self.dial.guess(known, target, _BEYOND)
+            if low is not None and high is not None and step % 3 == 2:
+                turn = 0.5 * (low + high)  # so that a curved relation cannot stall the search
+            if low is None and step == _STEPS - 2:  # out of proportion: the end itself
+                turn = 0.0
+            if turn in known:
+                break
+        return low, high
 
+    def between(self, wanted: float, close: float) -> Planned | None:
+        """Plan from the known ones on either side of a length, where these are close."""
+        below = [one for one in self.tried.values() if one.length_per_layer <= wanted * (1 + 1e-9)]
+        above = [one for one in self.tried.values() if one.length_per_layer > wanted * (1 + 1e-9)]
+        less = max(below, key=_length, default=None)
+        more = min(above, key=_length, default=None)
+        if less is not None and _meets(less.length_per_layer, wanted) and self.filled(less):
+            return less
+        if less is None or more is None:
+            return None
+        if more.length_per_layer - less.length_per_layer > close * wanted:
+            return None
+        count = len(self.layers)
+        found = mixed(
+            less.toolpaths,
+            more.toolpaths,
+            self.layers,
+            wanted * count,
+            self.machine.minimum_length,
+        )
+        length = length_per_layer(found.toolpaths, self.layers)
+        if not _meets(length, wanted) and np.isfinite(close):
+            return None
+        said = f"{self.dial.says(more.strategy)} on {found.more} of {count} layers"
+        if found.cut:
+            said += f", strands cut back on {found.cut}"
+        if not _meets(length, wanted):
+            said += (
+                f"; lays {length:.0f} of {wanted:.0f} mm per layer: the nearest that strands of "
+            )
+            said += f"{self.machine.minimum_length:g} mm allow"
+        return Planned(less.strategy, found.toolpaths, length, said, _meets(length, wanted))
 
-def _between(tried: list[Planned], layers: Sequence[Layer], wanted: float) -> Planned:
-    """Longest plan that is not too long, with layers of one that is where the two are close."""
-    best = _best(tried, wanted)
-    above = [one for one in tried if one.length_per_layer > wanted]
-    more = min(above, key=lambda one: one.length_per_layer, default=best)
-    if 0.0 < more.length_per_layer - best.length_per_layer <= _CLOSE * wanted:
-        return _mixed(best, more, layers, wanted)
-    return best
-
-
-def _mixed(less: Planned, more: Planned, layers: Sequence[Layer], wanted: float) -> Planned:
-    """Take as many layers as fit, evenly spread, from a plan that lays more."""
-    count, index = len(layers), [layer.index for layer in layers]
-    each = [
-        np.bincount(one.toolpaths.layer, one.toolpaths.lengths, minlength=max(index) + 1)[index]
-        for one in (less, more)
-    ]
-    chosen, room = np.zeros(count, dtype=bool), wanted * count - each[0].sum()
-    # Multiples of the golden ratio spread any number of layers over the stack.
-    for k in np.argsort((np.arange(count) * 0.5 * (np.sqrt(5.0) - 1.0)) % 1.0, kind="stable"):
-        gain = each[1][k] - each[0][k]
-        if 0.0 < gain <= room:
-            chosen[k], room = True, room - gain
-    if not chosen.any():
-        return less if len(less.toolpaths) else more
-    toolpaths = Toolpaths.concatenate(
-        (more if taken else less).toolpaths.on_layer(k)
-        for k, taken in zip(index, chosen, strict=True)
-    )
-    amount = less.strategy.amount.parameter
-    note = f"{amount} = {getattr(more.strategy, amount):.6g} on {chosen.sum()} of {count} layers"
-    note += "" if len(less.toolpaths) else ", no fibre on the others"
-    return Planned(less.strategy, toolpaths, length_per_layer(toolpaths, layers), note)
-
-
-def _with_value(strategy: Strategy, amount: Amount, value: float) -> Strategy:
-    changed: Any = replace(strategy, **{amount.parameter: value})  # type: ignore[type-var]
-    return changed
-
-
-def _best(tried: list[Planned], wanted: float) -> Planned:
-    """Return the longest plan that is not too long, or else the shortest."""
-    allowed = [one for one in tried if one.length_per_layer <= wanted * (1.0 + 1e-9)]
-    if allowed:
-        return max(allowed, key=lambda one: one.length_per_layer)
-    return min(tried, key=lambda one: one.length_per_layer)
-
-
-def _note(best: Planned, amount: Amount, wanted: float) -> str:
-    length, value = best.length_per_layer, getattr(best.strategy, amount.parameter)
-    if (1.0 - TOLERANCE) * wanted <= length <= wanted * (1.0 + 1e-9):
-        return best.note
-    mixed = f"{best.note}; " if best.note else ""
-    reached = f"{mixed}lays {length:.0f} of {wanted:.0f} mm per layer"
-    if value == amount.most and length < wanted:
-        return f"{reached}: its most, at {amount.parameter} = {value:g}"
-    if value == amount.least and length > wanted:
-        return f"{reached}: its least, at {amount.parameter} = {value:g}"
-    return f"{reached}: the nearest that its steps allow"
-
-
-def _search(
-    length: Callable[[float], float],
-    known: Mapping[float, float],
-    start: float,
-    amount: Amount,
-    target: float,
-) -> float:
-    """Value whose length is at most the target and within the tolerance, or the nearest found.
-
-    `known` holds the lengths that `length` has been asked for. False position between the nearest
-    known length on either side; while one side is unknown, a guess by proportion.
-    """
-    ends = min(amount.least, amount.most), max(amount.least, amount.most)
-    enough = (1.0 - 0.5 * TOLERANCE) * target
-    value = float(np.clip(start, *ends))
-    for step in range(_STEPS):
-        if value not in known and enough <= length(value) <= target:
-            return value
-        low = max((v for v in known if known[v] <= target), key=known.__getitem__, default=None)
-        high = min((v for v in known if known[v] > target), key=known.__getitem__, default=None)
-        if low is None or high is None:
-            value = _by_proportion(known, amount, target, 0.05)
-            if step == _STEPS - 2:  # out of proportion: the end itself is the last to be tried
-                value = amount.most if high is None else amount.least
-        elif known[low] >= enough or abs(high - low) <= _FINEST * (ends[1] - ends[0]):
-            return low
-        else:
-            share = (target - known[low]) / (known[high] - known[low])
-            # Every third step bisects, so that a curved relation cannot stall the search.
-            share = 0.5 if step % 3 == 2 else float(np.clip(share, 0.1, 0.9))
-            value = low + share * (high - low)
-        if value in known:
-            break
-    return low if low is not None else min(known, key=known.__getitem__)
-
-
-def _by_power(lengths: Mapping[float, float], amount: Amount, target: float) -> float:
-    """Guess from known lengths: the length goes as a power of the parameter."""
-    ends = min(amount.least, amount.most), max(amount.least, amount.most)
-    nearest = sorted(lengths, key=lambda value: abs(lengths[value] - target))[:2]
-    if ends[0] <= 0.0 or min(lengths[value] for value in nearest) <= 0.0:
-        return _by_proportion(lengths, amount, target, 0.0)
-    power = 1.0 if amount.most > amount.least else -1.0
-    if len(nearest) == 2:
-        (p, q), (a, b) = nearest, (lengths[value] for value in nearest)
-        found = power * np.log(a / b) / np.log(p / q)
-        # Where the length changes in steps two values say little about the next.
-        power *= float(np.clip(found, *_POWERS))
-    guess = nearest[0] * (target / lengths[nearest[0]]) ** (1.0 / power)
-    return float(np.clip(guess, *ends))
-
-
-def _by_proportion(
-    known: Mapping[float, float], amount: Amount, target: float, beyond: float
-) -> float:
-    """Guess while one side is unknown: the length goes as the parameter or as its inverse.
-
-    From the known value that is nearest to the unknown side, and a share `beyond` further, so that
-    the target comes to lie between two known lengths; the end itself where there is no proportion.
-    """
-    ends = min(amount.least, amount.most), max(amount.least, amount.most)
-    unknown = amount.most if min(known.values()) <= target else amount.least
-    nearest = min(known, key=lambda value: abs(value - unknown))
-    if not (known[nearest] > 0.0 and ends[0] > 0.0):
-        return unknown
-    factor = target / known[nearest]
-    factor *= 1.0 + beyond if factor > 1.0 else 1.0 - beyond
-    guess = nearest * factor if amount.most > amount.least else nearest / factor
-    return float(np.clip(guess, *ends))
+    def off(self, wanted: float) -> Planned:
+        """Return the extreme that is nearest to a length that the strategy does not reach."""
+        plans = [self.tried[turn] for turn in sorted(self.tried)]
+        much = min(map(_length, plans)) > wanted
+        best = min(plans, key=_length) if much else max(plans[::-1], key=_length)
+        end = "least" if much else "most"
+        note = (
+            f"lays {best.length_per_layer:.0f} of {wanted:.0f} mm per layer: its {end}, at "
+            f"{self.dial.says(best.strategy)}"
+        )
+        return Planned(best.strategy, best.toolpaths, best.length_per_layer, note, reached=False)

@@ -12,10 +12,10 @@ from ccfem.layers.layer_stress import stress_on
 from ccfem.layers.pitch import check_pitch
 from ccfem.machine.machine import Machine
 from ccfem.planning.steps import in_even_steps
-from ccfem.planning.strategy import PartStrategy, Strategy
+from ccfem.planning.strategy import LayerPlanner, PartStrategy, Strategy
 from ccfem.toolpaths import Toolpaths
 
-__all__ = ["plan"]
+__all__ = ["check_layers", "plan", "plan_layers"]
 
 _MOST_THREADS = 4
 """Layers that are planned at a time; much of the work waits for the interpreter's lock."""
@@ -48,15 +48,39 @@ def plan(
         When the strategy plans on flat layers only and a layer is curved, when layers are nearer
         than a strand is high; and whatever the strategy raises.
     """
-    _check_layers(strategy, layers)
-    check_pitch(layers, machine)
+    check_layers(strategy, layers, machine)
+    in_plane = getattr(strategy, "in_plane", False)
+    views: Sequence[Layer] = layers
+    if in_plane:
+        with ThreadPoolExecutor(min(os.cpu_count() or 1, _MOST_THREADS)) as pool:
+            views = tuple(pool.map(flat_view, layers))
+    if isinstance(strategy, PartStrategy):
+        planner: LayerPlanner = strategy.for_part(stress, views, machine)
+    else:
+        planner = strategy
+    return plan_layers(planner, layers, views, stress, machine)
+
+
+def plan_layers(
+    planner: LayerPlanner,
+    layers: Sequence[Layer],
+    views: Sequence[Layer],
+    stress: PartStress,
+    machine: Machine,
+) -> Toolpaths:
+    """Paths of all layers by one planner, in steps of at most a fibre width.
+
+    Parameters
+    ----------
+    planner : LayerPlanner
+        Called from several threads at once, each with a layer of its own.
+    layers : sequence of Layer
+    views : sequence of Layer
+        The same layers as the planner gets them: laid flat where it works in a plane.
+    stress : PartStress
+    machine : Machine
+    """
     with ThreadPoolExecutor(min(os.cpu_count() or 1, _MOST_THREADS)) as pool:
-        in_plane = getattr(strategy, "in_plane", False)
-        views = tuple(pool.map(flat_view, layers)) if in_plane else tuple(layers)
-        if isinstance(strategy, PartStrategy):
-            planner = strategy.for_part(stress, views, machine)
-        else:
-            planner = strategy
 
         def planned(layer: Layer, view: Layer) -> Toolpaths:
             paths = planner(view, stress_on(view, stress), machine)
@@ -66,8 +90,15 @@ def plan(
         return Toolpaths.concatenate(pool.map(planned, layers, views))
 
 
-def _check_layers(strategy: Strategy, layers: Sequence[Layer]) -> None:
-    """Refuse curved layers for a strategy that works in the plane of a layer."""
+def check_layers(strategy: Strategy, layers: Sequence[Layer], machine: Machine) -> None:
+    """Refuse layers that no strategy, or not this one, can plan on.
+
+    Raises
+    ------
+    InputError
+        When the strategy plans on flat layers only and a layer is curved, and when layers are
+        nearer than a strand is high.
+    """
     curved = [layer.index for layer in layers if layer.flat is None]
     if curved and getattr(strategy, "flat_layers_only", False):
         raise InputError(
@@ -75,3 +106,4 @@ def _check_layers(strategy: Strategy, layers: Sequence[Layer]) -> None:
             f"layers are curved, the first is layer {curved[0]}: choose a planar slicing, or a "
             "strategy for curved layers"
         )
+    check_pitch(layers, machine)

@@ -10,7 +10,14 @@ from ccfem.layers.layer_stress import LayerStress
 from ccfem.machine.machine import Machine
 from ccfem.toolpaths import Toolpaths
 
-__all__ = ["Amount", "LayerPlanner", "LayerStrategy", "PartStrategy", "Strategy"]
+__all__ = [
+    "Amount",
+    "LayerPlanner",
+    "LayerStrategy",
+    "LengthStrategy",
+    "PartStrategy",
+    "Strategy",
+]
 
 
 @dataclass(frozen=True)
@@ -23,11 +30,15 @@ class Amount:
         Name of the field.
     most, least : float
         Values that lay the most and the least fibre.
+    beyond : tuple of (str, float), default ()
+        Further parameters, each with the value that lays the most: where the first one at its most
+        lays too little, these go there one after the other, from the strategy's own values.
     """
 
     parameter: str
     most: float
     least: float
+    beyond: tuple[tuple[str, float], ...] = ()
 
 
 class LayerPlanner(Protocol):
@@ -81,6 +92,32 @@ class PartStrategy(Protocol):
         self, stress: PartStress, layers: Sequence[Layer], machine: Machine
     ) -> LayerPlanner:
         """Prepare what all layers share; what is returned plans each of them."""
+        ...
+
+
+@runtime_checkable
+class LengthStrategy(PartStrategy, Protocol):
+    """A `PartStrategy` that takes the length of fibre itself, so that nobody has to search it."""
+
+    def natural_length(self, layers: Sequence[Layer], machine: Machine) -> float:
+        """Length that its parameters ask for, mm per layer, known without planning."""
+        ...
+
+    def to_lengths(
+        self,
+        stress: PartStress,
+        layers: Sequence[Layer],
+        machine: Machine,
+        lengths: Sequence[float],
+    ) -> "Sequence[tuple[Strategy, LayerPlanner]]":
+        """Plan once, for the largest of some lengths, mm per layer, and cut that to each.
+
+        Returns
+        -------
+        sequence of (Strategy, LayerPlanner)
+            For each length the strategy that lays it, and what plans the layers. None lays more
+            than asked; where even the whole plan is too short, all of it.
+        """
         ...
 
 

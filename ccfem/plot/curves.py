@@ -13,7 +13,7 @@ from ccfem.plot.colours import INK, OUTLINE, palette
 if TYPE_CHECKING:
     from matplotlib.figure import Figure
 
-__all__ = ["curvature_curves", "matching_curves"]
+__all__ = ["axes_below", "curvature_curves", "legend_below", "matching_curves"]
 
 _LEAST, _MOST = 0.01, 10.0
 """Ends, 1/mm, of the scale of curvature; what is straighter counts at its left end."""
@@ -41,7 +41,7 @@ def matching_curves(
             raise InputError(
                 f"curve '{name}' has {len(rate)} values for {len(thresholds)} angles: give one each"
             )
-    figure, axes = _axes(heading, "angle, degrees", "share within that angle, %")
+    figure, axes = axes_below(heading, "angle, degrees", "share within that angle, %")
     axes.plot([0.0, 90.0], [0.0, 100.0], color=OUTLINE, lw=0.8, ls=(0, (4, 3)), zorder=1.0)
     axes.text(67.0, 66.0, "chance", size=7, color=OUTLINE)
     chosen = palette(rates) if colours is None else colours
@@ -49,7 +49,7 @@ def matching_curves(
         axes.plot(thresholds, 100.0 * rate, color=chosen[name], lw=1.6, marker="o", ms=2.5)
     axes.set_xlim(0.0, 90.0)
     axes.set_xticks(np.arange(0, 91, 15))
-    _legend(axes, chosen, list(rates))
+    legend_below(axes, chosen, list(rates))
     return figure
 
 
@@ -72,7 +72,7 @@ def curvature_curves(
         As in `matching_curves`.
     """
     check_number("the tightest radius", radius, at_least=0.0, unit="mm")
-    figure, axes = _axes(heading, "curvature, 1/mm", "share below it, %")
+    figure, axes = axes_below(heading, "curvature, 1/mm", "share below it, %")
     if radius > 0.0:
         axes.axvline(1.0 / radius, color=OUTLINE, lw=0.8, ls=(0, (4, 3)), zorder=1.0)
         axes.text(
@@ -94,12 +94,12 @@ def curvature_curves(
     axes.set_xscale("log")
     axes.set_xlim(_LEAST, _MOST)
     axes.set_xticks([0.01, 0.1, 1.0, 10.0], ["≤ 0.01", "0.1", "1", "10"])
-    _legend(axes, chosen, list(curvatures))
+    legend_below(axes, chosen, list(curvatures))
     return figure
 
 
-def _axes(heading: str, across: str, up: str) -> tuple["Figure", Any]:
-    """Figure with one pair of axes from 0 to 100 %."""
+def axes_below(heading: str, across: str, up: str) -> tuple["Figure", Any]:
+    """Figure with one pair of axes from 0 to 100 %, and room for a legend below."""
     from matplotlib.backends.backend_agg import FigureCanvasAgg
     from matplotlib.figure import Figure
 
@@ -118,7 +118,7 @@ def _axes(heading: str, across: str, up: str) -> tuple["Figure", Any]:
     return figure, axes
 
 
-def _legend(axes: Any, colours: Mapping[str, str], names: Sequence[str]) -> None:
+def legend_below(axes: Any, colours: Mapping[str, str], names: Sequence[str]) -> None:
     """Names with a mark each below the axes."""
     from matplotlib.lines import Line2D
 

@@ -6,7 +6,7 @@ guidelines and investigation into the influence of infill patterns, Rapid Protot
 """
 
 from collections.abc import Mapping
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import Any, ClassVar, Literal
 
 import numpy as np
@@ -21,7 +21,8 @@ from ccfem.geometry.shells import shells
 from ccfem.layers.layer import Layer
 from ccfem.layers.layer_stress import LayerStress
 from ccfem.machine.machine import Machine
-from ccfem.planning.infill import Infill, check_shells
+from ccfem.planning.infill import SPACING, Infill, check_shells
+from ccfem.planning.strategy import Amount
 from ccfem.raster.bitmap import Bitmap
 from ccfem.raster.patterns import Regions, grid_regions
 
@@ -37,9 +38,9 @@ class Grid(Infill):
     Attributes
     ----------
     spacing : float, default 1
-        Distance of neighbouring strands in fibre widths, at least 1.
+        Distance of neighbouring strands inside the shells in fibre widths, at least 1.
     shells : int, default 3
-        Number of rings along every border.
+        Number of rings along every border, a fibre width apart whatever the spacing.
     angle, turn : float, degrees, default 45 and 90
         Direction of the first family of lines to the first axis of the layer, and its turn to the
         second one: 45 for +-45, 0 for 0/90.
@@ -66,6 +67,7 @@ class Grid(Infill):
     minimum_length: float | None = None
     mode: Literal["polyline", "raster"] = "polyline"
 
+    amount: ClassVar[Amount] = replace(SPACING, beyond=(("shells", 60),))
     direction: ClassVar[str] = "angle"
     variants: ClassVar[Mapping[str, Mapping[str, Any]]] = {
         "both": {"families": "both"},
@@ -93,8 +95,8 @@ class Grid(Infill):
 
     def prepare(self, section: Region, machine: Machine) -> tuple[list[FloatArray], Region]:
         """Shells, and what they leave."""
-        pitch = self.spacing * machine.fibre_width
-        return shells(section, machine.fibre_width, pitch, self.shells, self.closest)
+        width = machine.fibre_width
+        return shells(section, width, width, self.shells, self.closest)
 
     def strands(
         self,

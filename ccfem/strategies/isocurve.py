@@ -35,6 +35,7 @@ from ccfem.layers.layer_stress import LayerStress, stress_on
 from ccfem.linking.clearance import trim_to_clearance
 from ccfem.linking.conformal import lead_into, parallel_curve
 from ccfem.linking.finishing import keep_off_border, linked_paths
+from ccfem.linking.joining import Joined
 from ccfem.linking.spiral import spiral
 from ccfem.machine.machine import Machine
 from ccfem.planning.strategy import Amount, LayerPlanner
@@ -73,6 +74,8 @@ _LITERAL: Mapping[str, Any] = {
     "spiral": False,
     "boundary_links": False,
     "trim": False,
+    "inset": 0.0,
+    "smooth": False,
 }
 
 
@@ -98,8 +101,8 @@ class Isocurve:
         Weight of even spacing against alignment in the fit (``fit="weighted"``).
     fill_length : float, mm, default 1.5
         Reach of the screened fill.
-    link_limit : float, default 7
-        Longest link between two ends, in strand widths; the paper says 2.
+    link_limit : float, default 5
+        Largest distance of two ends that are linked, in strand widths; the paper says 2.
     rings : tuple of float, default (1.5, 2.5)
         Distances, in strand widths, of the curves round loaded and supported holes. The isocurves
         are led into the last one.
@@ -130,10 +133,14 @@ class Isocurve:
         Links may follow the boundary; in the paper all are straight.
     trim : bool, default True
         Cut branches that come nearer than a strand's width to a longer one.
-    inset : float, default 0
-        Least distance of strands from the boundary, in strand widths. At 0 they may run along the
-        boundary with half of their width outside; 0.5 keeps them in, and their ends still meet
-        the links along the boundary.
+    inset : float, default 0.5
+        Least distance of strands from the boundary, in strand widths. 0.5 keeps them in, and their
+        ends still meet the links along the boundary; at 0 they may run along it with half of their
+        width outside.
+    smooth : bool, default True
+        Links keep the machine's minimum radius; those with corners join only what is too short to
+        be cut alone, and are marked as links. Otherwise all that are short enough are taken, as in
+        the paper.
     """
 
     cap: float = 86.0
@@ -142,7 +149,7 @@ class Isocurve:
     power: float = 1.0
     spacing_weight: float = 0.1
     fill_length: float = 1.5
-    link_limit: float = 7.0
+    link_limit: float = 5.0
     rings: tuple[float, ...] = (1.5, 2.5)
     conformal: tuple[str, ...] | Literal["loaded"] = ()
     stress: Source = "nodal"
@@ -156,13 +163,17 @@ class Isocurve:
     spiral: bool = True
     boundary_links: bool = True
     trim: bool = True
-    inset: float = 0.0
+    inset: float = 0.5
+    smooth: bool = True
 
-    amount: ClassVar[Amount] = Amount("density", most=4.0, least=0.05)
+    amount: ClassVar[Amount] = Amount(
+        "density", most=4.0, least=0.05, beyond=(("floor", 0.0), ("cap", 40.0))
+    )
     in_plane: ClassVar[bool] = True
     variants: ClassVar[Mapping[str, Mapping[str, Any]]] = {
         "literal": _LITERAL,
-        "inset": {"inset": 0.5},
+        "border": {"inset": 0.0},
+        "corners": {"smooth": False},
         "search": {"spacing": "search"},
         "cone": {"spacing": "cone"},
         "mesh": {
@@ -237,8 +248,8 @@ class _Planner:
             return Toolpaths.empty()
         surface = Surface.of(layer)
         lines = self.isocurves(surface, tension, machine.fibre_width)
-        lines = self.connected(lines, layer, tension, stress.held_or_loaded, machine)
-        return Toolpaths.from_plane(lines, layer)
+        paths = self.connected(lines, layer, tension, stress.held_or_loaded, machine)
+        return Toolpaths.from_plane(paths.lines, layer, link=paths.link)
 
     def isocurves(self, surface: Surface, tension: Tension, width: float) -> list[FloatArray]:
         """Isocurves of the field, at least a width apart."""
@@ -307,7 +318,7 @@ class _Planner:
         tension: Tension,
         patches: tuple[str, ...],
         machine: Machine,
-    ) -> list[FloatArray]:
+    ) -> Joined:
         """Curves round the chosen holes, isocurves led into them, ends linked, the rest dropped."""
         s, width, section = self.strategy, machine.fibre_width, layer.plane.polygon
         rings: list[FloatArray] = []
@@ -327,7 +338,8 @@ class _Planner:
         if s.spiral:
             lines = spiral(lines, _SPIRAL_LIMIT * width, _nearest(layer, tension.stress), section)
         limit, least = s.link_limit * width, machine.minimum_length
-        return linked_paths(lines, section, width, limit, least, s.boundary_links)
+        radius = machine.minimum_radius if s.smooth else 0.0
+        return linked_paths(lines, section, width, limit, least, s.boundary_links, radius)
 
 
 def _nearest(layer: Layer, values: FloatArray) -> Callable[[FloatArray], FloatArray]:

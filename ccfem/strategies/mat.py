@@ -34,9 +34,9 @@ class Mat(Infill):
     Attributes
     ----------
     spacing : float, default 1
-        Distance of neighbouring strands in fibre widths, at least 1.
+        Distance of neighbouring strands inside the shells in fibre widths, at least 1.
     shells : int, default 3
-        Number of rings along every border.
+        Number of rings along every border, a fibre width apart whatever the spacing.
     closest : float, default 0.6
         As in `Mps`.
     minimum_length : float, mm, optional
@@ -59,8 +59,8 @@ class Mat(Infill):
 
     def prepare(self, section: Region, machine: Machine) -> list[FloatArray]:
         """All strands: they depend on the section alone."""
-        pitch = self.spacing * machine.fibre_width
-        rings, interior = shells(section, machine.fibre_width, pitch, self.shells, self.closest)
+        width, pitch = machine.fibre_width, self.spacing * machine.fibre_width
+        rings, interior = shells(section, width, width, self.shells, self.closest)
         return rings + medial_fill(interior, pitch, self.closest)
 
     def strands(

@@ -62,9 +62,9 @@ class Mps(Infill):
     Attributes
     ----------
     spacing : float, default 1
-        Distance of neighbouring strands in fibre widths, at least 1.
+        Distance of neighbouring strands inside the shells in fibre widths, at least 1.
     shells : int, default 3
-        Number of rings along every border.
+        Number of rings along every border, a fibre width apart whatever the spacing.
     seeds : "segments", "ends" or tuple of points, default "segments"
         Where the streamlines start: at the middle of each segment of the medial axis inside the
         shells; at the middle of each patch that carries a load or a support (the paper); or at
@@ -101,8 +101,8 @@ class Mps(Infill):
 
     def prepare(self, section: Region, machine: Machine) -> _Inside:
         """Shells, what they leave, and the middles of its medial axis where these are seeds."""
-        pitch = self.spacing * machine.fibre_width
-        rings, interior = shells(section, machine.fibre_width, pitch, self.shells, self.closest)
+        width, pitch = machine.fibre_width, self.spacing * machine.fibre_width
+        rings, interior = shells(section, width, width, self.shells, self.closest)
         wanted = self.seeds == "segments" and not shapely.is_empty(interior)
         return _Inside(rings, interior, _middles(interior, pitch) if wanted else np.zeros((0, 2)))
 

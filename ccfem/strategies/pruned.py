@@ -5,11 +5,12 @@ least work go, until the wanted length is left (`ccfem.fibre_aware.prune`).
 """
 
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, field, replace
 from typing import Any, ClassVar
 
 import numpy as np
 
+from ccfem.arrays import freeze
 from ccfem.checks import check_fields
 from ccfem.elasticity.part_stress import PartStress
 from ccfem.elasticity.stress_field import solved
@@ -22,6 +23,7 @@ from ccfem.planning.equal_fibre import plan_to_length
 from ccfem.planning.strategy import Amount, LayerPlanner
 from ccfem.strategies import create
 from ccfem.toolpaths import Toolpaths
+from ccfem.virtual_testing.specimen import Specimen
 from ccfem.virtual_testing.strand import RHO, Strand
 
 __all__ = ["Pruned"]
@@ -38,6 +40,8 @@ class Pruned:
     ----------
     of : str, default "isocurve"
         Name of the strategy that plans.
+    base : mapping of str to value, default {}
+        Parameters of that strategy other than its defaults, as ``{"floor": 0.3}``.
     coverage : float, default 0.45
         Fibre length times strand width over area of the layers, in (0, 1].
     overfill : float, default 1.25
@@ -49,6 +53,7 @@ class Pruned:
     """
 
     of: str = "isocurve"
+    base: Mapping[str, Any] = field(default_factory=dict, hash=False)
     coverage: float = 0.45
     overfill: float = 1.25
     rounds: int = 2
@@ -61,9 +66,15 @@ class Pruned:
     def __post_init__(self) -> None:
         if self.of in ("pruned", "stream_function"):
             raise InputError(f"pruned.of must be another strategy; got {self.of!r}: correct it")
+        freeze(self, base=dict)
+        create(self.of, self.base)
         check_fields(self, "coverage", above=0.0, at_most=1.0)
         check_fields(self, "overfill", "rounds", at_least=1)
         check_fields(self, "rho", above=0.0, unit="mm^2")
+
+    def natural_length(self, layers: Sequence[Layer], machine: Machine) -> float:
+        """Length that the coverage asks for, mm per layer."""
+        return self.coverage * _mean_area(layers) / machine.fibre_width
 
     def for_part(
         self, stress: PartStress, layers: Sequence[Layer], machine: Machine
@@ -75,21 +86,42 @@ class Pruned:
         InputError
             Whatever the strategy that plans raises.
         """
-        area = float(np.mean([layer.areas.sum() for layer in layers]))
-        wanted = self.coverage * area / machine.fibre_width
-        planned = plan_to_length(create(self.of), layers, stress, machine, self.overfill * wanted)
-        if not len(planned.toolpaths):
-            return _Planned(planned.toolpaths)
-        return _Planned(
-            prune(
-                planned.toolpaths,
-                solved(stress, "pruned"),
-                wanted * len(layers),
-                machine,
-                Strand(self.rho),
-                self.rounds,
-            )
-        )
+        wanted = self.natural_length(layers, machine)
+        return self.to_lengths(stress, layers, machine, (wanted,))[0][1]
+
+    def to_lengths(
+        self,
+        stress: PartStress,
+        layers: Sequence[Layer],
+        machine: Machine,
+        lengths: Sequence[float],
+    ) -> list[tuple["Pruned", LayerPlanner]]:
+        """Plan once for the largest of some lengths, mm per layer, and prune that to each.
+
+        Raises
+        ------
+        InputError
+            As `for_part`.
+        """
+        planned = self.overfill * max(lengths)
+        paths = plan_to_length(
+            create(self.of, self.base), layers, stress, machine, planned
+        ).toolpaths
+        full = _mean_area(layers) / machine.fibre_width
+        found: list[tuple[Pruned, LayerPlanner]] = []
+        for length in lengths:
+            kept = paths
+            if len(paths):
+                part, strand = Specimen.of(solved(stress, "pruned")), Strand(self.rho)
+                kept = prune(paths, part, length * len(layers), machine, strand, self.rounds)
+            coverage = min(length / full, 1.0)
+            overfill = max(planned / full / coverage, 1.0)
+            found.append((replace(self, coverage=coverage, overfill=overfill), _Planned(kept)))
+        return found
+
+
+def _mean_area(layers: Sequence[Layer]) -> float:
+    return float(np.mean([layer.areas.sum() for layer in layers]))
 
 
 @dataclass(frozen=True)

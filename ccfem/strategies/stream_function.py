@@ -23,9 +23,9 @@ from ccfem.fibre_aware.heights import (
     nearest_layer,
 )
 from ccfem.fibre_aware.prune import Profile, least_price, profiles, shorten
-from ccfem.fibre_aware.smeared import SmearedPart, on_linear_cells
+from ccfem.fibre_aware.smeared import SmearedPart
 from ccfem.fibre_aware.spline_grid import SplineGrid
-from ccfem.fibre_aware.stream_design import StreamDesign, StreamProblem, design
+from ccfem.fibre_aware.stream_design import DENSEST, StreamDesign, StreamProblem, design
 from ccfem.fibre_aware.stream_start import plane_axes, start_field
 from ccfem.fields.layer_tension import layer_tension
 from ccfem.geometry.isocontours import isocontours, triangle_edges
@@ -57,6 +57,12 @@ _ALIKE = 0.8
 
 _MOST_GROUPS = 6
 
+_ENOUGH = 0.99
+"""Share of a wanted length below which the design is made once more."""
+
+_MORE = 1.03
+"""By how much more it then asks for than by proportion."""
+
 
 @dataclass(frozen=True)
 class StreamFunction:
@@ -86,12 +92,14 @@ class StreamFunction:
         Percentile of the stress above which the density of the first field grows no more.
     phases : int, default 5
         Positions of the levels of which the best is taken, layer by layer.
-    link_limit : float, default 7
-        Longest link between two ends, in strand widths.
-    inset : float, default 0
-        Least distance of strands from the boundary, in strand widths. At 0, as in the other
-        strategies of isocurves, strands may run along the boundary with half of their width
-        outside; 0.5 keeps them in, and their ends still meet the links along the boundary.
+    link_limit : float, default 10
+        Largest distance of two ends that are linked, in strand widths. Links keep the machine's
+        minimum radius; those with corners join only what is too short to be cut alone, and are
+        marked as links.
+    inset : float, default 0.5
+        Least distance of strands from the boundary, in strand widths. 0.5 keeps them in, and their
+        ends still meet the links along the boundary; at 0 they may run along it with half of their
+        width outside.
     """
 
     coverage: float = 0.45
@@ -102,13 +110,13 @@ class StreamFunction:
     grid: float = 2.0
     cap: float = 90.0
     phases: int = 5
-    link_limit: float = 7.0
-    inset: float = 0.0
+    link_limit: float = 10.0
+    inset: float = 0.5
 
     amount: ClassVar[Amount] = Amount("coverage", most=0.85, least=0.1)
     flat_layers_only: ClassVar[bool] = True
     variants: ClassVar[Mapping[str, Mapping[str, Any]]] = {
-        "inset": {"inset": 0.5, "evaluations": 5},
+        "border": {"inset": 0.0, "evaluations": 5},
         "groups": {"groups": 2, "evaluations": 5},
     }
 
@@ -119,6 +127,10 @@ class StreamFunction:
         check_fields(self, "grid", above=0.0, unit="fibre widths")
         check_fields(self, "cap", above=0.0, at_most=100.0)
         check_fields(self, "groups", "link_limit", "inset", at_least=0)
+
+    def natural_length(self, layers: Sequence[Layer], machine: Machine) -> float:
+        """Length that the coverage asks for, mm per layer."""
+        return self.coverage * _mean_area(layers) / machine.fibre_width
 
     def for_part(
         self, stress: PartStress, layers: Sequence[Layer], machine: Machine
@@ -132,6 +144,49 @@ class StreamFunction:
         InputError
             When no layer has a tensile direction.
         """
+        length = self.natural_length(layers, machine)
+        return _Planned(self._cut(stress, layers, machine, (length,))[0])
+
+    def to_lengths(
+        self,
+        stress: PartStress,
+        layers: Sequence[Layer],
+        machine: Machine,
+        lengths: Sequence[float],
+    ) -> list[tuple["StreamFunction", LayerPlanner]]:
+        """Design for the largest of some lengths, mm per layer, and cut that to each.
+
+        Where the paths of the design are too short in all it is made once more, with as much more
+        fibre.
+
+        Raises
+        ------
+        InputError
+            As `for_part`.
+        """
+        full, longest = _mean_area(layers) / machine.fibre_width, max(lengths)
+        told = replace(self, coverage=min(longest / full, 1.0))
+        found = told._cut(stress, layers, machine, lengths)
+        laid = max(float(paths.lengths.sum()) for paths in found) / len(layers)
+        if 0.0 < laid < _ENOUGH * longest and self.overfill * told.coverage < DENSEST:
+            told = replace(told, overfill=min(_MORE * longest / laid, 2.0) * self.overfill)
+            again = told._cut(stress, layers, machine, lengths)
+            if max(float(paths.lengths.sum()) for paths in again) > laid * len(layers):
+                found = again
+        designed = told.overfill * told.coverage
+        return [
+            (_designed_for(told, min(length / full, 1.0), designed), _Planned(paths))
+            for length, paths in zip(lengths, found, strict=True)
+        ]
+
+    def _cut(
+        self,
+        stress: PartStress,
+        layers: Sequence[Layer],
+        machine: Machine,
+        lengths: Sequence[float],
+    ) -> list[Toolpaths]:
+        """Design for this coverage, and cut the paths to each of some lengths, mm per layer."""
         if not any(layer_tension(stress_on(layer, stress)).defined.any() for layer in layers):
             largest = float(np.linalg.eigvalsh(stress.stress).max())
             raise InputError(
@@ -140,14 +195,15 @@ class StreamFunction:
             )
         field = solved(stress, "stream_function")
         problem, group, found = self.designed(field, layers, machine)
-        return _Planned(_Extraction(self, problem, found, field, machine).plan(layers, group))
+        extraction = _Extraction(self, problem, found, field, machine)
+        return extraction.plan(layers, group, [length * len(layers) for length in lengths])
 
     def designed(
         self, stress: StressField, layers: Sequence[Layer], machine: Machine
     ) -> tuple[StreamProblem, IntArray, StreamDesign]:
         """Design the fields: the problem, the group of each layer, and the design."""
-        linear = on_linear_cells(stress)
-        part = SmearedPart.of(linear, layers[0].plane.frame)
+        part = SmearedPart.of(stress, layers[0].plane.frame)
+        linear = part.specimen.unreinforced
         mesh = part.mesh
         centres = part.centroids @ part.frame[:2].T
         size = max(self.grid * machine.fibre_width, float(np.cbrt(6.0 * mesh.volumes.mean())))
@@ -157,7 +213,9 @@ class StreamFunction:
             groups = 1 if alike > _ALIKE else _MOST_GROUPS
         group = group_layers(layers, groups)
         corners = mesh.points[np.unique(mesh.corners)] @ part.frame[:2].T
-        points = [corners, centres, *(_refined(layer)[0] for layer in layers)]
+        points = [corners, centres]
+        for layer in layers:
+            points += [_refined(layer)[0], layer.plane.points[layer.triangles].mean(axis=1)]
         energy = mesh.volumes * np.einsum("cij,cij->c", linear.stress, linear.stress)
         grid = SplineGrid.over(np.concatenate(points), *plane_axes(part, energy), size)
         capacity = fibre_capacity(part, layers, machine)
@@ -174,6 +232,15 @@ class StreamFunction:
         chosen = [layers[_middle(np.flatnonzero(group == k))] for k in range(group.max() + 1)]
         start = start_field(problem, stress, chosen, self.cap)
         return problem, group, design(problem, start, self.evaluations)
+
+
+def _mean_area(layers: Sequence[Layer]) -> float:
+    return float(np.mean([layer.areas.sum() for layer in layers]))
+
+
+def _designed_for(strategy: StreamFunction, coverage: float, designed: float) -> StreamFunction:
+    """Strategy that lays a coverage of what is designed for another, overfill included."""
+    return replace(strategy, coverage=coverage, overfill=max(designed / coverage, 1.0))
 
 
 def _middle(numbers: IntArray) -> int:
@@ -200,9 +267,11 @@ class _Extraction:
     stress: StressField
     machine: Machine
 
-    def plan(self, layers: Sequence[Layer], group: IntArray) -> Toolpaths:
-        """Paths of all layers, as long as the coverage says."""
-        s, minimum = self.strategy, self.machine.minimum_length
+    def plan(
+        self, layers: Sequence[Layer], group: IntArray, lengths: Sequence[float]
+    ) -> list[Toolpaths]:
+        """Paths of all layers, cut to each of some lengths, mm in all."""
+        s = self.strategy
         fields = [self.field(k) for k in range(self.problem.groups)]
         shifts = (np.arange(s.phases) + 0.5) / s.phases
         variants = [
@@ -212,17 +281,27 @@ class _Extraction:
         ]
         toolpaths = Toolpaths.concatenate(variants)
         if not len(toolpaths):
-            return toolpaths
+            return [toolpaths for _ in lengths]
         along = self.profiles(toolpaths)
-        length = s.coverage * sum(float(layer.areas.sum()) for layer in layers)
-        length /= self.machine.fibre_width
         variant = np.repeat(np.arange(len(variants)), [len(paths) for paths in variants])
-        middle = [one for one in along if variant[one.path] % s.phases == s.phases // 2]
+        return [self.best(toolpaths, along, variant, len(variants), length) for length in lengths]
+
+    def best(
+        self,
+        toolpaths: Toolpaths,
+        along: list[Profile],
+        variant: IntArray,
+        count: int,
+        length: float,
+    ) -> Toolpaths:
+        """Stretches worth most, mm in all, of the variant of each layer that is worth most."""
+        phases, minimum = self.strategy.phases, self.machine.minimum_length
+        middle = [one for one in along if variant[one.path] % phases == phases // 2]
         price = least_price(middle, length, minimum, _CUT_COST) if middle else 0.0
-        gain = np.zeros(len(variants))
+        gain = np.zeros(count)
         for one in along:
             gain[variant[one.path]] += one.kept(price, minimum, _CUT_COST)[1]
-        best = np.argmax(gain.reshape(-1, s.phases), axis=1) + s.phases * np.arange(len(layers))
+        best = np.argmax(gain.reshape(-1, phases), axis=1) + phases * np.arange(count // phases)
         wanted = np.isin(variant, best)
         number = np.cumsum(wanted) - 1
         kept = [replace(one, path=int(number[one.path])) for one in along if wanted[one.path]]
@@ -247,7 +326,9 @@ class _Extraction:
         lines = keep_off_border(curves.lines(), section, self.strategy.inset * width)
         lines = trim_to_clearance(lines, _CLEARANCE * width, _SHORTEST * width)
         limit, least = self.strategy.link_limit * width, self.machine.minimum_length
-        return Toolpaths.from_plane(linked_paths(lines, section, width, limit, least), layer)
+        radius = self.machine.minimum_radius
+        found = linked_paths(lines, section, width, limit, least, radius=radius)
+        return Toolpaths.from_plane(found.lines, layer, link=found.link)
 
     def profiles(self, toolpaths: Toolpaths) -> list[Profile]:
         """Value of the paths at the strains of the designed part."""

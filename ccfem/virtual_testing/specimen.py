@@ -42,13 +42,23 @@ class Specimen:
 
     @classmethod
     def of(cls, unreinforced: StressField, backend: str = "auto") -> "Specimen":
-        """Make the specimen of a solved problem.
+        """Make the specimen of a solved problem, or return the one that was made before.
+
+        The field keeps it, so that all who plan and test on it share one factorisation.
 
         Raises
         ------
         InputError
             When forces act and supports move too: no single stiffness describes that.
         """
+        known = unreinforced.__dict__.setdefault("specimens", {})
+        if backend not in known:
+            known[backend] = cls._made(unreinforced, backend)
+        found: Specimen = known[backend]
+        return found
+
+    @classmethod
+    def _made(cls, unreinforced: StressField, backend: str) -> "Specimen":
         system = prepare(unreinforced.problem)
         case = unreinforced.case
         if system.held_in(case).value.any() and system.forces_in(case).any():

@@ -11,7 +11,9 @@ import numpy as np
 import pytest
 
 from ccfem import __version__
+from ccfem.cli.arguments import parameters_by_strategy
 from ccfem.cli.commands import main
+from ccfem.errors import InputError
 from ccfem.export.waypoints import read_waypoints
 from ccfem.io import write_mesh
 from ccfem.mesh import TetMesh
@@ -287,7 +289,8 @@ def test_every_parameter_of_a_strategy_is_explained(ccfem, monkeypatch, name):
     found = {row[0]: row[1:] for row in rows if len(row) == 4}
     for field in dataclasses.fields(named()[name]):
         default, kind, meaning = found[field.name]
-        assert default == repr(field.default)
+        made = field.default_factory is not dataclasses.MISSING
+        assert default == repr(field.default_factory() if made else field.default)
         assert kind
         assert len(meaning) > 15
         assert not meaning.startswith("As in")
@@ -420,3 +423,17 @@ def refused(ccfem, folder, message, *arguments):
     after = {path: path.stat().st_mtime_ns for path in folder.rglob("*") if path.is_file()}
     assert after == before
     assert not list(folder.rglob(".ccfem-*"))
+
+
+def test_a_parameter_that_is_a_table_takes_its_entries_one_by_one():
+    texts = ["pruned.of=zigzag", "pruned.base.angle=30", "pruned.base.turn=0", "zigzag.turn=1.5"]
+    assert parameters_by_strategy(texts) == {
+        "pruned": {"of": "zigzag", "base": {"angle": 30, "turn": 0}},
+        "zigzag": {"turn": 1.5},
+    }
+    only = parameters_by_strategy(["coverage=0.3", "pruned.base.angle=30"], "pruned")
+    assert only == {"pruned": {"coverage": 0.3, "base": {"angle": 30}}}
+    with pytest.raises(InputError, match=r"pruned.base has a value already"):
+        parameters_by_strategy(["pruned.base=3", "pruned.base.angle=30"])
+    with pytest.raises(InputError, match="expects STRATEGY"):
+        parameters_by_strategy(["angle=30"])

@@ -1,18 +1,22 @@
 """Comparison: equal fibre, nobody dropped, and the order by the virtual test."""
 
+import json
 import re
 from dataclasses import dataclass, replace
 from typing import ClassVar
 
 import numpy as np
+import pandas as pd
 import pytest
 
 from ccfem.cases.case import Case
 from ccfem.comparison.compare import compare, create_all
+from ccfem.comparison.files import write_results
 from ccfem.comparison.headline import HEADLINE, headline_values
 from ccfem.comparison.pictures import caption
 from ccfem.comparison.ranking import best_values
 from ccfem.elasticity.problem import Force, Problem, Support
+from ccfem.elasticity.system import System
 from ccfem.errors import InputError
 from ccfem.evaluation import evaluate
 from ccfem.layers.slicing import Planar
@@ -58,7 +62,7 @@ def test_strategies_lay_the_same_length(compared):
     for run in compared.runs:
         assert not run.failure
         assert run.length_per_layer <= compared.fibre_per_layer * (1.0 + 1e-9)
-        assert run.length_per_layer >= 0.99 * compared.fibre_per_layer or "of" in run.note
+        assert run.length_per_layer >= 0.99 * compared.fibre_per_layer
         assert set(run.seconds) == {"plan", "evaluate", "virtual test"}
 
 
@@ -116,7 +120,7 @@ def test_opposite_orders_are_undecided(compared):
     assert same.verdict.startswith(f"{first.name} makes the stiffest part")
 
 
-def test_what_cannot_be_thinned_leaves_layers_out():
+def test_what_cannot_be_thinned_is_named_and_leaves_no_layer_out():
     strategies = {
         "rings": create("contour_zigzag", {"contours": 4}),
         "zigzag": create("zigzag", {"spacing": 8.0}),
@@ -124,12 +128,66 @@ def test_what_cannot_be_thinned_leaves_layers_out():
     result = compare(strip(), strategies, strand=None)
     rings, zigzag = result.runs
     assert result.fibre_per_layer == zigzag.length_per_layer
-    assert 0.0 < rings.length_per_layer <= result.fibre_per_layer
-    assert re.search(r"spacing = 20 on \d of 4 layers, no fibre on the others", rings.note)
-    whole = plan(rings.strategy, result.layers, result.stress, result.case.machine)
-    for layer in result.layers:
-        mine = rings.toolpaths.on_layer(layer.index).points
-        assert not len(mine) or np.array_equal(mine, whole.on_layer(layer.index).points)
+    assert rings.length_per_layer > 1.01 * result.fibre_per_layer
+    assert rings.empty_layers == 0
+    assert re.search(r"lays \d+ of \d+ mm per layer: its least, at spacing = 20$", rings.note)
+    assert result.ranking == (zigzag, rings)
+    assert f"rings: {rings.note}, so it is placed below those that lay it" in result.remarks
+    assert result.curve is None
+
+
+@pytest.fixture(scope="module")
+def along():
+    """Rings whose least is more than the zigzag lays by itself, so that a curve has to tell."""
+    strategies = {
+        "rings": create("contour_zigzag", {"contours": 4}),
+        "zigzag": create("zigzag", {"spacing": 8.0, "angle": 0.0, "turn": 0.0}),
+    }
+    return compare(strip(), strategies, layers=2)
+
+
+def test_where_a_length_is_not_one_for_all_the_curve_decides(along):
+    curve = along.curve
+    assert 1 <= len(curve.common) <= 3
+    assert curve.common == tuple(sorted(curve.common))
+    for length in curve.common:
+        for run in curve.at(length):
+            assert run.length_per_layer == pytest.approx(length, rel=0.01)
+    for points in curve.points.values():
+        assert 3 <= len(points) <= 5
+        laid = [run.length_per_layer for _, run in points]
+        assert laid == sorted(laid)
+        ratios = [run.tested.bracket.tension.ratio for _, run in points]
+        assert ratios[0] < ratios[-1]
+    assert len(curve.verdicts) == len(curve.common)
+    for said, length in zip(curve.verdicts, curve.common, strict=True):
+        assert f"at {length:.0f} mm of fibre per layer" in said
+        best = max(curve.at(length), key=lambda run: run.tested.bracket.tension.ratio)
+        if "makes the stiffest part" in said:
+            assert said.startswith(f"{best.name} makes")
+    assert curve.verdicts[0] in str(along)
+
+
+def test_the_curve_is_a_table_and_a_picture(along, tmp_path):
+    write_results(along, tmp_path)
+    table = pd.read_csv(tmp_path / "curve.csv")
+    assert list(table["strategy"].unique()) == ["rings", "zigzag"]
+    at_all = table[table["reached_by_all"]]
+    assert set(at_all.groupby("wanted_per_layer").size()) == {2}
+    assert (tmp_path / "curve.png").stat().st_size > 5000
+    page = (tmp_path / "report.html").read_text()
+    assert "Stiffness over fibre" in page
+    about = json.loads((tmp_path / "results.json").read_text())
+    assert len(about["curve"]) == len(table)
+
+
+def test_a_curve_can_be_asked_for_and_left_out(along):
+    two = ["zigzag", "concentric"]
+    assert compare(strip(), two, layers=1, fibre_per_layer=400.0, curve=True).curve is not None
+    rings = {"rings": along.runs[0].strategy}
+    assert compare(strip(), rings, layers=1, fibre_per_layer=50.0, curve=False).curve is None
+    with pytest.raises(InputError, match="the curve is one of stiffness"):
+        compare(strip(), two, strand=None, curve=True)
 
 
 def test_more_fibre_than_wanted_comes_last():
@@ -151,22 +209,46 @@ def test_more_fibre_than_wanted_comes_last():
     assert rings.tested.bracket.tension.ratio > zigzag.tested.bracket.tension.ratio
     assert result.ranking == (zigzag, rings)
     assert any(
-        line.startswith("rings: given paths stay as they are: lays") and "placed last" in line
+        line.startswith("rings: given paths stay as they are: lays") and "placed below" in line
         for line in result.remarks
     )
     assert "stiffness_ratio_tension" not in best_values(result.runs, result.fibre_per_layer)
     assert result.verdict == ""
 
 
-def test_unequal_fibre_is_in_the_verdict():
+def test_all_runs_share_one_factorisation(monkeypatch):
+    """One for the solve, one for tests and pruning, one for the design and the bound."""
+    made = []
+    factorise = System.factorise
+
+    def counted(self, *arguments, **options):
+        made.append(self)
+        return factorise(self, *arguments, **options)
+
+    monkeypatch.setattr(System, "factorise", counted)
+    strategies = {
+        "designed": create("stream_function", {"evaluations": 3}),
+        "pruned": create("pruned", {"of": "zigzag"}),
+        "zigzag": create("zigzag"),
+        "rings": create("concentric"),
+    }
+    result = compare(strip(), strategies, layers=1, fibre_per_layer=300.0)
+    assert all(run.tested is not None for run in result.runs)
+    assert len(made) == 3
+
+
+def test_unequal_fibre_is_no_verdict():
     strategies = {
         "thin": create("zigzag", {"angle": 90.0, "turn": 0.0, "spacing": 6.0}),
         "dense": create("zigzag", {"angle": 0.0, "turn": 0.0, "spacing": 2.0}),
     }
     result = compare(strip(), strategies, natural=True)
-    dense = result.runs[1].length_per_layer / result.runs[0].length_per_layer - 1.0
+    thin, dense = result.runs
+    assert result.ranking == (dense, thin)
     assert "each with its own amount of fibre" in result.verdict
-    assert f"{dense:.0%} more fibre than thin" in replace(result, fibre_per_layer=1e4).verdict
+    held = replace(result, fibre_per_layer=thin.length_per_layer)
+    assert held.ranking == (thin, dense)
+    assert held.verdict == ""  # one is left, and there is no other at that length
 
 
 def test_a_strategy_that_fails_stays_with_its_reason():

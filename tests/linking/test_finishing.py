@@ -31,9 +31,9 @@ def test_lines_are_cut_where_they_come_near_the_border():
 def test_paths_are_linked_and_short_ones_dropped():
     lines = [np.array([[5.0, y], [25.0, y]]) for y in (5.0, 6.0)]
     lines += [np.array([[40.0, 30.0], [55.0, 30.0]])]
-    linked = linked_paths(lines, PLATE, 1.0, 2.0, 41.0)
+    linked = linked_paths(lines, PLATE, 1.0, 2.0, 41.0).lines
     assert len(linked) == 1
     length = np.linalg.norm(np.diff(linked[0], axis=0), axis=1).sum()
     assert length == pytest.approx(41.0, abs=0.6)
-    assert len(linked_paths(lines, PLATE, 1.0, 0.0, 10.0)) == 3
-    assert linked_paths(lines, PLATE, 1.0, 0.0, 30.0) == []
+    assert len(linked_paths(lines, PLATE, 1.0, 0.0, 10.0).lines) == 3
+    assert linked_paths(lines, PLATE, 1.0, 0.0, 30.0).lines == []

@@ -25,14 +25,14 @@ def length(line: np.ndarray) -> float:
 
 def test_join_follows_the_joints_whatever_the_direction() -> None:
     a, b, c = vertical(0.0), vertical(1.0), vertical(2.0)
-    joined = join([a, b, c], [Joint(1, 3, np.zeros((0, 2))), Joint(2, 4, np.zeros((0, 2)))])
+    joined = join([a, b, c], [Joint(1, 3, np.zeros((0, 2))), Joint(2, 4, np.zeros((0, 2)))]).lines
     assert len(joined) == 1
     assert length(joined[0]) == pytest.approx(3 * 20.0 + 2.0)
 
 
 def test_join_closes_a_ring() -> None:
     a, b = vertical(0.0), vertical(1.0)
-    (ring,) = join([a, b], [Joint(0, 2, np.zeros((0, 2))), Joint(1, 3, np.zeros((0, 2)))])
+    (ring,) = join([a, b], [Joint(0, 2, np.zeros((0, 2))), Joint(1, 3, np.zeros((0, 2)))]).lines
     np.testing.assert_array_equal(ring[0], ring[-1])
     assert length(ring) == pytest.approx(42.0)
 
@@ -40,7 +40,7 @@ def test_join_closes_a_ring() -> None:
 @pytest.mark.parametrize("along_boundary", [True, False])
 def test_parallel_strands_become_one_meander(along_boundary: bool) -> None:
     lines = [vertical(x) for x in (2.0, 4.0, 6.0, 8.0)]
-    (path,) = link_ends(lines, SQUARE, 3.0, 1.0, along_boundary=along_boundary)
+    (path,) = link_ends(lines, SQUARE, 3.0, 1.0, along_boundary=along_boundary).lines
     assert length(path) == pytest.approx(4 * 20.0 + 3 * 2.0, abs=3.1)
     assert shapely.LineString(path).is_simple
     assert shapely.covers(SQUARE, shapely.LineString(path))
@@ -56,7 +56,7 @@ def test_strands_that_end_half_a_width_off_a_hole_are_linked_round_it(angle: flo
     plate = shapely.transform(plate, lambda points: points @ rotation)
     rays = [np.array([[-3.0, 5.0], [-9.0, 15.0]]), np.array([[3.0, 5.0], [9.0, 15.0]])]
     kept = keep_off_border([ray @ rotation for ray in rays], plate, 0.5)
-    (path,) = link_ends(kept, plate, 7.5, 1.0)
+    (path,) = link_ends(kept, plate, 7.5, 1.0).lines
     # Straight from end to end the link would lead over the hole, so it follows a circle of 6.5 mm.
     expected = 2.0 * (np.hypot(9.0, 15.0) - 6.5) + 2.0 * 6.5 * np.arctan(0.6)
     assert length(path) == pytest.approx(expected, abs=0.01)
@@ -71,17 +71,17 @@ def test_of_equal_links_the_straight_one_is_taken_whatever_rounding_says() -> No
         rotation = np.array([[c, s], [-s, c]])
         turned = shapely.transform(plate, lambda points, by=rotation: points @ by)
         lines = [np.array([[x, 0.2], [x, 2.0 * x]]) @ rotation for x in (3.0, 5.5)]
-        (path,) = link_ends(keep_off_border(lines, turned, 0.5), turned, 2.7, 1.0)
+        (path,) = link_ends(keep_off_border(lines, turned, 0.5), turned, 2.7, 1.0).lines
         assert len(path) == 4
 
 
 def test_links_do_not_cross_strands_holes_or_the_limit() -> None:
     lines = [vertical(2.0), vertical(4.0)]
-    assert len(link_ends(lines, SQUARE, 1.5, 1.0)) == 2
+    assert len(link_ends(lines, SQUARE, 1.5, 1.0).lines) == 2
     between = np.array([[3.0, -10.0], [3.0, 30.0]])
-    assert len(link_ends([*lines, between], shapely.box(0, -12, 20, 32), 2.5, 1.0)) == 3
+    assert len(link_ends([*lines, between], shapely.box(0, -12, 20, 32), 2.5, 1.0).lines) == 3
     holed = SQUARE.difference(shapely.box(2.5, -1.0, 3.5, 21.0))
-    assert len(link_ends(lines, holed, 2.5, 1.0)) == 2
+    assert len(link_ends(lines, holed, 2.5, 1.0).lines) == 2
 
 
 @settings(max_examples=25, deadline=None)
@@ -93,7 +93,7 @@ def test_links_stay_inside_and_cross_nothing(seed: int) -> None:
     for x in np.arange(-9.0, 9.0, 1.1 + random.random()):
         piece = shapely.intersection(shapely.LineString([(x, -20), (x, 20)]), disc)
         lines += [shapely.get_coordinates(p) for p in shapely.get_parts(piece)]
-    paths = link_ends(lines, disc, random.uniform(1.0, 6.0), 1.0)
+    paths = link_ends(lines, disc, random.uniform(1.0, 6.0), 1.0).lines
     assert len(paths) <= len(lines)
     strings = [shapely.LineString(path) for path in paths]
     assert all(shapely.covers(disc.buffer(1e-9), string) for string in strings)

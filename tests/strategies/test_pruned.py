@@ -2,6 +2,7 @@
 
 import numpy as np
 import pytest
+import shapely
 
 from ccfem.cases import create_case
 from ccfem.elasticity import solve
@@ -41,3 +42,37 @@ def test_pruned_fibre_beats_the_same_length_planned_outright(name: str) -> None:
 def test_wrong_parameters_are_refused(wrong: dict) -> None:
     with pytest.raises(InputError, match=f"pruned.{next(iter(wrong))}"):
         create("pruned", wrong)
+
+
+def test_the_base_takes_parameters_of_its_own():
+    thin = create("pruned", {"of": "zigzag", "base": {"angle": 30.0}})
+    assert thin.base == {"angle": 30.0}
+    assert hash(thin) == hash(create("pruned", {"of": "zigzag", "base": {"angle": 30.0}}))
+    with pytest.raises(InputError, match="strategy 'zigzag' has no parameter 'angel'"):
+        create("pruned", {"of": "zigzag", "base": {"angel": 30.0}})
+    case = create_case("bar", element_size=5.0)
+    field = solve(case.problem)["pull"]
+    layers = Planar(count=1).cut(field.mesh, case.build)
+    coarse = create("zigzag", {"angle": 0.0, "turn": 0.0})
+    along = Pruned(of="zigzag", base={"angle": 0.0, "turn": 0.0}, coverage=0.4)
+    paths = plan(along, layers, field, case.machine)
+    whole = plan_to_length(
+        coarse, layers, field, case.machine, 1.25 * along.natural_length(layers, case.machine)
+    ).toolpaths
+    # What is left are stretches of the strands that the strategy with these parameters plans.
+    strands = shapely.MultiLineString([path[:, :2] for path in whole])
+    assert shapely.dwithin(shapely.points(paths.points[:, :2]), strands, 1e-3).all()
+    assert 0.99 * 0.8 * whole.lengths.sum() <= paths.lengths.sum() <= 0.81 * whole.lengths.sum()
+
+
+def test_several_lengths_are_cut_from_one_plan():
+    case = create_case("bar", element_size=5.0)
+    field = solve(case.problem)["pull"]
+    layers = Planar(count=2).cut(field.mesh, case.build)
+    full = Pruned(of="zigzag").natural_length(layers, case.machine)
+    found = Pruned(of="zigzag").to_lengths(field, layers, case.machine, [full, 0.5 * full])
+    for (strategy, planner), length in zip(found, (full, 0.5 * full), strict=True):
+        laid = sum(float(planner(layer, None, case.machine).lengths.sum()) for layer in layers)
+        assert 0.99 * length <= laid / len(layers) <= length
+        again = plan(strategy, layers, field, case.machine)
+        assert again.lengths.sum() == pytest.approx(laid, rel=1e-3)

@@ -1,0 +1,151 @@
+"""How the curve of a comparison comes about: lengths, plans, tests."""
+
+import itertools
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass, replace
+from typing import Any
+
+import numpy as np
+
+from ccfem.comparison.curve import Curve
+from ccfem.comparison.runs import Run
+from ccfem.comparison.stages import Part, Tell, attempted, evaluated, with_plan
+from ccfem.planning.equal_fibre import Planned, extremes, plan_to_lengths
+from ccfem.planning.given_paths import GivenPaths
+from ccfem.planning.strategy import LengthStrategy
+
+__all__ = ["along_curve"]
+
+_COMMON = 3
+"""Lengths that all strategies are held to."""
+_APART = 0.1
+"""Share of a length by which the next one on a curve is larger, at least."""
+
+
+@dataclass(frozen=True)
+class _Reach:
+    """What one strategy lays at the least and at the most, mm per layer, and plans that show it."""
+
+    run: Run
+    least: float
+    most: float
+    known: tuple[Planned, ...] = ()
+
+
+def along_curve(
+    runs: Sequence[Run],
+    part: Part,
+    wanted: float | None,
+    tested: Callable[[list[Run]], list[Run]],
+    tell: Tell,
+) -> Curve:
+    """Plan and test every strategy at three to five lengths of fibre.
+
+    Three are lengths that all reach, from the largest of the leasts to the smallest of the mosts;
+    the other two are a strategy's own least and most. Where nobody's reach overlaps, each has three
+    lengths of its own. Given paths are one point each.
+
+    Parameters
+    ----------
+    runs : sequence of Run
+        With the strategies as they were asked for, and what they laid.
+    part : Part
+    wanted : float, mm, or None
+        Length per layer that the comparison is made at: one of the three where it can be.
+    tested : callable
+        Tests runs virtually.
+    tell : callable
+    """
+    reaches = [reach for reach in (_reach(run, part, tell) for run in runs) if reach is not None]
+    free = [reach for reach in reaches if not isinstance(reach.run.strategy, GivenPaths)]
+    lengths = _common(free, [one.least for one in reaches if one not in free], wanted)
+    points: dict[str, tuple[tuple[float, Run], ...]] = {}
+    for reach in reaches:
+        asked = _asked(reach, lengths)
+        tell(f"planning {reach.run.name} along the curve")
+        planned = [evaluated(run, part, tell) for run in _planned(reach, asked, part)]
+        points[reach.run.name] = tuple(zip(asked, tested(planned), strict=True))
+    return Curve(lengths, points)
+
+
+def _reach(run: Run, part: Part, tell: Tell) -> _Reach | None:
+    """Find what a strategy lays at the least and at the most; None where it fails."""
+    strategy: Any = run.strategy
+    if run.failure:
+        return None
+    if isinstance(strategy, GivenPaths):
+        return _Reach(run, run.length_per_layer, run.length_per_layer)
+    if isinstance(strategy, LengthStrategy):
+        amount = strategy.amount
+        kinds: list[Any] = [
+            replace(strategy, **{amount.parameter: value})  # type: ignore[type-var]
+            for value in (amount.least, amount.most)
+        ]
+        least, most = (kind.natural_length(part.layers, part.machine) for kind in kinds)
+        return _Reach(run, least, most)
+    tell(f"planning the least and the most of {run.name}")
+    ends: list[tuple[Planned, Planned]] = []
+
+    def work() -> Run:
+        ends.append(extremes(strategy, part.layers, part.stress, part.machine))
+        return run
+
+    if attempted(run, work).failure or not ends[0][1].length_per_layer > 0.0:
+        return None
+    least, most = (one.length_per_layer for one in ends[0])
+    return _Reach(run, least, most, ends[0])
+
+
+def _common(
+    reaches: Sequence[_Reach], given: Sequence[float], wanted: float | None
+) -> tuple[float, ...]:
+    """Lengths that all reach: the ends of the reach of all, and one between."""
+    if not reaches:
+        return tuple(sorted(set(given)))
+    low, high = max(one.least for one in reaches), min(one.most for one in reaches)
+    if low > high:
+        return ()
+    if high < (1.0 + _APART) * low:
+        return (low,)
+    inner = [x for x in (*given, wanted) if x is not None and low < x < high]
+    inner = [x for x in inner if x > (1.0 + _APART) * low and high > (1.0 + _APART) * x]
+    if inner:
+        return (low, inner[0], high)
+    return tuple(float(x) for x in np.linspace(low, high, _COMMON))
+
+
+def _asked(reach: _Reach, lengths: Sequence[float]) -> list[float]:
+    """Lengths that one strategy is planned to, from the least to the most."""
+    if reach.least == reach.most:
+        near = [x for x in lengths if abs(reach.least / x - 1.0) <= 0.01]
+        return near[:1] or [reach.least]
+    if not lengths:
+        return [float(x) for x in np.linspace(reach.least, reach.most, _COMMON)]
+    asked = list(lengths)
+    if reach.least < asked[0] / (1.0 + _APART):
+        asked.insert(0, reach.least)
+    if reach.most > asked[-1] * (1.0 + _APART):
+        asked.append(reach.most)
+    if len(asked) < _COMMON:  # there is one common length: others at both sides of it
+        ends = sorted({reach.least, *asked, reach.most})
+        asked = sorted({*asked, *(0.5 * (a + b) for a, b in itertools.pairwise(ends))})
+    return asked
+
+
+def _planned(reach: _Reach, asked: Sequence[float], part: Part) -> list[Run]:
+    """Plan one strategy to several lengths; a failure is in all of the runs."""
+    bare = replace(reach.run, evaluation=None, tested=None, print_plan=None, why_not="", note="")
+    if isinstance(reach.run.strategy, GivenPaths):
+        return [bare for _ in asked]
+    found: list[Planned] = []
+
+    def work() -> Run:
+        found.extend(
+            plan_to_lengths(
+                reach.run.strategy, part.layers, part.stress, part.machine, asked, reach.known
+            )
+        )
+        return bare
+
+    done = attempted(bare, work)
+    return [with_plan(done, one) for one in found] if found else [done for _ in asked]
