@@ -7,6 +7,7 @@ from typing import Any
 
 from ccfem.arrays import freeze
 from ccfem.elasticity.problem import Force, Order, Problem, Support
+from ccfem.elasticity.support_kinds import AnySupport
 from ccfem.errors import InputError
 from ccfem.layers.slicer import Slicer
 from ccfem.layers.slicing.planar import Planar
@@ -44,6 +45,10 @@ class Case:
         Where a strategy should not use its defaults on this part.
     source : str
         Paper or person that the case comes from.
+    alternative_supports : tuple of supports
+        Another model of how the part is held, such as bolts that only press in place of walls that
+        are held. Where there are some, strategies are tested under both, and no order is told that
+        the two do not agree on.
     findings : tuple of str
         What was found and repaired in a mesh from a file, one line each.
     """
@@ -57,12 +62,13 @@ class Case:
     parameters: Mapping[str, Mapping[str, Any]] = field(default_factory=dict)
     source: str = ""
     findings: tuple[str, ...] = ()
+    alternative_supports: tuple[AnySupport, ...] = ()
 
     def __repr__(self) -> str:
         return f"Case {self.name}: {self.title}"
 
     def __post_init__(self) -> None:
-        freeze(self, parameters=dict)
+        freeze(self, parameters=dict, alternative_supports=tuple)
         if not re.fullmatch(r"\w[\w .+-]{0,79}", self.name):
             raise InputError(
                 "the name of a case must have letters, digits, spaces and ._+- alone, at most 80, "

@@ -103,6 +103,11 @@ them with a minus ("-z"), or three numbers.
     value = [0, 0, 0]                 # displacement they take, mm; default none
 
     [[supports]]
+    kind = "pressing"                 # the patch lies on something rigid: it may slide and lift
+    patch = "foot"                    # off, and not sink in
+    normal = "-z"                     # optional: out of the part
+
+    [[supports]]
     kind = "edge"                     # the nodes that two patches share
     patches = ["foot", "pin"]         # components, value
 
@@ -141,6 +146,10 @@ them with a minus ("-z"), or three numbers.
     patch = "foot"
     normal = 5.0
     tangential = 0.0                  # optional
+
+    [[alternative_supports]]          # another model of how the part is held, keys as of supports:
+    patch = "foot"                    # strategies are tested under both, and no order is told that
+    kind = "pressing"                 # the two do not agree on
 
     [[loads.pull]]                    # at least one load of one load case, here "pull"
     kind = "bearing"                  # total force, N, that a pin presses on a cylinder
@@ -248,6 +257,7 @@ class _Part(Body):
     loads: dict[str, Any]
     combinations: dict[str, Any] = field(default_factory=dict)
     regions: dict[str, Any] = field(default_factory=dict)
+    alternative_supports: tuple[dict[str, Any], ...] = ()
     name: str = ""
     title: str = ""
     source: str = ""
@@ -297,6 +307,7 @@ def _case(content: Mapping[str, Any], path: Path) -> Case:
     supports = read_supports(part.supports)
     slicing = _slicing(part)
     build = unit_vector(part.build, "build")
+    others = read_supports(part.alternative_supports, "alternative_supports")
     loads = read_loads(part.loads)
     combinations = read_combinations(part.combinations, loads)
     regions = read_regions(part.regions)
@@ -307,7 +318,7 @@ def _case(content: Mapping[str, Any], path: Path) -> Case:
     mesh, findings = part.read(path.parent)
     mesh = patches_from_rules(mesh, rules)
     findings = (*findings, *about_patches(mesh, rules))
-    mesh = without_faces(mesh, (*rules, *patches_in_use(supports, loads)))
+    mesh = without_faces(mesh, (*rules, *patches_in_use((*supports, *others), loads)))
     name = part.name or path.stem
     return Case(
         name=name,
@@ -327,6 +338,7 @@ def _case(content: Mapping[str, Any], path: Path) -> Case:
         parameters=part.strategies,
         source=part.source,
         findings=findings,
+        alternative_supports=others,
     )
 
 

@@ -25,6 +25,7 @@ from ccfem.elasticity.support_kinds import (
     Pin,
     PointSpring,
     PointSupport,
+    PressingSupport,
     RigidPatch,
     SlidingSupport,
     Spring,
@@ -59,22 +60,25 @@ SUPPORTS: dict[str, Callable[..., AnySupport]] = {
     "spring": Spring,
     "point_spring": PointSpring,
     "foundation": Foundation,
+    "pressing": PressingSupport,
 }
 """Supports by their kind."""
 
 
-def read_supports(tables: tuple[dict[str, Any], ...]) -> tuple[AnySupport, ...]:
-    """Read the tables ``[[supports]]``; one without a kind holds its patch.
+def read_supports(
+    tables: tuple[dict[str, Any], ...], key: str = "supports"
+) -> tuple[AnySupport, ...]:
+    """Read the tables of supports under a key; one without a kind holds its patch.
 
     Raises
     ------
     InputError
     """
-    if not tables:
+    if not tables and key == "supports":
         raise InputError("a part needs a support: add [[supports]] with its patch")
     found = []
     for k, table in enumerate(tables):
-        where = f"supports[{k}]"
+        where = f"{key}[{k}]"
         kind, rest = split({"kind": _HELD, **table}, "kind", SUPPORTS, where)
         found.append(from_table(SUPPORTS[kind], rest, where))
     return tuple(found)

@@ -16,6 +16,7 @@ __all__ = [
     "Pin",
     "PointSpring",
     "PointSupport",
+    "PressingSupport",
     "RigidPatch",
     "SlidingSupport",
     "Spring",
@@ -114,6 +115,31 @@ class SlidingSupport:
         _check_finite(self, "value")
         if self.normal is not None:
             unit_vector(self.normal, f"normal of the sliding support on patch '{self.patch}'")
+
+
+@dataclass(frozen=True)
+class PressingSupport:
+    """A patch that lies on something rigid without friction: it may lift off, not sink in.
+
+    A wall that a bolt stands in, the ring under its head, a table. There is no gap before the load,
+    so the solution is in proportion to the load. Where two such patches meet they have to be at
+    right angles. On quadratic cells the middles of the edges bear: under even pressure the corners
+    carry nothing.
+
+    Attributes
+    ----------
+    patch : str
+    normal : str or tuple of 3 floats, optional
+        Direction out of the part, towards the support, of any length, or "x", "-z" ...; by default
+        the outward normal at each node.
+    """
+
+    patch: str
+    normal: str | Vector | None = None
+
+    def __post_init__(self) -> None:
+        if self.normal is not None:
+            unit_vector(self.normal, f"normal of the pressing support on patch '{self.patch}'")
 
 
 @dataclass(frozen=True)
@@ -247,6 +273,7 @@ AnySupport = (
     | EdgeSupport
     | PointSupport
     | SlidingSupport
+    | PressingSupport
     | RigidPatch
     | Pin
     | Spring

@@ -77,7 +77,7 @@ class StreamFunction:
     ----------
     coverage : float, default 0.45
         Fibre length times strand width over area of the layers, in (0, 1].
-    overfill : float, default 1.15
+    overfill : float, default 1.25
         Fibre length of the design over that kept, at least 1.
     rho : float, mm^2, default 4
         Axial stiffness of a strand over Young's modulus of the matrix.
@@ -103,7 +103,7 @@ class StreamFunction:
     """
 
     coverage: float = 0.45
-    overfill: float = 1.15
+    overfill: float = 1.25
     rho: float = RHO
     evaluations: int = 50
     groups: int = 0
@@ -156,26 +156,29 @@ class StreamFunction:
     ) -> list[tuple["StreamFunction", LayerPlanner]]:
         """Design for the largest of some lengths, mm per layer, and cut that to each.
 
-        Where the paths of the design are too short in all it is made once more, with as much more
-        fibre.
+        Lengths above the most of the coverage are taken for that. Where the paths of the design
+        are too short in all it is made once more, with as much more fibre.
 
         Raises
         ------
         InputError
             As `for_part`.
         """
-        full, longest = _mean_area(layers) / machine.fibre_width, max(lengths)
-        told = replace(self, coverage=min(longest / full, 1.0))
+        full = _mean_area(layers) / machine.fibre_width
+        most = max(self.amount.most, self.coverage) * full
+        lengths = [min(length, most) for length in lengths]
+        longest = max(lengths)
+        told = replace(self, coverage=longest / full)
         found = told._cut(stress, layers, machine, lengths)
         laid = max(float(paths.lengths.sum()) for paths in found) / len(layers)
         if 0.0 < laid < _ENOUGH * longest and self.overfill * told.coverage < DENSEST:
-            told = replace(told, overfill=min(_MORE * longest / laid, 2.0) * self.overfill)
-            again = told._cut(stress, layers, machine, lengths)
+            more = replace(told, overfill=min(_MORE * longest / laid, 2.0) * self.overfill)
+            again = more._cut(stress, layers, machine, lengths)
             if max(float(paths.lengths.sum()) for paths in again) > laid * len(layers):
-                found = again
+                told, found = more, again
         designed = told.overfill * told.coverage
         return [
-            (_designed_for(told, min(length / full, 1.0), designed), _Planned(paths))
+            (_designed_for(told, length / full, designed), _Planned(paths))
             for length, paths in zip(lengths, found, strict=True)
         ]
 

@@ -8,6 +8,7 @@ import ccfem.cases.part_file
 from ccfem.cases.part_file import read_part
 from ccfem.elasticity.problem import Bearing, Force, PointForce, Pressure, Support, Traction
 from ccfem.elasticity.solve import solve
+from ccfem.elasticity.support_kinds import PressingSupport
 from ccfem.errors import InputError
 from ccfem.io import write_mesh
 from ccfem.layers.slicing.planar import Planar
@@ -123,6 +124,16 @@ name = "end"
 patch = "tip"
 components = "z"
 value = [0, 0, 0.1]
+[[supports]]
+patch = "other"
+kind = "pressing"
+normal = [1, 0, 0]
+[[alternative_supports]]
+patch = "foot"
+components = "x"
+[[alternative_supports]]
+patch = "side"
+kind = "pressing"
 [machine]
 minimum_length = 60
 [strategies.isocurve]
@@ -134,7 +145,9 @@ rings = [1.5]
     assert problem.supports == (
         Support("foot"),
         Support("tip", components="z", value=(0.0, 0.0, 0.1)),
+        PressingSupport("other", (1.0, 0.0, 0.0)),
     )
+    assert case.alternative_supports == (Support("foot", "x"), PressingSupport("side"))
     assert dict(problem.loads) == {
         "pull": (Force("end", (10.0, 0.0, 0.0)), Traction("end", (0.0, 0.5, 0.0))),
         "press": (Pressure("top", 0.2), PointForce((30.0, 5.0, 5.0), (0.0, 0.0, -1.0))),

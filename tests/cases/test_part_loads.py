@@ -19,6 +19,7 @@ from ccfem.elasticity import (
     Pin,
     PointSpring,
     PointSupport,
+    PressingSupport,
     RigidPatch,
     SlidingSupport,
     Spring,
@@ -121,6 +122,10 @@ kind = "foundation"
 patch = "z_max"
 normal = 4
 tangential = 0.5
+[[supports]]
+kind = "pressing"
+patch = "y_min"
+normal = "-y"
 """
     problem = read(folder, PART + text + PULLED)
     assert problem.supports == (
@@ -133,6 +138,7 @@ tangential = 0.5
         Spring("z_max", (1.0, 0.0, 2.5)),
         PointSpring((20.0, 0.0, 0.0), (0.0, 3.0, 0.0)),
         Foundation("z_max", 4.0, 0.5),
+        PressingSupport("y_min", "-y"),
     )
     assert len(problem.supports) == len(SUPPORTS)
 
