@@ -35,8 +35,10 @@ them with a minus ("-z"), or three numbers.
     [material]                        # isotropic ...
     modulus = 3500.0
     poisson = 0.35
-    name = "PLA+"                     # optional; so are source, tensile_strength and
-                                      # compressive_strength
+    name = "PLA+"                     # optional; so are source, tensile_strength,
+                                      # compressive_strength, ...
+    mass_density = 1.24               # ... g/cm^3, for gravity, and the strain by heat, 1/K: ...
+    expansion = 7e-5                  # ... or expansion_fibre and expansion_transverse
     [material]                        # ... or transversely isotropic, the fibre along x
     modulus_fibre = 60000.0
     modulus_transverse = 4100.0
@@ -89,13 +91,63 @@ them with a minus ("-z"), or three numbers.
     radius = 2.75
     axis = "z"                        # optional: only those along it
 
+    [regions.insert]                  # cells of another material, by a rule for their centres
+    rule = "cylinder"                 # point, axis, radius; or "box": lower, upper
+    point = [15, 15, 0]
+    axis = "z"
+    radius = 8.0
+    material = "pa6"                  # a name or a table, as above
+
     [[supports]]                      # at least one
+    kind = "held"                     # default: components of the displacement of a patch
     patch = "foot"
     components = "xyz"                # which are held; default all
     value = [0, 0, 0]                 # displacement they take, mm; default none
-    kind = "pressing"                 # optional: the patch lies on something rigid, may slide and
-                                      # lift off and not sink in: patch, and optionally normal, out
-                                      # of the part; "held" is the default
+
+    [[supports]]
+    kind = "pressing"                 # the patch lies on something rigid: it may slide and lift
+    patch = "foot"                    # off, and not sink in
+    normal = "-z"                     # optional: out of the part
+
+    [[supports]]
+    kind = "edge"                     # the nodes that two patches share
+    patches = ["foot", "pin"]         # components, value
+
+    [[supports]]
+    kind = "point"                    # the node nearest to a point: point, components, value
+    point = [0, 0, 0]
+
+    [[supports]]
+    kind = "sliding"                  # a patch of any slope that slides without friction:
+    patch = "corner"                  # only what goes across it is held
+    normal = [0, 1, 1]                # optional: the direction that is held
+    value = 0.0                       # optional: displacement along it, mm
+
+    [[supports]]
+    kind = "rigid"                    # a patch that a stiff plate is glued to
+    patch = "grip"
+    components = "z"                  # of its centre that are held, may be "" ...
+    rotations = ""                    # ... and the axes about which it cannot turn
+    angle = [0, 0, 0]                 # optional: rotation that it takes, degrees; value as above
+    centre = [80, 15, 3]              # optional
+
+    [[supports]]
+    kind = "pin"                      # a rigid pin in a hole; turns freely about its own axis
+    patch = "bore"
+    point = [15, 15, 0]               # on the axis
+    axis = "z"
+    slides = true                     # optional: moves along its axis too; value as above
+
+    [[supports]]
+    kind = "spring"                   # springs to the ground, spread evenly over a patch
+    patch = "tip"                     # ("point_spring": at the node nearest to a point)
+    stiffness = [10, 0, 0]            # N/mm along x, y, z, all together
+
+    [[supports]]
+    kind = "foundation"               # an elastic bed, MPa/mm across the patch and along it
+    patch = "foot"
+    normal = 5.0
+    tangential = 0.0                  # optional
 
     [[alternative_supports]]          # another model of how the part is held, keys as of supports:
     patch = "foot"                    # strategies are tested under both, and no order is told that
@@ -111,6 +163,25 @@ them with a minus ("-z"), or three numbers.
     patch = "tip"                     # "traction", MPa: patch, vector
     vector = [0, 0, -10]              # "pressure", MPa, inward: patch, magnitude
                                       # "point", N at the nearest node: point, vector
+                                      # "body_force", N/mm^3: vector
+
+    [[loads.weight]]
+    kind = "gravity"                  # all keys optional
+    acceleration = [0, 0, -9.81]      # m/s^2, the way in which the weight pulls
+    mass_density = 1.24               # g/cm^3, of the whole part; default that of its materials
+
+    [[loads.heat]]
+    kind = "temperature"              # of the whole part
+    change = 40.0                     # K
+
+    [[loads.moved]]
+    kind = "displacement"             # what the supports on a patch take in this load case, mm
+    patch = "foot"
+    vector = [0, 0, 0.1]
+
+    [combinations.hot_pull]           # a load case more: the sum of others times factors
+    pull = 1.5
+    heat = 1.0
 
     [machine]                         # what differs from ccfem.machine.machine.Machine
     minimum_length = 45.0
@@ -142,15 +213,14 @@ from ccfem.arrays import FloatArray
 from ccfem.cases.before_meshing import check_before_meshing
 from ccfem.cases.case import Case, check_name
 from ccfem.cases.part_body import Body
-from ccfem.cases.part_tables import (
+from ccfem.cases.part_loads import (
     alternative_supports_of,
-    check_strategies,
+    combinations_of,
     loads_of,
-    material_of,
-    named_table,
-    rules_of,
     supports_of,
 )
+from ccfem.cases.part_regions import region_rules_of, regions_of
+from ccfem.cases.part_tables import check_strategies, material_of, named_table, rules_of
 from ccfem.elasticity.load_kinds import patches_in_use
 from ccfem.elasticity.problem import Problem
 from ccfem.errors import InputError, Mistakes
@@ -177,6 +247,8 @@ class _Part(Body):
     supports: tuple[dict[str, Any], ...] = ()
     loads: dict[str, Any] = field(default_factory=dict)
     alternative_supports: tuple[dict[str, Any], ...] = ()
+    combinations: dict[str, Any] = field(default_factory=dict)
+    regions: dict[str, Any] = field(default_factory=dict)
     name: str = ""
     title: str = ""
     source: str = ""
@@ -242,6 +314,8 @@ def _case(content: Mapping[str, Any], path: Path) -> Case:
     supports = supports_of(part.supports, found) if "supports" not in unread else ()
     others = alternative_supports_of(part.alternative_supports, found)
     loads = loads_of(part.loads, found) if "loads" not in unread else {}
+    combinations = combinations_of(part.combinations, part.loads, found)
+    regions = region_rules_of(part.regions, found)
     with found.noted():
         part.check(path.parent)
     found.complain()
@@ -261,7 +335,15 @@ def _case(content: Mapping[str, Any], path: Path) -> Case:
     return Case(
         name=name,
         title=part.title or name,
-        problem=Problem(mesh, material, supports, loads, order=part.order),
+        problem=Problem(
+            mesh,
+            material,
+            supports,
+            loads,
+            regions=regions_of(mesh, regions),
+            combinations=combinations,
+            order=part.order,
+        ),
         build=(float(build[0]), float(build[1]), float(build[2])),
         slicing=slicing,
         machine=machine,

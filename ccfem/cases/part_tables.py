@@ -1,17 +1,8 @@
-"""Tables of a part file to values: rules of patches, loads, material, parameters of strategies."""
+"""Tables of a part file to values: rules of patches, material, parameters of strategies."""
 
 from collections.abc import Callable, Mapping
 from typing import Any
 
-from ccfem.elasticity.problem import (
-    Bearing,
-    Force,
-    Load,
-    PointForce,
-    Pressure,
-    Traction,
-)
-from ccfem.elasticity.support_kinds import AnySupport, PressingSupport, Support
 from ccfem.errors import InputError, Mistakes, shown
 from ccfem.io.toml import from_table
 from ccfem.materials import (
@@ -25,16 +16,14 @@ from ccfem.mesh.face_rules import Faces, Holes
 from ccfem.mesh.patches import Box, Cylinder, Group, Nearest, PatchRule, Plane
 
 __all__ = [
-    "alternative_supports_of",
+    "RULES",
     "check_strategies",
-    "loads_of",
     "material_of",
     "named_table",
     "rules_of",
-    "supports_of",
 ]
 
-_RULES: dict[str, Callable[..., PatchRule]] = {
+RULES: dict[str, Callable[..., PatchRule]] = {
     "plane": Plane,
     "box": Box,
     "cylinder": Cylinder,
@@ -43,15 +32,7 @@ _RULES: dict[str, Callable[..., PatchRule]] = {
     "face": Faces,
     "holes": Holes,
 }
-_HELD = "held"
-_SUPPORTS: dict[str, Callable[..., AnySupport]] = {_HELD: Support, "pressing": PressingSupport}
-_LOADS: dict[str, Callable[..., Load]] = {
-    "force": Force,
-    "traction": Traction,
-    "pressure": Pressure,
-    "bearing": Bearing,
-    "point": PointForce,
-}
+"""Rules of patches by their name."""
 
 
 def rules_of(tables: Mapping[str, Any], found: Mistakes) -> dict[str, PatchRule]:
@@ -60,59 +41,12 @@ def rules_of(tables: Mapping[str, Any], found: Mistakes) -> dict[str, PatchRule]
     for name, table in tables.items():
         with found.noted():
             where = f"patches.{name}"
-            kind, rest = named_table(table, "rule", _RULES, where)
-            make = _RULES[kind]
+            kind, rest = named_table(table, "rule", RULES, where)
+            make = RULES[kind]
             if kind == "plane" and "point" in rest:
                 make = Plane.through
             rules[name] = from_table(make, rest, where, infinite=kind == "box")
     return rules
-
-
-def supports_of(tables: tuple[dict[str, Any], ...], found: Mistakes) -> tuple[AnySupport, ...]:
-    """Supports of the tables [[supports]]; what is wrong is noted."""
-    if not tables:
-        found.lines.append("a part needs a support: add [[supports]] with its patch")
-    return _supports(tables, "supports", found)
-
-
-def alternative_supports_of(
-    tables: tuple[dict[str, Any], ...], found: Mistakes
-) -> tuple[AnySupport, ...]:
-    """Supports of the tables [[alternative_supports]], if any; what is wrong is noted."""
-    return _supports(tables, "alternative_supports", found)
-
-
-def _supports(
-    tables: tuple[dict[str, Any], ...], key: str, found: Mistakes
-) -> tuple[AnySupport, ...]:
-    supports: list[AnySupport] = []
-    for k, table in enumerate(tables):
-        with found.noted():
-            where = f"{key}[{k}]"
-            kind, rest = named_table({"kind": _HELD, **table}, "kind", _SUPPORTS, where)
-            supports.append(from_table(_SUPPORTS[kind], rest, where))
-    return tuple(supports)
-
-
-def loads_of(cases: Mapping[str, Any], found: Mistakes) -> dict[str, tuple[Load, ...]]:
-    """Read the loads of every load case; what is wrong is noted."""
-    if not cases:
-        found.lines.append("a part needs a load: add [[loads.NAME]] with its kind")
-    loads: dict[str, tuple[Load, ...]] = {}
-    for name, tables in cases.items():
-        if not isinstance(tables, list) or not tables:
-            found.lines.append(
-                f"loads.{name} must be a list of tables; got {shown(tables)}: write "
-                f"[[loads.{name}]]"
-            )
-            continue
-        for k, table in enumerate(tables):
-            with found.noted():
-                where = f"loads.{name}[{k}]"
-                kind, rest = named_table(table, "kind", _LOADS, where)
-                load = from_table(_LOADS[kind], rest, where)
-                loads[name] = (*loads.get(name, ()), load)
-    return loads
 
 
 def named_table(
@@ -128,7 +62,7 @@ def named_table(
     return name, {k: value for k, value in table.items() if k != key}
 
 
-def material_of(given: str | dict[str, Any] | None) -> Material:
+def material_of(given: str | dict[str, Any] | None, where: str = "material") -> Material:
     """Material by name, or of its moduli."""
     if given is None:
         raise InputError(
@@ -138,7 +72,7 @@ def material_of(given: str | dict[str, Any] | None) -> Material:
     if isinstance(given, str):
         return named_material(given)
     make = transversely_isotropic if "modulus_fibre" in given else isotropic
-    return from_table(make, given, "material")
+    return from_table(make, given, where)
 
 
 def check_strategies(tables: Mapping[str, Any], found: Mistakes) -> None:

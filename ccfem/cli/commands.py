@@ -25,6 +25,7 @@ from ccfem.cli.options import (
     Layers,
     LoadCase,
     Out,
+    Refine,
     SetCase,
     Slicing,
     StressFile,
@@ -218,6 +219,7 @@ def compare(
     ] = None,
     virtual_test: VirtualTest = True,
     load_case: LoadCase = None,
+    refine: Refine = False,
     calibration: Calibration = None,
     backend: Backend = "auto",
     stress: StressFile = None,
@@ -247,6 +249,7 @@ def compare(
         paths=files,
         frame=paths_frame,
         force=force,
+        refine=refine,
     )
 
 
@@ -265,6 +268,7 @@ def plan(
     fibre_per_layer: Fibre = None,
     virtual_test: VirtualTest = True,
     load_case: LoadCase = None,
+    refine: Refine = False,
     calibration: Calibration = None,
     backend: Backend = "auto",
     gcode: Annotated[
@@ -283,8 +287,19 @@ def plan(
     options["natural"] = fibre_per_layer is None
     options["print_plans"] = gcode
     options["stress"] = foreign_stress(stress, stress_unit)
-    suffix = f"-{strategy}"
-    run(case, set_case, (strategy,), parameters, options, calibration, out, suffix, force=force)
+    alone, suffix = (strategy,), f"-{strategy}"
+    run(
+        case,
+        set_case,
+        alone,
+        parameters,
+        options,
+        calibration,
+        out,
+        suffix,
+        force=force,
+        refine=refine,
+    )
 
 
 @app.command()
@@ -307,11 +322,12 @@ def solve(
         ),
     ] = None,
     backend: Backend = "auto",
+    refine: Refine = False,
 ) -> None:
     """Solve a part and write displacement, strain, stress, reactions and error for ParaView."""
     from ccfem.cli.solving import solve_part
 
-    solve_part(load(case, set_case), out, load_case, backend)
+    solve_part(load(case, set_case, refine), out, load_case, backend)
 
 
 @app.command()

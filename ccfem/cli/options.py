@@ -79,6 +79,14 @@ VirtualTest = Annotated[
         help="Re-solve the part with the fibres of each strategy in it.",
     ),
 ]
+Refine = Annotated[
+    bool,
+    typer.Option(
+        "--refine",
+        help="First halve cells where the estimated error sits, until it is below 10 % in energy "
+        "norm in all load cases.",
+    ),
+]
 LoadCase = Annotated[
     str | None,
     typer.Option("--load-case", metavar="NAME", help="Load case to plan for; default the first."),

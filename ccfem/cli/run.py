@@ -27,8 +27,8 @@ _SOLVED = 0.75
 """Share of the progress bar at which the comparison is made and the pictures begin."""
 
 
-def load(name: str, set_case: Sequence[str] | None) -> "Case":
-    """Read a part file, or make a case from its name and parameters."""
+def load(name: str, set_case: Sequence[str] | None, refine: bool = False) -> "Case":
+    """Read a part file, or make a case from its name and parameters; refine its cells if wanted."""
     from ccfem.cases.reading import read
 
     parameters = dict(assignment(text) for text in set_case or ())
@@ -36,7 +36,19 @@ def load(name: str, set_case: Sequence[str] | None) -> "Case":
         raise InputError(
             f"--set-case is for cases by name; '{name}' is a part file: change the file"
         )
-    return read(name, **parameters)
+    case = read(name, **parameters)
+    return _refined(case) if refine else case
+
+
+def _refined(case: "Case") -> "Case":
+    """Case on cells that are fine enough by the estimated error; a finding says how many."""
+    from ccfem.elasticity.refinement import refine
+
+    problem = refine(case.problem)
+    before, after = (len(each.mesh.cells) for each in (case.problem, problem))
+    said = f"{before:,} cells were refined to {after:,} by their estimated error"
+    findings = (*case.findings, said) if after > before else case.findings
+    return replace(case, problem=problem, findings=findings)
 
 
 def layers_of(layers: int | None, heights: str | None, slicing: str | None) -> Any:
@@ -92,6 +104,7 @@ def run(
     paths: Sequence[str] = (),
     frame: str | None = None,
     force: bool = False,
+    refine: bool = False,
 ) -> None:
     """Compare strategies, write the results and print the table; a failure leaves nothing behind.
 
@@ -116,14 +129,18 @@ def run(
         What the coordinates of these files are in.
     force : bool
         Replace files in the folder that ccfem did not write, too.
+    refine : bool
+        Refine the cells by their estimated error first.
     """
+    if refine and options.get("stress") is not None:
+        raise InputError("--refine changes the mesh that the file of --stress is on: drop one")
     from ccfem.cli.screen import print_comparison
     from ccfem.comparison.compare import compare, create_all
     from ccfem.comparison.files import write_results
     from ccfem.io.result_folder import whole_folder
 
     imported = time.perf_counter()
-    case = load(name, set_case)
+    case = load(name, set_case, refine)
     seconds = {"start": imported - _STARTED, "mesh": time.perf_counter() - imported}
     if calibration is not None:
         case, options = _calibrated(case, options, calibration)

@@ -175,9 +175,10 @@ def print_solution(field: StressField, findings: Sequence[str], where: Path) -> 
         lines.append(f"support {label}: ({', '.join(f'{x:.4g}' for x in force)}) N")
     lines.append(about_cells(field))
     how = f"{record.iterations} iterations" if record.iterations else "direct"
+    seconds = record.assembly_seconds + record.solve_seconds
     lines.append(
-        f"{record.backend}, {record.unknowns:,} unknowns, {how}, backward error "
-        f"{record.backward_error:.1e}, {record.assembly_seconds + record.solve_seconds:.1f} s"
+        f"{record.backend} ({record.backend_because}), {record.unknowns:,} unknowns, {how}, "
+        f"backward error {record.backward_error:.1e}, {seconds:.1f} s"
     )
     console.print(f"load case {field.case}", style="bold", markup=False)
     for line in lines:

@@ -325,7 +325,7 @@ def _otherwise_held(case: Case, field: StressField, backend: str) -> StressField
 
 
 def _load_case(case: Case, name: str | None) -> str:
-    known = list(case.problem.loads)
+    known = case.problem.cases
     if not known:
         raise InputError(f"case '{case.name}' has no load case; give it at least one load")
     if name is None:

@@ -16,6 +16,7 @@ from ccfem.elasticity.load_kinds import (
 from ccfem.elasticity.part_stress import GivenStress, PartStress
 from ccfem.elasticity.problem import Problem, Region
 from ccfem.elasticity.recovery import cell_stress, nodal_stress
+from ccfem.elasticity.refinement import refine
 from ccfem.elasticity.solve import solve
 from ccfem.elasticity.solvers import BACKENDS, Solver, factorise, preconditioned_cg
 from ccfem.elasticity.stress_field import SolveRecord, StressField
@@ -72,5 +73,6 @@ __all__ = [
     "pattern",
     "preconditioned_cg",
     "prepare",
+    "refine",
     "solve",
 ]

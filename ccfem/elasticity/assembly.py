@@ -7,6 +7,7 @@ corner gradients.
 """
 
 from dataclasses import dataclass
+from typing import Any
 
 import numpy as np
 import scipy.sparse as sp
@@ -29,36 +30,96 @@ class Pattern:
         First block of each row.
     indices : (b,) int array
         Column (node) of each block, ascending within a row.
+    order : (m,) int array
+        Cells by their lowest node, so that rows meet neighbouring cells one after the other.
     start : (n + 1,) int array
         First entry of each node in `touching`.
     touching : (m * q,) int array
-        ``q * cell + place`` of each cell that a node belongs to and its place there; q is the
-        number of nodes of a cell.
+        ``q * k + place`` of each cell ``order[k]`` that a node belongs to and its place there; q
+        is the number of nodes of a cell.
     """
 
     indptr: IntArray
     indices: IntArray
+    order: IntArray
     start: IntArray
     touching: IntArray
 
     def __post_init__(self) -> None:
-        freeze(self, indptr=np.int32, indices=np.int32, start=np.int32, touching=np.int32)
+        freeze(self, indptr=np.int32, indices=np.int32)
+        freeze(self, order=np.int32, start=np.int32, touching=np.int32)
 
 
 def pattern(mesh: CellMesh) -> Pattern:
     """Find the pattern of the stiffness matrix of a mesh."""
-    (m, q), n = mesh.cells.shape, len(mesh.points)
-    starts = np.arange(0, m * q + 1, q, dtype=np.int32)
-    nodes = mesh.cells.reshape(-1).astype(np.int32)
-    places = np.arange(m * q, dtype=np.int32)
-    cells_of_node = sp.csr_array((places, nodes, starts), shape=(m, n)).T.tocsr()
-    one = np.ones(m * q, dtype=np.bool_)
-    joined = sp.csr_array(
-        (one, cells_of_node.indices, cells_of_node.indptr), shape=(n, m)
-    ) @ sp.csr_array((one, nodes, starts), shape=(m, n))
-    # The pattern is symmetric, and transposing leaves the columns sorted.
-    joined = joined.T.tocsr()
-    return Pattern(joined.indptr, joined.indices, cells_of_node.indptr, cells_of_node.data)
+    n = len(mesh.points)
+    order = _grouped(_lowest(mesh.cells), np.zeros(n + 1, dtype=np.int32))
+    cells = mesh.cells[order].astype(np.int32)
+    start: Any = np.zeros(n + 1, dtype=np.int32)
+    touching = _grouped(cells, start)
+    indptr: Any = np.zeros(n + 1, dtype=np.int32)
+    indices = _neighbours(cells, start, touching, indptr)
+    return Pattern(indptr, indices, order, start, touching)
+
+
+@njit(cache=True)
+def _lowest(cells):  # type: ignore[no-untyped-def]  # pragma: no cover
+    """Lowest node (m, 1) of each cell."""
+    result = np.empty((len(cells), 1), np.int32)
+    for i in range(len(cells)):
+        least = cells[i, 0]
+        for a in range(1, cells.shape[1]):
+            least = min(least, cells[i, a])
+        result[i, 0] = least
+    return result
+
+
+@njit(cache=True)
+def _grouped(values, start):  # type: ignore[no-untyped-def]  # pragma: no cover
+    """Entries of (m, q) values, by value; `start` becomes the first entry of each value."""
+    for i in range(values.shape[0]):
+        for a in range(values.shape[1]):
+            start[values[i, a] + 1] += 1
+    for k in range(1, start.size):
+        start[k] += start[k - 1]
+    result = np.empty(values.size, np.int32)
+    place = start[:-1].copy()
+    for i in range(values.shape[0]):
+        for a in range(values.shape[1]):
+            v = values[i, a]
+            result[place[v]] = i * values.shape[1] + a
+            place[v] += 1
+    return result
+
+
+@njit(cache=True)
+def _neighbours(cells, start, touching, indptr):  # type: ignore[no-untyped-def]  # pragma: no cover
+    """Nodes that share a cell with each node, ascending; `indptr` becomes where each begins."""
+    q = cells.shape[1]
+    seen = np.full(start.size - 1, -1, np.int32)
+    result = np.empty(16 * start.size, np.int32)
+    for i in range(start.size - 1):
+        first = indptr[i]
+        last = first
+        if first + q * (start[i + 1] - start[i]) > result.size:
+            more = np.empty(2 * result.size + q * (start[i + 1] - start[i]), np.int32)
+            more[:first] = result[:first]
+            result = more
+        for e in range(start[i], start[i + 1]):
+            cell = touching[e] // q
+            for b in range(q):
+                j = cells[cell, b]
+                if seen[j] == i:
+                    continue
+                seen[j] = i
+                k = last
+                while k > first and result[k - 1] > j:
+                    result[k] = result[k - 1]
+                    k -= 1
+                result[k] = j
+                last += 1
+        indptr[i + 1] = last
+    return result[: indptr[-1]].copy()
 
 
 def cell_gradients(mesh: TetMesh) -> FloatArray:
@@ -71,12 +132,12 @@ def cell_gradients(mesh: TetMesh) -> FloatArray:
         displacement of its corners.
     """
     result = np.empty((len(mesh.cells), 4, 3))
-    _gradients(mesh.points, mesh.cells, result)
+    _gradients(mesh.points, mesh.cells, result, np.empty(len(mesh.cells)))
     return result
 
 
 @njit(cache=True)
-def _gradients(points, cells, result):  # type: ignore[no-untyped-def]
+def _gradients(points, cells, result, volume):  # type: ignore[no-untyped-def]
     e = np.empty((3, 3))
     for cell in range(len(cells)):
         for a in range(3):
@@ -90,6 +151,7 @@ def _gradients(points, cells, result):  # type: ignore[no-untyped-def]
                 result[cell, a + 1, d] = e[b, p] * e[c, q] - e[b, q] * e[c, p]
         for d in range(3):
             determinant += e[0, d] * result[cell, 1, d]
+        volume[cell] = determinant / 6.0
         for d in range(3):
             total = 0.0
             for a in range(1, 4):
@@ -126,16 +188,16 @@ def _mark(indptr, indices, i, slot):  # type: ignore[no-untyped-def]
 
 
 @njit(cache=True)
-def _gather_linear(indptr, indices, start, touching, cells, gradients, scale, stiffness, data):  # type: ignore[no-untyped-def]
-    one = stiffness.shape[0] == 1
+def _gather_linear(  # type: ignore[no-untyped-def]
+    indptr, indices, start, touching, cells, which, gradients, scale, stiffness, data
+):
     slot = np.empty(indptr.size - 1, np.int32)
     t = np.empty((6, 3))
     for i in range(indptr.size - 1):
         _mark(indptr, indices, i, slot)
         for e in range(start[i], start[i + 1]):
             cell, a = touching[e] // 4, touching[e] % 4
-            c = stiffness[0 if one else cell]
-            _times_gradient(c, gradients[cell, a], scale[cell], t)
+            _times_gradient(stiffness[which[cell]], gradients[cell, a], scale[cell], t)
             for b in range(4):
                 x, y, z = gradients[cell, b, 0], gradients[cell, b, 1], gradients[cell, b, 2]
                 s = slot[cells[cell, b]]
@@ -147,44 +209,66 @@ def _gather_linear(indptr, indices, start, touching, cells, gradients, scale, st
 
 
 @njit(cache=True)
+def _mirror(indptr, indices, i, diagonal, data):  # type: ignore[no-untyped-def]
+    """Copy the blocks left of the diagonal of row i from the rows above; note its diagonal.
+
+    Rows come in order, so the blocks of row j that are wanted come in order too: `diagonal` holds
+    the place of the last one.
+    """
+    for s in range(indptr[i], indptr[i + 1]):
+        j = indices[s]
+        if j == i:
+            diagonal[i] = s
+            break
+        diagonal[j] += 1
+        above = diagonal[j]
+        for p in range(3):
+            for r in range(3):
+                data[s, p, r] = data[above, r, p]
+
+
+@njit(cache=True)
 def _gather_quadratic(  # type: ignore[no-untyped-def]
-    indptr, indices, start, touching, cells, gradients, scale, stiffness, first, second, data
+    indptr, indices, start, touching, cells, which, gradients, scale, stiffness, first, second, data
 ):
     # Gradient of shape function a: sum of its terms phi_s g_s. A corner i has one term,
     # (4 L_i - 1) g_i; the edge (i, j) has two, 4 L_j g_i and 4 L_i g_j. Written with the corner
     # that the linear factor belongs to, any two terms integrate to 16 (1 + [same]) / 20, less 1
     # where one of them is a corner's (twice less 1, plus 1, where both are).
-    one = stiffness.shape[0] == 1
     slot = np.empty(indptr.size - 1, np.int32)
-    t = np.empty((6, 3))
-    block = np.empty((2, 4, 3, 3))
+    diagonal = np.empty(indptr.size - 1, np.int32)
+    t, h = np.empty((6, 3)), np.empty(4)
     for i in range(indptr.size - 1):
         _mark(indptr, indices, i, slot)
         for e in range(start[i], start[i + 1]):
             cell, a = touching[e] // 10, touching[e] % 10
-            c = stiffness[0 if one else cell]
-            terms_a = 1 if a < 4 else 2
-            for k in range(terms_a):
-                corner = first[a] if k == 0 else second[a]
-                _times_gradient(c, gradients[cell, corner], scale[cell], t)
-                for b in range(4):
-                    x, y, z = gradients[cell, b, 0], gradients[cell, b, 1], gradients[cell, b, 2]
-                    for p in range(3):
-                        block[k, b, p] = _against(t, p, x, y, z)
-            for b in range(10):
-                s = slot[cells[cell, b]]
-                terms_b = 1 if b < 4 else 2
-                for k in range(terms_a):
-                    linear_a = second[a] if k == 0 else first[a]
-                    for h in range(terms_b):
-                        linear_b = second[b] if h == 0 else first[b]
-                        corner = first[b] if h == 0 else second[b]
-                        w = 1.6 if linear_a == linear_b else 0.8
-                        if a < 4 or b < 4:
-                            w -= 1.0
-                        for p in range(3):
-                            for r in range(3):
-                                data[s, p, r] += w * block[k, corner, p, r]
+            c, g = stiffness[which[cell]], gradients[cell]
+            less = 1.0 if a < 4 else 0.0
+            for k in range(1 if a < 4 else 2):
+                corner, linear = (first[a], second[a]) if k == 0 else (second[a], first[a])
+                _times_gradient(c, g[corner], scale[cell], t)
+                for d in range(4):
+                    h[d] = 0.8 - less
+                h[linear] += 0.8
+                for b in range(10):
+                    j = cells[cell, b]
+                    if j < i:
+                        continue
+                    p, q = first[b], second[b]
+                    if b < 4:
+                        w = h[p] + less - 1.0
+                        x, y, z = w * g[p, 0], w * g[p, 1], w * g[p, 2]
+                    else:
+                        x = h[q] * g[p, 0] + h[p] * g[q, 0]
+                        y = h[q] * g[p, 1] + h[p] * g[q, 1]
+                        z = h[q] * g[p, 2] + h[p] * g[q, 2]
+                    s = slot[j]
+                    for r in range(3):
+                        u, v, w = _against(t, r, x, y, z)
+                        data[s, r, 0] += u
+                        data[s, r, 1] += v
+                        data[s, r, 2] += w
+        _mirror(indptr, indices, i, diagonal, data)
 
 
 _FIRST = np.concatenate([np.arange(4), TetMesh.edges[:, 0]])
@@ -204,7 +288,7 @@ def assemble(
     mesh : TetMesh
         Linear, or quadratic with straight sides.
     stiffness : (6, 6) or (m, 6, 6) array, MPa
-        In the global frame, for all cells or for each.
+        Symmetric, in the global frame, for all cells or for each.
     density : (m,) array, optional
         Factor on the stiffness of each cell.
     where : Pattern, optional
@@ -216,20 +300,24 @@ def assemble(
         Its columns are sorted and its ``indptr`` and ``indices`` are those of the pattern.
     """
     where = pattern(mesh) if where is None else where
-    scale = mesh.volumes if density is None else mesh.volumes * density
     stiffness = np.ascontiguousarray(stiffness, dtype=np.float64).reshape(-1, 6, 6)
     if len(stiffness) not in (1, len(mesh.cells)):
         raise ValueError(
             f"stiffness must have shape (6, 6) or ({len(mesh.cells)}, 6, 6); got "
             f"{len(stiffness)} matrices: give one a cell"
         )
+    which = where.order if len(stiffness) > 1 else np.zeros_like(where.order)
+    cells = mesh.cells[where.order]
+    gradients, scale = np.empty((len(cells), 4, 3)), np.empty(len(cells))
+    _gradients(mesh.points, cells, gradients, scale)
+    if density is not None:
+        scale *= density[where.order]
     data = np.zeros((len(where.indices), 3, 3))
-    arguments = (where.indptr, where.indices, where.start, where.touching, mesh.cells)
-    values = (cell_gradients(mesh), scale, stiffness)
+    arguments = (where.indptr, where.indices, where.start, where.touching, cells, which)
     if mesh.order == 1:
-        _gather_linear(*arguments, *values, data)
+        _gather_linear(*arguments, gradients, scale, stiffness, data)
     else:
-        _gather_quadratic(*arguments, *values, _FIRST, _SECOND, data)
+        _gather_quadratic(*arguments, gradients, scale, stiffness, _FIRST, _SECOND, data)
     n = 3 * len(mesh.points)
     return sp.bsr_array((data, where.indices, where.indptr), shape=(n, n))
 

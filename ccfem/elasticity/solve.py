@@ -114,6 +114,8 @@ class _Equations(Protocol[FieldT]):
 
     def held_in(self, case: str) -> Held: ...
 
+    def forces_in(self, case: str) -> FloatArray: ...
+
     def assemble(self) -> sp.bsr_array: ...
 
     def factorise(self, matrix: sp.bsr_array, backend: str, solves: int = 1) -> Solver: ...
@@ -134,15 +136,20 @@ def solve_system(
     each = 1 if system.held.presses is None else EXPECTED
     solver = system.factorise(matrix, backend, each * len(system.forces))
     record = SolveRecord(solver.backend, 0, 0.0, assembled - started, 0.0, system.held.unknowns)
+    because = solver.because
     fields, found = {}, {}
     started = assembled
-    for case, forces in system.forces.items():
-        work = partial(_solved, matrix, system.held_in(case), forces, tolerance)
+    # What lies on a support that only presses cannot be added up from the load cases.
+    sums = system.combinations if system.held.presses is None else {}
+    alone = [*system.forces, *(name for name in system.combinations if name not in sums)]
+    for case in alone:
+        work = partial(_solved, matrix, system.held_in(case), system.forces_in(case), tolerance)
         try:
             contact, energy = work(solver)
         except SolveError:
             if backend != "auto" or solver.exact or record.unknowns > LARGEST_DIRECT:
                 raise
+            because = f"{solver.backend} failed"
             solver = system.factorise(matrix, direct_backend())
             contact, energy = work(solver)
         solution, solver = contact.solution, contact.solver
@@ -151,6 +158,7 @@ def solve_system(
         record = replace(
             record,
             backend=solver.backend,
+            backend_because=because,
             iterations=contact.iterations,
             residual=solution.residual,
             backward_error=solution.backward_error,
@@ -159,7 +167,7 @@ def solve_system(
         )
         fields[case] = system.field(case, found[case], matrix, record)
         started = perf_counter()
-    for name, factors in system.combinations.items():
+    for name, factors in sums.items():
         total = sum((k * found[case] for case, k in factors.items()), np.zeros_like(found[case]))
         fields[name] = system.field(name, total, matrix, replace(record, iterations=0))
     return fields

@@ -4,6 +4,7 @@ from collections.abc import Callable
 from dataclasses import dataclass, replace
 from functools import cached_property, partial
 from importlib.util import find_spec
+from typing import Any, NamedTuple
 
 import numpy as np
 import scipy.sparse as sp
@@ -16,7 +17,7 @@ from ccfem.elasticity.skyline import skyline, skyline_operations
 from ccfem.elasticity.solution import Solution, checked, judged, product, reached
 from ccfem.errors import InputError
 
-__all__ = ["BACKENDS", "DIRECT", "Solution", "Solver", "factorise", "preconditioned_cg"]
+__all__ = ["BACKENDS", "DIRECT", "Choice", "Solution", "Solver", "factorise", "preconditioned_cg"]
 
 DIRECT = ("pypardiso", "cholmod", "superlu", "skyline")
 BACKENDS = (*DIRECT, "amg", "two-level")
@@ -67,6 +68,8 @@ class Solver:
     exact : bool
     make : callable
         Makes `apply` of any matrix with the pattern of this one.
+    because : str
+        The rule that chose the backend.
     """
 
     backend: str
@@ -74,6 +77,7 @@ class Solver:
     apply: Callable[[FloatArray], FloatArray]
     exact: bool
     make: Callable[[sp.bsr_array], Callable[[FloatArray], FloatArray]]
+    because: str = ""
 
     def refactorise(self, matrix: sp.bsr_array) -> "Solver":
         """Factorise another matrix of the same pattern, such as another stiffness on the mesh.
@@ -160,7 +164,7 @@ class Solver:
 
 
 def preconditioned_cg(
-    matrix: sp.bsr_array,
+    matrix: Any,
     rhs: FloatArray,
     solver: Solver,
     x0: FloatArray | None = None,
@@ -170,7 +174,7 @@ def preconditioned_cg(
 
     Parameters
     ----------
-    matrix : bsr_array (n, n)
+    matrix : bsr_array (n, n), or anything that ``@`` applies to an (n,) array
     rhs : (n,) array
     solver : Solver
         Of this matrix or of one like it (another stiffness on the same mesh and supports).
@@ -221,8 +225,15 @@ def choose_direct(matrix: sp.bsr_array, renewed: bool = False) -> str:
     return "skyline" if skyline_operations(matrix) <= limit else best
 
 
-def choose(unknowns: int, order: int, solves: int = 1, neighbours: float = np.inf) -> str:
-    """Name the backend that suits a system and what is installed.
+class Choice(NamedTuple):
+    """A backend and the rule that chose it."""
+
+    backend: str
+    because: str
+
+
+def choose(unknowns: int, order: int, solves: int = 1, neighbours: float = np.inf) -> Choice:
+    """Choose the backend that suits a system and what is installed.
 
     Parameters
     ----------
@@ -235,14 +246,21 @@ def choose(unknowns: int, order: int, solves: int = 1, neighbours: float = np.in
         Of a node, itself among them, in the mean.
     """
     if unknowns <= _SMALL:
-        return "superlu"
+        return Choice("superlu", f"at most {_SMALL:,} unknowns")
     if order == 2:
-        return "two-level"
+        return Choice("two-level", f"quadratic cells, more than {_SMALL:,} unknowns")
     best = direct_backend()
-    thin = best == "pypardiso" and neighbours < _THIN
-    if unknowns <= LARGEST_DIRECT and best != "superlu" and (solves >= _MANY or thin):
-        return best
-    return "amg"
+    direct = unknowns <= LARGEST_DIRECT and best != "superlu"
+    if direct and solves >= _MANY:
+        return Choice(best, f"{solves} load cases on at most {LARGEST_DIRECT:,} unknowns")
+    if direct and best == "pypardiso" and neighbours < _THIN:
+        thin = f"one or two cells high ({neighbours:.1f} neighbours a node, below {_THIN})"
+        return Choice(best, f"{thin}, at most {LARGEST_DIRECT:,} unknowns")
+    if unknowns > LARGEST_DIRECT:
+        return Choice("amg", f"linear cells, more than {LARGEST_DIRECT:,} unknowns")
+    if best == "superlu" and (solves >= _MANY or neighbours < _THIN):
+        return Choice("amg", "linear cells, and no sparse Cholesky is installed")
+    return Choice("amg", "linear cells, few load cases")
 
 
 def factorise(
@@ -278,14 +296,16 @@ def factorise(
     SolveError
         When the factorisation fails.
     """
+    because = "asked for"
     if backend == "auto":
         neighbours = len(matrix.indices) / max(1, len(matrix.indptr) - 1)
-        backend = choose(matrix.shape[0], 1 if parents is None else 2, solves, neighbours)
+        order = 1 if parents is None else 2
+        backend, because = choose(matrix.shape[0], order, solves, neighbours)
     check_known("backend", backend, ["auto", *BACKENDS])
     if backend in _MODULES and find_spec(_MODULES[backend]) is None:
         raise InputError(f"backend '{backend}' is not installed: {_CURES[backend]}")
     make = _maker(backend, matrix, points, parents, solves)
-    return Solver(backend, matrix, make(matrix), backend in DIRECT, make)
+    return Solver(backend, matrix, make(matrix), backend in DIRECT, make, because)
 
 
 def _maker(

@@ -47,6 +47,8 @@ class SolveRecord:
         NaN where it was not looked for.
     order_because : str
         Which order of the displacement was chosen and why, where it was left open.
+    backend_because : str
+        The rule that chose the backend, or why another one went on.
     """
 
     backend: str
@@ -59,6 +61,7 @@ class SolveRecord:
     energy_error: float = np.nan
     error: float = np.nan
     order_because: str = ""
+    backend_because: str = ""
 
 
 @dataclass(frozen=True)

@@ -7,6 +7,7 @@ import numpy as np
 
 from ccfem.elasticity.load_kinds import Vector
 from ccfem.errors import InputError
+from ccfem.mesh.patches import unit_vector
 
 __all__ = [
     "AnySupport",
@@ -99,23 +100,21 @@ class SlidingSupport:
     ----------
     patch : str
         A plane of any slope; where it is curved each node slides on its own tangent plane.
-    normal : tuple of 3 floats, optional
-        Direction that is held, of any length; by default the outward normal of the patch.
+    normal : str or tuple of 3 floats, optional
+        Direction that is held, of any length, or "x", "-z" ...; by default the outward normal of
+        the patch.
     value : float, mm, default 0
         Displacement along that direction.
     """
 
     patch: str
-    normal: Vector | None = None
+    normal: str | Vector | None = None
     value: float = 0.0
 
     def __post_init__(self) -> None:
         _check_finite(self, "value")
-        if self.normal is not None and not 0.0 < np.linalg.norm(self.normal) < np.inf:
-            raise InputError(
-                f"normal of the sliding support on patch '{self.patch}' must be 3 finite numbers, "
-                f"not all zero; got {self.normal}: correct it"
-            )
+        if self.normal is not None:
+            unit_vector(self.normal, f"normal of the sliding support on patch '{self.patch}'")
 
 
 @dataclass(frozen=True)
@@ -130,20 +129,17 @@ class PressingSupport:
     Attributes
     ----------
     patch : str
-    normal : tuple of 3 floats, optional
-        Direction out of the part, towards the support, of any length; by default the outward
-        normal at each node.
+    normal : str or tuple of 3 floats, optional
+        Direction out of the part, towards the support, of any length, or "x", "-z" ...; by default
+        the outward normal at each node.
     """
 
     patch: str
-    normal: Vector | None = None
+    normal: str | Vector | None = None
 
     def __post_init__(self) -> None:
-        if self.normal is not None and not 0.0 < np.linalg.norm(self.normal) < np.inf:
-            raise InputError(
-                f"normal of the pressing support on patch '{self.patch}' must be 3 finite numbers, "
-                f"not all zero; got {self.normal}: correct it"
-            )
+        if self.normal is not None:
+            unit_vector(self.normal, f"normal of the pressing support on patch '{self.patch}'")
 
 
 @dataclass(frozen=True)
@@ -192,8 +188,8 @@ class Pin:
         Wall of the hole.
     point : tuple of 3 floats, mm
         On the axis.
-    axis : tuple of 3 floats
-        Direction of the axis, of any length.
+    axis : str or tuple of 3 floats
+        Direction of the axis, of any length, or "x", "-z" ...
     slides : bool, default False
         Whether it is free to move along its axis too.
     value : tuple of 3 floats, mm, default zero
@@ -202,17 +198,13 @@ class Pin:
 
     patch: str
     point: Vector
-    axis: Vector
+    axis: str | Vector
     slides: bool = False
     value: Vector = _ZERO
 
     def __post_init__(self) -> None:
         _check_finite(self, "point", "value")
-        if not 0.0 < np.linalg.norm(self.axis) < np.inf:
-            raise InputError(
-                f"axis of the pin in patch '{self.patch}' must be 3 finite numbers, not all zero; "
-                f"got {self.axis}: correct it"
-            )
+        unit_vector(self.axis, f"axis of the pin in patch '{self.patch}'")
 
 
 @dataclass(frozen=True)

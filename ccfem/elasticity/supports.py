@@ -35,6 +35,7 @@ from ccfem.elasticity.support_kinds import (
 from ccfem.elasticity.ties import Body, Ties
 from ccfem.errors import InputError
 from ccfem.mesh.cell_mesh import CellMesh
+from ccfem.mesh.patches import unit_vector
 
 __all__ = ["check_support", "held", "held_in"]
 
@@ -262,8 +263,8 @@ def _sliding(found: _Collected, support: SlidingSupport, move: Sequence[float] |
         facets = patch_facets(found.surface, support.patch)
         normals = patch_normals(found.surface, facets, nodes)
     else:
-        normal = np.asarray(support.normal, dtype=np.float64)
-        normals = np.tile(normal / np.linalg.norm(normal), (len(nodes), 1))
+        normal = unit_vector(support.normal, "normal of the sliding support")
+        normals = np.tile(normal, (len(nodes), 1))
     values = np.full(len(nodes), support.value) if move is None else normals @ np.asarray(move)
     found.oblique.append((nodes, normals, values))
 
@@ -276,8 +277,8 @@ def _pressing(found: _Collected, support: PressingSupport, move: Sequence[float]
     if support.normal is None:
         normals = patch_normals(found.surface, facets, nodes)
     else:
-        normal = np.asarray(support.normal, dtype=np.float64)
-        normals = np.tile(normal / np.linalg.norm(normal), (len(nodes), 1))
+        normal = unit_vector(support.normal, "normal of the pressing support")
+        normals = np.tile(normal, (len(nodes), 1))
     found.pressing.append((nodes, normals))
 
 
@@ -292,7 +293,7 @@ def _rigid(found: _Collected, support: RigidPatch, move: Sequence[float] | None)
 
 
 def _pin(found: _Collected, support: Pin, move: Sequence[float] | None) -> None:
-    axis = np.array(support.axis) / np.linalg.norm(support.axis)
+    axis = unit_vector(support.axis, "axis of the pin")
     axes = np.linalg.svd(axis[None])[2].T
     axes[:, 0] = axis
     held = np.array([[not support.slides, True, True], [False, True, True]])

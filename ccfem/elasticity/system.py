@@ -3,6 +3,7 @@
 from collections.abc import Mapping
 from dataclasses import dataclass, field
 from functools import cached_property
+from typing import Any
 
 import numpy as np
 import scipy.sparse as sp
@@ -125,9 +126,12 @@ class System:
         )
 
     def field(
-        self, case: str, displacement: FloatArray, matrix: sp.bsr_array, record: SolveRecord
+        self, case: str, displacement: FloatArray, matrix: Any, record: SolveRecord
     ) -> StressField:
-        """Stress, reactions and energy of a displacement (n, 3), mm."""
+        """Stress, reactions and energy of a displacement (n, 3), mm.
+
+        `matrix` is what ``@`` turns a displacement (3n,) into forces (3n,), N, by.
+        """
         problem = self.problem
         scaled = self.stiffness
         if problem.density is not None:

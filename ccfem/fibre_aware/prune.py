@@ -92,11 +92,11 @@ def prune(
         return toolpaths
     specimen = Specimen.of(part) if isinstance(part, StressField) else part
     axial = (Strand() if strand is None else strand).stiffness(specimen.modulus)
-    displacement = None
+    known: tuple[FloatArray, ...] = ()
     for k in range(rounds):
         strands = cut_strands(toolpaths, specimen.unreinforced.mesh)
-        found = equilibrium(specimen, strands, axial, start=displacement, tolerance=1e-5)
-        displacement = found.displacement
+        found = equilibrium(specimen, strands, axial, known=known, tolerance=1e-5)
+        known = (found.displacement,)
         value = np.where(found.carries, found.strain, 0.0) ** 2
         wanted = length if k == rounds - 1 else length + 0.5 * (laid - length)
         along = profiles(toolpaths, strands, value)

@@ -62,6 +62,10 @@ class PlaneSystem:
         """Return what is held in one load case: the same in all."""
         return self.held
 
+    def forces_in(self, case: str) -> FloatArray:
+        """Return the forces (n, 2), N, of one load case."""
+        return self.forces[case]
+
     def assemble(self, matrices: FloatArray | None = None) -> sp.bsr_array:
         """Stiffness matrix (2n, 2n), N/mm, of the problem or of other element matrices."""
         return self.elements.assemble(self.matrices if matrices is None else matrices)

@@ -36,7 +36,7 @@ from ccfem.linking.finishing import keep_off_border, linked_paths
 from ccfem.machine.machine import Machine
 from ccfem.planning.strategy import Amount, LayerPlanner
 from ccfem.toolpaths import Toolpaths
-from ccfem.virtual_testing.bars import strain_operator
+from ccfem.virtual_testing.bars import bars
 from ccfem.virtual_testing.strand import RHO
 from ccfem.virtual_testing.strands import cut_strands
 
@@ -338,7 +338,7 @@ class _Extraction:
         mesh = self.problem.part.mesh
         strands = cut_strands(toolpaths, mesh)
         displacement = self.design.objective.solution.displacement
-        strain = strain_operator(strands, mesh) @ displacement.reshape(-1)
+        strain = bars(strands, mesh).strain(displacement)
         return profiles(toolpaths, strands, np.maximum(strain, 0.0) ** 2)
 
 

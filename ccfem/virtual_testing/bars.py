@@ -3,23 +3,21 @@
 A piece of length l along t adds the energy ``EA l (m . strain)^2 / 2`` with ``m = (tx^2, ty^2,
 tz^2, ty tz, tx tz, tx ty)`` on Voigt strain with engineering shear. With ``b = B^T m`` that is
 the element matrix ``EA l b b^T``. In a linear cell the constant stiffness ``EA l m m^T / V`` gives
-the very same matrix, so all pieces of a cell are summed before one assembly. In a quadratic cell b
-is taken at the middle of the piece.
+the very same matrix. In a quadratic cell b is taken at the middle of the piece. No matrix is made:
+which pieces carry changes from solve to solve, and a product with b and its transpose is cheap.
 """
 
+from dataclasses import dataclass
+
 import numpy as np
-import scipy.sparse as sp
 from numba import njit
 
-from ccfem.arrays import FloatArray
-from ccfem.elasticity.assembly import Pattern, add_blocks, assemble, cell_gradients
+from ccfem.arrays import FloatArray, IntArray, freeze
+from ccfem.elasticity.assembly import cell_gradients
 from ccfem.mesh.tet_mesh import TetMesh
 from ccfem.virtual_testing.strands import Strands
 
-__all__ = ["bar_matrix", "bar_stiffness", "strain_operator"]
-
-_BLOCK = 4000
-"""Pieces in quadratic cells that are assembled at once."""
+__all__ = ["Bars", "bar_stiffness", "bars"]
 
 
 def bar_stiffness(
@@ -60,50 +58,83 @@ def _add_bars(cell, weight, tangent, result):  # type: ignore[no-untyped-def]  #
                 result[c, i, j] += weight[s] * m[i] * m[j]
 
 
-def bar_matrix(
-    strands: Strands, mesh: TetMesh, where: Pattern, share: FloatArray | None = None
-) -> sp.bsr_array:
-    """Stiffness matrix (3n, 3n) of strands with the axial stiffness EA = 1 N.
+@dataclass(frozen=True)
+class Bars:
+    """Pieces of fibre as axial bars, ready to be applied to displacements.
 
-    Parameters
+    Attributes
     ----------
-    strands : Strands
-    mesh : TetMesh
-    where : Pattern
-        Of the stiffness matrix of the mesh.
-    share : (s,) array in [0, 1], optional
-        How much of its stiffness each piece lends; default 1.
-
-    Returns
-    -------
-    bsr_array (3n, 3n) with 3x3 blocks, 1/mm
-        On the pattern; multiply by EA, N, for N/mm.
+    nodes : (s, q) int array
+        Nodes of the cell of each piece.
+    slope : (s, q) array, 1/mm
+        Slopes of its shape functions along the piece.
+    tangent : (s, 3) array
+    length : (s,) array, mm
     """
-    if mesh.order == 1:
-        return assemble(mesh, bar_stiffness(strands, mesh.volumes, share), None, where)
-    weight = strands.length if share is None else strands.length * share
-    slope, tangent, nodes = _slopes(strands, mesh), strands.tangent, mesh.cells[strands.cell]
-    blocks = np.zeros((len(where.indices), 3, 3))
-    matrix = sp.bsr_array((blocks, where.indices, where.indptr), shape=2 * (3 * len(mesh.points),))
-    for first in range(0, len(strands), _BLOCK):
-        at = slice(first, first + _BLOCK)
-        b = (slope[at, :, None] * tangent[at, None]).reshape(-1, 3 * slope.shape[1])
-        add_blocks(matrix, nodes[at], weight[at, None, None] * b[:, :, None] * b[:, None])
-    return matrix
+
+    nodes: IntArray
+    slope: FloatArray
+    tangent: FloatArray
+    length: FloatArray
+
+    def __post_init__(self) -> None:
+        freeze(self, nodes=np.int32, slope=float, tangent=float, length=float)
+
+    def strain(self, displacement: FloatArray) -> FloatArray:
+        """Strain (s,) along the pieces, at their middles, of a displacement (n, 3), mm."""
+        result = np.empty(len(self.length))
+        u = np.ascontiguousarray(displacement, dtype=np.float64)
+        _strain(self.nodes, self.slope, self.tangent, u, result)
+        return result
+
+    def forces(self, stiffness: FloatArray, displacement: FloatArray) -> FloatArray:
+        """Return the forces (n, 3), N, that hold the pieces in a displacement (n, 3), mm.
+
+        Parameters
+        ----------
+        stiffness : (s,) array, N
+            EA of each piece; those of zero stiffness cost nothing.
+        displacement : (n, 3) array, mm
+        """
+        u = np.ascontiguousarray(displacement, dtype=np.float64)
+        result = np.zeros(u.shape)
+        _forces(self.nodes, self.slope, self.tangent, stiffness * self.length, u, result)
+        return result
 
 
-def strain_operator(strands: Strands, mesh: TetMesh) -> sp.csr_array:
-    """Operator (s, 3n), 1/mm, from the displacement to the strain of each piece.
+@njit(cache=True)
+def _stretch(nodes, slope, t, u):  # type: ignore[no-untyped-def]  # pragma: no cover
+    total = 0.0
+    for a in range(len(nodes)):
+        i = nodes[a]
+        total += slope[a] * (t[0] * u[i, 0] + t[1] * u[i, 1] + t[2] * u[i, 2])
+    return total
 
-    The strain is that along the tangent, at the middle of the piece; ``operator @ u.reshape(-1)``
-    for a displacement u (n, 3), mm.
-    """
-    slope, nodes = _slopes(strands, mesh), mesh.cells[strands.cell]
-    values = slope[:, :, None] * strands.tangent[:, None]
-    columns = 3 * nodes[:, :, None] + np.arange(3)
-    starts = np.arange(len(strands) + 1) * (3 * nodes.shape[1])
-    shape = (len(strands), 3 * len(mesh.points))
-    return sp.csr_array((values.reshape(-1), columns.reshape(-1), starts), shape=shape)
+
+@njit(cache=True)
+def _strain(nodes, slope, tangent, u, result):  # type: ignore[no-untyped-def]  # pragma: no cover
+    for s in range(len(nodes)):
+        result[s] = _stretch(nodes[s], slope[s], tangent[s], u)
+
+
+@njit(cache=True)
+def _forces(nodes, slope, tangent, weight, u, result):  # type: ignore[no-untyped-def]  # pragma: no cover
+    for s in range(len(nodes)):
+        if weight[s] == 0.0:
+            continue
+        size = weight[s] * _stretch(nodes[s], slope[s], tangent[s], u)
+        x, y, z = size * tangent[s, 0], size * tangent[s, 1], size * tangent[s, 2]
+        for a in range(nodes.shape[1]):
+            i, k = nodes[s, a], slope[s, a]
+            result[i, 0] += k * x
+            result[i, 1] += k * y
+            result[i, 2] += k * z
+
+
+def bars(strands: Strands, mesh: TetMesh) -> Bars:
+    """Make the pieces of fibre in a mesh ready to be applied to displacements."""
+    nodes = mesh.cells[strands.cell]
+    return Bars(nodes, _slopes(strands, mesh), strands.tangent, strands.length)
 
 
 def _slopes(strands: Strands, mesh: TetMesh) -> FloatArray:

@@ -152,7 +152,8 @@ def _field(problem: Problem, case: str | None) -> StressField:
             f"expected the load case of the test; got {case}: name one of "
             f"{', '.join(problem.loads)}"
         )
-    return solve(replace(problem, loads={case: problem.loads[case]}))[case]
+    alone = replace(problem, loads={case: problem.loads[case]}, combinations={})
+    return solve(alone)[case]
 
 
 def _poisson(problem: Problem) -> float:

@@ -1,5 +1,6 @@
 """Equilibrium of the part with its fibres, bonded or carrying tension only."""
 
+from collections.abc import Sequence
 from dataclasses import dataclass
 
 import numpy as np
@@ -8,9 +9,11 @@ import scipy.sparse as sp
 from ccfem.arrays import BoolArray, FloatArray, freeze
 from ccfem.checks import check_known, check_number
 from ccfem.elasticity.contact import check_pressed
+from ccfem.elasticity.held import Held
 from ccfem.elasticity.solvers import preconditioned_cg
 from ccfem.errors import SolveError
-from ccfem.virtual_testing.bars import bar_matrix, strain_operator
+from ccfem.virtual_testing.bars import Bars, bars
+from ccfem.virtual_testing.reinforced import Reduced, Reinforced
 from ccfem.virtual_testing.specimen import Specimen
 from ccfem.virtual_testing.strands import Strands
 
@@ -35,7 +38,7 @@ class Equilibrium:
     Attributes
     ----------
     displacement : (n, 3) array, mm
-    matrix : bsr_array (3n, 3n), N/mm
+    matrix : Reinforced
         Stiffness of part and carrying fibres.
     strain : (s,) array
         Along each piece of fibre.
@@ -50,7 +53,7 @@ class Equilibrium:
     """
 
     displacement: FloatArray
-    matrix: sp.bsr_array
+    matrix: Reinforced
     strain: FloatArray
     carries: BoolArray
     updates: int
@@ -66,7 +69,7 @@ def equilibrium(
     strands: Strands,
     axial_stiffness: float,
     mode: str = TENSION,
-    start: FloatArray | None = None,
+    known: Sequence[FloatArray] = (),
     tolerance: float = 1e-8,
 ) -> Equilibrium:
     """Find the displacement of a part with fibres.
@@ -85,8 +88,9 @@ def equilibrium(
         EA of one strand.
     mode : str
         "bonded" (all fibres carry) or "tension" (those that are stretched).
-    start : (n, 3) array, mm, optional
-        Where to start; default the part without fibres.
+    known : sequence of (n, 3) arrays, mm, optional
+        Displacements of the same part with less and more of fibre, the nearest last; the mixture
+        of them that has the least energy is where to start. Default: the part without fibres.
     tolerance : float
         Largest relative residual that is accepted.
 
@@ -99,15 +103,22 @@ def equilibrium(
     """
     check_known("mode", mode, MODES)
     check_number("axial stiffness", axial_stiffness, at_least=0.0, unit="N")
-    u = specimen.unreinforced.displacement if start is None else start
+    known = known or (specimen.unreinforced.displacement,)
+    u, total = known[-1], 0
     held, forces = specimen.held.touching(u), specimen.forces
     most = _UPDATES if held.presses is None else 2 * _UPDATES
-    x, total = held.restrict(u), 0
-    operator = strain_operator(strands, specimen.system.problem.mesh)
-    strain, carries = _state(operator, u, mode)
-    matrix = _reinforced(specimen, strands, axial_stiffness, carries)
-    reduced, rhs = held.reduce(matrix), held.right_hand_side(matrix, forces)
+    pieces = bars(strands, specimen.system.problem.mesh)
+    full = axial_stiffness * strands.share
+    strain, carries = _state(pieces, u, mode)
+    matrix = Reinforced(specimen.matrix, pieces, carries * full)
+    if len(known) > 1 and held.presses is None:
+        u = _mixed(matrix, forces, known)
+        strain, carries = _state(pieces, u, mode)
+        matrix = Reinforced(specimen.matrix, pieces, carries * full)
+    part = _reduced(specimen, held)
+    x, rhs = held.restrict(u), held.right_hand_side(matrix, forces)
     for update in range(most):
+        reduced = Reduced(part, matrix, held)
         rest = rhs - reduced @ x
         residual = float(np.linalg.norm(rest) / np.linalg.norm(rhs))
         if residual <= max(tolerance, _SETTLING if held.presses is not None else 0.0):
@@ -117,7 +128,8 @@ def equilibrium(
                 held = following
                 x = held.restrict(u)
                 u = held.expand(x)
-                reduced, rhs = held.reduce(matrix), held.right_hand_side(matrix, forces)
+                part, rhs = _reduced(specimen, held), held.right_hand_side(matrix, forces)
+                reduced = Reduced(part, matrix, held)
                 rest = rhs - reduced @ x
                 residual = float(np.linalg.norm(rest) / np.linalg.norm(rhs))
         if residual <= tolerance:
@@ -129,29 +141,32 @@ def equilibrium(
         x = x + step.values
         u = held.expand(x)
         before = carries
-        strain, carries = _state(operator, u, mode)
+        strain, carries = _state(pieces, u, mode)
         if (before != carries).any():
-            matrix = _reinforced(specimen, strands, axial_stiffness, carries)
-            reduced, rhs = held.reduce(matrix), held.right_hand_side(matrix, forces)
+            matrix = Reinforced(specimen.matrix, pieces, carries * full)
+            rhs = held.right_hand_side(matrix, forces)
     raise SolveError(
         f"virtual test: relative residual {residual:.1e} after {most} updates of the fibres "
         f"that carry tension, above the tolerance {tolerance:.1e}"
     )
 
 
-def _state(
-    operator: sp.csr_array, displacement: FloatArray, mode: str
-) -> tuple[FloatArray, BoolArray]:
+def _reduced(specimen: Specimen, held: Held) -> sp.bsr_array:
+    """Stiffness of the part without fibres on what is left free where it touches this much."""
+    return specimen.solver.matrix if held.presses is None else held.reduce(specimen.matrix)
+
+
+def _mixed(matrix: Reinforced, forces: FloatArray, known: Sequence[FloatArray]) -> FloatArray:
+    """Mixture of displacements (n, 3), by shares that add to 1, of least energy with a matrix."""
+    last = known[-1]
+    moves = np.array([(each - last).reshape(-1) for each in known[:-1]])
+    images = np.array([matrix @ move for move in moves])
+    rest = forces.reshape(-1) - matrix @ last.reshape(-1)
+    shares = np.linalg.lstsq(moves @ images.T, moves @ rest, rcond=1e-12)[0]
+    return last + (shares @ moves).reshape(last.shape)
+
+
+def _state(pieces: Bars, displacement: FloatArray, mode: str) -> tuple[FloatArray, BoolArray]:
     """Strain (s,) of the pieces, and which of them carry."""
-    strain = operator @ displacement.reshape(-1)
+    strain = pieces.strain(displacement)
     return strain, strain > 0.0 if mode == TENSION else np.ones(len(strain), dtype=bool)
-
-
-def _reinforced(
-    specimen: Specimen, strands: Strands, axial_stiffness: float, carries: BoolArray
-) -> sp.bsr_array:
-    """Stiffness matrix (3n, 3n), N/mm, of the part and the pieces of fibre (s,) that carry."""
-    system = specimen.system
-    bars = bar_matrix(strands, system.problem.mesh, system.where, carries * strands.share)
-    data = specimen.matrix.data + axial_stiffness * bars.data
-    return sp.bsr_array((data, bars.indices, bars.indptr), shape=bars.shape)

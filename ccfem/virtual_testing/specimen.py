@@ -71,11 +71,10 @@ class Specimen:
                 f"load case '{case}' heats the part; a virtual test needs forces or moving "
                 "supports: leave the heat out"
             )
-        if not system.held.value.any() and not np.any(
-            system.held.restrict(system.forces[unreinforced.case])
-        ):
+        held = system.held_in(case)
+        if not held.value.any() and not np.any(held.restrict(system.forces_in(case))):
             raise InputError(
-                f"load case '{unreinforced.case}' acts on nodes only that the supports hold, so "
+                f"load case '{case}' acts on nodes only that the supports hold, so "
                 "nothing moves and no stiffness can be told: load another patch"
             )
         return cls(unreinforced, system, system.assemble(), backend)

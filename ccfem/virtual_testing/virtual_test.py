@@ -151,19 +151,20 @@ def virtual_test(
     )
     after = specimen.system.field(before.case, found.displacement, found.matrix, record)
     unreinforced = specimen.stiffness(before.displacement, before.strain_energy)
-    ratios = []
+    ratios, known = [], [before.displacement]
     for rho in span:
         other = equilibrium(
             specimen,
             strands,
             rho * specimen.modulus,
             mode,
-            start=found.displacement,
+            known=[*known, found.displacement],
             tolerance=_SPAN_TOLERANCE,
         )
         energy = 0.5 * float(
             other.displacement.reshape(-1) @ (other.matrix @ other.displacement.reshape(-1))
         )
+        known.append(other.displacement)
         ratios.append((float(rho), specimen.stiffness(other.displacement, energy) / unreinforced))
     force = np.where(found.carries, axial * found.strain, 0.0)
     return VirtualTest(

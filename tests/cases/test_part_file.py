@@ -80,7 +80,7 @@ def test_the_documentation_lists_every_key():
     keys |= {line.strip("[]# ").split("]")[0].split(".")[0] for line in lines if line[:1] == "["}
     for field in ccfem.cases.part_file._Part.__dataclass_fields__:
         assert field in keys, field
-    for kind in (*ccfem.cases.part_tables._RULES, *ccfem.cases.part_tables._LOADS):
+    for kind in (*ccfem.cases.part_tables.RULES, *ccfem.cases.part_loads.LOADS):
         assert f'"{kind}"' in described
 
 

@@ -42,6 +42,18 @@ def test_solve_writes_and_prints_each_load_case(ccfem, tmp_path):
     assert "load case" in err
 
 
+def test_cells_are_refined_on_demand(ccfem, tmp_path):
+    part = ("bar", "--set-case", "element_size=12", "--refine")
+    code, out, err = ccfem("solve", *part, "-o", "bar.vtu")
+    assert (code, err) == (0, "")
+    assert "294 cells were refined to " in out
+    error = float(out.split("linear cells; error ")[1].split("%")[0])
+    assert error <= 10.0
+    code, _, err = ccfem("plan", *part, "--strategy", "zigzag", "--stress", "bar.vtu")
+    assert code == 2
+    assert "--refine changes the mesh that the file of --stress is on: drop one" in err
+
+
 def test_a_comparison_on_the_written_stress_is_the_same(ccfem, tmp_path):
     case = ("bar", "--set-case", "element_size=6", "--layers", 2, "--no-virtual-test")
     assert ccfem("solve", *case[:3], "-o", "bar.vtu")[0] == 0

@@ -65,6 +65,25 @@ def test_energy_of_linear_strain_is_exact_on_quadratic_cells():
 
 
 @pytest.mark.parametrize("order", [1, 2])
+def test_the_order_of_nodes_and_cells_does_not_count(order):
+    mesh, generator = random_mesh(order), np.random.default_rng(3)
+    stiffness, density = (
+        random_stiffness(len(mesh.cells)),
+        generator.uniform(0.1, 1, len(mesh.cells)),
+    )
+    number, turn = generator.permutation(len(mesh.points)), generator.permutation(len(mesh.cells))
+    points = np.empty_like(mesh.points)
+    points[number] = mesh.points
+    mixed = assemble(TetMesh(points, number[mesh.cells][turn]), stiffness[turn], density[turn])
+    assert mixed.has_sorted_indices
+    rows = (3 * number[:, None] + np.arange(3)).reshape(-1)
+    plain = assemble(mesh, stiffness, density).toarray()
+    np.testing.assert_allclose(
+        mixed.toarray()[np.ix_(rows, rows)], plain, rtol=0, atol=1e-12 * plain.max()
+    )
+
+
+@pytest.mark.parametrize("order", [1, 2])
 def test_agrees_with_scikit_fem(order):
     skfem = pytest.importorskip("skfem")
     from skfem.models.elasticity import lame_parameters, linear_elasticity

@@ -130,19 +130,28 @@ def test_two_levels_need_a_quadratic_mesh():
 
 def test_the_choice_follows_size_order_and_what_is_installed(monkeypatch):
     monkeypatch.setattr(solvers, "find_spec", lambda name: None)
-    assert choose(1_000, 1) == choose(1_000, 2) == "superlu"
-    assert choose(20_000, 1) == choose(20_000, 1, solves=10) == "amg"
-    assert choose(20_000, 2) == "two-level"
+    assert choose(1_000, 1).backend == choose(1_000, 2).backend == "superlu"
+    assert choose(20_000, 1).backend == choose(20_000, 1, solves=10).backend == "amg"
+    assert choose(20_000, 2).backend == "two-level"
     monkeypatch.setattr(solvers, "find_spec", lambda name: name == "sksparse" or None)
-    assert choose(20_000, 1) == "amg"
-    assert choose(20_000, 1, solves=10) == "cholmod"
+    assert choose(20_000, 1).backend == "amg"
+    assert choose(20_000, 1, solves=10).backend == "cholmod"
     monkeypatch.setattr(solvers, "find_spec", lambda name: True)
-    assert choose(20_000, 1, solves=10) == "pypardiso"
-    assert choose(500_000, 1, solves=10) == "amg"
-    assert choose(20_000, 1, neighbours=14.0) == "amg"
-    assert choose(20_000, 1, neighbours=11.0) == "pypardiso"
-    assert choose(500_000, 1, neighbours=11.0) == "amg"
-    assert choose(20_000, 2, neighbours=11.0) == "two-level"
+    assert choose(20_000, 1, solves=10).backend == "pypardiso"
+    assert choose(500_000, 1, solves=10).backend == "amg"
+    assert choose(20_000, 1, neighbours=14.0).backend == "amg"
+    assert choose(20_000, 1, neighbours=11.0).backend == "pypardiso"
+    assert choose(500_000, 1, neighbours=11.0).backend == "amg"
+    assert choose(20_000, 2, neighbours=11.0).backend == "two-level"
+    assert "one or two cells high" in choose(20_000, 1, neighbours=11.0).because
+    assert "10 load cases" in choose(20_000, 1, solves=10).because
+
+
+def test_the_record_names_the_rule_that_chose_the_backend(monkeypatch):
+    problem = replace(system().problem, order=1)
+    assert next(iter(solve(problem).values())).record.backend_because == "at most 6,000 unknowns"
+    asked = next(iter(solve(problem, "amg").values())).record
+    assert (asked.backend, asked.backend_because) == ("amg", "asked for")
 
 
 def test_thin_parts_are_told_by_the_neighbours_of_a_node(monkeypatch):

@@ -8,6 +8,7 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
+from ccfem.elasticity import Displacement
 from ccfem.elasticity.problem import Force, PointForce, Problem, Support
 from ccfem.elasticity.solve import solve
 from ccfem.errors import InputError, SolveError
@@ -16,6 +17,7 @@ from ccfem.materials import isotropic
 from ccfem.mesh.box import box_mesh
 from ccfem.toolpaths import Toolpaths
 from ccfem.virtual_testing import equilibrium as equilibrium_module
+from ccfem.virtual_testing.bars import bars
 from ccfem.virtual_testing.equilibrium import BONDED, MODES, TENSION, equilibrium
 from ccfem.virtual_testing.specimen import Specimen
 from ccfem.virtual_testing.stiffer import FIRST, RESOLUTION, SAME, SECOND, UNDECIDED, stiffer
@@ -105,6 +107,23 @@ def test_bar_with_straight_fibres_is_a_rod_in_a_matrix(mode, order):
     assert test.strands.total == pytest.approx(6 * SIZE[0])
 
 
+def test_combination_is_tested_as_a_load_case():
+    half = (Force("x_max", (150.0, 0.0, 0.0)),)
+    problem = dataclasses.replace(
+        stretched(length=0.0),
+        loads={"pull": half, "move": (Displacement("x_max", (0.005, 0.0, 0.0)),)},
+        combinations={"both": {"move": 2.0}},
+    )
+    test = virtual_test(toolpaths(*grid_lines()), solve(problem)["both"], Strand(900.0 / MODULUS))
+    matrix, fibre = MODULUS * SIZE[1] * SIZE[2] / SIZE[0], 6 * 900.0 / SIZE[0]
+    assert test.unreinforced_stiffness == pytest.approx(matrix, rel=1e-10)
+    assert test.stiffness == pytest.approx(matrix + fibre, rel=1e-10)
+    free = dataclasses.replace(bar(half), combinations={"twice": {"load": 2.0}})
+    test = virtual_test(toolpaths(*grid_lines()), solve(free)["twice"], Strand(900.0 / MODULUS))
+    assert test.force == pytest.approx(300.0)
+    assert test.unreinforced_stiffness == pytest.approx(matrix, rel=1e-10)
+
+
 @pytest.mark.parametrize("mode", MODES)
 def test_bar_pulled_by_forces_is_a_rod_in_a_matrix_free_to_narrow(mode):
     # Fibres through rows of nodes; each end is pulled by the force that its fibre carries.
@@ -192,8 +211,7 @@ def test_tension_only_minimises_the_energy():
     held = specimen.system.held
 
     def energy(u):
-        operator = equilibrium_module.strain_operator(strands, specimen.unreinforced.mesh)
-        strain = np.maximum(operator @ u.reshape(-1), 0.0)
+        strain = np.maximum(bars(strands, specimen.unreinforced.mesh).strain(u), 0.0)
         fibre = 0.5 * 4.0 * MODULUS * np.vdot(strands.length, strain**2)
         matrix = 0.5 * u.reshape(-1) @ (specimen.matrix @ u.reshape(-1))
         return fibre + matrix - np.vdot(specimen.forces, u)

@@ -1,0 +1,153 @@
+"""The supports, loads and combinations of a part file: tables to values."""
+
+from collections.abc import Callable, Mapping
+from typing import Any
+
+from ccfem.cases.part_tables import named_table
+from ccfem.elasticity.load_kinds import (
+    Bearing,
+    BodyForce,
+    Displacement,
+    Force,
+    Gravity,
+    Load,
+    PointForce,
+    Pressure,
+    Temperature,
+    Traction,
+)
+from ccfem.elasticity.support_kinds import (
+    AnySupport,
+    EdgeSupport,
+    Foundation,
+    Pin,
+    PointSpring,
+    PointSupport,
+    PressingSupport,
+    RigidPatch,
+    SlidingSupport,
+    Spring,
+    Support,
+)
+from ccfem.errors import InputError, Mistakes, known_names, shown
+from ccfem.io.toml import from_table
+
+__all__ = [
+    "LOADS",
+    "SUPPORTS",
+    "alternative_supports_of",
+    "combinations_of",
+    "loads_of",
+    "supports_of",
+]
+
+LOADS: dict[str, Callable[..., Load]] = {
+    "force": Force,
+    "traction": Traction,
+    "pressure": Pressure,
+    "bearing": Bearing,
+    "point": PointForce,
+    "body_force": BodyForce,
+    "gravity": Gravity,
+    "temperature": Temperature,
+    "displacement": Displacement,
+}
+"""Loads by their kind."""
+
+_HELD = "held"
+SUPPORTS: dict[str, Callable[..., AnySupport]] = {
+    _HELD: Support,
+    "pressing": PressingSupport,
+    "edge": EdgeSupport,
+    "point": PointSupport,
+    "sliding": SlidingSupport,
+    "rigid": RigidPatch,
+    "pin": Pin,
+    "spring": Spring,
+    "point_spring": PointSpring,
+    "foundation": Foundation,
+}
+"""Supports by their kind."""
+
+
+def supports_of(tables: tuple[dict[str, Any], ...], found: Mistakes) -> tuple[AnySupport, ...]:
+    """Supports of the tables [[supports]]; one without a kind holds its patch.
+
+    What is wrong is noted.
+    """
+    if not tables:
+        found.lines.append("a part needs a support: add [[supports]] with its patch")
+    return _supports(tables, "supports", found)
+
+
+def alternative_supports_of(
+    tables: tuple[dict[str, Any], ...], found: Mistakes
+) -> tuple[AnySupport, ...]:
+    """Supports of the tables [[alternative_supports]], if any; what is wrong is noted."""
+    return _supports(tables, "alternative_supports", found)
+
+
+def _supports(
+    tables: tuple[dict[str, Any], ...], key: str, found: Mistakes
+) -> tuple[AnySupport, ...]:
+    supports: list[AnySupport] = []
+    for k, table in enumerate(tables):
+        with found.noted():
+            where = f"{key}[{k}]"
+            kind, rest = named_table({"kind": _HELD, **table}, "kind", SUPPORTS, where)
+            supports.append(from_table(SUPPORTS[kind], rest, where))
+    return tuple(supports)
+
+
+def loads_of(cases: Mapping[str, Any], found: Mistakes) -> dict[str, tuple[Load, ...]]:
+    """Read the loads of every load case, of the tables [[loads.NAME]]; what is wrong is noted."""
+    if not cases:
+        found.lines.append("a part needs a load: add [[loads.NAME]] with its kind")
+    loads: dict[str, tuple[Load, ...]] = {}
+    for name, tables in cases.items():
+        if not isinstance(tables, list) or not tables:
+            found.lines.append(
+                f"loads.{name} must be a list of tables; got {shown(tables)}: write "
+                f"[[loads.{name}]]"
+            )
+            continue
+        for k, table in enumerate(tables):
+            with found.noted():
+                where = f"loads.{name}[{k}]"
+                kind, rest = named_table(table, "kind", LOADS, where)
+                load = from_table(LOADS[kind], rest, where)
+                loads[name] = (*loads.get(name, ()), load)
+    return loads
+
+
+def combinations_of(
+    tables: Mapping[str, Any], cases: Mapping[str, Any], found: Mistakes
+) -> dict[str, dict[str, float]]:
+    """Factors of load cases, of the tables [combinations.NAME]; what is wrong is noted."""
+    combinations = {}
+    for name, table in tables.items():
+        with found.noted():
+            combinations[name] = _factors(name, table, cases)
+    return combinations
+
+
+def _factors(name: str, table: object, cases: Mapping[str, Any]) -> dict[str, float]:
+    """Factors of the load cases in one combination."""
+    where = f"combinations.{name}"
+    if not isinstance(table, Mapping) or not table:
+        raise InputError(
+            f"{where} must be a table of load cases with their factors; got {shown(table)}: write "
+            f"[{where}] and NAME = FACTOR"
+        )
+    for case, factor in table.items():
+        if case not in cases:
+            raise InputError(
+                f"{where} names no load case '{case}'; there are: {known_names(case, cases)}"
+            )
+        if isinstance(factor, bool) or not isinstance(factor, int | float):
+            raise InputError(f"{where}.{case} must be a number; got {shown(factor)}: correct it")
+        if not abs(factor) < 1e300:
+            raise InputError(f"{where}.{case} must be finite; got {shown(factor)}: correct it")
+    if name in cases:
+        raise InputError(f"{where} has the name of a load case: rename one of them")
+    return {case: float(factor) for case, factor in table.items()}
