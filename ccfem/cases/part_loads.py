@@ -57,7 +57,6 @@ LOADS: dict[str, Callable[..., Load]] = {
 _HELD = "held"
 SUPPORTS: dict[str, Callable[..., AnySupport]] = {
     _HELD: Support,
-    "pressing": PressingSupport,
     "edge": EdgeSupport,
     "point": PointSupport,
     "sliding": SlidingSupport,
@@ -66,6 +65,7 @@ SUPPORTS: dict[str, Callable[..., AnySupport]] = {
     "spring": Spring,
     "point_spring": PointSpring,
     "foundation": Foundation,
+    "pressing": PressingSupport,
 }
 """Supports by their kind."""
 

@@ -13,7 +13,7 @@ def start() -> None:
     signal.signal(signal.SIGTERM, _end)
     if heeded:
         signal.signal(signal.SIGINT, _end)
-    from ccfem.cli.commands import main
+    from ccfem.cli.main import main
 
     if heeded:
         signal.signal(signal.SIGINT, signal.default_int_handler)

@@ -7,7 +7,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from ccfem.cli.commands import main
+from ccfem.cli.main import main
 from ccfem.virtual_testing.calibration import read_calibration
 
 QUICK = ["--set-case", "element_size=4.0", "--layers", "2"]

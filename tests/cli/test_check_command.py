@@ -5,7 +5,7 @@ import sys
 
 import pytest
 
-from ccfem.cli.commands import main
+from ccfem.cli.main import main
 
 PART = """
 title = "Strip, 60 mm"

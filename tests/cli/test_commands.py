@@ -12,7 +12,7 @@ import pytest
 
 from ccfem import __version__
 from ccfem.cli.arguments import parameters_by_strategy
-from ccfem.cli.commands import main
+from ccfem.cli.main import main
 from ccfem.errors import InputError
 from ccfem.export.waypoints import read_waypoints
 from ccfem.io import write_mesh

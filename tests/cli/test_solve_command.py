@@ -7,7 +7,7 @@ import numpy as np
 import pytest
 import pyvista
 
-from ccfem.cli.commands import main
+from ccfem.cli.main import main
 
 
 @pytest.fixture

@@ -6,7 +6,7 @@ import sys
 import numpy as np
 import pytest
 
-from ccfem.cli.commands import main
+from ccfem.cli.main import main
 from ccfem.export.waypoints import read_waypoints
 
 PART = """
