@@ -30,6 +30,7 @@ if TYPE_CHECKING:
     from ccfem.comparison.result import Comparison
     from ccfem.elasticity import Problem, solve
     from ccfem.evaluation import evaluate
+    from ccfem.inspection.part_check import check
     from ccfem.layers.slicing import slice
     from ccfem.machine import Machine
     from ccfem.planning import plan
@@ -40,6 +41,7 @@ __all__ = [
     "Comparison",
     "Machine",
     "Problem",
+    "check",
     "compare",
     "evaluate",
     "plan",
@@ -56,6 +58,7 @@ _HOMES = {
     "Comparison": "comparison",
     "Machine": "machine",
     "Problem": "elasticity",
+    "check": "inspection",
     "compare": "comparison",
     "evaluate": "evaluation",
     "plan": "planning",
@@ -69,9 +72,9 @@ _HOMES = {
 _PACKAGES = frozenset(
     {
         *("cases", "comparison", "elasticity", "errors", "evaluation", "export", "fields"),
-        *("geometry", "io", "layers", "linking", "machine", "materials", "mesh", "meshing"),
-        *("planning", "plates", "plot", "progress", "raster", "strategies", "tensor"),
-        *("toolpaths", "topopt", "virtual_testing"),
+        *("geometry", "inspection", "io", "layers", "linking", "machine", "materials"),
+        *("mesh", "meshing", "planning", "plates", "plot", "progress", "raster", "strategies"),
+        *("tensor", "toolpaths", "topopt", "virtual_testing"),
     }
 )
 """Packages and modules that need no import of their own."""

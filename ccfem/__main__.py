@@ -1,6 +1,6 @@
 """``python -m ccfem`` is ``ccfem``."""
 
-from ccfem.cli.commands import main
+from ccfem.cli.start import start
 
 if __name__ == "__main__":
-    main()
+    start()

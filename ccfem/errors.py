@@ -1,9 +1,11 @@
-"""The two errors that ccfem raises."""
+"""The two errors that ccfem raises, and how several mistakes become one of them."""
 
 import difflib
-from collections.abc import Iterable
+import reprlib
+from collections.abc import Iterable, Iterator
+from contextlib import contextmanager
 
-__all__ = ["InputError", "SolveError", "known_names"]
+__all__ = ["InputError", "Mistakes", "SolveError", "known_names", "shown"]
 
 
 class InputError(ValueError):
@@ -11,7 +13,48 @@ class InputError(ValueError):
 
     The message is one line that says what was expected, what came and the cure; the command line
     prints it and exits with code 2.
+
+    Attributes
+    ----------
+    mistakes : tuple of str
+        All that was found, one line each, where several mistakes were; else the message.
     """
+
+    def __init__(self, *lines: str) -> None:
+        more = f" (and {len(lines) - 1} more: ccfem check names them all)" if lines[1:] else ""
+        super().__init__("".join(lines[:1]) + more)
+        self.mistakes = lines
+
+
+class Mistakes:
+    """Collects mistakes, so that all of them come at once.
+
+    Examples
+    --------
+    >>> found = Mistakes()
+    >>> with found.noted():
+    ...     raise InputError("no foot")
+    >>> with found.noted("body: "):
+    ...     raise InputError("no head")
+    >>> found.lines
+    ['no foot', 'body: no head']
+    """
+
+    def __init__(self) -> None:
+        self.lines: list[str] = []
+
+    @contextmanager
+    def noted(self, where: str = "") -> Iterator[None]:
+        """Note what goes wrong in the block, and go on behind it."""
+        try:
+            yield
+        except InputError as error:
+            self.lines += [where + line for line in error.mistakes]
+
+    def complain(self) -> None:
+        """Raise where there were mistakes."""
+        if self.lines:
+            raise InputError(*dict.fromkeys(self.lines))
 
 
 class SolveError(RuntimeError):
@@ -31,3 +74,20 @@ def known_names(wanted: str, known: Iterable[str]) -> str:
     names = list(known)
     near = difflib.get_close_matches(wanted, names, n=1)
     return ", ".join(names) + (f": did you mean '{near[0]}'?" if near else "")
+
+
+def shown(value: object) -> str:
+    """Show what came, cut where it is long: an integer of 400 digits, a list of a thousand items.
+
+    Examples
+    --------
+    >>> shown("abc")
+    "'abc'"
+    >>> len(shown(10**5000)) < 90, len(shown([[1.0] * 1000] * 1000)) < 300
+    (True, True)
+    """
+    if isinstance(value, int) and abs(value) >= 10**40:
+        return "a number of more than 40 digits"
+    short = reprlib.Repr()
+    short.maxstring = short.maxother = short.maxlong = 80
+    return short.repr(value)

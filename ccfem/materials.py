@@ -36,6 +36,12 @@ class Material:
     mass_density : float or None, g/cm^3
     expansion : tuple of 3 floats or None, 1/K
         Strain by heat along axes 1, 2 and 3.
+    interlayer_tensile : float or None, MPa
+        Strength of the bond between printed layers across them: that of a bar printed upright,
+        over its gross area.
+    interlayer_shear : float or None, MPa
+        The same along the layers; where None, `interlayer_tensile`. A bar with layers at 45 degrees
+        that fails at s gives it: ``1 / shear^2 = 4 / s^2 - 1 / tensile^2``.
     """
 
     name: str
@@ -45,6 +51,8 @@ class Material:
     source: str = ""
     mass_density: float | None = None
     expansion: tuple[float, float, float] | None = None
+    interlayer_tensile: float | None = None
+    interlayer_shear: float | None = None
 
     def __repr__(self) -> str:
         modulus = 1.0 / np.linalg.inv(self.stiffness)[0, 0]
@@ -53,6 +61,12 @@ class Material:
     def __post_init__(self) -> None:
         freeze(self, stiffness=float)
         check_fields(self, "tensile_strength", "compressive_strength", above=0.0, unit="MPa")
+        check_fields(self, "interlayer_tensile", "interlayer_shear", above=0.0, unit="MPa")
+        if self.interlayer_shear is not None and self.interlayer_tensile is None:
+            raise InputError(
+                f"material '{self.name}': interlayer_shear needs interlayer_tensile beside it; got "
+                f"{self.interlayer_shear:g} MPa alone: give both"
+            )
         stiffness = self.stiffness
         if stiffness.shape != (6, 6) or not np.allclose(stiffness, stiffness.T, rtol=1e-9):
             raise InputError(
@@ -85,10 +99,12 @@ def isotropic(
     source: str = "",
     mass_density: float | None = None,
     expansion: float | None = None,
+    interlayer_tensile: float | None = None,
+    interlayer_shear: float | None = None,
 ) -> Material:
     """Isotropic material from Young's modulus, MPa, and Poisson's ratio in (-1, 0.5).
 
-    Mass density in g/cm^3, expansion by heat in 1/K.
+    Mass density in g/cm^3, expansion by heat in 1/K; strengths, MPa, as those of `Material`.
     """
     check_number(f"modulus of material '{name}'", modulus, above=0.0, unit="MPa")
     check_number(f"poisson of material '{name}'", poisson, above=-1.0, below=0.5)
@@ -98,7 +114,15 @@ def isotropic(
     stiffness[:3, :3] += lame
     heat = None if expansion is None else (expansion, expansion, expansion)
     return Material(
-        name, stiffness, tensile_strength, compressive_strength, source, mass_density, heat
+        name,
+        stiffness,
+        tensile_strength,
+        compressive_strength,
+        source,
+        mass_density,
+        heat,
+        interlayer_tensile,
+        interlayer_shear,
     )
 
 
@@ -115,6 +139,8 @@ def transversely_isotropic(
     mass_density: float | None = None,
     expansion_fibre: float | None = None,
     expansion_transverse: float | None = None,
+    interlayer_tensile: float | None = None,
+    interlayer_shear: float | None = None,
 ) -> Material:
     """Transversely isotropic material with the fibre along axis 1, moduli in MPa.
 
@@ -129,6 +155,8 @@ def transversely_isotropic(
     mass_density : float, g/cm^3, optional
     expansion_fibre, expansion_transverse : float, 1/K, optional
         Both or none.
+    interlayer_tensile, interlayer_shear : float, MPa, optional
+        Strengths of the bond between layers: see `Material`.
     """
     e1, e2, nu, nu23 = modulus_fibre, modulus_transverse, poisson_fibre, poisson_transverse
     if not (min(e1, e2, shear_fibre) > 0.0 and -1.0 < nu23 < 1.0 - 2.0 * nu * nu * e2 / e1):
@@ -150,7 +178,15 @@ def transversely_isotropic(
     if expansion_fibre is not None and expansion_transverse is not None:
         heat = (expansion_fibre, expansion_transverse, expansion_transverse)
     return Material(
-        name, stiffness, tensile_strength, compressive_strength, source, mass_density, heat
+        name,
+        stiffness,
+        tensile_strength,
+        compressive_strength,
+        source,
+        mass_density,
+        heat,
+        interlayer_tensile,
+        interlayer_shear,
     )
 
 
@@ -199,13 +235,36 @@ def _printed_fibre(name: str, modulus: float, tensile: float, compressive: float
 
 _TABLE: dict[str, Callable[[], Material]] = {
     "pla": lambda: isotropic(
-        3000.0, 0.35, "pla", 52.0, 61.0, f"{_NEURAL_TOMO} (in-plane axis 1; transverse 32/-47)"
+        3000.0,
+        0.35,
+        "pla",
+        52.0,
+        61.0,
+        f"{_NEURAL_TOMO} (in-plane axis 1; transverse 32/-47; between layers 18, printed PLA spans "
+        "12 to 29); assumed: shear between layers as tension",
+        interlayer_tensile=18.0,
+        interlayer_shear=18.0,
     ),
     "pla_plus": lambda: isotropic(
-        3000.0, 0.35, "pla_plus", 52.0, 61.0, f"{_NEURAL_TOMO} (elastic constants as PLA there)"
+        3000.0,
+        0.35,
+        "pla_plus",
+        52.0,
+        61.0,
+        f"{_NEURAL_TOMO} (elastic constants as PLA there; between layers 18 and 14.43)",
+        interlayer_tensile=18.0,
+        interlayer_shear=14.43,
     ),
     "onyx": lambda: isotropic(
-        1400.0, 0.41, "onyx", 36.0, None, f"{_MARKFORGED}; strength at yield; assumed: nu 0.41"
+        1400.0,
+        0.41,
+        "onyx",
+        36.0,
+        None,
+        f"{_MARKFORGED}; strength at yield; assumed: nu 0.41, and 13 MPa between layers, the share "
+        "0.36 of the strength in the layer that other short-fibre polyamides have",
+        interlayer_tensile=13.0,
+        interlayer_shear=13.0,
     ),
     "nylon_w": lambda: isotropic(
         1700.0, 0.39, "nylon_w", 51.0, None, f"{_MARKFORGED}; strength at yield; assumed: nu 0.39"
@@ -273,4 +332,6 @@ def printed_pla() -> Material:
         table.tensile_strength,
         table.compressive_strength,
         f"assumed: modulus and Poisson's ratio; strengths: {table.source}",
+        interlayer_tensile=table.interlayer_tensile,
+        interlayer_shear=table.interlayer_shear,
     )

@@ -45,3 +45,11 @@ def box():
 @pytest.fixture(scope="session")
 def build_box():
     return make_box
+
+
+@pytest.fixture(scope="session", autouse=True)
+def meshes_of_tests(tmp_path_factory):
+    """Keep the meshes that tests make apart from the user's."""
+    with pytest.MonkeyPatch.context() as patch:
+        patch.setenv("CCFEM_CACHE", str(tmp_path_factory.mktemp("meshes")))
+        yield

@@ -7,14 +7,15 @@ from typing import Any
 
 from ccfem.arrays import freeze
 from ccfem.elasticity.problem import Force, Order, Problem, Support
-from ccfem.errors import InputError
+from ccfem.elasticity.support_kinds import AnySupport
+from ccfem.errors import Mistakes, shown
 from ccfem.layers.slicer import Slicer
 from ccfem.layers.slicing.planar import Planar
 from ccfem.machine.machine import Machine
 from ccfem.materials import printed_pla
 from ccfem.mesh.tet_mesh import TetMesh
 
-__all__ = ["Case", "pulled"]
+__all__ = ["Case", "check_name", "pulled"]
 
 
 def pulled(mesh: TetMesh, force: tuple[float, float, float], order: Order) -> Problem:
@@ -44,6 +45,10 @@ class Case:
         Where a strategy should not use its defaults on this part.
     source : str
         Paper or person that the case comes from.
+    alternative_supports : tuple of supports
+        Another model of how the part is held, such as bolts that only press in place of walls that
+        are held. Where there are some, strategies are tested under both, and no order is told that
+        the two do not agree on.
     findings : tuple of str
         What was found and repaired in a mesh from a file, one line each.
     """
@@ -57,16 +62,31 @@ class Case:
     parameters: Mapping[str, Mapping[str, Any]] = field(default_factory=dict)
     source: str = ""
     findings: tuple[str, ...] = ()
+    alternative_supports: tuple[AnySupport, ...] = ()
 
     def __repr__(self) -> str:
         return f"Case {self.name}: {self.title}"
 
     def __post_init__(self) -> None:
-        freeze(self, parameters=dict)
-        if not re.fullmatch(r"\w[\w .+-]{0,79}", self.name):
-            raise InputError(
-                "the name of a case must have letters, digits, spaces and ._+- alone, at most 80, "
-                f"and begin with a letter or digit; got {self.name[:90]!r}: rename it"
-            )
-        if not self.title.isprintable():
-            raise InputError(f"the title of a case must be one printable line; got {self.title!r}")
+        freeze(self, parameters=dict, alternative_supports=tuple)
+        check_name(self.name, self.title)
+
+
+def check_name(name: str, title: str) -> None:
+    """Refuse a name that is none for a folder, and a title that does not print.
+
+    Raises
+    ------
+    InputError
+    """
+    found = Mistakes()
+    if not re.fullmatch(r"\w[\w .+-]{0,79}", name):
+        found.lines.append(
+            "the name of a case must have letters, digits, spaces and ._+- alone, at most 80, "
+            f"and begin with a letter or digit; got {name[:90]!r}: rename it"
+        )
+    if not title.isprintable():
+        found.lines.append(
+            f"the title of a case must be one printable line; got {shown(title)}: rewrite it"
+        )
+    found.complain()

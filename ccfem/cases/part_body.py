@@ -1,5 +1,6 @@
 """The body of a part file: a mesh, a surface to be filled, or a planform to be extruded."""
 
+from collections.abc import Callable
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
@@ -7,14 +8,20 @@ from typing import Any
 import numpy as np
 import shapely
 
+from ccfem.checks import check_number
 from ccfem.elasticity.problem import Order
-from ccfem.errors import InputError
-from ccfem.io import read_mesh, read_surface
+from ccfem.errors import InputError, Mistakes
+from ccfem.io import Surface, read_mesh
 from ccfem.io.toml import from_table
+from ccfem.io.whole import existing_file
 from ccfem.mesh.check import check_mesh
 from ccfem.mesh.tet_mesh import TetMesh
+from ccfem.meshing.volume import Mesher
 
 __all__ = ["Body"]
+
+_SMALLEST, _LARGEST = 0.1, 1e5
+"""Diagonals, mm, beyond which a unit is wrong."""
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -28,30 +35,61 @@ class Body:
     scale: float = 1.0
     merge_nodes: bool = False
     order: Order = "auto"
+    mesher: Mesher = "auto"
 
-    def read(self, folder: Path) -> tuple[TetMesh, tuple[str, ...]]:
-        """Mesh of the part, checked, and what was found in it; files are relative to a folder."""
+    def check(self, folder: Path) -> None:
+        """Raise on keys that do not go together, and on files that do not exist."""
+        found = Mistakes()
         given = [key for key in ("mesh", "surface", "planform") if getattr(self, key) is not None]
         if len(given) != 1:
-            raise InputError(
+            found.lines.append(
                 "a part needs one of mesh, surface and planform; got "
                 f"{' and '.join(given) or 'none'}: name one"
             )
-        if (self.edge_length is not None) != (self.surface is not None):
-            raise InputError(
+        elif (self.edge_length is not None) != (self.surface is not None):
+            found.lines.append(
                 "edge_length goes with surface, and surface with edge_length: add the one that is "
                 "missing (a planform has its own edge_length)"
             )
         if self.planform is not None and self.scale != 1.0:
-            raise InputError("scale goes with mesh or surface: leave it out of a planform")
+            found.lines.append("scale goes with mesh or surface: leave it out of a planform")
+        with found.noted():
+            check_number("scale", self.scale, above=0.0)
+        for key in ("mesh", "surface"):
+            if getattr(self, key) is not None:
+                with found.noted():
+                    existing_file(folder / getattr(self, key), f"{key} file")
+        found.complain()
+
+    def read(
+        self, folder: Path, before: Callable[[Surface], None] | None = None
+    ) -> tuple[TetMesh, tuple[str, ...]]:
+        """Mesh of the part, checked, and what was found in it; files are relative to a folder.
+
+        `before` is called with a surface that has to be meshed.
+        """
+        self.check(folder)
+        made: tuple[str, ...] = ()
         if self.mesh is not None:
             mesh = read_mesh(folder / self.mesh, self.scale, check=False)
             if self.order == 1 and mesh.order == 2:
                 mesh = mesh.linear()
             mesh, report = check_mesh(mesh, merge=self.merge_nodes)
+        elif self.surface is not None and self.edge_length is not None:
+            from ccfem.meshing import mesh_body
+
+            file = folder / self.surface
+            mesh, made = mesh_body(file, self.edge_length, self.scale, self.mesher, before)
+            mesh, report = check_mesh(mesh)
         else:
-            mesh, report = check_mesh(_filled(self, folder))
-        found = (*report.findings, *self._about_edge_length(mesh))
+            mesh, report = check_mesh(_extruded(self))
+        size = report.diagonal
+        if not _SMALLEST <= size <= _LARGEST:
+            raise InputError(
+                f"the part measures {size:.3g} mm across; expected {_SMALLEST:g} to {_LARGEST:g} "
+                "mm: correct scale, which makes the coordinates mm"
+            )
+        found = (*made, *report.findings, *self._about_edge_length(mesh))
         return mesh.quadratic() if self.order == 2 else mesh, found
 
     def _about_edge_length(self, mesh: TetMesh) -> tuple[str, ...]:
@@ -90,13 +128,8 @@ class _Planform:
     holes: tuple[dict[str, Any], ...] = ()
 
 
-def _filled(body: Body, folder: Path) -> TetMesh:
-    """Mesh of a surface or a planform."""
-    if body.surface is not None and body.edge_length is not None:
-        from ccfem.meshing import tetrahedralise, with_faces_of
-
-        surface = read_surface(folder / body.surface, body.scale)
-        return with_faces_of(surface, tetrahedralise(surface, body.edge_length))
+def _extruded(body: Body) -> TetMesh:
+    """Mesh of a planform."""
     from ccfem.meshing import extrude
 
     plan = from_table(_Planform, body.planform, "planform")

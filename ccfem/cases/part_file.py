@@ -12,8 +12,10 @@ them with a minus ("-z"), or three numbers.
 
     # The body: exactly one of mesh, surface and planform.
     mesh = "hook.msh"                 # tetrahedra: .tet .msh .vtu .inp .npz
-    surface = "hook.stl"              # closed surface (.stl .obj .ply), filled with tetrahedra ...
+    surface = "hook.stl"              # closed surface (.stl .obj .ply) or CAD file (.step .iges
+                                      # .brep), filled with tetrahedra ...
     edge_length = 2.0                 # ... of this edge length
+    mesher = "auto"                   # "gmsh", "ftetwild", or Gmsh where it is installed and works
     scale = 1.0                       # factor on the coordinates of either file; 1000 for metres
     merge_nodes = false               # join pieces of a mesh where their nodes coincide
     order = "auto"                    # linear (1) or quadratic cells (2), or what the estimated
@@ -91,6 +93,13 @@ them with a minus ("-z"), or three numbers.
     patch = "foot"
     components = "xyz"                # which are held; default all
     value = [0, 0, 0]                 # displacement they take, mm; default none
+    kind = "pressing"                 # optional: the patch lies on something rigid, may slide and
+                                      # lift off and not sink in: patch, and optionally normal, out
+                                      # of the part; "held" is the default
+
+    [[alternative_supports]]          # another model of how the part is held, keys as of supports:
+    patch = "foot"                    # strategies are tested under both, and no order is told that
+    kind = "pressing"                 # the two do not agree on
 
     [[loads.pull]]                    # at least one load of one load case, here "pull"
     kind = "bearing"                  # total force, N, that a pin presses on a cylinder
@@ -124,73 +133,50 @@ them with a minus ("-z"), or three numbers.
 
 import os
 import tomllib
-from collections.abc import Callable, Mapping
+from collections.abc import Mapping
 from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Any
 
-from ccfem.cases.case import Case
+from ccfem.arrays import FloatArray
+from ccfem.cases.before_meshing import check_before_meshing
+from ccfem.cases.case import Case, check_name
 from ccfem.cases.part_body import Body
-from ccfem.elasticity.load_kinds import patches_in_use
-from ccfem.elasticity.problem import (
-    Bearing,
-    Force,
-    Load,
-    PointForce,
-    Pressure,
-    Problem,
-    Support,
-    Traction,
+from ccfem.cases.part_tables import (
+    alternative_supports_of,
+    check_strategies,
+    loads_of,
+    material_of,
+    named_table,
+    rules_of,
+    supports_of,
 )
-from ccfem.errors import InputError
+from ccfem.elasticity.load_kinds import patches_in_use
+from ccfem.elasticity.problem import Problem
+from ccfem.errors import InputError, Mistakes
+from ccfem.io.surface import Surface
 from ccfem.io.toml import from_table
 from ccfem.io.whole import existing_file
 from ccfem.layers import slicing as slicers
 from ccfem.layers.slicer import Slicer
 from ccfem.layers.slicing.planar import Planar
 from ccfem.machine.machine import Machine
-from ccfem.materials import Material, isotropic, named_material, transversely_isotropic
-from ccfem.mesh.face_rules import Faces, Holes, without_faces
+from ccfem.materials import Material
+from ccfem.mesh.face_rules import without_faces
 from ccfem.mesh.patch_findings import about_patches
-from ccfem.mesh.patches import (
-    Box,
-    Cylinder,
-    Group,
-    Nearest,
-    PatchRule,
-    Plane,
-    Vector,
-    patches_from_rules,
-    unit_vector,
-)
+from ccfem.mesh.patches import Vector, patches_from_rules, unit_vector
 
 __all__ = ["read_part"]
-
-_RULES: dict[str, Callable[..., PatchRule]] = {
-    "plane": Plane,
-    "box": Box,
-    "cylinder": Cylinder,
-    "nearest": Nearest,
-    "group": Group,
-    "face": Faces,
-    "holes": Holes,
-}
-_LOADS: dict[str, Callable[..., Load]] = {
-    "force": Force,
-    "traction": Traction,
-    "pressure": Pressure,
-    "bearing": Bearing,
-    "point": PointForce,
-}
 
 
 @dataclass(frozen=True, kw_only=True)
 class _Part(Body):
     """The keys of a part file."""
 
-    material: str | dict[str, Any]
-    supports: tuple[dict[str, Any], ...]
-    loads: dict[str, Any]
+    material: str | dict[str, Any] | None = None
+    supports: tuple[dict[str, Any], ...] = ()
+    loads: dict[str, Any] = field(default_factory=dict)
+    alternative_supports: tuple[dict[str, Any], ...] = ()
     name: str = ""
     title: str = ""
     source: str = ""
@@ -225,35 +211,53 @@ def read_part(path: str | os.PathLike[str]) -> Case:
     try:
         with path.open("rb") as file:
             content = tomllib.load(file)
-    except (tomllib.TOMLDecodeError, UnicodeDecodeError) as error:
+    except (ValueError, RecursionError) as error:
         raise InputError(f"{path} is not a TOML file: {error}: correct it") from None
     try:
         return _case(content, path)
     except InputError as error:
-        message = str(error)
-        raise InputError(message if str(path) in message else f"{path}: {message}") from None
+        raise InputError(
+            *(line if str(path) in line else f"{path}: {line}" for line in error.mistakes)
+        ) from None
 
 
 def _case(content: Mapping[str, Any], path: Path) -> Case:
-    """Case of a part file's content."""
-    part = from_table(_Part, content, "the part file")
-    if not part.supports:
-        raise InputError("a part needs a support: add [[supports]] with its patch")
-    slicing = _slicing(part)
-    build = unit_vector(part.build, "build")
-    supports = tuple(
-        from_table(Support, table, f"supports[{k}]") for k, table in enumerate(part.supports)
-    )
-    loads = _loads(part.loads)
-    rules = {name: _rule(table, f"patches.{name}") for name, table in part.patches.items()}
-    machine = from_table(Machine, part.machine, "machine")
-    material = _material(part.material)
-    _check_strategies(part.strategies)
-    mesh, findings = part.read(path.parent)
-    mesh = patches_from_rules(mesh, rules)
+    """Case of a part file's content; all mistakes come at once, if possible before meshing."""
+    found = Mistakes()
+    part, unread = _readable(content, found)
+    name, given = part.name or path.stem, _Values()
+    with found.noted():
+        check_name(name, part.title or name)
+    with found.noted():
+        given.build = unit_vector(part.build, "build")
+    with found.noted():
+        given.slicing = _slicing(part)
+    with found.noted():
+        given.machine = from_table(Machine, part.machine, "machine")
+    if "material" not in unread:
+        with found.noted():
+            given.material = material_of(part.material)
+    check_strategies(part.strategies, found)
+    rules = rules_of(part.patches, found)
+    supports = supports_of(part.supports, found) if "supports" not in unread else ()
+    others = alternative_supports_of(part.alternative_supports, found)
+    loads = loads_of(part.loads, found) if "loads" not in unread else {}
+    with found.noted():
+        part.check(path.parent)
+    found.complain()
+
+    def before(surface: Surface) -> None:
+        assert part.edge_length is not None
+        check_before_meshing(surface, part.edge_length, rules, supports, loads)
+
+    mesh, findings = part.read(path.parent, before)
+    for each, rule in rules.items():
+        with found.noted():
+            mesh = patches_from_rules(mesh, {each: rule})
+    found.complain()
     findings = (*findings, *about_patches(mesh, rules))
-    mesh = without_faces(mesh, (*rules, *patches_in_use(supports, loads)))
-    name = part.name or path.stem
+    mesh = without_faces(mesh, (*rules, *patches_in_use((*supports, *others), loads)))
+    build, slicing, machine, material = given.whole()
     return Case(
         name=name,
         title=part.title or name,
@@ -264,7 +268,34 @@ def _case(content: Mapping[str, Any], path: Path) -> Case:
         parameters=part.strategies,
         source=part.source,
         findings=findings,
+        alternative_supports=others,
     )
+
+
+@dataclass
+class _Values:
+    """What the sections of a part file give."""
+
+    build: FloatArray | None = None
+    slicing: Slicer | None = None
+    machine: Machine | None = None
+    material: Material | None = None
+
+    def whole(self) -> tuple[FloatArray, Slicer, Machine, Material]:
+        """All of them; none is missing where there was no mistake."""
+        found = (self.build, self.slicing, self.machine, self.material)
+        assert all(each is not None for each in found)
+        return found  # type: ignore[return-value]
+
+
+def _readable(content: Mapping[str, Any], found: Mistakes) -> tuple[_Part, set[str]]:
+    """Take of a part file what reads; the rest is noted, and named."""
+    good = {}
+    for key, value in content.items():
+        with found.noted():
+            from_table(_Part, {key: value}, "the part file")
+            good[key] = value
+    return from_table(_Part, good, "the part file"), set(content) - set(good)
 
 
 def _slicing(part: _Part) -> Slicer:
@@ -276,68 +307,5 @@ def _slicing(part: _Part) -> Slicer:
             "one"
         )
     if part.slicing is not None:
-        return slicers.create(*_named(part.slicing, "method", slicers.named(), "slicing"))
+        return slicers.create(*named_table(part.slicing, "method", slicers.named(), "slicing"))
     return Planar(count=part.layers, heights=part.heights)
-
-
-def _rule(table: object, where: str) -> PatchRule:
-    """Rule of a table with the key rule."""
-    name, rest = _named(table, "rule", _RULES, where)
-    make = _RULES[name]
-    if name == "plane" and "point" in rest:
-        make = Plane.through
-    return from_table(make, rest, where, infinite=name == "box")
-
-
-def _loads(cases: Mapping[str, Any]) -> dict[str, tuple[Load, ...]]:
-    """Read the loads of every load case."""
-    if not cases:
-        raise InputError("a part needs a load: add [[loads.NAME]] with its kind")
-    found = {}
-    for name, tables in cases.items():
-        if not isinstance(tables, list) or not tables:
-            raise InputError(
-                f"loads.{name} must be a list of tables; got {tables!r}: write [[loads.{name}]]"
-            )
-        loads = []
-        for k, table in enumerate(tables):
-            where = f"loads.{name}[{k}]"
-            kind, rest = _named(table, "kind", _LOADS, where)
-            loads.append(from_table(_LOADS[kind], rest, where))
-        found[name] = tuple(loads)
-    return found
-
-
-def _named(
-    table: object, key: str, known: Mapping[str, Any], where: str
-) -> tuple[str, dict[str, Any]]:
-    """Split a table into the name under a key, which must be known, and the rest."""
-    name = table.get(key) if isinstance(table, Mapping) else None
-    if not isinstance(table, Mapping) or not isinstance(name, str) or name not in known:
-        raise InputError(
-            f"{where} must be a table with {key} one of {', '.join(known)}; got "
-            f"{name if name is not None else table!r}: correct it"
-        )
-    return name, {k: value for k, value in table.items() if k != key}
-
-
-def _material(given: str | dict[str, Any]) -> Material:
-    """Material by name, or of its moduli."""
-    if isinstance(given, str):
-        return named_material(given)
-    make = transversely_isotropic if "modulus_fibre" in given else isotropic
-    return from_table(make, given, "material")
-
-
-def _check_strategies(tables: Mapping[str, Any]) -> None:
-    """Raise on an unknown strategy, or on parameters that it does not take."""
-    if not tables:
-        return
-    from ccfem.strategies import create
-
-    for name, parameters in tables.items():
-        if not isinstance(parameters, Mapping):
-            raise InputError(
-                f"strategies.{name} must be a table; got {parameters!r}: write [strategies.{name}]"
-            )
-        create(name, parameters)

@@ -8,10 +8,11 @@ from tempfile import TemporaryDirectory
 import numpy as np
 import shapely
 
-from ccfem.arrays import FloatArray
+from ccfem.arrays import FloatArray, IntArray
 from ccfem.cases.case import Case
 from ccfem.cases.stored import mesh_of_case
 from ccfem.elasticity.problem import Bearing, Force, Order, Problem, Support
+from ccfem.elasticity.support_kinds import PressingSupport
 from ccfem.layers.slicing.spatial import Spatial
 from ccfem.materials import printed_pla
 from ccfem.mesh.check import check_mesh
@@ -19,12 +20,16 @@ from ccfem.mesh.patches import Cylinder, patches_from_rules
 from ccfem.mesh.tet_mesh import TetMesh
 from ccfem.meshing import extrude
 
-__all__ = ["t_bracket", "t_bracket_front", "t_bracket_mesh", "t_bracket_top"]
+__all__ = ["bolt_heads", "t_bracket", "t_bracket_front", "t_bracket_mesh", "t_bracket_top"]
 
 ELEMENT_SIZE = 3.0
 HOLE_RADIUS = 5.5
 _DEPTH = 15.0
 """Half of the thickness of the head, along z, and of the width of the base, mm."""
+HEAD_RADIUS = 9.5
+"""Radius of the heads of the bolts in the base, mm."""
+_HEAD_LEVEL, _UP = 15.0, 0.9
+"""Height, mm, above which the top of the base lies, and least y of its outward normal."""
 _TOLERANCE = 5e-4
 """Of the mesher, in the diagonal of the part."""
 HOLES = {
@@ -69,6 +74,18 @@ def t_bracket_top() -> shapely.Polygon:
     return outline.difference(shapely.union_all(holes))
 
 
+def bolt_heads(mesh: TetMesh) -> dict[str, IntArray]:
+    """Find the facets (k, 3) on top of the base with their middles under the heads of its bolts."""
+    middle = mesh.points[mesh.boundary].mean(axis=1)
+    up = mesh.facet_areas(mesh.boundary)[1][:, 1] > _UP
+    top = up & (middle[:, 1] > _HEAD_LEVEL)
+    found = {}
+    for name, x in (("head_left", -50.0), ("head_right", 50.0)):
+        radius = np.hypot(middle[:, 0] - x, middle[:, 2])
+        found[name] = mesh.boundary[top & (radius < HEAD_RADIUS)]
+    return found
+
+
 def t_bracket_mesh(element_size: float) -> TetMesh:
     """Mesh of what two extrusions have in common; takes a quarter of an hour.
 
@@ -105,7 +122,12 @@ def _write_surface(name: str, points: FloatArray, mesh: TetMesh) -> None:
     pyvista.PolyData(points, faces.ravel()).save(name)
 
 
-def t_bracket(element_size: float = ELEMENT_SIZE, order: Order = 2, force: float = 1000.0) -> Case:
+def t_bracket(
+    element_size: float = ELEMENT_SIZE,
+    order: Order = 2,
+    force: float = 1000.0,
+    bolts: bool = False,
+) -> Case:
     """T-bracket of 130 x 60 x 30 mm: bolted down at its base, pulled by a bolt through its head.
 
     The shape is recovered from the layers that the authors published (GuoxinFang/
@@ -120,8 +142,17 @@ def t_bracket(element_size: float = ELEMENT_SIZE, order: Order = 2, force: float
         Linear or quadratic cells, or what their estimated error calls for.
     force : float, N
         Of the pull; a quarter of it sideways.
+    bolts : bool
+        Whether strategies are tested a second time with the base's bolts as they are: walls and
+        heads that only press.
     """
     mesh = mesh_of_case("t_bracket", element_size, order, t_bracket_mesh)
+    alternative: tuple[PressingSupport, ...] = ()
+    if bolts:
+        heads = bolt_heads(mesh)
+        mesh = mesh.with_patches(heads)
+        pressed = ("base_left", "base_right", *heads)
+        alternative = tuple(PressingSupport(name) for name in pressed)
     return Case(
         name="t_bracket",
         title="T-bracket 130 x 60 x 30 mm, bolts through base and head at right angles",
@@ -139,4 +170,5 @@ def t_bracket(element_size: float = ELEMENT_SIZE, order: Order = 2, force: float
         slicing=Spatial(),
         source="shape recovered from the layers published by Fang et al., Additive Manufacturing "
         "79 (2024) 103903; load in the direction of theirs",
+        alternative_supports=alternative,
     )

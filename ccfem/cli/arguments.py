@@ -5,7 +5,10 @@ A text that cannot be read raises `InputError`.
 
 import tomllib
 from collections.abc import Sequence
+from pathlib import Path
 from typing import TYPE_CHECKING, Any
+
+import typer
 
 from ccfem.errors import InputError
 
@@ -17,8 +20,16 @@ __all__ = [
     "names_of",
     "numbers_of",
     "parameters_by_strategy",
+    "path_of",
     "slicer_of",
 ]
+
+
+def path_of(text: str | Path) -> Path:
+    """Path of an option; an empty text would be the current folder."""
+    if not str(text).strip():
+        raise typer.BadParameter("it must not be empty: name one, or . for here")
+    return Path(text)
 
 
 def names_of(text: str) -> tuple[str, ...]:

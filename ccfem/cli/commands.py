@@ -3,16 +3,18 @@
 Everything heavy is imported by the command that needs it, so that ``ccfem --help`` answers at once.
 """
 
+import io
 import os
 import signal
 import sys
+import warnings
 from importlib import metadata
 from pathlib import Path
 from typing import Annotated, Any
 
 import typer
 
-from ccfem.cli.arguments import names_of, parameters_by_strategy
+from ccfem.cli.arguments import names_of, parameters_by_strategy, path_of
 from ccfem.cli.options import (
     Backend,
     Calibration,
@@ -96,7 +98,10 @@ def _list(kind: str, name: str | None) -> None:
 def faces(
     body: Annotated[
         Path,
-        typer.Argument(metavar="BODY", help="Surface (.stl ...), mesh, part file or case."),
+        typer.Argument(
+            metavar="BODY",
+            help="Surface (.stl), CAD file (.step), mesh, part file or case.",
+        ),
     ],
     angle: Annotated[
         float, typer.Option(metavar="DEGREES", help="Angle from which an edge separates faces.")
@@ -105,13 +110,64 @@ def faces(
         float, typer.Option(metavar="S", help="Factor that makes a file's coordinates mm.")
     ] = 1.0,
     out: Annotated[
-        Path, typer.Option("--out", metavar="PICTURE", help="Picture (.png, .pdf, .svg).")
+        Path,
+        typer.Option(
+            "--out", metavar="PICTURE", parser=path_of, help="Picture (.png, .pdf, .svg)."
+        ),
     ] = Path("faces.png"),
 ) -> None:
     """List the smooth faces of a body with numbers to choose patches by, and draw them."""
     from ccfem.cli.faces import list_faces
 
     list_faces(body, angle, scale, out)
+
+
+@app.command()
+def check(
+    case: CasePath,
+    set_case: SetCase = None,
+    out: Annotated[
+        Path | None,
+        typer.Option(
+            "--out",
+            metavar="PICTURE",
+            parser=path_of,
+            help="Picture (.png, .pdf, .svg), beside it a page that turns; default NAME-check.png.",
+        ),
+    ] = None,
+) -> None:
+    """Say and draw all that is known of a part before it is solved; all mistakes at once."""
+    from ccfem.cli.check_part import check_part
+
+    code = check_part(case, set_case, out)
+    if code:
+        raise typer.Exit(code)
+
+
+@app.command()
+def mesh(
+    body: Annotated[
+        Path,
+        typer.Argument(metavar="BODY", help="Surface (.stl, .obj, .ply) or CAD file (.step ...)."),
+    ],
+    size: Annotated[float, typer.Option("--size", metavar="MM", help="Edge length of the cells.")],
+    out: Annotated[
+        Path,
+        typer.Option(
+            "-o", "--out", metavar="MESH", parser=path_of, help="Mesh (.vtu, .npz, .tet)."
+        ),
+    ],
+    scale: Annotated[
+        float, typer.Option(metavar="S", help="Factor that makes a file's coordinates mm.")
+    ] = 1.0,
+    mesher: Annotated[
+        str, typer.Option(metavar="auto|gmsh|ftetwild", help="What meshes a surface.")
+    ] = "auto",
+) -> None:
+    """Mesh a surface or a CAD file, its faces as patches: face_1, face_2, or their names."""
+    from ccfem.cli.mesh_body import mesh_file
+
+    mesh_file(body, size, out, scale, mesher)
 
 
 @app.command()
@@ -236,7 +292,9 @@ def solve(
     case: CasePath,
     out: Annotated[
         Path,
-        typer.Option("-o", "--out", metavar="RESULT.vtu", help="File that is written."),
+        typer.Option(
+            "-o", "--out", metavar="RESULT.vtu", parser=path_of, help="File that is written."
+        ),
     ],
     set_case: SetCase = None,
     load_case: Annotated[
@@ -251,24 +309,9 @@ def solve(
     backend: Backend = "auto",
 ) -> None:
     """Solve a part and write displacement, strain, stress, reactions and error for ParaView."""
-    from ccfem.checks import check_known
-    from ccfem.cli.screen import print_solution
-    from ccfem.elasticity.solve import solve as solved
-    from ccfem.export.vtu_result import result_path, write_result
-    from ccfem.io.whole import check_writable
+    from ccfem.cli.solving import solve_part
 
-    loaded = load(case, set_case)
-    names = loaded.problem.cases
-    if load_case is not None:
-        check_known("load case", load_case, names)
-        names = (load_case,)
-    files = {name: out if len(names) == 1 else result_path(out, name) for name in names}
-    for file in files.values():
-        check_writable(result_path(file))
-    fields = solved(loaded.problem, backend=backend)
-    for name, file in files.items():
-        write_result(fields[name], file)
-        print_solution(fields[name], loaded.findings, file)
+    solve_part(load(case, set_case), out, load_case, backend)
 
 
 @app.command()
@@ -293,7 +336,10 @@ def calibrate(
     fibre_per_layer: Fibre = None,
     load_case: LoadCase = None,
     out: Annotated[
-        Path, typer.Option("--out", metavar="MATERIAL.toml", help="File that is written.")
+        Path,
+        typer.Option(
+            "--out", metavar="MATERIAL.toml", parser=path_of, help="File that is written."
+        ),
     ] = Path("calibrated.toml"),
 ) -> None:
     """Fit modulus, matrix strength and strand stiffness to force-displacement curves (CSV).
@@ -301,31 +347,16 @@ def calibrate(
     The paths of the reinforced part are planned again as they were printed: give the strategy, its
     parameters and the amount of fibre of that print.
     """
-    from ccfem.comparison.compare import compare, create_all
-    from ccfem.io.whole import check_writable
-    from ccfem.virtual_testing.calibration import calibrate as fit
-    from ccfem.virtual_testing.force_displacement import read_curve
+    from ccfem.cli.fitting import fit_material
 
-    check_writable(out)
-    without = read_curve(unreinforced)
-    with_fibre = None if reinforced is None else read_curve(reinforced)
-    if (reinforced is None) != (strategy is None):
-        raise InputError("--reinforced and --strategy belong together; got only one of them")
-    loaded, paths = load(case, set_case), None
-    if strategy is not None:
-        chosen = create_all(loaded, (strategy,), parameters_by_strategy(set_ or (), strategy))
-        options = options_of(layers, fibre_per_layer, False, load_case, "auto")
-        (planned,) = compare(loaded, chosen, natural=fibre_per_layer is None, **options).runs
-        if not len(planned.toolpaths):
-            raise InputError(f"{strategy} could not plan the part: {planned.failure}")
-        paths = planned.toolpaths
-    found = fit(loaded.problem, without, with_fibre, paths, load_case, out.stem)
-    found.write(out)
-    rho = "" if found.rho is None else f", rho {found.rho:.3g} mm^2"
-    print(
-        f"{out}: modulus {found.modulus:.4g} MPa, matrix strength {found.tensile_strength:.3g} MPa"
-        f"{rho}; use it with --calibration {out}"
-    )
+    parameters = parameters_by_strategy(set_ or (), strategy) if strategy is not None else {}
+    options = options_of(layers, fibre_per_layer, False, load_case, "auto")
+    options["natural"] = fibre_per_layer is None
+
+    def read() -> Any:
+        return load(case, set_case)
+
+    fit_material(read, unreinforced, reinforced, strategy, parameters, options, out)
 
 
 def main() -> None:
@@ -333,6 +364,11 @@ def main() -> None:
     # The base class of a wrong option or argument, wherever typer keeps it.
     usage_error: Any = typer.BadParameter.__mro__[1]
     signal.signal(signal.SIGTERM, signal.default_int_handler)
+    for stream in (sys.stdout, sys.stderr):
+        if isinstance(stream, io.TextIOWrapper):  # a title outside ASCII on an ASCII terminal
+            stream.reconfigure(errors="replace")
+    # A title in letters that the font of pictures lacks is drawn as boxes; no more to say.
+    warnings.filterwarnings("ignore", message="Glyph .* missing from")
     try:
         code = typer.main.get_command(app)(standalone_mode=False)
     except (InputError, SolveError) as error:

@@ -11,7 +11,8 @@ from ccfem.cases.reading import read
 from ccfem.errors import InputError
 from ccfem.io.mesh_file import read_mesh
 from ccfem.io.surface import is_surface, read_surface
-from ccfem.mesh.smooth_faces import Face, smooth_faces
+from ccfem.mesh.smooth_faces import Face, given_faces, smooth_faces
+from ccfem.meshing.cad import is_cad, read_cad
 from ccfem.plot.canvas import check_picture
 from ccfem.plot.part_views import Label, draw_part
 
@@ -28,7 +29,7 @@ def list_faces(body: Path, angle: float, scale: float, picture: Path) -> None:
     Parameters
     ----------
     body : Path
-        Surface or mesh file, part file, or the name of a case.
+        Surface, CAD or mesh file, part file, or the name of a case.
     angle : float, degrees
         Feature angle.
     scale : float
@@ -37,13 +38,22 @@ def list_faces(body: Path, angle: float, scale: float, picture: Path) -> None:
         File of the picture.
     """
     check_picture(picture)
-    points, triangles = _boundary(body, scale)
-    faces = smooth_faces(points, triangles, angle)
+    names: tuple[str, ...] = ()
+    if is_cad(body):
+        cad = read_cad(body, scale)
+        points, triangles, names = cad.surface.points, cad.surface.triangles, cad.names
+        rows = [np.flatnonzero(cad.face == k) for k in range(1, len(names) + 1)]
+        faces = given_faces(points, triangles, [each for each in rows if len(each)])
+    else:
+        points, triangles = _boundary(body, scale)
+        faces = smooth_faces(points, triangles, angle)
+    columns = ("face", "area, mm^2", "what", "name")[: 4 if any(names) else 3]
     table = Table(box=None, padding=(0, 2, 0, 0))
-    for column in ("face", "area, mm^2", "what"):
-        table.add_column(column, justify="left" if column == "what" else "right")
+    for column in columns:
+        table.add_column(column, justify="left" if column in ("what", "name") else "right")
     for number, face in enumerate(faces, 1):
-        table.add_row(str(number), f"{face.area:.4g}", face.about)
+        row = (str(number), f"{face.area:.4g}", face.about, *names[number - 1 : number])
+        table.add_row(*row[: len(columns)])
     console = Console(highlight=False, markup=False)
     console.print(table)
     of = np.zeros(len(triangles), dtype=np.int64)
@@ -52,8 +62,9 @@ def list_faces(body: Path, angle: float, scale: float, picture: Path) -> None:
     colour = [_COLOURS[k % len(_COLOURS)] for k in of.tolist()]
     labels = [_label(points, triangles, face, k) for k, face in enumerate(faces[:_NAMED], 1)]
     draw_part(points, triangles, colour, labels, picture, title=f"{body.name}: {len(faces)} faces")
+    about = "" if is_cad(body) else f" at a feature angle of {angle:g} degrees"
     console.print(
-        f"{len(faces)} faces at a feature angle of {angle:g} degrees; picture: {picture}\n"
+        f"{len(faces)} faces{about}; picture: {picture}\n"
         'in a part file: [patches.NAME] with rule = "face", number = [1, 2]; lengths are mm'
     )
 

@@ -5,6 +5,8 @@ from typing import Annotated
 
 import typer
 
+from ccfem.cli.arguments import path_of
+
 __all__ = [
     "Backend",
     "Calibration",
@@ -24,7 +26,10 @@ __all__ = [
 CasePath = Annotated[
     str, typer.Argument(metavar="CASE_OR_PART.toml", help="Name of a case, or a part file.")
 ]
-Out = Annotated[Path | None, typer.Option("--out", metavar="DIR", help="Folder for the results.")]
+Out = Annotated[
+    Path | None,
+    typer.Option("--out", metavar="DIR", parser=path_of, help="Folder for the results."),
+]
 SetCase = Annotated[
     list[str] | None,
     typer.Option(

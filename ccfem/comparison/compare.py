@@ -30,6 +30,7 @@ from ccfem.comparison.stages import (
 from ccfem.elasticity.part_stress import GivenStress
 from ccfem.elasticity.solve import solve
 from ccfem.elasticity.stress_field import StressField
+from ccfem.elasticity.support_kinds import PressingSupport
 from ccfem.errors import InputError, known_names
 from ccfem.export.print_plan import check_machine
 from ccfem.fibre_aware.upper_bound import upper_bound
@@ -267,7 +268,11 @@ def compare(
     if print_plans:
         runs = [with_print(run, part, tell) for run in runs]
     if strand is not None:
-        runs = all_tested(runs, field, case.machine, strand, backend, tell)
+        alternative = None
+        if case.alternative_supports:
+            with timed(seconds, "solve, alternative supports"):
+                alternative = _otherwise_held(case, field, backend)
+        runs = all_tested(runs, field, part, strand, backend, tell, alternative)
     along = None
     if strand is not None and (curve or (curve is None and _misses(runs, wanted))):
         with timed(seconds, "curve"):
@@ -275,14 +280,15 @@ def compare(
                 _as_asked(runs, asked_for),
                 part,
                 wanted,
-                lambda some: all_tested(some, field, case.machine, strand, backend, tell, ()),
+                lambda some: all_tested(some, field, part, strand, backend, tell, alternative, ()),
                 tell,
             )
     equal = [run for run in runs if run.tested is not None and not off_length(run, wanted)]
     lengths = [float(run.toolpaths.lengths.sum()) for run in equal]
     bound = None
-    # The bound is one for flat layers.
-    if lengths and all(layer.flat is not None for layer in stack):
+    # The bound is one for flat layers, and for supports that hold both ways.
+    pressing = any(isinstance(each, PressingSupport) for each in field.problem.supports)
+    if lengths and not pressing and all(layer.flat is not None for layer in stack):
         tell("bounding what any paths could reach")
         with timed(seconds, "bound"):
             bound = upper_bound(
@@ -305,6 +311,17 @@ def _as_asked(runs: Sequence[Run], asked_for: Sequence[Run]) -> list[Run]:
     return [
         replace(run, strategy=asked.strategy) for run, asked in zip(runs, asked_for, strict=True)
     ]
+
+
+def _otherwise_held(case: Case, field: StressField, backend: str) -> StressField:
+    """Solution of the same load case under the alternative supports."""
+    loads = {field.case: field.problem.loads[field.case]}
+    supports = case.alternative_supports
+    try:
+        problem = replace(field.problem, supports=supports, loads=loads, combinations={})
+        return solve(problem, backend)[field.case]
+    except InputError as error:
+        raise InputError(f"alternative supports: {error}") from None
 
 
 def _load_case(case: Case, name: str | None) -> str:

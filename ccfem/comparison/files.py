@@ -28,6 +28,8 @@ def write_results(
 ) -> None:
     """Write ``results.csv``, ``results.json``, ``report.html``, pictures and paths.
 
+    ``part.png`` shows the part with its patches, loads and supports, ``part.html`` turns it.
+
     Where layers are curved, also ``STRATEGY_space.png`` and a page that turns,
     ``STRATEGY_space.html``; with a curve, ``curve.csv`` and ``curve.png``. Runs with a print plan
     get ``STRATEGY.gcode`` too. In ``paths.vtp`` the cell array "strategy" numbers the strategies
@@ -74,6 +76,8 @@ def _write_pictures(pictures: "Pictures", folder: Path) -> None:
         (folder / f"{name}_force.png").write_bytes(image)
     (folder / "tension.png").write_bytes(pictures.tension)
     (folder / "overview.png").write_bytes(pictures.overview)
+    (folder / "part.png").write_bytes(pictures.part)
+    (folder / "part.html").write_text(pictures.part_page, encoding="utf-8")
     if pictures.curve:
         (folder / "curve.png").write_bytes(pictures.curve)
 

@@ -5,8 +5,9 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from ccfem.comparison.runs import Run
+from ccfem.comparison.runs import Run, Tested
 from ccfem.evaluation.column import Column
+from ccfem.virtual_testing.strength import FirstFailure
 
 __all__ = ["HEADLINE", "TEST_COLUMNS", "Headline", "cell_text", "headline_values"]
 
@@ -79,9 +80,72 @@ TEST_COLUMNS = (
         "first_failure_load",
         "N",
         "Load at which the matrix (von Mises stress averaged over a 2 mm ball, away from loads and "
-        "supports) or the fibre (99th percentile of the axial force by length) first reaches its "
-        "strength, fibres carrying tension only.",
+        "supports), the fibre (99th percentile of the axial force by length) or the bond between "
+        "layers (interlayer_load) first reaches its strength, fibres carrying tension only.",
         "> 0, higher is better; missing where a strength is unknown",
+    ),
+    Column(
+        "interlayer_load",
+        "N",
+        "Load at which printed layers come apart: the stress tensor averaged over a 2 mm ball, its "
+        "traction on the layer against tensile and shear strength of the bond (quadratic "
+        "criterion), from 3 mm on from loads and supports.",
+        "> 0, infinite where nothing opens; missing where the bond's strength is unknown; of use "
+        "for comparing layers of one part, not as a load",
+    ),
+    Column(
+        "interlayer_load_near",
+        "N",
+        "As interlayer_load, from 1.5 mm on from loads and supports.",
+        "<= interlayer_load; how much of it is the zone's",
+    ),
+    Column(
+        "interlayer_load_everywhere",
+        "N",
+        "As interlayer_load, in all cells.",
+        "<= interlayer_load_near",
+    ),
+    Column(
+        "interlayer_index",
+        "1",
+        "f of that criterion under the load of the test, at its peak.",
+        ">= 0, 1 at failure, lower is better; missing as interlayer_load",
+    ),
+    *(
+        Column(
+            f"interlayer_{axis}",
+            "mm",
+            f"Coordinate {axis} of the place where layers first come apart.",
+            "in the frame of the mesh",
+        )
+        for axis in "xyz"
+    ),
+    Column(
+        "interlayer_opening",
+        "MPa",
+        "Averaged traction across the layer at that place.",
+        "negative where it presses",
+    ),
+    Column(
+        "interlayer_sliding",
+        "MPa",
+        "Averaged traction in the layer at that place.",
+        ">= 0",
+    ),
+    *(
+        Column(
+            f"{name}_alternative",
+            unit,
+            f"{name} under the alternative supports of the part.",
+            f"as {name}; missing where the part has none",
+        )
+        for name, unit in (
+            ("stiffness_ratio_tension", "1"),
+            ("stiffness_ratio_bonded", "1"),
+            ("stiffness", "N/mm"),
+            ("first_failure_load", "N"),
+            ("interlayer_load", "N"),
+        )
     ),
 )
 """Indices of the virtual test, described as those of the evaluator are."""
@@ -114,8 +178,11 @@ HEADLINE = (
     Headline("stiffness", "stiffness, N/mm", "high", "{:.4g}"),
     Headline("stiffness_ratio_tension", "stiffness ×, tension only", "high", "{:.2f}"),
     Headline("stiffness_ratio_bonded", "stiffness ×, bonded", "high", "{:.2f}"),
+    Headline("stiffness_ratio_tension_alternative", "stiffness ×, other supports", "", "{:.2f}"),
     Headline("displacement", "displacement, mm", "low", "{:.3g}"),
     Headline("first_failure_load", "first failure, N", "high", "{:.0f}"),
+    Headline("first_failure_load_alternative", "first failure, other supports, N", "", "{:.0f}"),
+    Headline("interlayer_load", "layers part, N", "", "{:.0f}"),
     Headline("fibre_per_layer", "fibre, mm a layer", "", "{:.0f}"),
     Headline("fibre_mass", "fibre, g", "", "{:.3g}"),
     Headline("print_time_nearest", "print time, min", "low", "{:.0f}"),
@@ -148,9 +215,20 @@ def headline_values(run: Run) -> Mapping[str, float]:
 
 
 def _test_values(run: Run) -> dict[str, float]:
+    """Values of the virtual test, and of that under the alternative supports."""
     if run.tested is None:
         return {}
-    tension, bonded = run.tested.bracket.tension, run.tested.bracket.bonded
+    values, other = _values_of(run.tested), run.tested.alternative
+    if other is not None:
+        found = _values_of(other)
+        ends = [column.name for column in TEST_COLUMNS if column.name.endswith("_alternative")]
+        names = {name: name.removesuffix("_alternative") for name in ends}
+        values |= {name: found[own] for name, own in names.items() if own in found}
+    return values
+
+
+def _values_of(tested: Tested) -> dict[str, float]:
+    tension, bonded = tested.bracket.tension, tested.bracket.bonded
     values = {
         "stiffness_ratio_tension": tension.ratio,
         "stiffness_ratio_bonded": bonded.ratio,
@@ -163,12 +241,27 @@ def _test_values(run: Run) -> dict[str, float]:
         ratios = [ratio for _, ratio in tension.span]
         values["stiffness_ratio_low"] = min(ratios)
         values["stiffness_ratio_high"] = max(ratios)
-    if run.tested.failure is not None:
-        values["first_failure_load"] = run.tested.failure.load
-        values["matrix_stress_change"] = (
-            run.tested.failure.matrix_index / run.tested.matrix_before - 1.0
-        )
+    if tested.failure is not None:
+        values["first_failure_load"] = tested.failure.load
+        values["matrix_stress_change"] = tested.failure.matrix_index / tested.matrix_before - 1.0
+        values |= _between_layers(tested.failure)
     return values
+
+
+def _between_layers(failure: FirstFailure) -> dict[str, float]:
+    """Values of the bond between layers; none where it was not judged."""
+    if not failure.interlayer_zones:
+        return {}
+    away, near, everywhere = failure.interlayer_zones
+    return {
+        "interlayer_load": away,
+        "interlayer_load_near": near,
+        "interlayer_load_everywhere": everywhere,
+        "interlayer_index": failure.interlayer_index,
+        **{f"interlayer_{c}": failure.interlayer_where[k] for k, c in enumerate("xyz")},
+        "interlayer_opening": failure.opening,
+        "interlayer_sliding": failure.sliding,
+    }
 
 
 def cell_text(run: Run, head: Headline) -> tuple[str, str]:
@@ -185,4 +278,7 @@ def cell_text(run: Run, head: Headline) -> tuple[str, str]:
         extra = f"{values['stiffness_ratio_low']:.2f}–{values['stiffness_ratio_high']:.2f}"
     if head.column == "first_failure_load" and run.tested is not None and run.tested.failure:
         extra = run.tested.failure.what
+    if head.column == "first_failure_load_alternative":
+        other = None if run.tested is None else run.tested.alternative
+        extra = other.failure.what if other is not None and other.failure is not None else ""
     return head.pattern.format(value), extra

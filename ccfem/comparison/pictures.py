@@ -14,12 +14,14 @@ from ccfem.elasticity.stress_field import StressField
 from ccfem.evaluation.matching import THRESHOLDS, along_fibre, matching_curve
 from ccfem.evaluation.plane_paths import pool
 from ccfem.fields.chart import chart_of, flat_view, in_charts
+from ccfem.inspection.part_check import check
 from ccfem.layers import Layer
 from ccfem.layers.layer_stress import LayerStress, stress_on
 from ccfem.plot.canvas import png
 from ccfem.plot.colours import palette
 from ccfem.plot.curves import curvature_curves, matching_curves
 from ccfem.plot.fields import error_picture, tension_picture
+from ccfem.plot.part_picture import part_page, part_picture
 from ccfem.plot.paths import (
     Coloured,
     compare_layer,
@@ -55,6 +57,10 @@ class Pictures:
         All strategies side by side on the middle layer.
     matching, curvature : bytes
         Curves of all strategies over all layers.
+    part : bytes
+        The part with its patches, loads and supports.
+    part_page : str
+        Page on which it turns, HTML.
     middle : int
         Index of the middle layer.
     curve : bytes
@@ -68,6 +74,8 @@ class Pictures:
     overview: bytes
     matching: bytes
     curvature: bytes
+    part: bytes
+    part_page: str
     middle: int
     curve: bytes = b""
 
@@ -87,6 +95,7 @@ def draw_pictures(comparison: Comparison, progress: Progress = silent) -> Pictur
     centre = _drawn(comparison)[len(stresses) // 2]
     rates, bends = _curves(runs)
     heading = f"tension in layer {middle.layer.index}, load case {comparison.stress.case}"
+    checked = check(comparison.case)
     return Pictures(
         _layers(runs, stresses, machine.fibre_width, limit, colours, progress),
         _forces(runs, centre, machine.fibre_width, colours),
@@ -95,6 +104,8 @@ def draw_pictures(comparison: Comparison, progress: Progress = silent) -> Pictur
         png(_overview(runs, middle, machine.fibre_width, limit)),
         png(matching_curves(rates, THRESHOLDS, "fibre along the stress", colours)),
         png(curvature_curves(bends, machine.minimum_radius, "curvature", colours)),
+        png(part_picture(checked)),
+        part_page(checked),
         middle.layer.index,
         _curve(comparison, colours),
     )

@@ -82,10 +82,23 @@ def best_values(runs: Sequence[Run], wanted: float | None) -> dict[str, float]:
         if head.column in _STIFFNESSES and not stiffest:
             continue
         found = known[-1] if head.better == "high" else known[0]
-        if head.column == "first_failure_load" and found < (1.0 + RESOLUTION) * known[-2]:
+        if head.column == "first_failure_load" and not _strongest(equal, found):
             continue
         best[head.column] = found
     return best
+
+
+def _strongest(runs: Sequence[Run], load: float) -> bool:
+    """Whether the run that fails last, at a load, does so by far and under all supports."""
+    columns = ("first_failure_load", "first_failure_load_alternative")
+    first, again = ([headline_values(run).get(name, np.nan) for run in runs] for name in columns)
+    best = first.index(load)
+    return not any(
+        loads[best] < (1.0 + RESOLUTION) * other
+        for loads in (first, again)
+        for k, other in enumerate(loads)
+        if k != best
+    )
 
 
 def off_length(run: Run, wanted: float | None) -> bool:
@@ -115,11 +128,17 @@ def order_of(better: Run, other: Run) -> str:
     -------
     str
         FIRST, SAME or UNDECIDED of `ccfem.virtual_testing.stiffer`: undecided also where only
-        bonded fibres tell them apart. SAME where one is untested.
+        bonded fibres, or only the alternative supports, tell them apart, and where these tell the
+        opposite. SAME where one is untested.
     """
     if better.tested is None or other.tested is None:
         return SAME
     found = stiffer(better.tested.bracket, other.tested.bracket)
+    again = (better.tested.alternative, other.tested.alternative)
+    if again[0] is not None and again[1] is not None:
+        second = stiffer(again[0].bracket, again[1].bracket)
+        if second not in (found, SAME):
+            found = second if found == SAME else UNDECIDED
     if found == FIRST and stiffness_ratios(better, other)[0] <= 1.0 + RESOLUTION:
         return UNDECIDED
     return found if found in (FIRST, SAME) else UNDECIDED

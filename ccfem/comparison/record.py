@@ -44,6 +44,7 @@ def results_frame(comparison: Comparison) -> "pd.DataFrame":
             for column in TEST_COLUMNS:
                 if column.name in extra:
                     frame.loc[frame.index[-1], column.name] = extra[column.name]
+            frame.loc[frame.index[-1], "fails_in"] = run.fails_in
             frames.append(frame)
         frames[-1].insert(0, "strategy", run.name)
     frame = pd.concat(frames, ignore_index=True)
@@ -130,7 +131,14 @@ def _run_record(run: Run) -> dict[str, Any]:
         "untested": run.untested,
         "total": headline_values(run),
         "first_failure": vars(run.tested.failure) if run.tested and run.tested.failure else None,
+        "first_failure_alternative": _alternative_failure(run),
     }
+
+
+def _alternative_failure(run: Run) -> dict[str, Any] | None:
+    """Say what fails first under the alternative supports; None where there are none."""
+    other = None if run.tested is None else run.tested.alternative
+    return vars(other.failure) if other is not None and other.failure is not None else None
 
 
 def _versions() -> dict[str, str]:

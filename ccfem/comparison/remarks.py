@@ -45,6 +45,8 @@ def _about(run: Run, wanted: float | None, bounded: bool) -> list[str]:
         "no first-failure load": run.tested.note if run.tested is not None else "",
     }
     lines = [f"{what}: {reason}" for what, reason in reasons.items() if reason]
+    if run.tested is not None and run.tested.failure is not None and run.tested.failure.note:
+        lines.append(run.tested.failure.note)
     if run.evaluation is not None:
         lines += _about_links(run.evaluation.total)
         if getattr(run.strategy, "crosses", False):
@@ -61,9 +63,10 @@ def _about(run: Run, wanted: float | None, bounded: bool) -> list[str]:
 
 def _about_orders(tested: Sequence[Run]) -> list[str]:
     """Say which runs, best first, cannot be put in an order."""
+    both = any(run.tested is not None and run.tested.alternative is not None for run in tested)
+    of = "tension-only and bonded fibres" + (", or both models of the supports," if both else "")
     reasons = {
-        UNDECIDED: "undecided against {}, for tension-only and bonded fibres do not agree on an "
-        "order",
+        UNDECIDED: f"undecided against {{}}, for {of} do not agree on an order",
         SAME: f"no difference to {{}}: less than {RESOLUTION:.0%}, the resolution of the test",
     }
     lines = []

@@ -200,10 +200,12 @@ def _pictures(comparison: Comparison, pictures: Pictures) -> str:
         every = f"<details><summary>All {len(rows)} layers</summary>\n{''.join(rows)}</details>\n"
     tension = figure(pictures.tension, "tension in the middle layer")
     error = figure(pictures.error, "estimated error of the cells in the middle layer")
+    part = figure(pictures.part, "patches, resultants of the loads, supports (triangles)")
     return (
         f"<h2>Paths</h2>\n{_layer(pictures.middle, places[pictures.middle], runs, pictures)}"
         f"{every}{_forces(runs, pictures)}{_curves(pictures)}"
         f"<h2>Tension without fibres</h2>\n{grid([tension, error, '', ''])}\n"
+        f"<h2>The part</h2>\n{grid([part])}\n"
     )
 
 

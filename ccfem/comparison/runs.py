@@ -30,12 +30,15 @@ class Tested:
         Why there is no first-failure load; else empty.
     matrix_before : float, MPa
         Peak of the averaged von Mises stress without fibre; NaN where it cannot be judged.
+    alternative : Tested, optional
+        The same under the alternative supports of the case, where it has some.
     """
 
     bracket: Bracket
     failure: FirstFailure | None
     note: str = ""
     matrix_before: float = float("nan")
+    alternative: "Tested | None" = None
 
 
 @dataclass(frozen=True)
@@ -102,6 +105,12 @@ class Run:
     def printable(self) -> bool:
         """Whether there are paths, within all limits of the machine."""
         return self.evaluation is not None and not self.why_not
+
+    @property
+    def fails_in(self) -> str:
+        """What fails first, "matrix", "fibre" or "interlayer"; empty where that is not known."""
+        failure = None if self.tested is None else self.tested.failure
+        return "" if failure is None else failure.what
 
     @property
     def empty_layers(self) -> int:

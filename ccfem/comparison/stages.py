@@ -23,7 +23,7 @@ from ccfem.toolpaths import FIBRE, MATRIX, Toolpaths
 from ccfem.virtual_testing.equilibrium import BONDED, TENSION
 from ccfem.virtual_testing.specimen import Specimen
 from ccfem.virtual_testing.strand import RHO_SPAN, Strand
-from ccfem.virtual_testing.strands import cut_strands
+from ccfem.virtual_testing.strands import Strands, cut_strands
 from ccfem.virtual_testing.strength import first_failure, matrix_peak
 from ccfem.virtual_testing.virtual_test import Bracket, virtual_test
 
@@ -200,50 +200,73 @@ def _volume(print_plan: PrintPlan, machine: Machine) -> float:
 def all_tested(
     runs: Sequence[Run],
     stress: StressField,
-    machine: Machine,
+    part: Part,
     strand: Strand,
     backend: str,
     tell: Tell,
+    alternative: StressField | None = None,
     span: Sequence[float] = RHO_SPAN,
 ) -> list[Run]:
-    """Test every run that did not fail virtually, all on one factorisation."""
+    """Test every run that did not fail virtually, all on one factorisation.
+
+    Where there is a solution under alternative supports, every run is tested under these too.
+    """
+    fields = [stress] if alternative is None else [stress, alternative]
     try:
-        specimen = Specimen.of(stress, backend)
+        specimens = [Specimen.of(field, backend) for field in fields]
     except InputError as error:
         return [replace(run, untested=str(error)) for run in runs]
+    before = [_peak(field) for field in fields]
+    models = list(zip(specimens, before, strict=True))
+    return [_tested(run, models, strand, part, tell, span) for run in runs]
+
+
+def _peak(stress: StressField) -> float:
+    """Peak of the averaged von Mises stress, MPa; NaN where it cannot be judged."""
     try:
-        before, _ = matrix_peak(stress)
+        return matrix_peak(stress)[0]
     except InputError:
-        before = float("nan")
-    return [_tested(run, specimen, strand, machine, before, tell, span) for run in runs]
+        return float("nan")
 
 
 def _tested(
     run: Run,
-    specimen: Specimen,
+    models: Sequence[tuple[Specimen, float]],
     strand: Strand,
-    machine: Machine,
-    before: float,
+    part: Part,
     tell: Tell,
     span: Sequence[float],
 ) -> Run:
-    """Test a run virtually, or say why it cannot be tested."""
+    """Test a run virtually under one or two models of the supports, or say why it cannot be."""
     tell(f"testing {run.name}")
     if run.evaluation is None:
         return run
 
     def work() -> Run:
-        mesh = specimen.unreinforced.mesh
-        strands = cut_strands(run.toolpaths, mesh, machine=machine)
-        tension = virtual_test(strands, specimen, strand, TENSION, span)
-        bracket = Bracket(tension, virtual_test(strands, specimen, strand, BONDED, span=()))
-        try:
-            test = Tested(bracket, first_failure(tension, strand), matrix_before=before)
-        except InputError as error:
-            test = Tested(bracket, None, str(error))
-        return replace(run, tested=test)
+        mesh = models[0][0].unreinforced.mesh
+        strands = cut_strands(run.toolpaths, mesh, machine=part.machine)
+        found = [_test(strands, *model, strand, part, span) for model in models]
+        return replace(run, tested=replace(found[0], alternative=[*found[1:], None][0]))
 
     return _stage(run, "virtual test", work, reason="untested")
+
+
+def _test(
+    strands: Strands,
+    specimen: Specimen,
+    before: float,
+    strand: Strand,
+    part: Part,
+    span: Sequence[float],
+) -> Tested:
+    """Both tests of strands, and what fails first."""
+    tension = virtual_test(strands, specimen, strand, TENSION, span)
+    bracket = Bracket(tension, virtual_test(strands, specimen, strand, BONDED, span=()))
+    try:
+        failure = first_failure(tension, strand, layers=part.layers)
+    except InputError as error:
+        return Tested(bracket, None, str(error))
+    return Tested(bracket, failure, matrix_before=before)
 
 
 def _stage(run: Run, stage: str, work: Callable[[], Run], reason: str = "failure") -> Run:

@@ -27,8 +27,9 @@ def frame(ranking: Sequence[Run]) -> "pd.DataFrame":
     Returns
     -------
     DataFrame
-        Columns rank (1 is the best), strategy, printable, why_not, failure, empty_layers, and every
-        index of the virtual test and of the evaluator; NaN where a run has none.
+        Columns rank (1 is the best), strategy, printable, why_not, failure, fails_in (matrix, fibre
+        or interlayer), empty_layers, and every index of the virtual test and of the evaluator; NaN
+        where a run has none.
     """
     import pandas as pd
 
@@ -40,6 +41,7 @@ def frame(ranking: Sequence[Run]) -> "pd.DataFrame":
         "printable": [run.printable for run in ranking],
         "why_not": [run.why_not for run in ranking],
         "failure": [run.failure for run in ranking],
+        "fails_in": [run.fails_in for run in ranking],
         "empty_layers": [run.empty_layers for run in ranking],
     }
     numbers = {name: [found.get(name, np.nan) for found in values] for name in names}

@@ -17,7 +17,8 @@ def verdict(runs: Sequence[Run], wanted: float | None) -> str:
 
     It speaks of the runs that can be printed and keep to the wanted length. "No difference" where
     the best are nearer to each other than the resolution of the test, "undecided" where
-    tension-only and bonded fibres disagree on the order of the best and any other.
+    tension-only and bonded fibres, or the supports of the part and its alternative ones, disagree
+    on the order of the best and any other.
 
     Parameters
     ----------
@@ -53,26 +54,27 @@ def _of_printable(order: Sequence[Run], wanted: float | None) -> str:
     tested = [run for run in order[1:] if run.tested is not None]
     unclear = [run for run in tested if order_of(first, run) == UNDECIDED]
     same = [run for run in tested if order_of(first, run) == SAME]
+    both = first.tested.alternative is not None
     if unclear:
         group = [first, *(run for run in tested if run in unclear or run in same)]
         return (
             f"Undecided between {_names(group)}, {_amount(wanted)}: "
             f"{_ratios(group)} times the unreinforced stiffness where fibres carry tension only, "
-            f"{_ratios(group, 'bonded')} where they are bonded."
+            f"{_ratios(group, 'bonded')} where they are bonded{_under_other(group)}."
         )
     if same:
         group = [first, *same]
         return (
             f"No difference between {_names(group)}, {_amount(wanted)}: "
             f"{_ratios(group)} times the unreinforced stiffness, within {RESOLUTION:.0%}, the "
-            "resolution of the test."
+            f"resolution of the test{', under both models of the supports' if both else ''}."
         )
     gain = stiffness_ratio(first) / stiffness_ratio(second)
     return (
         f"{first.name} makes the stiffest part, {_amount(wanted)}: "
         f"{stiffness_ratio(first):.2f} times the unreinforced one, and {gain:.2f} times "
         f"{second.name} (predicted, fibres carrying tension only; no other is stiffer with bonded "
-        "fibres)."
+        f"fibres{', or under the alternative supports' if both else ''})."
     )
 
 
@@ -95,6 +97,16 @@ def _names(runs: Sequence[Run]) -> str:
 def _ratios(runs: Sequence[Run], mode: str = "tension") -> str:
     ratios = [f"{stiffness_ratio(run, mode):.2f}" for run in runs]
     return f"{', '.join(ratios[:-1])} and {ratios[-1]}"
+
+
+def _under_other(runs: Sequence[Run]) -> str:
+    """Say the same of the alternative supports, where there are some."""
+    if not all(run.tested is not None and run.tested.alternative is not None for run in runs):
+        return ""
+    return (
+        f"; under the alternative supports {_ratios(runs, 'tension_alternative')}, and "
+        f"{_ratios(runs, 'bonded_alternative')}"
+    )
 
 
 def _amount(wanted: float | None) -> str:

@@ -1,6 +1,7 @@
 """What is held of a displacement, and the equations that are left."""
 
 from dataclasses import dataclass, replace
+from functools import cached_property
 
 import numpy as np
 import scipy.sparse as sp
@@ -9,6 +10,16 @@ from ccfem.arrays import BoolArray, FloatArray, IntArray
 from ccfem.elasticity.ties import Ties
 
 __all__ = ["Held", "rigid_modes"]
+
+_BED = 1e-11
+"""Stiffness, over the mean of the diagonal, that a component which has lifted off keeps, so that a
+part which nothing presses any more has a solution; what it carries is checked."""
+
+_PULLS = 1e-6
+"""Force of a support that pulls, over the largest, that is taken for rounding."""
+
+_SINKS = 1e-7
+"""Displacement into a support, over the largest of all, that is taken for rounding."""
 
 
 def rigid_modes(points: FloatArray) -> FloatArray:
@@ -37,12 +48,69 @@ class Held:
     ties : Ties, optional
         Where nodes have axes of their own, or move together as a rigid body. Then `free`, `value`
         and `nodes` are of the nodes that the ties leave, along their axes.
+    presses : (n, 3) bool array, optional
+        Components that may move back, below zero, and not forth. Those in contact are not free.
     """
 
     free: BoolArray
     value: FloatArray
     nodes: IntArray
     ties: Ties | None = None
+    presses: BoolArray | None = None
+
+    @cached_property
+    def _pressing(self) -> tuple[IntArray, IntArray, FloatArray]:
+        """Node, component and axis (3,) of all that presses."""
+        assert self.presses is not None
+        assert self.ties is not None
+        node, component = np.nonzero(self.presses)
+        return node, component, self.ties.axes[node, :, component]
+
+    def along_pressing(self, vectors: FloatArray) -> FloatArray:
+        """Part (k,) of nodal vectors (n, 3) along the axes that press, out of the part."""
+        node, _, axis = self._pressing
+        return np.einsum("ki,ki->k", axis, vectors[node])
+
+    @property
+    def contact(self) -> BoolArray:
+        """Which of the components that press are in contact, (k,)."""
+        node, component, _ = self._pressing
+        return ~self.free[node, component]
+
+    def with_contact(self, contact: BoolArray) -> "Held":
+        """Return the same supports in another contact (k,)."""
+        node, component, _ = self._pressing
+        free = self.free.copy()
+        free[node, component] = ~contact
+        return replace(self, free=free)
+
+    def touching(self, displacement: FloatArray) -> "Held":
+        """Return the same supports in the contact that a solution (n, 3), mm, has."""
+        if self.presses is None:
+            return self
+        back = -1e-12 * float(np.abs(displacement).max())
+        return self.with_contact(self.along_pressing(displacement) >= back)
+
+    def following(self, displacement: FloatArray, reactions: FloatArray) -> "Held":
+        """Contact that follows from a solution with this one; this one where it holds.
+
+        What pulls is let go, what sinks in is held: the primal-dual active set (Hintermueller, Ito
+        and Kunisch, SIAM J. Optimization 13, 2002, 865-888).
+
+        Parameters
+        ----------
+        displacement : (n, 3) array, mm
+        reactions : (n, 3) array, N
+            Of all supports on the part.
+        """
+        if self.presses is None:
+            return self
+        before = self.contact
+        pulls, sinks = self.along_pressing(reactions), self.along_pressing(displacement)
+        pulled = pulls > _PULLS * np.abs(pulls[before]).max(initial=0.0)
+        sunk = sinks > _SINKS * float(np.abs(displacement).max())
+        after = np.where(before, ~pulled, sunk)
+        return self if (after == before).all() else self.with_contact(after)
 
     def at(self, value: FloatArray) -> "Held":
         """Return the same held components at other values (n, 3), mm."""
@@ -70,11 +138,19 @@ class Held:
         row, column, data = row[kept], column[kept], matrix.data[kept]
         free = self.free[self.nodes]
         partly = np.logical_not(free.all(axis=1))
+        size = (
+            0.0
+            if not partly.any() and self.presses is None
+            else float(np.abs(matrix.diagonal()).mean())
+        )
+        if self.presses is not None:
+            own = np.flatnonzero(row == column)
+            lifted = (self.presses & self.free)[self.nodes][row[own]]
+            data[own] += _BED * size * np.eye(d) * lifted[:, :, None]
         if partly.any():
             cut = np.flatnonzero(partly[row] | partly[column])
             data[cut] *= free[row[cut], :, None] & free[column[cut], None, :]
             diagonal = cut[row[cut] == column[cut]]
-            size = float(np.abs(matrix.diagonal()).mean())
             data[diagonal] += size * np.eye(d) * np.logical_not(free[row[diagonal]])[:, :, None]
         indptr = np.concatenate([[0], np.cumsum(np.bincount(row, minlength=k))]).astype(np.int32)
         return sp.bsr_array((data, column, indptr), shape=(d * k, d * k))

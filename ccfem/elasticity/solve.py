@@ -11,10 +11,10 @@ import scipy.sparse as sp
 
 from ccfem.arrays import FloatArray
 from ccfem.elasticity.conditioning import about_conditioning
+from ccfem.elasticity.contact import EXPECTED, Contact, find_contact
 from ccfem.elasticity.held import Held
 from ccfem.elasticity.order import LARGEST_ERROR, MOST_CELLS, linear_locks, on_quadratic
 from ccfem.elasticity.problem import Problem
-from ccfem.elasticity.solution import Solution
 from ccfem.elasticity.solvers import LARGEST_DIRECT, Solver, direct_backend
 from ccfem.elasticity.stress_field import SolveRecord, StressField
 from ccfem.elasticity.system import prepare
@@ -131,26 +131,27 @@ def solve_system(
     system = prepare()
     matrix = system.assemble()
     assembled = perf_counter()
-    solver = system.factorise(matrix, backend, len(system.forces))
+    each = 1 if system.held.presses is None else EXPECTED
+    solver = system.factorise(matrix, backend, each * len(system.forces))
     record = SolveRecord(solver.backend, 0, 0.0, assembled - started, 0.0, system.held.unknowns)
     fields, found = {}, {}
     started = assembled
     for case, forces in system.forces.items():
-        held = system.held_in(case)
-        rhs = held.right_hand_side(matrix, forces)
+        work = partial(_solved, matrix, system.held_in(case), forces, tolerance)
         try:
-            solution, energy = _solved(solver, rhs, tolerance)
+            contact, energy = work(solver)
         except SolveError:
             if backend != "auto" or solver.exact or record.unknowns > LARGEST_DIRECT:
                 raise
             solver = system.factorise(matrix, direct_backend())
-            solution, energy = _solved(solver, rhs, tolerance)
-        found[case] = held.expand(solution.values)
+            contact, energy = work(solver)
+        solution, solver = contact.solution, contact.solver
+        found[case] = contact.held.expand(solution.values)
         now = perf_counter()
         record = replace(
             record,
             backend=solver.backend,
-            iterations=solution.iterations,
+            iterations=contact.iterations,
             residual=solution.residual,
             backward_error=solution.backward_error,
             energy_error=energy,
@@ -164,13 +165,21 @@ def solve_system(
     return fields
 
 
-def _solved(solver: Solver, rhs: FloatArray, tolerance: float) -> tuple[Solution, float]:
-    """Solution of a right-hand side, and the bound of the energy of its error."""
-    solution = solver.solve(rhs, tolerance=tolerance)
-    energy = solver.energy_error(rhs, solution)
+def _solved(
+    matrix: sp.bsr_array, held: Held, forces: FloatArray, tolerance: float, solver: Solver
+) -> tuple[Contact, float]:
+    """Solution for forces (n, 3), N, and the bound of the energy of its error."""
+    if held.presses is None:
+        rhs = held.right_hand_side(matrix, forces)
+        solution = solver.solve(rhs, tolerance=tolerance)
+        found = Contact(held, solver, rhs, solution, solution.iterations)
+    else:
+        found = find_contact(matrix, held, forces, solver, tolerance)
+    energy = found.solver.energy_error(found.right, found.solution)
     if not energy <= _ENERGY:
         raise SolveError(
             f"{solver.backend}: the energy of the error may be {energy:.1e} of that of the "
-            f"displacement, above {_ENERGY:.0e}, at a relative residual of {solution.residual:.1e}"
+            f"displacement, above {_ENERGY:.0e}, at a relative residual of "
+            f"{found.solution.residual:.1e}"
         )
-    return solution, energy
+    return found, energy

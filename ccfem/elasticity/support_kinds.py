@@ -15,6 +15,7 @@ __all__ = [
     "Pin",
     "PointSpring",
     "PointSupport",
+    "PressingSupport",
     "RigidPatch",
     "SlidingSupport",
     "Spring",
@@ -113,6 +114,34 @@ class SlidingSupport:
         if self.normal is not None and not 0.0 < np.linalg.norm(self.normal) < np.inf:
             raise InputError(
                 f"normal of the sliding support on patch '{self.patch}' must be 3 finite numbers, "
+                f"not all zero; got {self.normal}: correct it"
+            )
+
+
+@dataclass(frozen=True)
+class PressingSupport:
+    """A patch that lies on something rigid without friction: it may lift off, not sink in.
+
+    A wall that a bolt stands in, the ring under its head, a table. There is no gap before the load,
+    so the solution is in proportion to the load. Where two such patches meet they have to be at
+    right angles. On quadratic cells the middles of the edges bear: under even pressure the corners
+    carry nothing.
+
+    Attributes
+    ----------
+    patch : str
+    normal : tuple of 3 floats, optional
+        Direction out of the part, towards the support, of any length; by default the outward
+        normal at each node.
+    """
+
+    patch: str
+    normal: Vector | None = None
+
+    def __post_init__(self) -> None:
+        if self.normal is not None and not 0.0 < np.linalg.norm(self.normal) < np.inf:
+            raise InputError(
+                f"normal of the pressing support on patch '{self.patch}' must be 3 finite numbers, "
                 f"not all zero; got {self.normal}: correct it"
             )
 
@@ -252,6 +281,7 @@ AnySupport = (
     | EdgeSupport
     | PointSupport
     | SlidingSupport
+    | PressingSupport
     | RigidPatch
     | Pin
     | Spring

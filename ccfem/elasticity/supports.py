@@ -7,6 +7,7 @@ import numpy as np
 
 from ccfem.arrays import BoolArray, FloatArray, IntArray, read_only
 from ccfem.elasticity.body import LoadedBody, SupportedProblem
+from ccfem.elasticity.frames import node_frames
 from ccfem.elasticity.held import Held
 from ccfem.elasticity.load_kinds import Displacement
 from ccfem.elasticity.nodes import (
@@ -25,6 +26,7 @@ from ccfem.elasticity.support_kinds import (
     Pin,
     PointSpring,
     PointSupport,
+    PressingSupport,
     RigidPatch,
     SlidingSupport,
     Spring,
@@ -35,9 +37,6 @@ from ccfem.errors import InputError
 from ccfem.mesh.cell_mesh import CellMesh
 
 __all__ = ["check_support", "held", "held_in"]
-
-_PARALLEL = 1e-6
-"""Sine of the angle below which directions that are held count as one."""
 
 
 def held(problem: SupportedProblem) -> Held:
@@ -79,6 +78,7 @@ def held_in(problem: SupportedProblem, case: str, at_rest: Held) -> Held:
         return at_rest
     for patch, vector in moves.items():
         holding = [s for s in problem.supports if type(s) in _KINDS and _moves(s) == patch]
+        holding = [s for s in holding if not isinstance(s, PressingSupport)]
         known = {letter for s in holding for letter in getattr(s, "components", "xyz")}
         wanted = {letter for letter, size in zip("xyz", vector, strict=True) if size}
         if not np.isfinite(vector).all() or not wanted <= known:
@@ -137,6 +137,7 @@ class _Collected:
     free: BoolArray
     value: FloatArray
     oblique: list[tuple[IntArray, FloatArray, FloatArray]] = field(default_factory=list)
+    pressing: list[tuple[IntArray, FloatArray]] = field(default_factory=list)
     rigid: list[_Rigid] = field(default_factory=list)
     soft: list[tuple[IntArray, FloatArray]] = field(default_factory=list)
 
@@ -159,9 +160,9 @@ class _Collected:
             self.value[nodes, k] = value[k]
 
     def holds(self) -> Holds:
-        """Directions that are held, springs among them."""
+        """Directions that are held, those of springs and of supports that only press too."""
         nodes, directions = _axis_holds(~self.free)
-        more = [(n, d) for n, d, _ in self.oblique] + self.soft
+        more = [(n, d) for n, d, _ in self.oblique] + self.pressing + self.soft
         moved = [(k, a) for k, r in enumerate(self.rigid) for a in r.body.axes.T[r.held[0]]]
         turned = [(k, a) for k, r in enumerate(self.rigid) for a in r.body.axes.T[r.held[1]]]
         which = np.array([k for k, _ in moved], dtype=np.int64)
@@ -183,41 +184,24 @@ class _Collected:
         unused = np.ones(len(free), dtype=bool)
         unused[self.mesh.cells] = False
         free[unused] = False
-        if self.oblique or self.rigid:
-            turned, frames = self._frames(free, value)
+        presses = np.zeros(free.shape, dtype=bool)
+        if self.oblique or self.rigid or self.pressing:
+            turned, frames = node_frames(self.oblique, self.pressing, free, value, presses)
             ties = Ties(self.mesh.points, turned, frames, tuple(r.body for r in self.rigid))
             self._check_slaves(ties, free)
             free[ties.slaves] = False
             for rigid in self.rigid:
                 free = np.concatenate([free, ~rigid.held])
+                presses = np.concatenate([presses, np.zeros((2, 3), dtype=bool)])
                 value = np.concatenate([value, np.where(rigid.held, rigid.value, 0.0)])
-        nodes = np.flatnonzero(free.any(axis=1))
-        return Held(read_only(free, np.bool_), read_only(value), read_only(nodes, np.int64), ties)
-
-    def _frames(self, free: BoolArray, value: FloatArray) -> tuple[IntArray, FloatArray]:
-        """Axes of the nodes that are held across them; what is held becomes theirs, in place."""
-        wanted: dict[int, list[tuple[FloatArray, float]]] = {}
-        for nodes, directions, values in self.oblique:
-            for node, direction, at in zip(nodes, directions, values, strict=True):
-                wanted.setdefault(int(node), []).append((direction, float(at)))
-        turned = np.array(sorted(wanted), dtype=np.int64)
-        frames = np.empty((len(turned), 3, 3))
-        for k, node in enumerate(turned):
-            fixed = ~free[node]
-            rows = np.concatenate([np.eye(3)[fixed], [d for d, _ in wanted[int(node)]]])
-            levels = np.concatenate([value[node, fixed], [v for _, v in wanted[int(node)]]])
-            _, sizes, axes = np.linalg.svd(rows)
-            rank = int((sizes > _PARALLEL).sum())
-            at = np.linalg.lstsq(rows @ axes[:rank].T, levels, rcond=None)[0]
-            if np.abs(rows @ axes[:rank].T @ at - levels).max() > 1e-9 * max(1.0, np.abs(at).max()):
-                raise InputError(
-                    f"supports contradict each other at node {node}, which is held along several "
-                    "directions: give them values that agree"
-                )
-            frames[k] = axes.T
-            free[node] = np.arange(3) >= rank
-            value[node] = np.concatenate([at, np.zeros(3 - rank)])
-        return turned, frames
+        nodes = np.flatnonzero((free | presses).any(axis=1))
+        return Held(
+            read_only(free, np.bool_),
+            read_only(value),
+            read_only(nodes, np.int64),
+            ties,
+            read_only(presses, np.bool_) if presses.any() else None,
+        )
 
     def _check_slaves(self, ties: Ties, free: BoolArray) -> None:
         """Raise where a node of a rigid patch is held besides, or belongs to two."""
@@ -284,6 +268,19 @@ def _sliding(found: _Collected, support: SlidingSupport, move: Sequence[float] |
     found.oblique.append((nodes, normals, values))
 
 
+def _pressing(found: _Collected, support: PressingSupport, move: Sequence[float] | None) -> None:
+    mesh = found.mesh
+    facets, nodes = patch_facets(found.surface, support.patch), patch_nodes(mesh, support.patch)
+    if len(mesh.cells[0]) > len(mesh.corners[0]):
+        nodes = np.setdiff1d(nodes, facets)
+    if support.normal is None:
+        normals = patch_normals(found.surface, facets, nodes)
+    else:
+        normal = np.asarray(support.normal, dtype=np.float64)
+        normals = np.tile(normal / np.linalg.norm(normal), (len(nodes), 1))
+    found.pressing.append((nodes, normals))
+
+
 def _rigid(found: _Collected, support: RigidPatch, move: Sequence[float] | None) -> None:
     value = support.value if move is None else move
     held = np.array([[c in letters for c in "xyz"] for letters in
@@ -328,6 +325,7 @@ _KINDS: dict[type, Callable[..., None]] = {
     EdgeSupport: _edge,
     PointSupport: _point,
     SlidingSupport: _sliding,
+    PressingSupport: _pressing,
     RigidPatch: _rigid,
     Pin: _pin,
 }

@@ -19,6 +19,7 @@ from ccfem.elasticity.springs import add_springs, soft_supports, spring_forces
 from ccfem.elasticity.stress_field import SolveRecord, StressField
 from ccfem.elasticity.supports import held, held_in
 from ccfem.elasticity.volume_loads import free_strain, strain_forces
+from ccfem.errors import InputError
 from ccfem.mesh.tet_mesh import TetMesh
 
 __all__ = ["System", "prepare"]
@@ -92,7 +93,13 @@ class System:
         add_springs(matrix, problem.mesh, soft_supports(problem))
         return matrix
 
-    def factorise(self, matrix: sp.bsr_array, backend: str = "auto", solves: int = 1) -> Solver:
+    def factorise(
+        self,
+        matrix: sp.bsr_array,
+        backend: str = "auto",
+        solves: int = 1,
+        held: Held | None = None,
+    ) -> Solver:
         """Factorise a stiffness matrix (3n, 3n) with the supports in place.
 
         Parameters
@@ -101,8 +108,10 @@ class System:
         backend : str, default "auto"
         solves : int, default 1
             Right-hand sides to expect.
+        held : Held, optional
+            The supports in another contact than all.
         """
-        mesh, held = self.problem.mesh, self.held
+        mesh, held = self.problem.mesh, self.held if held is None else held
         ends = _ends(mesh) if mesh.order == 2 else None
         if held.ties is None:
             parents = None if ends is None else held.parents(ends)
@@ -163,6 +172,11 @@ def prepare(problem: Problem) -> System:
     """
     forces = load_cases(problem)
     at_rest = held(problem)
+    if at_rest.presses is not None and problem.combinations:
+        raise InputError(
+            "load cases do not add up where supports only press; got the combinations "
+            f"{', '.join(problem.combinations)}: make each a load case of its own"
+        )
     moved = {}
     for case in problem.loads:
         here = held_in(problem, case, at_rest)

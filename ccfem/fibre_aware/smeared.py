@@ -157,7 +157,7 @@ class SmearedPart:
 
     @cached_property
     def _reduced(self) -> Any:
-        return self.specimen.system.held.reduce(self.specimen.matrix)
+        return self.specimen.held.reduce(self.specimen.matrix)
 
     def strain(self, displacement: FloatArray) -> FloatArray:
         """Strains (m, 3) in the plane: 11, 22 and 12 (engineering shear)."""

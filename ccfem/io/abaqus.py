@@ -32,6 +32,8 @@ _KINDS = (
 )
 """Element types by the start of their name (variants end in letters), and their nodes."""
 
+_LARGEST = 2**53
+"""Labels that a double holds."""
 _FACES = np.array([[0, 1, 2], [0, 3, 1], [1, 3, 2], [2, 3, 0]])
 """Corner nodes of the faces S1 to S4."""
 
@@ -52,8 +54,8 @@ class _Deck:
 
     nodes: list[FloatArray] = field(default_factory=list)
     elements: dict[str, list[IntArray]] = field(default_factory=dict)
-    node_sets: dict[str, list[str]] = field(default_factory=dict)
-    element_sets: dict[str, list[str]] = field(default_factory=dict)
+    node_sets: dict[str, list[str | range]] = field(default_factory=dict)
+    element_sets: dict[str, list[str | range]] = field(default_factory=dict)
     surfaces: dict[str, list[tuple[str, str]]] = field(default_factory=dict)
     titles: dict[str, str] = field(default_factory=dict)
     parts: int = 0
@@ -137,10 +139,11 @@ def _read_block(deck: _Deck, block: _Block) -> None:
         if parameters.get("SYSTEM", "R").upper() != "R":
             raise ValueError("only rectangular coordinates are read")
         rows = _numbers(block.lines, 4)
+        _check_labels(rows[:, :1])
         deck.nodes.append(rows)
         if "NSET" in parameters:
-            members = [str(int(label)) for label in rows[:, 0]]
-            deck.node_sets.setdefault(_key(deck, parameters["NSET"]), []).extend(members)
+            nodes = [str(int(label)) for label in rows[:, 0]]
+            deck.node_sets.setdefault(_key(deck, parameters["NSET"]), []).extend(nodes)
     elif block.keyword == "ELEMENT":
         _read_elements(deck, block)
     elif block.keyword in ("NSET", "ELSET"):
@@ -164,7 +167,11 @@ def _read_elements(deck: _Deck, block: _Block) -> None:
     if not known:
         return
     _, kind, count = known[0]
-    rows = _numbers(block.lines, count + 1).astype(np.int64) if count else np.zeros((1, 1), int)
+    rows = np.zeros((1, 1), dtype=np.int64)
+    if count:
+        values = _numbers(block.lines, count + 1)
+        _check_labels(values)
+        rows = values.astype(np.int64)
     deck.elements.setdefault(kind, []).append(rows)
     if "ELSET" in block.parameters and count:
         members = [str(label) for label in rows[:, 0]]
@@ -180,15 +187,22 @@ def _numbers(lines: list[str], columns: int) -> FloatArray:
     return values.reshape(-1, columns)
 
 
-def _members(lines: list[str], generate: bool) -> list[str]:
-    """Labels and set names in a set."""
+def _check_labels(values: FloatArray) -> None:
+    """Raise on labels that are no whole numbers."""
+    wrong = values[~((values == np.floor(values)) & (np.abs(values) < _LARGEST))]
+    if len(wrong):
+        raise ValueError(f"labels are whole numbers; got {wrong[0]:g}")
+
+
+def _members(lines: list[str], generate: bool) -> list[str | range]:
+    """Labels, set names, and ranges of labels in a set."""
     items = [item.strip() for line in lines for item in line.split(",") if item.strip()]
     if not generate:
-        return items
-    found: list[str] = []
+        return list(items)
+    found: list[str | range] = []
     for line in lines:
         first, last, *step = (int(item) for item in line.split(",") if item.strip())
-        found += [str(label) for label in range(first, last + 1, step[0] if step else 1)]
+        found.append(range(first, last + 1, step[0] if step else 1))
     return found
 
 
@@ -199,16 +213,31 @@ def _key(deck: _Deck, name: str) -> str:
     return title.upper()
 
 
-def _labels(members: list[str], sets: dict[str, list[str]], depth: int = 0) -> list[int]:
-    """Labels of the members of a set, sets within it resolved."""
-    found: list[int] = []
-    for member in members:
-        name = member.strip('"').rpartition(".")[2]
-        if name.isdigit():
-            found.append(int(name))
-        elif name.upper() in sets and depth < 20:
-            found += _labels(sets[name.upper()], sets, depth + 1)
-    return found
+def _labels(
+    members: list[str | range], sets: dict[str, list[str | range]], known: IntArray
+) -> IntArray:
+    """Those of the known labels that are members of a set, sets within it resolved."""
+    chosen = np.zeros(len(known), dtype=bool)
+    single: list[int] = []
+    seen: set[str] = set()
+    waiting = [members]
+    while waiting:
+        for member in waiting.pop():
+            if isinstance(member, range):
+                if len(member):
+                    low, high = min(member[0], member[-1]), max(member[0], member[-1])
+                    inside = (known >= max(low, -_LARGEST)) & (known <= min(high, _LARGEST))
+                    step = min(abs(member.step), _LARGEST)
+                    chosen |= inside & ((known - max(min(low, _LARGEST), -_LARGEST)) % step == 0)
+                continue
+            name = member.strip('"').rpartition(".")[2]
+            if name.isascii() and name.isdecimal():
+                if len(name) < 16:
+                    single.append(int(name))
+            elif name.upper() in sets and name.upper() not in seen:
+                seen.add(name.upper())
+                waiting.append(sets[name.upper()])
+    return known[chosen | np.isin(known, np.array(single, dtype=np.int64))]
 
 
 def _positions(wanted: IntArray, labels: IntArray, path: Path) -> IntArray:
@@ -232,13 +261,16 @@ def _patches(deck: _Deck, mesh: TetMesh, labels: IntArray, path: Path) -> dict[s
         for rows in deck.elements.get(kind, [])
         for row in rows
     }
+    flat_labels = np.array(sorted(triangles), dtype=np.int64)
+    solid_labels = np.array(sorted(corners_of), dtype=np.int64)
 
-    def of_nodes(members: list[str]) -> IntArray:
-        inside = np.isin(labels, np.array(_labels(members, deck.node_sets), dtype=np.int64))
+    def of_nodes(members: list[str | range]) -> IntArray:
+        inside = np.isin(labels, _labels(members, deck.node_sets, labels))
         return mesh.boundary[inside[mesh.boundary].all(axis=1)]
 
-    def of_triangles(members: list[str]) -> IntArray:
-        rows = [triangles[k] for k in _labels(members, deck.element_sets) if k in triangles]
+    def of_triangles(members: list[str | range]) -> IntArray:
+        named = _labels(members, deck.element_sets, flat_labels)
+        rows = [triangles[k] for k in named.tolist()]
         if not rows:
             return np.zeros((0, 3), dtype=np.int64)
         return match_boundary(mesh, _positions(np.array(rows), labels, path))
@@ -249,9 +281,8 @@ def _patches(deck: _Deck, mesh: TetMesh, labels: IntArray, path: Path) -> dict[s
             if face == "NODE":
                 facets.append(of_nodes([name]))
             elif re.fullmatch(r"S[1-4]", face):
-                chosen = [
-                    corners_of[k] for k in _labels([name], deck.element_sets) if k in corners_of
-                ]
+                named = _labels([name], deck.element_sets, solid_labels)
+                chosen = [corners_of[k] for k in named.tolist()]
                 facets.append(mesh.corners[chosen][:, _FACES[int(face[1]) - 1]])
             else:
                 facets.append(of_triangles([name]))

@@ -1,22 +1,18 @@
-"""Gmsh ``.msh`` meshes, versions 2.2 and 4.1, text or binary, through meshio."""
+"""Gmsh ``.msh`` meshes, versions 2.2 and 4.1, text or binary: meshio in a process of its own."""
 
-import struct
 from pathlib import Path
-from typing import Any
 
 import numpy as np
 
 from ccfem.arrays import IntArray
 from ccfem.errors import InputError
 from ccfem.io.cells import tetrahedra
+from ccfem.isolated.limited import read_isolated
+from ccfem.isolated.process import ChildError
 from ccfem.mesh.patches import with_groups
 from ccfem.mesh.tet_mesh import TetMesh
 
 __all__ = ["read_msh"]
-
-_TAG = "gmsh:physical"
-_BROKEN = (ValueError, LookupError, TypeError, EOFError, AssertionError, MemoryError, OverflowError)
-"""What meshio raises on broken files."""
 
 
 def read_msh(path: Path) -> TetMesh:
@@ -25,41 +21,22 @@ def read_msh(path: Path) -> TetMesh:
     A group without a name is called by its number. Quadratic tetrahedra come in VTK order: Gmsh
     swaps the last two mid-side nodes and meshio swaps them back.
     """
-    import meshio
-
     with path.open("rb") as file:
         start = file.read(256)
     if b"$MeshFormat" not in start and not start.startswith(b"$Comments"):
         raise InputError(f"{path} is not a Gmsh mesh: it must begin with $MeshFormat")
     try:
-        found = meshio.gmsh.read(path)
-    except (meshio.ReadError, struct.error, *_BROKEN) as error:
-        reason = str(error).split("\n")[0] or type(error).__name__
+        found = read_isolated("gmsh_files:read", path)
+    except ChildError as error:
         raise InputError(
-            f"{path} is not a Gmsh mesh that can be read ({reason}): save it again as version 4.1"
+            f"{path} is not a Gmsh mesh that can be read ({error}): save it again as version 4.1"
         ) from None
-    cells = tetrahedra([(block.type, block.data) for block in found.cells], path)
-    mesh = TetMesh(np.asarray(found.points, dtype=np.float64)[:, :3], cells)
-    return with_groups(mesh, _triangle_groups(found))
-
-
-def _triangle_groups(found: Any) -> dict[str, IntArray]:
-    """Corner nodes (k, 3) of the triangles in each physical group."""
+    parts = {name: name.split(":", 2) for name in found}
+    blocks = {p[1]: (p[2], found[name]) for name, p in parts.items() if p[0] == "cells"}
+    mesh = TetMesh(found["points"][:, :3], tetrahedra(blocks.values(), path))
     groups: dict[str, list[IntArray]] = {}
-    names = {
-        int(tag): name for name, (tag, dimension) in found.field_data.items() if dimension == 2
-    }
-    tags = found.cell_data.get(_TAG, [None] * len(found.cells))
-    for k, block in enumerate(found.cells):
-        if not block.type.startswith("triangle"):
-            continue
-        corners = np.asarray(block.data)[:, :3]
-        for tag in np.unique(tags[k]) if tags[k] is not None else []:
-            if tag > 0:
-                name = names.get(int(tag), str(tag))
-                groups.setdefault(name, []).append(corners[tags[k] == tag])
-        for name, members in found.cell_sets.items():
-            if not name.startswith("gmsh:") and members[k] is not None and len(members[k]):
-                chosen = np.asarray(members[k], dtype=np.int64)
-                groups.setdefault(name, []).append(corners[chosen])
-    return {name: np.concatenate(parts) for name, parts in groups.items()}
+    for name, (kind, *rest) in parts.items():
+        if kind == "group":
+            corners = blocks[rest[0]][1][:, :3]
+            groups.setdefault(rest[1], []).append(corners[found[name]])
+    return with_groups(mesh, {name: np.concatenate(each) for name, each in groups.items()})

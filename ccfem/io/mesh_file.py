@@ -18,7 +18,7 @@ from ccfem.io.whole import existing_file, whole_file
 from ccfem.mesh.check import check_mesh
 from ccfem.mesh.tet_mesh import TetMesh
 
-__all__ = ["read_mesh", "write_mesh"]
+__all__ = ["check_mesh_name", "read_mesh", "write_mesh"]
 
 _READERS: dict[str, Callable[[Path], TetMesh]] = {
     ".tet": read_tet,
@@ -99,12 +99,24 @@ def write_mesh(mesh: TetMesh, path: str | os.PathLike[str]) -> None:
         For another suffix, a mesh that the format cannot hold, or a file that cannot be written.
     """
     path = Path(path)
+    suffix = check_mesh_name(path)
+    if not np.isfinite(mesh.points).all():
+        raise InputError(f"cannot write {path}: the mesh has NaN or infinite coordinates")
+    with whole_file(path) as temporary:
+        _WRITERS[suffix](mesh, temporary)
+
+
+def check_mesh_name(path: Path) -> str:
+    """Return the suffix of a mesh file that can be written.
+
+    Raises
+    ------
+    InputError
+        For another suffix.
+    """
     suffix = path.suffix.lower()
     if suffix not in _WRITERS:
         raise InputError(
             f"cannot write a mesh to {path}: its name must end in {', '.join(sorted(_WRITERS))}"
         )
-    if not np.isfinite(mesh.points).all():
-        raise InputError(f"cannot write {path}: the mesh has NaN or infinite coordinates")
-    with whole_file(path) as temporary:
-        _WRITERS[suffix](mesh, temporary)
+    return suffix

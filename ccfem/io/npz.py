@@ -5,29 +5,37 @@ named ``patch:NAME`` for each patch. Nothing in the archive is unpickled.
 """
 
 import zipfile
-import zlib
 from pathlib import Path
 from typing import Any
 
 import numpy as np
 
-from ccfem.errors import InputError
+from ccfem.errors import InputError, shown
 from ccfem.mesh.tet_mesh import TetMesh
 
 __all__ = ["read_npz", "write_npz"]
 
 _PATCH = "patch:"
+_SMALL, _PACKED = 10_000_000, 200
+"""Bytes that any archive may unpack to, and how many times its size more."""
 
 
 def read_npz(path: Path) -> TetMesh:
     """Read a mesh from a NumPy archive."""
     try:
+        _check_sizes(path)
         with np.load(path, allow_pickle=False) as archive:
             arrays = {name: archive[name] for name in archive.files}
-    except (ValueError, OSError, EOFError, KeyError, zipfile.BadZipFile, zlib.error) as error:
+    except InputError:
+        raise
+    except Exception as error:  # numpy, zipfile and zlib raise a dozen kinds on broken files
+        reason = shown(str(error).partition("\n")[0] or type(error).__name__)
         raise InputError(
-            f"{path} is not a mesh in a NumPy archive ({error}): write it with write_mesh"
+            f"{path} is not a mesh in a NumPy archive ({reason}): write it with write_mesh"
         ) from None
+    wrong = sorted(name for name, array in arrays.items() if not isinstance(array, np.ndarray))
+    if wrong:
+        raise InputError(f"{path} holds {shown(wrong[0])}, no array: write it with write_mesh")
     if "points" not in arrays or "cells" not in arrays:
         raise InputError(
             f"{path} must hold the arrays points and cells; it has: "
@@ -43,6 +51,20 @@ def read_npz(path: Path) -> TetMesh:
         if name.startswith(_PATCH)
     }
     return TetMesh(arrays["points"], arrays["cells"], patches)
+
+
+def _check_sizes(path: Path) -> None:
+    """Raise on an archive that says it unpacks to far more than any mesh does."""
+    size = path.stat().st_size
+    if not zipfile.is_zipfile(path):
+        raise InputError(f"{path} is not a mesh in a NumPy archive: write it with write_mesh")
+    with zipfile.ZipFile(path) as archive:
+        unpacked = sum(entry.file_size for entry in archive.infolist())
+    if unpacked > _SMALL + _PACKED * size:
+        raise InputError(
+            f"{path} unpacks from {size:.3g} to {unpacked:.3g} bytes, as no mesh does: write it "
+            "with write_mesh"
+        )
 
 
 def write_npz(mesh: TetMesh, path: Path) -> None:

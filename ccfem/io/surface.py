@@ -9,8 +9,9 @@ import numpy as np
 from ccfem.arrays import FloatArray, IntArray, freeze, read_only
 from ccfem.checks import check_number
 from ccfem.errors import InputError
-from ccfem.io.quiet import read_quietly
 from ccfem.io.whole import existing_file
+from ccfem.isolated.limited import read_isolated
+from ccfem.isolated.process import ChildError
 
 __all__ = ["Surface", "is_surface", "read_surface"]
 
@@ -44,6 +45,11 @@ class Surface:
             )
         if not np.isfinite(self.points).all():
             raise InputError("surface points must be finite; got NaN or infinity: repair the file")
+        if self.triangles.min() < 0 or self.triangles.max() >= len(self.points):
+            raise InputError(
+                f"triangles must name points 0 to {len(self.points) - 1}; got "
+                f"{self.triangles.min()} to {self.triangles.max()}: repair the file"
+            )
         _check_closed(self.points, self.triangles)
         if self.volume < 0.0:
             object.__setattr__(self, "triangles", read_only(self.triangles[:, ::-1], np.int64))
@@ -83,15 +89,14 @@ def read_surface(path: str | os.PathLike[str], scale: float = 1.0) -> Surface:
             f"{', '.join(_SUFFIXES)}"
         )
     check_number("surface scale", scale, above=0.0)
-    found = read_quietly(path)
-    faces = getattr(found, "triangulate", lambda: None)()
-    if faces is None or not getattr(faces, "n_cells", 0) or not hasattr(faces, "regular_faces"):
-        raise InputError(
-            f"{path} is not a surface that can be read: it holds no triangles: export it again as "
-            "binary STL"
-        )
     try:
-        return Surface(*_merged(np.asarray(faces.points, dtype=float) * scale, faces.regular_faces))
+        found = read_isolated("vtk_files:read_surface", path)
+    except ChildError as error:
+        raise InputError(
+            f"{path} is not a surface that can be read: {error}: export it again as binary STL"
+        ) from None
+    try:
+        return Surface(*_merged(found["points"] * scale, found["triangles"]))
     except InputError as error:
         raise InputError(f"{path}: {error}") from None
 

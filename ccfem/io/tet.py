@@ -42,12 +42,16 @@ def read_tet(path: Path) -> TetMesh:
         values = np.array(lines[2].split() if len(lines) > 2 else [], dtype=np.float64)
     except ValueError as error:
         raise _not_tet(path, str(error)) from None
+    if points_count < 1:
+        raise _not_tet(path, f"{points_count} vertices")
     expected = 3 * points_count + 5 * cells_count
     if len(values) != expected:
         raise _not_tet(path, f"{len(values)} numbers in place of {expected}")
     points = values[: 3 * points_count].reshape(-1, 3)
     rows = values[3 * points_count :].reshape(-1, 5)
-    wrong = np.flatnonzero((rows[:, 0] != 4) | (rows != np.floor(rows)).any(axis=1))
+    wrong = np.flatnonzero(
+        (rows[:, 0] != 4) | ~((rows == np.floor(rows)) & (np.abs(rows) < 2**53)).all(axis=1)
+    )
     if len(wrong):
         raise _not_tet(path, f"tetrahedron {wrong[0]} does not read '4 a b c d'")
     return TetMesh(points, rows[:, 1:].astype(np.int64))

@@ -8,7 +8,7 @@ import typing
 from collections.abc import Callable, Mapping
 from typing import Any, Literal, TypeVar, Union, get_args, get_origin
 
-from ccfem.errors import InputError, known_names
+from ccfem.errors import InputError, Mistakes, known_names, shown
 
 __all__ = ["from_table"]
 
@@ -43,27 +43,33 @@ def from_table(make: Callable[..., T], table: object, where: str, infinite: bool
     ------
     InputError
         For something that is no table, an unknown or a missing key (the known ones are listed), a
-        value of another type, or whatever `make` refuses.
+        value of another type, or whatever `make` refuses; all mistakes of the table at once.
     """
     if not isinstance(table, Mapping):
-        raise InputError(f"{where} must be a table; got {table!r}: write [{where}] and its keys")
+        raise InputError(
+            f"{where} must be a table; got {shown(table)}: write [{where}] and its keys"
+        )
     parameters = inspect.signature(make).parameters
     hints = typing.get_type_hints(make)
+    found, values = Mistakes(), {}
     for key in table:
         if key not in parameters:
-            raise InputError(f"{where} has no key '{key}'; it has: {known_names(key, parameters)}")
-    values = {}
+            found.lines.append(
+                f"{where} has no key '{key}'; it has: {known_names(str(key), parameters)}"
+            )
     for name, parameter in parameters.items():
         if name in table:
-            values[name] = _converted(table[name], hints[name], f"{where}.{name}", infinite)
+            with found.noted():
+                values[name] = _converted(table[name], hints[name], f"{where}.{name}", infinite)
         elif parameter.default is inspect.Parameter.empty:
-            raise InputError(
+            found.lines.append(
                 f"{where} needs the key '{name}'; its keys are: {', '.join(parameters)}"
             )
+    found.complain()
     try:
         return make(**values)
     except InputError as error:
-        raise InputError(f"{where}: {error}") from None
+        raise InputError(*(f"{where}: {line}" for line in error.mistakes)) from None
 
 
 def _converted(value: object, hint: Any, where: str, infinite: bool) -> Any:
@@ -74,7 +80,7 @@ def _converted(value: object, hint: Any, where: str, infinite: bool) -> Any:
             return from_table(option, value, where, infinite)
     found = _fitted(value, hint, infinite)
     if found is _UNFIT:
-        raise InputError(f"{where} must be {_described(hint)}; got {value!r}: correct it")
+        raise InputError(f"{where} must be {_described(hint)}; got {shown(value)}: correct it")
     return found
 
 
@@ -115,9 +121,13 @@ def _plain(value: Any, hint: Any, infinite: bool) -> Any:
         return value if hint is bool and isinstance(value, bool) else _UNFIT
     if hint in (str, int):
         return value if isinstance(value, hint) else _UNFIT
-    if not isinstance(value, int | float) or math.isnan(value):
+    if not isinstance(value, int | float) or value != value:
         return _UNFIT
-    return float(value) if infinite or math.isfinite(value) else _UNFIT
+    try:
+        number = float(value)
+    except OverflowError:
+        return _UNFIT
+    return number if infinite or math.isfinite(number) else _UNFIT
 
 
 def _described(hint: Any) -> str:

@@ -1,18 +1,20 @@
-"""VTK unstructured grids (``.vtu``), through pyvista."""
+"""VTK unstructured grids (``.vtu``): read by VTK in a process of its own, written by pyvista."""
 
+from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
 import numpy as np
 
-from ccfem.arrays import IntArray
+from ccfem.arrays import FloatArray, IntArray
 from ccfem.errors import InputError
 from ccfem.io.cells import tetrahedra
-from ccfem.io.quiet import read_quietly
+from ccfem.isolated.limited import read_isolated
+from ccfem.isolated.process import ChildError
 from ccfem.mesh.patches import with_groups
 from ccfem.mesh.tet_mesh import TetMesh
 
-__all__ = ["grid_of", "read_grid", "read_vtu", "write_vtu"]
+__all__ = ["Grid", "grid_of", "read_grid", "read_vtu", "write_vtu"]
 
 _PATCH = "patch:"
 _TYPES = {
@@ -30,6 +32,7 @@ _TYPES = {
     29: "hexahedron27",
     42: "polyhedron",
 }
+_TRIANGLE, _TRIANGLE6 = 5, 22
 _TAGS = ("patch", "gmsh:physical", "CellEntityIds", "PhysicalIds")
 """Integer cell data that number the groups of triangles in files of other programs."""
 
@@ -42,49 +45,88 @@ def read_vtu(path: Path) -> TetMesh:
     (called by their number).
     """
     grid = read_grid(path)
-    blocks = {
-        _TYPES.get(int(kind), f"VTK cell type {kind}"): (int(kind), np.asarray(nodes))
-        for kind, nodes in grid.cells_dict.items()
-    }
-    cells = tetrahedra([(name, nodes) for name, (_, nodes) in blocks.items()], path)
-    mesh = TetMesh(np.asarray(grid.points, dtype=np.float64), cells)
+    blocks = {_TYPES.get(kind, f"VTK cell type {kind}"): kind for kind in grid.cells}
+    cells = tetrahedra([(name, grid.cells[kind]) for name, kind in blocks.items()], path)
+    mesh = TetMesh(grid.points, cells)
     groups = {
-        name.removeprefix(_PATCH): np.asarray(grid.field_data[name]).reshape(-1, 3)
-        for name in grid.field_data
-        if name.startswith(_PATCH)
+        name.removeprefix(_PATCH): facets.reshape(-1, 3)
+        for name, facets in grid.field.items()
+        if name.startswith(_PATCH) and facets.dtype.kind in "iu" and facets.size % 3 == 0
     }
-    groups = {**_tagged_triangles(grid, blocks), **groups}
-    return with_groups(mesh, groups)
+    return with_groups(mesh, {**_tagged_triangles(grid), **groups})
 
 
-def read_grid(path: Path) -> Any:
-    """Read an unstructured grid of pyvista."""
+@dataclass(frozen=True)
+class Grid:
+    """An unstructured grid as arrays.
+
+    Attributes
+    ----------
+    points : (n, 3) array
+    types : (m,) int array
+        VTK's number of the type of each cell.
+    cells : dict of type to (k, q) int array
+        Nodes of the cells of each type, in their order; (k, 0) of those that ccfem does not take.
+    point, cell, field : dict of name to array
+        Data of points, of cells, and of the whole.
+    components : dict of (where, name) to list of str
+        Names of the components of data, where they have some.
+    """
+
+    points: FloatArray
+    types: IntArray
+    cells: dict[int, IntArray]
+    point: dict[str, Any]
+    cell: dict[str, Any]
+    field: dict[str, Any]
+    components: dict[tuple[str, str], list[str]]
+
+
+def read_grid(path: Path) -> Grid:
+    """Read an unstructured grid."""
     with path.open("rb") as file:
         start = file.read(4096)
     if b"<VTKFile" not in start or b"UnstructuredGrid" not in start:
         raise InputError(
             f"{path} is not a VTK unstructured grid: it must hold <VTKFile type='UnstructuredGrid'>"
         )
-    grid = read_quietly(path)
-    if grid is None:
-        raise InputError(f"{path} is not a VTK unstructured grid that can be read: write it again")
-    return grid
+    try:
+        found = read_isolated("vtk_files:read_grid", path)
+    except ChildError as error:
+        raise InputError(
+            f"{path} is not a VTK unstructured grid that can be read: {error}: write it again"
+        ) from None
+    parts: dict[str, dict[str, Any]] = {
+        kind: {k.partition(":")[2]: v for k, v in found.items() if k.startswith(f"{kind}:")}
+        for kind in ("cells", "point", "cell", "field", "components")
+    }
+    return Grid(
+        np.asarray(found["points"], dtype=np.float64),
+        found["types"].astype(np.int64),
+        {int(kind): nodes for kind, nodes in parts["cells"].items()},
+        parts["point"],
+        parts["cell"],
+        parts["field"],
+        {
+            (name.partition(":")[0], name.partition(":")[2]): names.tolist()
+            for name, names in parts["components"].items()
+        },
+    )
 
 
-def _tagged_triangles(grid: Any, blocks: dict[str, tuple[int, IntArray]]) -> dict[str, IntArray]:
+def _tagged_triangles(grid: Grid) -> dict[str, IntArray]:
     """Corner nodes (k, 3) of the triangles of each number."""
-    tag = next((name for name in _TAGS if name in grid.cell_data), None)
-    groups: dict[str, IntArray] = {}
-    if tag is None or grid.cell_data[tag].dtype.kind not in "iu":
-        return groups
-    for kind in ("triangle", "triangle6"):
-        if kind not in blocks:
+    tag = next((name for name in _TAGS if name in grid.cell), None)
+    groups: dict[str, list[IntArray]] = {}
+    if tag is None or grid.cell[tag].dtype.kind not in "iu" or grid.cell[tag].ndim != 1:
+        return {}
+    for kind in (_TRIANGLE, _TRIANGLE6):
+        if kind not in grid.cells:
             continue
-        code, nodes = blocks[kind]
-        numbers = np.asarray(grid.cell_data[tag])[np.asarray(grid.celltypes) == code]
+        numbers = grid.cell[tag][grid.types == kind]
         for number in np.unique(numbers):
-            groups[str(number)] = nodes[numbers == number][:, :3]
-    return groups
+            groups.setdefault(str(number), []).append(grid.cells[kind][numbers == number][:, :3])
+    return {name: np.concatenate(parts) for name, parts in groups.items()}
 
 
 def write_vtu(mesh: TetMesh, path: Path) -> None:

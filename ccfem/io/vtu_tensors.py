@@ -8,7 +8,7 @@ import numpy as np
 from ccfem.arrays import FloatArray
 from ccfem.errors import InputError
 from ccfem.io.stress_data import COMPONENTS, StressData, component_order
-from ccfem.io.vtu import read_grid
+from ccfem.io.vtu import Grid, read_grid
 from ccfem.tensor import to_voigt
 
 __all__ = ["UNIT", "set_tensors", "vtu_stress"]
@@ -35,26 +35,28 @@ def vtu_stress(path: Path, array: str) -> StressData:
     (xx, yy, zz, yz, xz, xy in any order, as xx, Sxx or S11).
     """
     grid = read_grid(path)
-    nodal, cell = (_tensors(data, array, path) for data in (grid.point_data, grid.cell_data))
+    nodal, cell = (_tensors(grid, where, array, path) for where in ("point", "cell"))
     if nodal is None and cell is None:
-        known = sorted({*grid.point_data.keys(), *grid.cell_data.keys()})
+        known = sorted({*grid.point, *grid.cell})
         raise InputError(
             f"{path} has no array '{array}'; there are: {', '.join(known) or 'none'}: name the "
             "one that holds the stress"
         )
-    tetrahedra = [nodes for kind, nodes in grid.cells_dict.items() if int(kind) in (10, 24)]
-    if len(tetrahedra) != 1 or len(tetrahedra[0]) != grid.n_cells:
+    tetrahedra = [nodes for kind, nodes in grid.cells.items() if kind in (10, 24)]
+    if len(tetrahedra) != 1 or len(tetrahedra[0]) != len(grid.types):
         raise InputError(f"{path}: expected tetrahedra of one kind only; mesh the part with those")
-    unit = str(grid.field_data[UNIT][0]) if UNIT in grid.field_data else ""
-    points = np.asarray(grid.points, dtype=np.float64)
+    unit = str(grid.field[UNIT][0]) if len(grid.field.get(UNIT, ())) else ""
     corners = np.asarray(tetrahedra[0], dtype=np.int64)[:, :4]
-    return StressData(points, corners, nodal, cell, unit)
+    return StressData(grid.points, corners, nodal, cell, unit)
 
 
-def _tensors(data: Any, name: str, path: Path) -> FloatArray | None:
+def _tensors(grid: Grid, where: str, name: str, path: Path) -> FloatArray | None:
     """Voigt components (k, 6) of an array; None where there is no such array."""
-    if name not in data.keys():  # noqa: SIM118 - pyvista's mapping is one by its keys only
+    data = grid.point if where == "point" else grid.cell
+    if name not in data:
         return None
+    if data[name].dtype.kind not in "fiu":
+        raise InputError(f"{path}: array '{name}' must hold numbers; got {data[name].dtype}")
     values = np.asarray(data[name], dtype=np.float64)
     if values.ndim == 3 and values.shape[1:] == (3, 3):
         values = values.reshape(-1, 9)
@@ -65,6 +67,5 @@ def _tensors(data: Any, name: str, path: Path) -> FloatArray | None:
     if values.shape[1] == 9:
         full = values.reshape(-1, 3, 3)
         return to_voigt(0.5 * (full + full.swapaxes(1, 2)))
-    array = data.VTKObject.GetArray(name)
-    names = [array.GetComponentName(k) or "" for k in range(6)]
+    names = grid.components.get((where, name), [""] * 6)
     return values[:, component_order(names, f"{path}: array '{name}'")]

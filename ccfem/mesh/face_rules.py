@@ -8,11 +8,12 @@ import numpy as np
 from ccfem.arrays import IntArray
 from ccfem.checks import check_fields
 from ccfem.errors import InputError
-from ccfem.mesh.patches import Vector, match_boundary, unit_vector
-from ccfem.mesh.smooth_faces import FEATURE_ANGLE, Face, smooth_faces
+from ccfem.mesh.facets import are_among
+from ccfem.mesh.patches import Bounded, Vector, match_boundary, unit_vector
+from ccfem.mesh.smooth_faces import FEATURE_ANGLE, Face, given_faces, smooth_faces
 from ccfem.mesh.tet_mesh import TetMesh
 
-__all__ = ["GROUP", "Faces", "Holes", "without_faces"]
+__all__ = ["GROUP", "Faces", "Holes", "faces_of", "without_faces"]
 
 GROUP = "face_{}"
 """Name of the group that holds a numbered face of the surface that a mesh was made from."""
@@ -46,7 +47,7 @@ class Faces:
     def _numbers(self) -> tuple[int, ...]:
         return (self.number,) if isinstance(self.number, int) else self.number
 
-    def __call__(self, mesh: TetMesh) -> IntArray:
+    def __call__(self, mesh: Bounded) -> IntArray:
         """Boundary facets (k, 3) of the faces.
 
         Where the mesh was made from a surface whose faces came with it as groups, of these.
@@ -90,9 +91,9 @@ class Holes:
         if self.axis is not None:
             unit_vector(self.axis, "holes axis")
 
-    def __call__(self, mesh: TetMesh) -> IntArray:
+    def __call__(self, mesh: Bounded) -> IntArray:
         """Boundary facets (k, 3) of the walls."""
-        faces = smooth_faces(mesh.points, mesh.boundary, self.angle)
+        faces = faces_of(mesh, self.angle)
         walls = [face for face in faces if face.kind == "cylinder" and face.hollow]
         chosen = [face for face in walls if self._fits(face)]
         if not chosen:
@@ -112,6 +113,19 @@ class Holes:
             return True
         across = np.cross(face.direction, unit_vector(self.axis, "holes axis"))
         return float(np.linalg.norm(across)) <= _PARALLEL
+
+
+def faces_of(mesh: Bounded, angle: float = FEATURE_ANGLE) -> tuple[Face, ...]:
+    """Faces of what a mesh was made from, where they came with it as groups; else its smooth ones.
+
+    The facets of each are rows of `TetMesh.boundary`. A coarse mesh has corners all round a hole;
+    the file that it was made from has not.
+    """
+    names = sorted(name for name in mesh.patches if name.startswith(GROUP.format("")))
+    if GROUP.format(1) not in names:
+        return smooth_faces(mesh.points, mesh.boundary, angle)
+    rows = [np.flatnonzero(are_among(mesh.boundary, mesh.patches[name])) for name in names]
+    return given_faces(mesh.points, mesh.boundary, [each for each in rows if len(each)])
 
 
 def without_faces(mesh: TetMesh, kept: Iterable[str]) -> TetMesh:

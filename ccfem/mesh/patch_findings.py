@@ -5,9 +5,10 @@ from collections.abc import Mapping
 import numpy as np
 
 from ccfem.arrays import BoolArray, FloatArray
+from ccfem.mesh.face_rules import faces_of
 from ccfem.mesh.facets import are_among
 from ccfem.mesh.patches import Box, Cylinder, PatchRule, Plane
-from ccfem.mesh.smooth_faces import Face, smooth_faces
+from ccfem.mesh.smooth_faces import Face
 from ccfem.mesh.tet_mesh import TetMesh
 
 __all__ = ["about_patches"]
@@ -39,7 +40,7 @@ def about_patches(mesh: TetMesh, rules: Mapping[str, PatchRule]) -> tuple[str, .
     if not guessed:
         return ()
     area, normal = mesh.facet_areas(mesh.boundary)
-    faces = smooth_faces(mesh.points, mesh.boundary)
+    faces = faces_of(mesh)
     taken = {name: are_among(mesh.boundary, mesh.patches[name]) for name in rules}
     anywhere = np.any(list(taken.values()), axis=0)
     lines: list[str] = []

@@ -6,7 +6,7 @@ chooses nothing is an error that names the nearest candidate.
 
 from collections.abc import Mapping
 from dataclasses import dataclass
-from typing import Protocol
+from typing import Protocol, Self, TypeVar
 
 import numpy as np
 from numpy.typing import ArrayLike
@@ -15,9 +15,9 @@ from ccfem.arrays import BoolArray, FloatArray, IntArray
 from ccfem.checks import check_fields
 from ccfem.errors import InputError
 from ccfem.mesh.facets import are_among
-from ccfem.mesh.tet_mesh import TetMesh
 
 __all__ = [
+    "Bounded",
     "Box",
     "Cylinder",
     "Group",
@@ -39,10 +39,45 @@ _SURFACE = 1e-3
 """Default tolerance of plane and cylinder, in diagonals of the part (pytetwild's envelope)."""
 
 
+class Bounded(Protocol):
+    """A mesh, or a surface that is to be meshed, as rules see it."""
+
+    @property
+    def points(self) -> FloatArray:
+        """Nodes (n, 3), mm."""
+        ...
+
+    @property
+    def patches(self) -> Mapping[str, IntArray]:
+        """Patches by name."""
+        ...
+
+    @property
+    def boundary(self) -> IntArray:
+        """Boundary facets (b, 3), outward."""
+        ...
+
+    @property
+    def bounds(self) -> FloatArray:
+        """Smallest and largest coordinates, (2, 3), mm."""
+        ...
+
+    def facet_areas(self, facets: IntArray) -> tuple[FloatArray, FloatArray]:
+        """Areas, mm^2, and unit normals of facets."""
+        ...
+
+    def with_patches(self, patches: Mapping[str, IntArray]) -> Self:
+        """Return the same with more patches."""
+        ...
+
+
+BoundedT = TypeVar("BoundedT", bound=Bounded)
+
+
 class PatchRule(Protocol):
     """Chooses boundary facets of a mesh."""
 
-    def __call__(self, mesh: TetMesh) -> IntArray:
+    def __call__(self, mesh: Bounded) -> IntArray:
         """Boundary facets (k, 3), outward, k >= 1."""
         ...
 
@@ -82,7 +117,7 @@ class Plane:
         offset = float(np.asarray(point, dtype=float) @ unit_vector(normal, "plane normal"))
         return cls(normal, offset, tolerance)
 
-    def __call__(self, mesh: TetMesh) -> IntArray:
+    def __call__(self, mesh: Bounded) -> IntArray:
         """Boundary facets (k, 3) whose nodes lie on the plane."""
         normal = unit_vector(self.normal, "plane normal")
         height = mesh.points @ normal
@@ -126,7 +161,7 @@ class Box:
                 f"box lower must not exceed upper; got {self.lower} and {self.upper}: swap them"
             )
 
-    def __call__(self, mesh: TetMesh) -> IntArray:
+    def __call__(self, mesh: Bounded) -> IntArray:
         """Boundary facets (k, 3) in the box."""
         beyond = np.maximum(np.array(self.lower) - mesh.points, mesh.points - np.array(self.upper))
         missed = np.maximum(beyond.max(axis=1), 0.0)[mesh.boundary].max(axis=1)
@@ -171,7 +206,7 @@ class Cylinder:
                 "cylinder half must be a direction across the axis; got one along it: turn it"
             )
 
-    def __call__(self, mesh: TetMesh) -> IntArray:
+    def __call__(self, mesh: Bounded) -> IntArray:
         """Facets (k, 3) of the cylinder's wall."""
         axis = unit_vector(self.axis, "cylinder axis")
         arm = mesh.points - np.array(self.point)
@@ -211,7 +246,7 @@ class Nearest:
         check_fields(self, "count", at_least=1)
         check_fields(self, "radius", above=0.0, unit="mm")
 
-    def __call__(self, mesh: TetMesh) -> IntArray:
+    def __call__(self, mesh: Bounded) -> IntArray:
         """Boundary facets (k, 3) nearest to the point."""
         distance = np.linalg.norm(_centres(mesh) - np.array(self.point), axis=1)
         if self.radius is None:
@@ -229,7 +264,7 @@ class Group:
 
     name: str
 
-    def __call__(self, mesh: TetMesh) -> IntArray:
+    def __call__(self, mesh: Bounded) -> IntArray:
         """Facets (k, 3) of the group."""
         if self.name not in mesh.patches:
             raise InputError(
@@ -239,7 +274,7 @@ class Group:
         return mesh.patches[self.name]
 
 
-def patches_from_rules(mesh: TetMesh, rules: Mapping[str, PatchRule]) -> TetMesh:
+def patches_from_rules(mesh: BoundedT, rules: Mapping[str, PatchRule]) -> BoundedT:
     """Name patches of a mesh by rules.
 
     Parameters
@@ -266,7 +301,7 @@ def patches_from_rules(mesh: TetMesh, rules: Mapping[str, PatchRule]) -> TetMesh
     return mesh.with_patches(patches)
 
 
-def match_boundary(mesh: TetMesh, facets: IntArray) -> IntArray:
+def match_boundary(mesh: Bounded, facets: IntArray) -> IntArray:
     """Find the boundary facets, outward, that have the nodes of `facets` (k, 3) in any order.
 
     Facets that are not on the boundary, and repeated ones, drop out; the order is that of
@@ -277,7 +312,7 @@ def match_boundary(mesh: TetMesh, facets: IntArray) -> IntArray:
     return mesh.boundary[are_among(mesh.boundary, facets)]
 
 
-def with_groups(mesh: TetMesh, groups: Mapping[str, IntArray]) -> TetMesh:
+def with_groups(mesh: BoundedT, groups: Mapping[str, IntArray]) -> BoundedT:
     """Return the mesh with groups of facets (k, 3) as patches, as far as they are on the boundary.
 
     Groups without a boundary facet give no patch.
@@ -303,10 +338,10 @@ def unit_vector(value: str | ArrayLike, what: str) -> FloatArray:
         sign = -1.0 if value.startswith("-") else 1.0
         return sign * np.array(_AXES[value.removeprefix("-")])
     vector = _vector(value, what)
-    length = np.linalg.norm(vector)
-    if not 0.0 < length < np.inf:
+    largest = float(np.abs(vector).max())
+    if not 0.0 < largest < np.inf:
         raise InputError(f"{what} must have a finite length above 0; got {value}: correct it")
-    return vector / length
+    return np.asarray(vector / largest / np.linalg.norm(vector / largest))
 
 
 def _vector(value: ArrayLike, what: str) -> FloatArray:
@@ -319,28 +354,28 @@ def _vector(value: ArrayLike, what: str) -> FloatArray:
     return vector
 
 
-def _diagonal(mesh: TetMesh) -> float:
+def _diagonal(mesh: Bounded) -> float:
     return float(np.linalg.norm(mesh.bounds[1] - mesh.bounds[0]))
 
 
-def _default(tolerance: float | None, mesh: TetMesh) -> float:
+def _default(tolerance: float | None, mesh: Bounded) -> float:
     return _SURFACE * _diagonal(mesh) if tolerance is None else tolerance
 
 
-def _normals(mesh: TetMesh) -> FloatArray:
+def _normals(mesh: Bounded) -> FloatArray:
     return mesh.facet_areas(mesh.boundary)[1]
 
 
-def _centres(mesh: TetMesh) -> FloatArray:
+def _centres(mesh: Bounded) -> FloatArray:
     return mesh.points[mesh.boundary].mean(axis=1)
 
 
-def _groups(mesh: TetMesh) -> str:
+def _groups(mesh: Bounded) -> str:
     return ", ".join(sorted(mesh.patches)) or "none"
 
 
 def _choose(
-    mesh: TetMesh, missed: FloatArray, tolerance: float, wanted: BoolArray, label: str
+    mesh: Bounded, missed: FloatArray, tolerance: float, wanted: BoolArray, label: str
 ) -> IntArray:
     """Facets among the `wanted` that miss the rule by no more than the tolerance, mm."""
     chosen = wanted & (missed <= tolerance)

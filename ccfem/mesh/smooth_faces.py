@@ -1,5 +1,6 @@
 """Smooth faces of a boundary, as a designer sees them: planes, round walls, others."""
 
+from collections.abc import Iterable
 from dataclasses import dataclass
 from typing import Literal
 
@@ -12,7 +13,7 @@ from ccfem.arrays import BoolArray, FloatArray, IntArray, freeze
 from ccfem.checks import check_number
 from ccfem.mesh.facets import facet_keys
 
-__all__ = ["FEATURE_ANGLE", "Face", "smooth_faces"]
+__all__ = ["FEATURE_ANGLE", "Face", "given_faces", "smooth_faces"]
 
 FEATURE_ANGLE = 30.0
 """Angle between facets, degrees, from which an edge separates two faces."""
@@ -22,8 +23,11 @@ _SEAM = 0.5
 """Angle between facets, degrees, up to which they lie in one plane."""
 _ROUND = 0.02
 """Distance of the nodes of a round wall from a cylinder, in radii."""
-_STRAIGHT = 0.02
-"""Share of the normals of a round wall that may lie along its axis."""
+_STRAIGHT = 0.15
+"""Root mean square share of the normals of a round wall along its axis: a coarse mesh of 12 edges a
+turn has 0.05. What is a cone or a torus is told by the distance of its nodes."""
+_CLOSED = 0.02
+"""Resultant of the normals of a wall, over its area, below which it goes all round."""
 _WIDE = 4.0
 """Area of a plane that runs smoothly into a round wall, in areas of the wall's flat strips."""
 _LARGE = 0.03
@@ -88,7 +92,7 @@ class Face:
             cosine = float(self.direction @ axis)
             if abs(cosine) > 1.0 - 1e-6:
                 return name if cosine > 0.0 else f"-{name}"
-        return "[" + ", ".join(f"{x:.4g}" for x in self.direction + 0.0) + "]"
+        return "[" + ", ".join(f"{x:.4g}" for x in np.round(self.direction, 5) + 0.0) + "]"
 
 
 def smooth_faces(
@@ -122,10 +126,8 @@ def smooth_faces(
     check_number("feature angle", angle, above=0.0, below=180.0, unit="degrees")
     points = np.asarray(points, dtype=np.float64)
     triangles = np.asarray(triangles, dtype=np.int64)
-    a, b, c = np.moveaxis(points[triangles], 1, 0)
-    across = 0.5 * np.cross(b - a, c - a)
-    area = np.linalg.norm(across, axis=1)
-    surface = _Surface(points, triangles, area, across / np.maximum(area, 1e-300)[:, None])
+    surface = _surface(points, triangles)
+    area = surface.area
     pairs = _neighbours(triangles)
     cosine = np.einsum("ij,ij->i", surface.normal[pairs[:, 0]], surface.normal[pairs[:, 1]])
     label = _components(len(triangles), pairs[cosine > np.cos(np.radians(angle))])
@@ -146,6 +148,23 @@ def smooth_faces(
     return tuple(sorted(faces, key=lambda face: _order(face, size)))
 
 
+def given_faces(
+    points: ArrayLike, triangles: ArrayLike, groups: Iterable[ArrayLike]
+) -> tuple[Face, ...]:
+    """Find what kind faces are whose triangles are known, as those of a CAD file.
+
+    Parameters
+    ----------
+    points : (n, 3) array, mm
+    triangles : (t, 3) int array
+        Outward.
+    groups : iterable of (k,) int arrays
+        Rows of the triangles of each face, at least one.
+    """
+    surface = _surface(np.asarray(points, dtype=float), np.asarray(triangles, dtype=np.int64))
+    return tuple(_face(surface, np.asarray(rows, dtype=np.int64)) for rows in groups)
+
+
 @dataclass(frozen=True)
 class _Surface:
     """Triangles with their areas (t,) and normals (t, 3)."""
@@ -154,6 +173,13 @@ class _Surface:
     triangles: IntArray
     area: FloatArray
     normal: FloatArray
+
+
+def _surface(points: FloatArray, triangles: IntArray) -> _Surface:
+    a, b, c = np.moveaxis(points[triangles], 1, 0)
+    across = 0.5 * np.cross(b - a, c - a)
+    area = np.linalg.norm(across, axis=1)
+    return _Surface(points, triangles, area, across / np.maximum(area, 1e-300)[:, None])
 
 
 def _order(face: Face, size: float) -> tuple[float, ...]:
@@ -215,7 +241,7 @@ def _cylinder(surface: _Surface, rows: IntArray) -> Face | None:
     spread, axes = np.linalg.eigh((area * normal.T) @ normal / area.sum())
     if spread[0] > _STRAIGHT**2 or spread[1] < 1e-3:
         return None
-    axis = axes[:, 0] * np.sign(axes[np.argmax(np.abs(axes[:, 0]) > 1e-6), 0])
+    axis = axes[:, 0] * np.sign(axes[np.argmax(np.abs(axes[:, 0]) > _STRAIGHT), 0])
     nodes = np.unique(surface.triangles[rows])
     plane = surface.points[nodes] @ axes[:, 1:]
     # The circle |p|^2 = 2 m p + c through the nodes, by least squares.
@@ -234,10 +260,11 @@ def _cylinder(surface: _Surface, rows: IntArray) -> Face | None:
     turn = np.sort(np.arctan2(arm[:, 1], arm[:, 0]))
     gap = float(np.diff(np.append(turn, turn[0] + 2.0 * np.pi)).max())
     step = float(np.median(np.diff(np.unique(np.round(turn, 6)))))
-    degrees = 360.0 if gap < 2.5 * step else 360.0 - float(np.degrees(gap))
+    closed = gap < 2.5 * step or np.linalg.norm(area @ normal) < _CLOSED * area.sum()
+    degrees = 360.0 if closed else 360.0 - float(np.degrees(gap))
     return Face(rows, "cylinder", float(area.sum()), centre, axis, radius, inward, degrees)
 
 
 def _numbers(place: FloatArray) -> str:
     """Write a place, mm, as a part file has it."""
-    return "[" + ", ".join(f"{x:.4g}" for x in np.round(place, 9) + 0.0) + "]"
+    return "[" + ", ".join(f"{x:.4g}" for x in np.round(place, 4) + 0.0) + "]"

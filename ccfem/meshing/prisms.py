@@ -7,10 +7,14 @@ from scipy.sparse.csgraph import reverse_cuthill_mckee
 
 from ccfem.arrays import FloatArray, IntArray
 from ccfem.checks import check_number
+from ccfem.errors import InputError
 from ccfem.mesh.tet_mesh import TetMesh
 from ccfem.meshing.planform import triangulate
 
 __all__ = ["extrude"]
+
+_MOST = 2e7
+"""Number of cells above which a length is taken for a mistake of units."""
 
 _SPLIT = np.array([[0, 1, 2, 5], [0, 1, 4, 5], [0, 3, 4, 5]])
 """Tetrahedra of a prism (bottom 0 1 2, top 3 4 5): side diagonals rise with the order."""
@@ -51,6 +55,12 @@ def extrude(
     plane, triangles = triangulate(polygon, edge_length, keep)
     plane, triangles = _numbered_along(plane, triangles)
     count = layers or max(1, round(height / edge_length))
+    expected = 3.0 * len(triangles) * count
+    if expected > _MOST:
+        raise InputError(
+            f"a height of {height:g} mm in cells of {edge_length:g} mm would make about "
+            f"{expected:.1g} cells: choose a longer edge length"
+        )
     levels = count + 1
     points = np.empty((len(plane), levels, 3))
     points[:, :, :2] = plane[:, None]

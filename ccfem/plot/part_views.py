@@ -3,6 +3,7 @@
 from collections.abc import Sequence
 from dataclasses import dataclass
 from pathlib import Path
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
@@ -10,7 +11,10 @@ from ccfem.arrays import FloatArray, IntArray
 from ccfem.plot.canvas import save
 from ccfem.plot.colours import INK
 
-__all__ = ["Arrow", "Label", "draw_part"]
+if TYPE_CHECKING:
+    from matplotlib.figure import Figure
+
+__all__ = ["Arrow", "Label", "draw_part", "part_figure"]
 
 _VIEWS = ((-60.0, 28.0), (120.0, -28.0))
 """Azimuth and elevation of the two views, degrees."""
@@ -31,11 +35,12 @@ class Label:
 
 @dataclass(frozen=True)
 class Arrow:
-    """An arrow of a direction (3,) that ends at a place (3,), mm."""
+    """An arrow of a direction (3,) that ends at a place (3,), mm, with a text at its tail."""
 
     place: FloatArray
     direction: FloatArray
     colour: str = INK
+    text: str = ""
 
 
 def draw_part(
@@ -47,6 +52,19 @@ def draw_part(
     arrows: Sequence[Arrow] = (),
     title: str = "",
 ) -> None:
+    """Draw a closed surface from two opposite sides into a file: see `part_figure`."""
+    save(part_figure(points, triangles, colour, labels, arrows, title), path)
+
+
+def part_figure(
+    points: FloatArray,
+    triangles: IntArray,
+    colour: Sequence[str],
+    labels: Sequence[Label],
+    arrows: Sequence[Arrow] = (),
+    title: str = "",
+    marks: FloatArray | None = None,
+) -> "Figure":
     """Draw a closed surface from two opposite sides, without perspective.
 
     Parameters
@@ -58,11 +76,11 @@ def draw_part(
         Of each triangle, "#rrggbb".
     labels : sequence of Label
         Written where they face the reader.
-    path : Path
-        .png, .pdf or .svg.
     arrows : sequence of Arrow, optional
         Drawn a sixth of the part long.
     title : str, optional
+    marks : (k, 3) array, mm, optional
+        Places of a support: small triangles.
     """
     from matplotlib.backends.backend_agg import FigureCanvasAgg
     from matplotlib.collections import PolyCollection
@@ -90,9 +108,21 @@ def draw_part(
         plane = np.stack([points @ right, points @ up], axis=1)
         shapes = list(plane[triangles[order]])
         axes.add_collection(PolyCollection(shapes, facecolors=shades, edgecolors=shades, lw=0.3))
+        if marks is not None and len(marks):
+            style: dict[str, Any] = {
+                "s": 26.0,
+                "marker": "^",
+                "c": "white",
+                "edgecolors": INK,
+                "linewidths": 1.0,
+            }
+            axes.scatter(marks @ right, marks @ up, zorder=3, **style)
         for arrow in arrows:
             along = arrow.direction / max(float(np.linalg.norm(arrow.direction)), 1e-300)
             tail = arrow.place - along * size / 6.0
+            if arrow.text:
+                at = (float(tail @ right), float(tail @ up))
+                axes.text(*at, arrow.text, color=arrow.colour, ha="center", va="center", size=9)
             axes.annotate(
                 "",
                 (arrow.place @ right, arrow.place @ up),
@@ -110,7 +140,7 @@ def draw_part(
         axes.set_ylim(ends[0, 1] - room, ends[1, 1] + room)
     if title:
         figure.suptitle(title, color=INK)
-    save(figure, path)
+    return figure
 
 
 def _frame(azimuth: float, elevation: float) -> tuple[FloatArray, FloatArray, FloatArray]:

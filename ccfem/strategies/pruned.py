@@ -20,13 +20,16 @@ from ccfem.layers.layer import Layer
 from ccfem.layers.layer_stress import LayerStress
 from ccfem.machine.machine import Machine
 from ccfem.planning.equal_fibre import plan_to_length
-from ccfem.planning.strategy import Amount, LayerPlanner
+from ccfem.planning.strategy import Amount, LayerPlanner, Strategy
 from ccfem.strategies import create
 from ccfem.toolpaths import Toolpaths
 from ccfem.virtual_testing.specimen import Specimen
 from ccfem.virtual_testing.strand import RHO, Strand
 
 __all__ = ["Pruned"]
+
+_BASES: Mapping[str, Mapping[str, Any]] = {"isocurve": {"link_limit": 10.0}}
+"""Parameters with which strategies plan better when they are pruned."""
 
 
 @dataclass(frozen=True)
@@ -41,7 +44,8 @@ class Pruned:
     of : str, default "isocurve"
         Name of the strategy that plans.
     base : mapping of str to value, default {}
-        Parameters of that strategy other than its defaults, as ``{"floor": 0.3}``.
+        Parameters of that strategy other than its defaults, as ``{"floor": 0.3}``. Isocurves that
+        are pruned have ``link_limit = 10`` by default: what short pieces are worth is tested.
     coverage : float, default 0.45
         Fibre length times strand width over area of the layers, in (0, 1].
     overfill : float, default 1.25
@@ -67,10 +71,14 @@ class Pruned:
         if self.of in ("pruned", "stream_function"):
             raise InputError(f"pruned.of must be another strategy; got {self.of!r}: correct it")
         freeze(self, base=dict)
-        create(self.of, self.base)
+        self._planner()
         check_fields(self, "coverage", above=0.0, at_most=1.0)
         check_fields(self, "overfill", "rounds", at_least=1)
         check_fields(self, "rho", above=0.0, unit="mm^2")
+
+    def _planner(self) -> Strategy:
+        """Strategy that plans, with its parameters."""
+        return create(self.of, {**_BASES.get(self.of, {}), **self.base})
 
     def natural_length(self, layers: Sequence[Layer], machine: Machine) -> float:
         """Length that the coverage asks for, mm per layer."""
@@ -109,9 +117,7 @@ class Pruned:
         most = max(self.amount.most, self.coverage) * full
         lengths = [min(length, most) for length in lengths]
         planned = self.overfill * max(lengths)
-        paths = plan_to_length(
-            create(self.of, self.base), layers, stress, machine, planned
-        ).toolpaths
+        paths = plan_to_length(self._planner(), layers, stress, machine, planned).toolpaths
         found: list[tuple[Pruned, LayerPlanner]] = []
         for length in lengths:
             kept = paths

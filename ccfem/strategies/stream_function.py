@@ -77,7 +77,7 @@ class StreamFunction:
     ----------
     coverage : float, default 0.45
         Fibre length times strand width over area of the layers, in (0, 1].
-    overfill : float, default 1.15
+    overfill : float, default 1.25
         Fibre length of the design over that kept, at least 1.
     rho : float, mm^2, default 4
         Axial stiffness of a strand over Young's modulus of the matrix.
@@ -103,7 +103,7 @@ class StreamFunction:
     """
 
     coverage: float = 0.45
-    overfill: float = 1.15
+    overfill: float = 1.25
     rho: float = RHO
     evaluations: int = 50
     groups: int = 0

@@ -84,6 +84,11 @@ class Compliance:
         system = self._equations.system
         if any(system.held_in(case).value.any() for case in system.forces):
             raise InputError("topology optimisation takes supports at rest: hold them at zero")
+        if system.held.presses is not None:
+            raise InputError(
+                "topology optimisation takes supports that hold both ways; got some that only "
+                "press: hold their patches, or let them slide (SlidingSupport)"
+            )
         self._backend = self._equations.backend() if backend == "auto" else backend
         self._solver: Solver | None = None
         self._displacement: dict[str, FloatArray] = {}

@@ -83,7 +83,7 @@ class Specimen:
     @cached_property
     def solver(self) -> Solver:
         """Factorisation, or preconditioner, of the part without fibres."""
-        return self.system.factorise(self.matrix, self.backend)
+        return self.system.factorise(self.matrix, self.backend, held=self.held)
 
     @property
     def forces(self) -> FloatArray:
@@ -92,8 +92,9 @@ class Specimen:
 
     @cached_property
     def held(self) -> Held:
-        """The supports, where the load case has them."""
-        return self.system.held_in(self.unreinforced.case)
+        """The supports where the load case has them, in contact as without fibres."""
+        before = self.unreinforced
+        return self.system.held_in(before.case).touching(before.displacement)
 
     @property
     def modulus(self) -> float:

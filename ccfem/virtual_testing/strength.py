@@ -1,42 +1,30 @@
-"""The load at which the part first fails: matrix or fibre, whichever comes first.
+"""The load at which the part first fails: matrix, fibre or bond of the layers, the first of them.
 
-Both limits scale with the load, for the solution with fibres that carry tension only does so too.
-Delamination between layers and debonding of the strands are not predicted; nor is what happens
-after the first failure.
+All limits scale with the load, for the solution with fibres that carry tension only and supports
+that only press does so too. Debonding of the strands is not predicted; nor is what happens after
+the first failure.
 """
 
-from dataclasses import dataclass
-from typing import Any
+from collections.abc import Sequence
+from dataclasses import dataclass, field, replace
 
 import numpy as np
-from numba import njit
-from scipy.spatial import cKDTree
 
-from ccfem.arrays import FloatArray, IntArray
-from ccfem.elasticity.load_kinds import patches_of, points_of
-from ccfem.elasticity.nodes import edge_nodes
+from ccfem.arrays import FloatArray, freeze
 from ccfem.elasticity.stress_field import StressField
-from ccfem.elasticity.support_kinds import AnySupport, EdgeSupport, Support
 from ccfem.errors import InputError
-from ccfem.mesh.facets import are_among
-from ccfem.mesh.tet_mesh import TetMesh
+from ccfem.layers import Layer
 from ccfem.tensor import von_mises
+from ccfem.virtual_testing.ball import BALL, ball_averages
+from ccfem.virtual_testing.interlayer import Interlayer, interlayer
 from ccfem.virtual_testing.strand import Strand
 from ccfem.virtual_testing.virtual_test import VirtualTest
+from ccfem.virtual_testing.zone import ZONE, distance_from_patches
 
 __all__ = ["FIBRE_SHARE", "FirstFailure", "fibre_peak", "first_failure", "matrix_peak"]
 
-_BALL = 2.0
-"""Radius, mm, of the ball over which the von Mises stress is averaged."""
-
-_ZONE = 3.0
-"""Distance, mm, from patches of loads and supports within which stress is not judged."""
-
 FIBRE_SHARE = 0.99
 """Share of the fibre length whose axial force stays below the fibre's index."""
-
-_SPACING = 0.5
-"""Largest distance, mm, between points that stand for a patch."""
 
 
 @dataclass(frozen=True)
@@ -48,7 +36,7 @@ class FirstFailure:
     load : float, N
         Size of the load at first failure.
     what : str
-        "matrix" or "fibre".
+        "matrix", "fibre" or "interlayer".
     where : (3,) array, mm
         Middle of the cell, or of the piece of fibre, that decides.
     matrix_load, fibre_load : float, N
@@ -57,6 +45,21 @@ class FirstFailure:
         Peak of the averaged von Mises stress under the load of the test.
     fibre_index : float, N
         Axial force that 99 % of the fibre length stays below under the load of the test.
+    interlayer_load : float, N
+        Load at which layers would come apart; infinite where nothing opens or slides, and where
+        that was not judged.
+    interlayer_index : float
+        f of `ccfem.virtual_testing.interlayer` under the load of the test: 1 at failure; NaN where
+        not judged.
+    interlayer_where : (3,) array, mm
+        Middle of the cell that has it; NaN where not judged.
+    opening, sliding : float, MPa
+        Traction there across the layer and in it; NaN where not judged.
+    interlayer_zones : tuple of floats, N
+        `interlayer_load` with cells judged from 3, from 1.5 and from 0 mm on from loads and
+        supports; empty where not judged.
+    note : str
+        Why the bond between layers was not judged, or what is doubtful about it; else empty.
     """
 
     load: float
@@ -66,12 +69,25 @@ class FirstFailure:
     fibre_load: float
     matrix_index: float
     fibre_index: float
+    interlayer_load: float = np.inf
+    interlayer_index: float = np.nan
+    interlayer_where: FloatArray = field(default_factory=lambda: np.full(3, np.nan))
+    opening: float = np.nan
+    sliding: float = np.nan
+    interlayer_zones: tuple[float, ...] = ()
+    note: str = ""
+
+    def __post_init__(self) -> None:
+        freeze(self, where=float, interlayer_where=float)
 
 
 def first_failure(
-    test: VirtualTest, strand: Strand | None = None, matrix_strength: float | None = None
+    test: VirtualTest,
+    strand: Strand | None = None,
+    matrix_strength: float | None = None,
+    layers: Sequence[Layer] | None = None,
 ) -> FirstFailure:
-    """Load at which the matrix or the fibre first fails.
+    """Load at which the matrix, the fibre or the bond between layers first fails.
 
     Parameters
     ----------
@@ -81,6 +97,9 @@ def first_failure(
     matrix_strength : float, MPa, optional
         Von Mises stress at failure, calibrated (`ccfem.virtual_testing.calibration`); default
         the tensile strength of the material of the part.
+    layers : sequence of Layer, optional
+        Of the matrix. Without them, and where the material has no strength between layers, that
+        bond is not judged; `FirstFailure.note` says so where layers are given.
 
     Raises
     ------
@@ -105,16 +124,36 @@ def first_failure(
     fibre_index, fibre_at = fibre_peak(test)
     matrix_load = test.force * matrix_strength / matrix_index
     fibre_load = test.force * strength / fibre_index if fibre_index > 0.0 else np.inf
-    broken = fibre_load < matrix_load
-    return FirstFailure(
-        load=min(matrix_load, fibre_load),
-        what="fibre" if broken else "matrix",
-        where=fibre_at if broken else matrix_at,
-        matrix_load=matrix_load,
-        fibre_load=fibre_load,
-        matrix_index=matrix_index,
-        fibre_index=fibre_index,
+    found = _between(test.solution, layers)
+    zones: tuple[float, ...] = ()
+    if isinstance(found, Interlayer):
+        zones = tuple(test.force / f if f > 0.0 else np.inf for f in found.zone_indices)
+    failures = [("matrix", matrix_load, matrix_at), ("fibre", fibre_load, fibre_at)]
+    failures += [("interlayer", zones[0], found.where)] if isinstance(found, Interlayer) else []
+    what, load, where = min(failures, key=lambda failure: failure[1])
+    first = FirstFailure(load, what, where, matrix_load, fibre_load, matrix_index, fibre_index)
+    if not isinstance(found, Interlayer):
+        return replace(first, note=found)
+    return replace(
+        first,
+        interlayer_load=zones[0],
+        interlayer_index=found.index,
+        interlayer_where=found.where,
+        opening=found.opening,
+        sliding=found.sliding,
+        interlayer_zones=zones,
+        note=found.note,
     )
+
+
+def _between(stress: StressField, layers: Sequence[Layer] | None) -> Interlayer | str:
+    """Return what `interlayer` finds, or why it finds nothing; empty without layers."""
+    if layers is None:
+        return ""
+    try:
+        return interlayer(stress, layers)
+    except InputError as error:
+        return f"bond between layers not judged: {error}"
 
 
 def fibre_peak(test: VirtualTest, share: float = FIBRE_SHARE) -> tuple[float, FloatArray]:
@@ -140,96 +179,13 @@ def matrix_peak(stress: StressField) -> tuple[float, FloatArray]:
     """
     mesh = stress.mesh
     centroid = mesh.points[mesh.corners].mean(axis=1)
-    # Beyond the bound the distance is infinite, and the search short.
-    tree, bound = cKDTree(_held_and_loaded(stress)), np.nextafter(_ZONE, np.inf)
-    distance, _ = tree.query(centroid, distance_upper_bound=bound)
-    judged = np.flatnonzero(np.isinf(distance))
+    judged = np.flatnonzero(np.isinf(distance_from_patches(stress, centroid, ZONE)))
     if not len(judged):
         raise InputError(
-            f"no cell lies farther than {_ZONE:g} mm from the patches of loads and supports, so "
+            f"no cell lies farther than {ZONE:g} mm from the patches of loads and supports, so "
             "no matrix stress can be judged: the part is too small for this index"
         )
-    average = _averages(centroid, von_mises(stress.stress), mesh.volumes, judged, _BALL)
+    mises = von_mises(stress.stress)[:, None]
+    average = ball_averages(centroid, mises, mesh.volumes, judged, BALL)[:, 0]
     peak = average.argmax()
     return float(average[peak]), centroid[judged[peak]]
-
-
-def _held_and_loaded(stress: StressField) -> FloatArray:
-    """Points (k, 3) that cover the patches of the supports and of the load case."""
-    problem = stress.problem
-    mesh = problem.mesh
-    edges = [each.patches for each in problem.supports if isinstance(each, EdgeSupport)]
-    kinds: list[Any] = [*problem.loads_of(stress.case)]
-    kinds += [
-        each
-        for each in problem.supports
-        if not isinstance(each, EdgeSupport) and not _slides(mesh, each)
-    ]
-    points = [np.zeros((0, 3))]
-    points += [np.array([point]) for kind in kinds for point in points_of(kind)]
-    points += [mesh.points[edge_nodes(mesh, names)] for names in edges]
-    names = {name for kind in kinds for name in patches_of(kind)}
-    points += [_cover(mesh, name) for name in sorted(names)]
-    return np.concatenate(points)
-
-
-def _slides(mesh: TetMesh, support: AnySupport) -> bool:
-    """Whether a support holds a whole flat face across its plane and nothing else."""
-    if not isinstance(support, Support) or len(support.components) > 1:
-        return False
-    place = mesh.points[:, "xyz".index(support.components)]
-    patch = mesh.patch(support.patch)
-    level = place[patch[0, 0]]
-    flat = (np.abs(place[mesh.boundary] - level) <= 1e-9 * np.ptp(mesh.bounds)).all(axis=1)
-    return bool(are_among(patch, mesh.boundary[flat]).all()) and (
-        len(patch) == np.count_nonzero(flat)
-    )
-
-
-def _cover(mesh: TetMesh, name: str) -> FloatArray:
-    """Points at most half a millimetre apart on the facets of a patch."""
-    corners = mesh.points[mesh.patch(name)]
-    edges = np.linalg.norm(corners - np.roll(corners, 1, axis=1), axis=2).max(axis=1)
-    parts = np.maximum(np.ceil(edges / _SPACING), 1.0).astype(np.int64)
-    points = [corners.reshape(-1, 3)]
-    for n in np.unique(parts):
-        i, j = np.meshgrid(np.arange(n + 1), np.arange(n + 1), indexing="ij")
-        inside = i + j <= n
-        weights = np.stack([i[inside], j[inside], n - i[inside] - j[inside]], axis=1) / n
-        points.append(np.einsum("wc,kcx->kwx", weights, corners[parts == n]).reshape(-1, 3))
-    return np.concatenate(points)
-
-
-def _averages(
-    points: FloatArray, values: FloatArray, weights: FloatArray, judged: IntArray, radius: float
-) -> FloatArray:
-    """Weighted averages over the points within `radius` of each judged point."""
-    first = points.min(axis=0)
-    box = np.floor((points - first) / radius).astype(np.int64) + 1
-    shape = box.max(axis=0) + 2
-    number = (box[:, 0] * shape[1] + box[:, 1]) * shape[2] + box[:, 2]
-    order = np.argsort(number, kind="stable")
-    offsets = np.searchsorted(number[order], np.arange(int(np.prod(shape)) + 1))
-    return np.asarray(
-        _ball(points[order], values[order], weights[order], points[judged], number[judged], offsets,
-              shape, radius)
-    )  # fmt: skip
-
-
-@njit(cache=True)
-def _ball(points, values, weights, centres, box, offsets, shape, radius):  # type: ignore[no-untyped-def]  # pragma: no cover
-    result = np.empty(len(centres))
-    for k in range(len(centres)):
-        total, weight = 0.0, 0.0
-        for i in range(-1, 2):
-            for j in range(-1, 2):
-                row = box[k] + (i * shape[1] + j) * shape[2]
-                for p in range(offsets[row - 1], offsets[row + 2]):
-                    x = points[p, 0] - centres[k, 0]
-                    y = points[p, 1] - centres[k, 1]
-                    z = points[p, 2] - centres[k, 2]
-                    if x * x + y * y + z * z <= radius * radius:
-                        total += weights[p] * values[p]
-                        weight += weights[p]
-        result[k] = total / weight
-    return result

@@ -5,9 +5,11 @@ import numpy as np
 import pytest
 
 import ccfem.cases.part_file
+import ccfem.cases.part_tables
 from ccfem.cases.part_file import read_part
 from ccfem.elasticity.problem import Bearing, Force, PointForce, Pressure, Support, Traction
 from ccfem.elasticity.solve import solve
+from ccfem.elasticity.support_kinds import PressingSupport
 from ccfem.errors import InputError
 from ccfem.io import write_mesh
 from ccfem.layers.slicing.planar import Planar
@@ -78,7 +80,7 @@ def test_the_documentation_lists_every_key():
     keys |= {line.strip("[]# ").split("]")[0].split(".")[0] for line in lines if line[:1] == "["}
     for field in ccfem.cases.part_file._Part.__dataclass_fields__:
         assert field in keys, field
-    for kind in (*ccfem.cases.part_file._RULES, *ccfem.cases.part_file._LOADS):
+    for kind in (*ccfem.cases.part_tables._RULES, *ccfem.cases.part_tables._LOADS):
         assert f'"{kind}"' in described
 
 
@@ -123,6 +125,16 @@ name = "end"
 patch = "tip"
 components = "z"
 value = [0, 0, 0.1]
+[[supports]]
+patch = "other"
+kind = "pressing"
+normal = [1, 0, 0]
+[[alternative_supports]]
+patch = "foot"
+components = "x"
+[[alternative_supports]]
+patch = "side"
+kind = "pressing"
 [machine]
 minimum_length = 60
 [strategies.isocurve]
@@ -134,7 +146,9 @@ rings = [1.5]
     assert problem.supports == (
         Support("foot"),
         Support("tip", components="z", value=(0.0, 0.0, 0.1)),
+        PressingSupport("other", (1.0, 0.0, 0.0)),
     )
+    assert case.alternative_supports == (Support("foot", "x"), PressingSupport("side"))
     assert dict(problem.loads) == {
         "pull": (Force("end", (10.0, 0.0, 0.0)), Traction("end", (0.0, 0.5, 0.0))),
         "press": (Pressure("top", 0.2), PointForce((30.0, 5.0, 5.0), (0.0, 0.0, -1.0))),
@@ -214,7 +228,7 @@ def without(start, stop=None):
         ("order = 3" + PART, "order must be one of 'auto', 1, 2; got 3"),
         ("build = 'w'" + PART, "build must be 'x', 'y', 'z'"),
         ("build = [1, 2]" + PART, "build must be a string or a list of 3, each a number"),
-        ("scale = 0" + PART, "mesh scale must be"),
+        ("scale = 0" + PART, "scale must be"),
         ("surface = 'a.stl'" + PART, "one of mesh, surface and planform; got mesh and surface"),
         ("edge_length = 2.0" + PART, "edge_length goes with surface"),
         (PART.replace("body.npz", "none.npz"), "mesh file .*none.npz does not exist"),
@@ -232,11 +246,11 @@ def without(start, stop=None):
         (PART.replace("offset", "ofset"), "patches.foot has no key 'ofset'; it has: normal, offs"),
         (PART.replace('"min"', "nan"), "patches.foot.offset must be a number or a string; got nan"),
         (PART.replace('"min"', "50.0"), "patch 'foot': plane x at 50 mm chooses no boundary"),
-        (without("[[supports", "[[loads"), "the part file needs the key 'supports'"),
+        (without("[[supports", "[[loads"), r"a part needs a support: add .*supports"),
         ("supports = []\n" + without("[[supports", "[[loads"), "a part needs a support"),
         (PART.replace('"foot"\n[[l', '"feet"\n[[l'), "no patch named 'feet'; there are: end, f"),
         (PART + "[[supports]]\npatch = 'foot'\ncomponents = 'w'", "components must be letters"),
-        (without("[[loads"), "the part file needs the key 'loads'"),
+        (without("[[loads"), r"a part needs a load: add .*loads.NAME"),
         ("loads = {}\n" + without("[[loads"), "a part needs a load"),
         (PART.replace("[[loads.pull]]", "[loads.pull]"), r"write \[\[loads.pull\]\]"),
         (PART.replace('"force"', '"push"'), r"loads.pull\[0\] must be a table with kind one of"),

@@ -32,6 +32,21 @@ def test_walls_of_the_holes_have_the_area_of_cylinders(case):
         assert np.average(np.abs(normal[:, axis]), weights=area) < 0.05
 
 
+def test_bolts_press_on_the_walls_and_under_their_heads(case):
+    assert case.alternative_supports == ()
+    bolted = t_bracket(order=1, bolts=True)
+    mesh = bolted.problem.mesh
+    names = tuple(support.patch for support in bolted.alternative_supports)
+    assert names == ("base_left", "base_right", "head_left", "head_right")
+    assert bolted.problem.supports == case.problem.supports
+    for name in ("head_left", "head_right"):
+        area, normal = mesh.facet_areas(mesh.patch(name))
+        assert (normal[:, 1] > 0.9).all()
+        # The ring from the hole to the rim of the head, on top at y = 20.
+        assert area.sum() == pytest.approx(np.pi * (9.5**2 - 5.5**2), rel=0.15)
+        np.testing.assert_allclose(mesh.points[mesh.patch(name)][:, :, 1], 20.0, atol=0.1)
+
+
 def test_outlines_meet_in_the_part():
     front, top = t_bracket_front(), t_bracket_top()
     assert front.is_valid

@@ -43,6 +43,8 @@ FILES = {
     *(f"{name}_waypoints.txt" for name in ("isocurve", "zigzag")),
     "tension.png",
     "overview.png",
+    "part.png",
+    "part.html",
     "results.csv",
     "results.json",
     "paths.vtp",

@@ -16,6 +16,7 @@ from ccfem.comparison.headline import HEADLINE, headline_values
 from ccfem.comparison.pictures import caption
 from ccfem.comparison.ranking import best_values
 from ccfem.elasticity.problem import Force, Problem, Support
+from ccfem.elasticity.support_kinds import PressingSupport
 from ccfem.elasticity.system import System
 from ccfem.errors import InputError
 from ccfem.evaluation import evaluate
@@ -37,7 +38,7 @@ def strip(force=1000.0):
     supports = (Support("x_min", "x"), Support("y_min", "y"), Support("z_min", "z"))
     problem = Problem(
         mesh,
-        isotropic(3500.0, 0.35, tensile_strength=50.0),
+        isotropic(3500.0, 0.35, tensile_strength=50.0, interlayer_tensile=18.0),
         supports,
         {"pull": (Force("x_max", (force, 0.0, 0.0)),), "push": (Force("x_max", (-1.0, 0.0, 0.0)),)},
     )
@@ -98,7 +99,8 @@ def test_fibre_along_the_pull_wins_by_the_rule_of_mixtures():
 
 def test_best_values_are_the_largest_or_the_smallest_as_each_column_says(compared):
     best, sides = best_values(compared.runs, compared.fibre_per_layer), set()
-    for head in HEADLINE:
+    # Those of alternative supports are missing where a part has none.
+    for head in (head for head in HEADLINE if not head.column.endswith("_alternative")):
         values = sorted(headline_values(run)[head.column] for run in compared.runs)
         if head.better and values[0] < values[-1]:
             assert best.pop(head.column) == values[{"low": 0, "high": -1}[head.better]]
@@ -118,6 +120,53 @@ def test_opposite_orders_are_undecided(compared):
     same = replace(compared, runs=(first, second))
     assert not any("undecided" in line for line in same.remarks)
     assert same.verdict.startswith(f"{first.name} makes the stiffest part")
+
+
+def test_the_bond_between_layers_is_judged_where_its_strength_is_known(compared, tmp_path):
+    # The pull lies in the layers of `strip`, so they are cut across it here.
+    case = strip()
+    upright = compare(replace(case, build=(1.0, 0.0, 0.0)), ["concentric"], layers=6)
+    failure, table = upright.runs[0].tested.failure, upright.frame
+    assert table["fails_in"][0] == failure.what == "interlayer"
+    # Most that the bond holds: 18 MPa over 24 x 4 mm, less what strands draw to themselves.
+    assert 0.8 * 18.0 * 96.0 < table["interlayer_load"][0] <= 18.0 * 96.0
+    assert table["first_failure_load"][0] == table["interlayer_load"][0] == failure.load
+    zones = ("interlayer_load", "interlayer_load_near", "interlayer_load_everywhere")
+    assert tuple(table[name][0] for name in zones) == failure.interlayer_zones
+    assert table["interlayer_index"][0] == pytest.approx(1000.0 / failure.load)
+    place = [table[f"interlayer_{axis}"][0] for axis in "xyz"]
+    np.testing.assert_array_equal(place, failure.interlayer_where)
+    write_results(upright, tmp_path)
+    total = pd.read_csv(tmp_path / "results.csv").iloc[-1]
+    assert total["fails_in"] == "interlayer"
+    assert total["interlayer_load"] == pytest.approx(failure.load)
+    assert "layers part, N" in (tmp_path / "report.html").read_text(encoding="utf-8")
+    # Layers along the pull do not open; without a strength nothing is judged, and that is said.
+    assert compared.frame["interlayer_load"].min() > 5.0 * failure.load
+    assert not any("bond between layers" in line for line in compared.remarks)
+    weak = replace(case.problem, material=isotropic(3500.0, 0.35, tensile_strength=50.0))
+    unknown = compare(replace(case, problem=weak), ["concentric"])
+    assert any("bond between layers not judged: material" in line for line in unknown.remarks)
+    assert "interlayer_load" not in unknown.frame
+
+
+def test_alternative_supports_are_tested_too():
+    """Pushed against a wall it is held as by one that cannot lift off."""
+    case = strip()
+    wall = (PressingSupport("x_min"), Support("y_min", "y"), Support("z_min", "z"))
+    found = compare(
+        replace(case, alternative_supports=wall), ["concentric", "zigzag"], load_case="push"
+    )
+    table = found.frame
+    for name in ("stiffness", "stiffness_ratio_tension", "stiffness_ratio_bonded"):
+        np.testing.assert_allclose(table[f"{name}_alternative"], table[name], rtol=1e-6)
+    # By the wall nothing is judged, by a plane of symmetry it is.
+    for name in ("first_failure_load", "interlayer_load"):
+        assert (table[f"{name}_alternative"] >= (1.0 - 1e-6) * table[name]).all()
+    assert "solve, alternative supports" in found.seconds
+    # Pulled it would come off.
+    with pytest.raises(InputError, match="alternative supports: the load lifts"):
+        compare(replace(case, alternative_supports=wall), ["concentric"])
 
 
 def test_what_cannot_be_thinned_is_named_and_leaves_no_layer_out():

@@ -178,3 +178,66 @@ def test_no_verdict_is_a_number_that_there_is_none_of(compared):
     made = replace(compared, runs=tuple(runs), bound=None, fibre_per_layer=None)
     assert made.verdict == "No verdict: there is no virtual test, and no fibre lies in tension."
     assert "nan" not in str(made)
+
+
+def with_alternative(run, tension, bonded):
+    """A run with a second test, of such stiffnesses, under other supports."""
+    other = with_stiffness(run, tension, bonded).tested
+    return replace(run, tested=replace(run.tested, alternative=other))
+
+
+@pytest.mark.parametrize(
+    ("own", "other", "said"),
+    [
+        ((2.0, 1.5), (1.8, 1.5), "makes the stiffest part"),
+        ((2.0, 1.5), (1.5, 1.505), "makes the stiffest part"),
+        ((2.0, 1.5), (1.5, 1.8), "Undecided between"),
+        ((1.5, 1.49), (1.8, 1.5), "Undecided between"),
+        ((1.5, 1.49), (1.5, 1.8), "Undecided between"),
+        ((1.5, 1.49), (1.5, 1.505), "No difference between"),
+    ],
+)
+def test_an_order_that_other_supports_turn_round_is_undecided(compared, own, other, said):
+    first, second = [replace(run, why_not="") for run in compared.ranking[:2]]
+    first, second = (
+        with_alternative(with_stiffness(run, k, k), again, again)
+        for run, k, again in zip((first, second), own, other, strict=True)
+    )
+    made = replace(compared, runs=(first, second), fibre_per_layer=None, bound=None)
+    table = made.frame.set_index("strategy")
+    for name, k, again in zip((first.name, second.name), own, other, strict=True):
+        assert table.loc[name, "stiffness_ratio_tension"] == pytest.approx(k)
+        for column in ("stiffness_ratio_tension_alternative", "stiffness_ratio_bonded_alternative"):
+            assert table.loc[name, column] == pytest.approx(again)
+    assert said in made.verdict
+    ends = {
+        "makes": "or under the alternative supports).",
+        "No": "under both models of the supports.",
+        "Undecided": f"; under the alternative supports {other[0]:.2f} and {other[1]:.2f}, and "
+        f"{other[0]:.2f} and {other[1]:.2f}.",
+    }
+    assert made.verdict.endswith(ends[said.split()[0]])
+    undecided = any("undecided against" in line for line in made.remarks)
+    assert undecided == (said == "Undecided between")
+    if undecided:
+        assert any("or both models of the supports, do not agree" in line for line in made.remarks)
+
+
+def test_the_strongest_is_marked_where_it_is_so_under_both_supports(compared):
+    runs = [replace(run, why_not="") for run in compared.ranking[:2]]
+    if any(run.empty_layers for run in runs):
+        pytest.skip("layers without fibre have no best value")
+
+    def marked(own, other):
+        made = []
+        for run, load, again in zip(runs, own, other, strict=True):
+            failure = replace(run.tested.failure, load=load)
+            second = replace(run.tested, failure=replace(failure, load=again))
+            made.append(
+                replace(run, tested=replace(run.tested, failure=failure, alternative=second))
+            )
+        return best_values(made, None).get("first_failure_load")
+
+    assert marked((5000.0, 4000.0), (3000.0, 2000.0)) == 5000.0
+    assert marked((5000.0, 4000.0), (2000.0, 3000.0)) is None
+    assert marked((5000.0, 4990.0), (3000.0, 2000.0)) is None

@@ -114,3 +114,16 @@ def test_edge_length_has_to_suit(box, edge_length):
     points, triangles = box_surface(box)
     with pytest.raises(InputError, match="edge length"):
         tetrahedralise(Surface(points, triangles), edge_length)
+
+
+def test_a_mesh_that_lost_the_part_is_refused(box, monkeypatch):
+    """fTetWild fills a needle of 80 x 0.1 x 0.1 mm with two cells at one end, or crashes."""
+    points, triangles = box_surface(box)
+    corner = np.concatenate([np.zeros((1, 3)), np.eye(3)])
+
+    def one_cell(*_, **__):
+        return {"points": corner, "cells": np.array([[0, 1, 2, 3]])}
+
+    monkeypatch.setattr("ccfem.meshing.volume.in_own_process", one_cell)
+    with pytest.raises(InputError, match=r"has 2.8% of its volume"):  # 1/6 of 6
+        tetrahedralise(Surface(points, triangles), 0.5, "ftetwild")

@@ -54,7 +54,8 @@ def bent_plate():
 
 def test_uniform_tension_gets_straight_fibre_and_the_stiffness_of_parallel_bars(pulled_bar):
     stress, layers = pulled_bar
-    paths = plan(StreamFunction(coverage=0.4, evaluations=10, inset=0.0), layers, stress, MACHINE)
+    strategy = StreamFunction(coverage=0.4, overfill=1.0, evaluations=10, inset=0.0)
+    paths = plan(strategy, layers, stress, MACHINE)
     steps = np.concatenate([np.diff(path, axis=0) for path in paths])
     middle = np.concatenate([0.5 * (path[1:, 0] + path[:-1, 0]) for path in paths])
     inner = steps[np.abs(middle - 30.0) < 25.0]  # without the links at the ends
@@ -62,7 +63,7 @@ def test_uniform_tension_gets_straight_fibre_and_the_stiffness_of_parallel_bars(
     # Bars in parallel: 1 + rho L / V, which nothing exceeds.
     exact = 1.0 + 4.0 * paths.lengths.sum() / (60.0 * 20.0 * 4.0)
     reached = virtual_test(paths, stress, span=()).ratio
-    assert 1.0 + 0.93 * (exact - 1.0) < reached <= exact
+    assert 1.0 + 0.97 * (exact - 1.0) < reached <= exact
 
 
 def test_stiffer_than_isocurves_of_the_same_length(bent_beam):

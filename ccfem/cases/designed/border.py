@@ -8,7 +8,7 @@ import shapely
 
 from ccfem.arrays import BoolArray, FloatArray, IntArray
 from ccfem.errors import InputError
-from ccfem.mesh.tet_mesh import TetMesh
+from ccfem.mesh.patches import Bounded
 from ccfem.plates import PlaneMesh
 
 __all__ = ["NEAR", "Hole", "Stretch"]
@@ -29,7 +29,7 @@ class Stretch:
         middles = mesh.points[mesh.boundary].mean(axis=1)
         return mesh.boundary[self._holds(middles)]
 
-    def __call__(self, mesh: TetMesh) -> IntArray:
+    def __call__(self, mesh: Bounded) -> IntArray:
         """Walls (k, 3) of an extruded plate with all their nodes on it."""
         _, normal = mesh.facet_areas(mesh.boundary)
         walls = mesh.boundary[np.abs(normal[:, 2]) < 0.5]

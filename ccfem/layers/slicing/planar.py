@@ -8,7 +8,7 @@ import numpy as np
 from ccfem.arrays import FloatArray, IntArray
 from ccfem.checks import check_choices
 from ccfem.elasticity.part_stress import PartStress
-from ccfem.errors import InputError
+from ccfem.errors import InputError, shown
 from ccfem.layers.layer import Layer
 from ccfem.layers.level_cut import border_edges, chain, cut_at_zero, patch_edges
 from ccfem.layers.pitch import check_pitch
@@ -25,6 +25,9 @@ _SNAP = 2e-6
 
 _COUNT = 12
 """Layers where nothing else is asked for: those of the Loop of Chen et al. 2021."""
+
+_MOST = 100_000
+"""Layers above which their number is taken for a mistake."""
 
 _AXES = {"x": (1.0, 0.0, 0.0), "y": (0.0, 1.0, 0.0), "z": (0.0, 0.0, 1.0)}
 
@@ -64,6 +67,11 @@ class Planar:
             object.__setattr__(self, "count", _COUNT)
         if self.count is not None and self.count < 1:
             raise InputError(f"the number of layers must be at least 1; got {self.count}")
+        if self.count is not None and self.count > _MOST:
+            raise InputError(
+                f"the number of layers must be at most {_MOST:,}; got {shown(self.count)}: correct "
+                "it"
+            )
         if self.heights is not None:
             heights = tuple(sorted(float(height) for height in self.heights))
             if not heights or not np.isfinite(heights).all():

@@ -1,0 +1,101 @@
+"""Feed mutants of good files to the readers: each ends well, or in one line.
+
+Run ``python -m benchmarks.fuzz [COUNT] [SEED] [FORMATS,...]``: by default 3,000 mutants over all
+formats. Whatever else a file does is printed, and the file is kept under ``results/fuzz``.
+"""
+
+import os
+import resource
+import sys
+import tempfile
+import time
+from collections import Counter
+from pathlib import Path
+
+from benchmarks.fuzz.mutants import good_files, mutants
+from ccfem.cases.part_file import read_part
+from ccfem.errors import InputError
+from ccfem.io import read_mesh, read_surface
+from ccfem.io.surface import is_surface
+
+SECONDS, MEMORY = 20.0, 2e9
+
+
+def read(path: Path) -> None:
+    """Read a file as ccfem does by its name."""
+    if path.suffix == ".toml":
+        read_part(path)
+    elif is_surface(path):
+        read_surface(path)
+    else:
+        read_mesh(path, check=False)
+
+
+def verdict(path: Path) -> str:
+    """Read a file in a process of its own: "read", "refused", or what is wrong."""
+    with tempfile.TemporaryFile() as said:
+        child = os.fork()
+        if child == 0:
+            os.dup2(said.fileno(), 1)
+            os.dup2(said.fileno(), 2)
+            code = 1
+            try:
+                read(path)
+                code = 0
+            except InputError as error:
+                code = 2 if "\n" not in str(error) and len(str(error)) < 2000 else 3
+            except BaseException:
+                import traceback
+
+                traceback.print_exc()
+            finally:
+                sys.stdout.flush()
+                sys.stderr.flush()
+                os._exit(code)
+        start = time.perf_counter()
+        _, status, used = os.wait4(child, 0)
+        seconds = time.perf_counter() - start
+        said.seek(0)
+        text = said.read().decode(errors="replace").strip()
+    code = os.waitstatus_to_exitcode(status)
+    if used.ru_maxrss * 1024 > MEMORY:
+        return f"{used.ru_maxrss / 1e6:.1f} GB"
+    if seconds > 2.0 * SECONDS:
+        return f"{seconds:.0f} s"
+    if code not in (0, 2):
+        return f"code {code}: {text.splitlines()[-1] if text else ''}"
+    return f"says {text[:200]}" if text else ("refused" if code else "read")
+
+
+def main(count: int = 3000, seed: str = "1", wanted: tuple[str, ...] = ()) -> int:
+    """Try `count` mutants over all formats; return how many are not met as they should be."""
+    resource.setrlimit(resource.RLIMIT_CORE, (0, 0))
+    tally: Counter[str] = Counter()
+    wrong = 0
+    with tempfile.TemporaryDirectory() as name:
+        folder = Path(name)
+        files = [f for f in good_files(folder) if not wanted or f.suffix[1:] in wanted]
+        for file in files:
+            before = time.perf_counter()
+            content = file.read_bytes()
+            target = file.with_name(f"mutant{file.suffix}")
+            for k, spoiled in enumerate(mutants(content, count // len(files), seed + file.name)):
+                target.write_bytes(spoiled)
+                found = verdict(target)
+                tally[f"{file.suffix} {found if found in ('read', 'refused') else 'WRONG'}"] += 1
+                if found not in ("read", "refused"):
+                    wrong += 1
+                    kept = Path("results/fuzz")
+                    kept.mkdir(parents=True, exist_ok=True)
+                    (kept / f"{file.stem}-{seed}-{k}{file.suffix}").write_bytes(spoiled)
+                    print(f"{file.name} {k}: {found}", flush=True)
+            print(f"{file.name}: {time.perf_counter() - before:.0f} s", flush=True)
+    print(dict(sorted(tally.items())))
+    print(f"{sum(tally.values())} mutants, {wrong} not met as they should be")
+    return wrong
+
+
+if __name__ == "__main__":
+    given = sys.argv[1:]
+    formats = tuple(given[2].split(",")) if len(given) > 2 else ()
+    sys.exit(bool(main(int(given[0]) if given else 3000, *given[1:2], wanted=formats)))

@@ -1,0 +1,137 @@
+"""Good files of every format that ccfem reads, and mutants of them; the same for the same seed."""
+
+import random
+from collections.abc import Iterator
+from pathlib import Path
+
+import numpy as np
+
+from ccfem.io import write_mesh
+from ccfem.mesh import box_mesh
+
+__all__ = ["good_files", "mutants"]
+
+PART = """name = "box"
+mesh = "box.npz"
+material = "pla"
+layers = 3
+[patches.foot]
+rule = "plane"
+normal = "x"
+offset = "min"
+[patches.pin]
+rule = "cylinder"
+point = [15, 10, 0]
+axis = "z"
+radius = 50.0
+[[supports]]
+patch = "foot"
+[[loads.pull]]
+kind = "force"
+patch = "x_max"
+vector = [10, 0, 0]
+[machine]
+minimum_length = 45.0
+"""
+NUMBERS = (
+    *("0", "-1", "1e308", "-1e308", "nan", "inf", "-inf", "1e-320", "4294967296", "2147483647"),
+    *("1000000000", "99999999999999999999", "9" * 400, "0x10", "1.5", "''", "[]", "1e6"),
+)
+
+
+def good_files(folder: Path) -> list[Path]:
+    """Write one good file of each format."""
+    import pyvista
+
+    mesh = box_mesh((20.0, 10.0, 5.0), (4, 2, 1))
+    for name in ("box.npz", "box.tet", "box.vtu"):
+        write_mesh(mesh, folder / name)
+    used, triangles = np.unique(mesh.boundary, return_inverse=True)
+    shell = pyvista.PolyData.from_regular_faces(mesh.points[used], triangles.reshape(-1, 3))
+    for name, binary in (
+        *(("box.stl", True), ("text.stl", False), ("box.ply", True), ("text.ply", False)),
+    ):
+        shell.save(folder / name, binary=binary)
+    grid = pyvista.UnstructuredGrid({10: mesh.cells}, np.array(mesh.points))
+    grid.save(folder / "text.vtu", binary=False)
+    rows = [f"v {x} {y} {z}" for x, y, z in shell.points.tolist()]
+    rows += ["f " + " ".join(str(k + 1) for k in t) for t in triangles.reshape(-1, 3).tolist()]
+    (folder / "box.obj").write_text("\n".join(rows) + "\n")
+    (folder / "box.inp").write_text(_deck(mesh))
+    (folder / "box.msh").write_text(_msh(mesh))
+    (folder / "part.toml").write_text(PART)
+    return sorted(folder.iterdir())
+
+
+def _deck(mesh) -> str:
+    """Abaqus deck with nested sets, a generated one, and a surface."""
+    lines = ["*NODE"]
+    lines += [f"{k}, {x}, {y}, {z}" for k, (x, y, z) in enumerate(mesh.points.tolist(), 1)]
+    lines += ["*ELEMENT, TYPE=C3D4, ELSET=ALL"]
+    lines += [f"{k}, " + ", ".join(str(n + 1) for n in c) for k, c in enumerate(mesh.cells, 1)]
+    foot = np.flatnonzero(mesh.points[:, 0] == 0.0) + 1
+    lines += ["*NSET, NSET=FOOT", ", ".join(map(str, foot[:8])), "*NSET, NSET=OUTER", "FOOT"]
+    lines += ["*NSET, NSET=SOME, GENERATE", "1, 12, 2", "*ELSET, ELSET=FIRST", "1, 2, 3"]
+    lines += ["*SURFACE, NAME=SKIN", "FIRST, S1", "ALL, S2"]
+    return "\n".join(lines) + "\n"
+
+
+def _msh(mesh) -> str:
+    """Gmsh mesh 2.2, with a group."""
+    lines = ["$MeshFormat", "2.2 0 8", "$EndMeshFormat", "$PhysicalNames", "1", '2 1 "foot"']
+    lines += ["$EndPhysicalNames", "$Nodes", str(len(mesh.points))]
+    lines += [f"{k} {x} {y} {z}" for k, (x, y, z) in enumerate(mesh.points.tolist(), 1)]
+    foot = mesh.patches["x_min"]
+    lines += ["$EndNodes", "$Elements", str(len(foot) + len(mesh.cells))]
+    rows = [(2, 1, t) for t in foot] + [(4, 2, c) for c in mesh.cells]
+    lines += [
+        f"{k} {kind} 2 {tag} 1 " + " ".join(str(n + 1) for n in nodes)
+        for k, (kind, tag, nodes) in enumerate(rows, 1)
+    ]
+    return "\n".join([*lines, "$EndElements"]) + "\n"
+
+
+def mutants(content: bytes, count: int, seed: str) -> Iterator[bytes]:
+    """Spoil a file in `count` ways: bytes, cuts, repeats, lines, and numbers."""
+    chance = random.Random(seed)
+    for _ in range(count):
+        spoiled = bytearray(content)
+        for _ in range(chance.choice((1, 1, 1, 2, 4))):
+            chance.choice((_flip, _cut, _repeat, _line, _number, _number, _number))(spoiled, chance)
+        yield bytes(spoiled)
+
+
+def _flip(data: bytearray, chance: random.Random) -> None:
+    for _ in range(chance.randint(1, 8)):
+        if data:
+            data[chance.randrange(len(data))] = chance.randrange(256)
+
+
+def _cut(data: bytearray, chance: random.Random) -> None:
+    start = chance.randrange(len(data) + 1)
+    del data[start : start + chance.choice((1, 7, 100, len(data)))]
+
+
+def _repeat(data: bytearray, chance: random.Random) -> None:
+    start = chance.randrange(len(data) + 1)
+    piece = bytes(data[start : start + chance.choice((3, 50, 400))])
+    data[start:start] = piece * chance.choice((1, 3, 40))
+
+
+def _line(data: bytearray, chance: random.Random) -> None:
+    lines = bytes(data).split(b"\n")
+    k, j = chance.randrange(len(lines)), chance.randrange(len(lines))
+    if chance.random() < 0.5:
+        del lines[k]
+    else:
+        lines[k], lines[j] = lines[j], lines[k]
+    data[:] = b"\n".join(lines)
+
+
+def _number(data: bytearray, chance: random.Random) -> None:
+    import re
+
+    found = list(re.finditer(rb"-?\d+(\.\d+)?(e-?\d+)?", bytes(data[:20000])))
+    if found:
+        one = chance.choice(found)
+        data[one.start() : one.end()] = chance.choice(NUMBERS).encode()

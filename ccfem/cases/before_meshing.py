@@ -1,0 +1,71 @@
+"""What can be known of patches and supports before a surface is meshed, which may take minutes."""
+
+from collections.abc import Mapping
+from dataclasses import dataclass
+
+import numpy as np
+
+from ccfem.elasticity.body import LoadedBody
+from ccfem.elasticity.load_kinds import Load, PointForce, patches_in_use
+from ccfem.elasticity.loads import nodal_forces
+from ccfem.elasticity.support_kinds import AnySupport
+from ccfem.elasticity.supports import held
+from ccfem.errors import Mistakes
+from ccfem.io.surface import Surface
+from ccfem.mesh.cell_mesh import CellMesh
+from ccfem.mesh.face_rules import GROUP
+from ccfem.mesh.patches import PatchRule, patches_from_rules
+from ccfem.mesh.shell import Shell, refined
+from ccfem.mesh.smooth_faces import smooth_faces
+
+__all__ = ["check_before_meshing"]
+
+
+@dataclass(frozen=True)
+class _Outline:
+    """Supports and loads on a surface alone."""
+
+    mesh: CellMesh
+    body: LoadedBody
+    supports: tuple[AnySupport, ...]
+    loads: Mapping[str, tuple[Load, ...]]
+
+
+def check_before_meshing(
+    surface: Surface,
+    edge_length: float,
+    rules: Mapping[str, PatchRule],
+    supports: tuple[AnySupport, ...],
+    loads: Mapping[str, tuple[Load, ...]],
+) -> None:
+    """Try rules, supports and loads on the surface, cut finer than the mesh will be.
+
+    Raises
+    ------
+    InputError
+        For rules that choose nothing, unknown patches, loads that their patch cannot take, and
+        motions that no support hinders.
+    """
+    found = Mistakes()
+    points, triangles, origin = refined(surface.points, surface.triangles, 0.5 * edge_length)
+    groups = {
+        GROUP.format(k): triangles[np.isin(origin, face.facets)]
+        for k, face in enumerate(smooth_faces(surface.points, surface.triangles), 1)
+    }
+    shell = Shell(points, triangles, groups)
+    for name, rule in rules.items():
+        with found.noted():
+            shell = patches_from_rules(shell, {name: rule})
+    for name in set(patches_in_use(supports, loads)) - set(rules):
+        with found.noted():
+            shell.patch(name)
+    found.complain()
+    outline = _Outline(shell, shell, supports, loads)
+    with found.noted():
+        held(outline)
+    for those in loads.values():
+        for load in those:
+            if not isinstance(load, PointForce):
+                with found.noted():
+                    nodal_forces(shell, load)  # type: ignore[arg-type]
+    found.complain()

@@ -1,0 +1,50 @@
+"""What ``ccfem check`` does: print what is known of a part before it is solved, and draw it."""
+
+from pathlib import Path
+
+from ccfem.cli.run import load
+from ccfem.errors import InputError
+from ccfem.inspection import check
+from ccfem.io.whole import check_writable, whole_file
+from ccfem.plot.canvas import check_picture, save
+from ccfem.plot.part_picture import part_page, part_picture
+
+__all__ = ["check_part"]
+
+
+def check_part(part: str, set_case: list[str] | None, picture: Path | None) -> int:
+    """Print a check; write its picture, and beside it the page that turns.
+
+    Parameters
+    ----------
+    part : str
+        Name of a case, or a part file.
+    set_case : list of str, optional
+        Parameters of a case.
+    picture : Path, optional
+        .png, .pdf or .svg; default the part's name and ``-check.png``.
+
+    Returns
+    -------
+    int
+        Exit code: 2 where something keeps the part from being solved.
+    """
+    if picture is not None:
+        check_picture(picture)
+    try:
+        checked = check(load(part, set_case))
+    except InputError as error:
+        if len(error.mistakes) < 2:
+            raise
+        for line in error.mistakes:
+            print(f"mistake: {line}")
+        return 2
+    if picture is None:
+        picture = check_picture(Path(f"{checked.case.name}-check.png"))
+    page = check_writable(picture.with_suffix(".html"))
+    print(checked)
+    save(part_picture(checked), picture)
+    with whole_file(page) as temporary:
+        temporary.write_text(part_page(checked), encoding="utf-8")
+    print(f"{picture}, and {page} to turn it")
+    return 2 if checked.mistakes else 0

@@ -1,0 +1,59 @@
+"""What ``ccfem calibrate`` does: from curves of printed parts to a material."""
+
+from collections.abc import Callable, Mapping
+from pathlib import Path
+from typing import Any
+
+from ccfem.cases.case import Case
+from ccfem.comparison.compare import compare, create_all
+from ccfem.errors import InputError
+from ccfem.io.whole import check_writable
+from ccfem.virtual_testing.calibration import calibrate
+from ccfem.virtual_testing.force_displacement import read_curve
+
+__all__ = ["fit_material"]
+
+
+def fit_material(
+    read: Callable[[], Case],
+    unreinforced: Path,
+    reinforced: Path | None,
+    strategy: str | None,
+    parameters: Mapping[str, Mapping[str, Any]],
+    options: Mapping[str, Any],
+    out: Path,
+) -> None:
+    """Fit a material to force-displacement curves, write it, and say what was found.
+
+    Parameters
+    ----------
+    read : callable
+        Returns the part as it was printed; called when all files have been looked at.
+    unreinforced, reinforced : Path
+        Curves without and with fibre.
+    strategy : str, optional
+        That planned the reinforced part.
+    parameters : mapping of strategy name to parameters
+    options : mapping
+        From `ccfem.cli.run.options_of`, and ``natural``.
+    out : Path
+    """
+    check_writable(out)
+    without = read_curve(unreinforced)
+    with_fibre = None if reinforced is None else read_curve(reinforced)
+    if (reinforced is None) != (strategy is None):
+        raise InputError("--reinforced and --strategy belong together; got only one of them")
+    case, paths = read(), None
+    if strategy is not None:
+        chosen = create_all(case, (strategy,), parameters)
+        (planned,) = compare(case, chosen, **options).runs
+        if not len(planned.toolpaths):
+            raise InputError(f"{strategy} could not plan the part: {planned.failure}")
+        paths = planned.toolpaths
+    found = calibrate(case.problem, without, with_fibre, paths, options["load_case"], out.stem)
+    found.write(out)
+    rho = "" if found.rho is None else f", rho {found.rho:.3g} mm^2"
+    print(
+        f"{out}: modulus {found.modulus:.4g} MPa, matrix strength {found.tensile_strength:.3g} MPa"
+        f"{rho}; use it with --calibration {out}"
+    )

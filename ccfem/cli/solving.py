@@ -1,0 +1,27 @@
+"""What ``ccfem solve`` does: the stress of a part, written for ParaView and summed up."""
+
+from pathlib import Path
+
+from ccfem.cases.case import Case
+from ccfem.checks import check_known
+from ccfem.cli.screen import print_solution
+from ccfem.elasticity.solve import solve
+from ccfem.export.vtu_result import result_path, write_result
+from ccfem.io.whole import check_writable
+
+__all__ = ["solve_part"]
+
+
+def solve_part(case: Case, out: Path, load_case: str | None, backend: str) -> None:
+    """Solve a part in one load case or all, write the results, and print what was found."""
+    names = case.problem.cases
+    if load_case is not None:
+        check_known("load case", load_case, names)
+        names = (load_case,)
+    files = {name: out if len(names) == 1 else result_path(out, name) for name in names}
+    for file in files.values():
+        check_writable(result_path(file))
+    fields = solve(case.problem, backend=backend)
+    for name, file in files.items():
+        write_result(fields[name], file)
+        print_solution(fields[name], case.findings, file)

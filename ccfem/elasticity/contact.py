@@ -1,0 +1,131 @@
+"""Equilibrium of a part on supports that only press: which of them it touches."""
+
+from dataclasses import dataclass, replace
+
+import numpy as np
+import scipy.sparse as sp
+
+from ccfem.arrays import FloatArray
+from ccfem.elasticity.held import Held
+from ccfem.elasticity.solution import Solution
+from ccfem.elasticity.solvers import Solver
+from ccfem.errors import InputError, SolveError
+
+__all__ = ["EXPECTED", "Contact", "check_pressed", "find_contact"]
+
+EXPECTED = 8
+"""Solves until a contact has settled, about."""
+
+_ROUGH = 1e-4
+"""Relative residual of the solves until then."""
+
+_ROUNDS = 200
+"""Changes of the contact after which to give up: a slender part lifts off cell by cell."""
+
+_SLOW = 40
+"""Iterations from which a factorisation with the contact at hand pays."""
+
+_CARRIED = 1e-4
+"""Share of the load that may be left to what keeps a loose part in place."""
+
+
+@dataclass(frozen=True)
+class Contact:
+    """Solution on supports that only press.
+
+    Attributes
+    ----------
+    held : Held
+        The supports, with what is touched.
+    solver : Solver
+        Of the matrix with these, for further load cases.
+    right : (n,) array
+        Right-hand side.
+    solution : Solution
+    iterations : int
+        Of conjugate gradients, over all rounds.
+    """
+
+    held: Held
+    solver: Solver
+    right: FloatArray
+    solution: Solution
+    iterations: int
+
+
+def find_contact(
+    matrix: sp.bsr_array,
+    held: Held,
+    forces: FloatArray,
+    solver: Solver,
+    tolerance: float,
+) -> Contact:
+    """Solve, let go what pulls, hold what sinks in, and so on until nothing changes.
+
+    The first round is solved with all in contact. A direct backend then renews its factorisation,
+    the ordering of which stays; with a multigrid the following rounds are solved by conjugate
+    gradients with that of the first as preconditioner, which is renewed where they are slow.
+
+    Parameters
+    ----------
+    matrix : bsr_array (3n, 3n), N/mm
+    held : Held
+        With all in contact.
+    forces : (n, 3) array, N
+    solver : Solver
+        Of the matrix with these supports, in whatever contact; it may be used up.
+    tolerance : float
+        Relative residual of the solution.
+
+    Raises
+    ------
+    InputError
+        Where the load lifts the part off its supports.
+    SolveError
+        Where a solve fails, or the contact does not settle.
+    """
+    start, slow, total, goal = None, False, 0, max(tolerance, _ROUGH)
+    for _ in range(_ROUNDS):
+        rhs = held.right_hand_side(matrix, forces)
+        reduced = held.reduce(matrix)
+        if not np.array_equal(reduced.data, solver.matrix.data):
+            renewed = slow or solver.exact
+            solver = solver.refactorise(reduced) if renewed else replace(solver, matrix=reduced)
+        solution = solver.solve(rhs, start, goal)
+        total += solution.iterations
+        slow = solution.iterations > _SLOW
+        displacement = held.expand(solution.values)
+        internal = (matrix @ displacement.reshape(-1)).reshape(forces.shape)
+        following = held.following(displacement, internal - forces)
+        if following is held and goal > tolerance:
+            goal = tolerance
+        elif following is held:
+            check_pressed(held, internal - forces, forces)
+            return Contact(held, solver, rhs, solution, total)
+        held = following
+        start = held.restrict(displacement)
+    raise SolveError(
+        f"contact did not settle in {_ROUNDS} rounds: the part hardly rests on what presses; hold "
+        "it by one more support, or take a finer mesh"
+    )
+
+
+def check_pressed(held: Held, reactions: FloatArray, forces: FloatArray) -> None:
+    """Refuse a part that the load lifts off its supports.
+
+    Parameters
+    ----------
+    held : Held
+    reactions : (n, 3) array, N
+        Of all supports, and of what keeps a loose part in place.
+    forces : (n, 3) array, N
+        Of the load.
+    """
+    if held.presses is None:
+        return
+    carried = float(np.abs(held.along_pressing(reactions)[~held.contact]).sum())
+    if carried > _CARRIED * float(np.linalg.norm(forces, axis=1).sum()):
+        raise InputError(
+            "the load lifts the part off its supports that only press, so nothing holds it: hold "
+            "it by another support, or turn the load round"
+        )

@@ -1,0 +1,7 @@
+"""A part seen before it is solved: its mesh, patches, loads and supports, and what is doubtful."""
+
+from ccfem.inspection.load_row import LoadRow
+from ccfem.inspection.part_check import Check, check
+from ccfem.inspection.patch_row import PatchRow
+
+__all__ = ["Check", "LoadRow", "PatchRow", "check"]

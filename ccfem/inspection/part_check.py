@@ -1,0 +1,238 @@
+"""Everything that is known of a part before it is solved."""
+
+import os
+from collections.abc import Sequence
+from dataclasses import dataclass
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+
+from ccfem.cases.case import Case
+from ccfem.cases.reading import read
+from ccfem.elasticity.held import Held
+from ccfem.elasticity.load_kinds import patches_of
+from ccfem.elasticity.loads import load_case
+from ccfem.elasticity.supports import held, held_in
+from ccfem.errors import Mistakes
+from ccfem.inspection.cost import solve_costs
+from ccfem.inspection.load_row import LoadRow, load_row
+from ccfem.inspection.patch_row import PatchRow, patch_rows
+from ccfem.mesh.check import about_slivers
+from ccfem.mesh.facets import are_among
+from ccfem.mesh.measures import connected
+
+if TYPE_CHECKING:
+    import pandas as pd
+
+__all__ = ["Check", "check"]
+
+_ALL, _SOME = 1.0 - 1e-9, 0.02
+"""Share of a load on held nodes from which it does nothing, and from which it is worth a word."""
+
+
+@dataclass(frozen=True)
+class Check:
+    """A part before it is solved.
+
+    Attributes
+    ----------
+    case : Case
+    facts : tuple of str
+        Size, cells, quality, pieces, and what a solve will take.
+    patches : tuple of PatchRow
+    loads : tuple of LoadRow
+    warnings : tuple of str
+        What may not be meant, each with its cure.
+    mistakes : tuple of str
+        What keeps the part from being solved.
+    """
+
+    case: Case
+    facts: tuple[str, ...]
+    patches: tuple[PatchRow, ...]
+    loads: tuple[LoadRow, ...]
+    warnings: tuple[str, ...]
+    mistakes: tuple[str, ...]
+
+    def __str__(self) -> str:
+        lines = [self.case.title, *(f"  {fact}" for fact in self.facts), ""]
+        for frame in (self.to_frame(), self.load_frame()):
+            lines += [*frame.to_string(index=False).splitlines(), ""]
+        lines += [f"warning: {line}" for line in self.warnings]
+        lines += [f"mistake: {line}" for line in self.mistakes]
+        if not self.mistakes:
+            lines.append("nothing keeps this part from being solved")
+        return "\n".join(line.rstrip() for line in lines)
+
+    def _repr_html_(self) -> str:
+        from html import escape
+
+        rest = "".join(f"<p>{escape(x)}</p>" for x in (*self.facts, *self.warnings, *self.mistakes))
+        return self.to_frame().to_html(index=False) + self.load_frame().to_html(index=False) + rest
+
+    def to_frame(self) -> "pd.DataFrame":
+        """Table of the patches: a row a patch."""
+        import pandas as pd
+
+        return pd.DataFrame(
+            {
+                "patch": [row.name for row in self.patches],
+                "area, mm^2": [float(f"{row.area:.4g}") for row in self.patches],
+                "centre, mm": [_numbers(row.centre) for row in self.patches],
+                "mean normal": [_numbers(row.normal, 2, 5e-3) for row in self.patches],
+                "facets": [row.facets for row in self.patches],
+                "pieces": [row.pieces for row in self.patches],
+                "carries": [row.carries for row in self.patches],
+            }
+        )
+
+    def load_frame(self) -> "pd.DataFrame":
+        """Table of the loads: a row a load."""
+        import pandas as pd
+
+        return pd.DataFrame(
+            {
+                "load case": [row.case for row in self.loads],
+                "load": [row.what for row in self.loads],
+                "resultant, N": [_numbers(row.resultant) for row in self.loads],
+                "acts at, mm": [_numbers(row.point) for row in self.loads],
+                "moment, N mm": [_numbers(row.moment, 4, 1e-3 * row.size) for row in self.loads],
+            }
+        )
+
+
+def check(part: str | os.PathLike[str] | Case, **parameters: Any) -> Check:
+    """Look at a part without solving it.
+
+    Parameters
+    ----------
+    part : str, path or Case
+        As `ccfem.read` takes it.
+    **parameters
+        Of a case by name.
+
+    Returns
+    -------
+    Check
+        ``print(check(...))`` says it all; `Check.to_frame` is the table of the patches.
+
+    Raises
+    ------
+    InputError
+        For a part that cannot be read; `InputError.mistakes` holds all that is wrong with it.
+    """
+    case = read(part, **parameters)
+    problem, found = case.problem, Mistakes()
+    at_rest: Held | None = None
+    with found.noted():
+        at_rest = held(problem)
+    rows = []
+    for name, loads in problem.loads.items():
+        before = len(found.lines)
+        for load in loads:
+            with found.noted(f"load case '{name}': "):
+                rows.append(load_row(problem, name, load, at_rest))
+        if len(found.lines) == before:
+            with found.noted():
+                load_case(problem, name)
+                if at_rest is not None:
+                    held_in(problem, name, at_rest)
+    found.lines += [
+        f"load case '{row.case}': {row.what} acts on held nodes alone and does nothing: choose "
+        "another patch for the load, or for the support"
+        for row in rows
+        if row.held >= _ALL
+    ]
+    if not problem.loads:
+        found.lines.append("the part has no load case: give at least one load")
+    return Check(
+        case,
+        _facts(case),
+        patch_rows(problem.mesh, _carried(case)),
+        tuple(rows),
+        tuple(_warnings(case, rows)),
+        tuple(dict.fromkeys(found.lines)),
+    )
+
+
+def _facts(case: Case) -> tuple[str, ...]:
+    """Size, cells, quality, pieces and cost."""
+    mesh = case.problem.mesh
+    size = " x ".join(f"{side:.4g}" for side in np.ptp(mesh.bounds, axis=0))
+    pieces = len(np.unique(connected(mesh.neighbours, len(mesh.cells))))
+    kind = "linear" if mesh.order == 1 else "quadratic"
+    costs = " or, if their error calls for it, ".join(
+        cost.about for cost in solve_costs(case.problem)
+    )
+    told = tuple(line for line in case.findings if _only_told(line))
+    return (
+        f"{size} mm, {mesh.volumes.sum() / 1e3:.4g} cm^3, {case.problem.material.name}",
+        f"{len(mesh.cells):,} {kind} cells, {len(mesh.points):,} nodes, {pieces} "
+        f"piece{'s' if pieces > 1 else ''}",
+        f"longest edge of a cell over its least height: {np.median(mesh.aspects):.3g} in the "
+        f"middle, {mesh.aspects.max():.3g} at most",
+        *told,
+        f"solve of a load case, {costs}",
+    )
+
+
+def _only_told(finding: str) -> bool:
+    """Whether a finding tells how the mesh was made, and nothing to be mended."""
+    return finding.startswith("meshed by") and ": shorten" not in finding
+
+
+def _carried(case: Case) -> dict[str, list[str]]:
+    """Say what each patch carries."""
+    carried: dict[str, list[str]] = {}
+    for support in case.problem.supports:
+        held_along = getattr(support, "components", "")
+        for name in patches_of(support):
+            word = type(support).__name__.lower()
+            carried.setdefault(name, []).append(f"{word} {held_along}".strip())
+    for label, loads in case.problem.loads.items():
+        for load in loads:
+            for name in patches_of(load):
+                carried.setdefault(name, []).append(f"{type(load).__name__.lower()} of {label}")
+    return carried
+
+
+def _warnings(case: Case, rows: Sequence[LoadRow]) -> list[str]:
+    """Say what may not be meant."""
+    problem = case.problem
+    lines = [line for line in case.findings if not _only_told(line)]
+    sliver = about_slivers(problem.mesh)
+    if sliver:
+        lines.append(sliver)
+    for row in rows:
+        if row.held < _ALL and row.held > _SOME:
+            lines.append(
+                f"load case '{row.case}': {row.held:.0%} of {row.what} acts on held nodes and does "
+                "nothing: keep the patches of loads and supports apart"
+            )
+        if row.size == 0.0:
+            lines.append(
+                f"load case '{row.case}': {row.what} has no resultant: its parts cancel; check "
+                "that the patch faces one way"
+            )
+    supported = {name for each in problem.supports for name in patches_of(each)}
+    loaded = {name for those in problem.loads.values() for x in those for name in patches_of(x)}
+    for one in sorted(loaded):
+        for other in sorted(supported - {one}):
+            both = are_among(problem.mesh.patch(one), problem.mesh.patch(other))
+            if both.any():
+                lines.append(
+                    f"patches '{one}' (loaded) and '{other}' (held) share {int(both.sum())} of "
+                    f"{len(both)} facets: choose them apart"
+                )
+    unused = sorted(set(problem.mesh.patches) - loaded - supported)
+    if unused and len(unused) <= 6:
+        lines.append(f"patches without load and support: {', '.join(unused)}")
+    return lines
+
+
+def _numbers(values: Any, digits: int = 4, least: float = 0.0) -> str:
+    """Components as words; those below the least, or very small beside the largest, are zero."""
+    if np.isnan(values).any():
+        return "-"
+    least = max(least, 1e-4 * float(np.abs(values).max()))
+    return ", ".join(f"{0.0 if abs(x) <= least else x:.{digits}g}" for x in values)

@@ -1,0 +1,91 @@
+"""A call in a process of its own: a crash, a hang or a flood of memory becomes an exception."""
+
+import os
+import signal
+import subprocess
+import sys
+from pathlib import Path
+from tempfile import TemporaryDirectory
+from typing import Any
+
+import numpy as np
+
+from ccfem.errors import InputError
+
+__all__ = ["ChildError", "in_own_process"]
+
+_PACKAGES = Path(__file__).resolve().parents[2]
+"""Folder from which ccfem is imported."""
+
+
+class ChildError(RuntimeError):
+    """A call that did not come to its end; the message says why, as part of a sentence."""
+
+
+def in_own_process(
+    function: str, seconds: float | None = None, memory: float = 0.0, **arguments: Any
+) -> dict[str, Any]:
+    """Call a function of `ccfem.isolated` in a process of its own, on one core, without a word.
+
+    Parameters
+    ----------
+    function : str
+        ``module:name``. It returns a mapping of names to arrays, numbers and strings.
+    seconds : float, optional
+        The process is ended after this time.
+    memory : float, bytes, optional
+        Most address space that it may take; 0 for no limit.
+    **arguments : arrays, numbers and strings
+
+    Returns
+    -------
+    dict of name to array; numbers and strings as arrays without dimension
+
+    Raises
+    ------
+    InputError
+        What the function raises itself.
+    ChildError
+        For any other failure: too much time or memory, a crash, an exception.
+    """
+    environment = dict(os.environ)
+    before = environment.get("PYTHONPATH")
+    environment["PYTHONPATH"] = os.pathsep.join([str(_PACKAGES), *([before] if before else [])])
+    for library in ("OMP", "OPENBLAS", "MKL"):
+        environment[f"{library}_NUM_THREADS"] = "1"
+    with TemporaryDirectory(prefix="ccfem-", ignore_cleanup_errors=True) as folder:
+        np.savez(Path(folder) / "in.npz", function=function, memory=memory, **arguments)
+        command = [sys.executable, "-P", "-m", "ccfem.isolated.child", folder]
+        try:
+            done = subprocess.run(
+                command,
+                cwd=folder,
+                env=environment,
+                stdin=subprocess.DEVNULL,
+                stdout=subprocess.DEVNULL,
+                stderr=subprocess.DEVNULL,
+                timeout=seconds,
+                check=False,
+            )
+        except subprocess.TimeoutExpired:
+            raise ChildError(f"it takes more than {seconds:.0f} s") from None
+        out = Path(folder) / "out.npz"
+        if not out.exists():
+            raise ChildError(f"the library crashed ({_ending(done.returncode)})")
+        with np.load(out, allow_pickle=False) as file:
+            found = {name: file[name] for name in file.files}
+    if "refused" in found:
+        raise InputError(str(found["refused"]))
+    if "failed" in found:
+        raise ChildError(str(found["failed"]))
+    return found
+
+
+def _ending(code: int) -> str:
+    """Say how a process ended."""
+    if code < 0:
+        try:
+            return signal.Signals(-code).name
+        except ValueError:
+            return f"signal {-code}"
+    return f"exit code {code}"

@@ -1,0 +1,99 @@
+"""Files that VTK reads: grids and surfaces, to plain arrays."""
+
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+__all__ = ["read_grid", "read_surface"]
+
+_NODES = {5: 3, 10: 4, 22: 6, 24: 10}
+"""Nodes of the cells whose nodes are wanted, by VTK's number of their type."""
+
+
+def read_grid(path: str) -> dict[str, Any]:
+    """Points, types and nodes of cells, and data of an unstructured grid (.vtu).
+
+    Names are ``points``, ``types``, ``cells:TYPE``, ``point:NAME``, ``cell:NAME``, ``field:NAME``,
+    and ``components:point:NAME`` where components have names.
+    """
+    from vtkmodules.util.numpy_support import vtk_to_numpy
+    from vtkmodules.vtkIOXML import vtkXMLUnstructuredGridReader
+
+    grid = _output(vtkXMLUnstructuredGridReader(), path)
+    if grid.GetPoints() is None or not grid.GetNumberOfCells():
+        raise ValueError("no points or no cells")
+    found: dict[str, Any] = {"points": vtk_to_numpy(grid.GetPoints().GetData())}
+    types = vtk_to_numpy(grid.GetCellTypesArray())
+    offsets = vtk_to_numpy(grid.GetCells().GetOffsetsArray()).astype(np.int64)
+    nodes = vtk_to_numpy(grid.GetCells().GetConnectivityArray()).astype(np.int64)
+    if len(offsets) != len(types) + 1:
+        raise ValueError("cells do not fit their types")
+    found["types"] = types
+    for kind in np.unique(types).tolist():
+        found[f"cells:{kind}"] = _rows(nodes, offsets, types == kind, _NODES.get(kind, 0))
+    for where, data in (
+        ("point", grid.GetPointData()),
+        ("cell", grid.GetCellData()),
+        ("field", grid.GetFieldData()),
+    ):
+        for k in range(data.GetNumberOfArrays()):
+            array = data.GetAbstractArray(k)
+            name = f"{where}:{array.GetName()}"
+            if not hasattr(array, "GetComponentName") or array.IsA("vtkStringArray"):
+                found[name] = np.array(
+                    [array.GetValue(i) for i in range(array.GetNumberOfValues())]
+                )
+                continue
+            found[name] = vtk_to_numpy(array)
+            names = [array.GetComponentName(i) or "" for i in range(array.GetNumberOfComponents())]
+            if any(names):
+                found[f"components:{name}"] = np.array(names)
+    return found
+
+
+def _rows(
+    nodes: NDArray[Any], offsets: NDArray[Any], chosen: NDArray[Any], count: int
+) -> NDArray[Any]:
+    """Nodes (m, count) of the chosen cells; of types whose nodes are not wanted, (m, 0)."""
+    start, stop = offsets[:-1][chosen], offsets[1:][chosen]
+    if count and (stop - start != count).any():
+        raise ValueError("cells have the wrong number of nodes")
+    return nodes[start[:, None] + np.arange(count)]
+
+
+def read_surface(path: str) -> dict[str, Any]:
+    """Points and triangles of a surface (.stl, .obj, .ply)."""
+    from vtkmodules.util.numpy_support import vtk_to_numpy
+    from vtkmodules.vtkFiltersCore import vtkTriangleFilter
+    from vtkmodules.vtkIOGeometry import vtkOBJReader, vtkSTLReader
+    from vtkmodules.vtkIOPLY import vtkPLYReader
+
+    make = {"stl": vtkSTLReader, "obj": vtkOBJReader, "ply": vtkPLYReader}[path[-3:].lower()]
+    surface = _output(make(), path)
+    cut = vtkTriangleFilter()
+    cut.PassVertsOff()
+    cut.PassLinesOff()
+    cut.SetInputData(surface)
+    cut.Update()
+    surface = cut.GetOutput()
+    if surface.GetPoints() is None or not surface.GetNumberOfPolys():
+        raise ValueError("it holds no triangles")
+    triangles = vtk_to_numpy(surface.GetPolys().GetConnectivityArray()).reshape(-1, 3)
+    if triangles.min() < 0 or triangles.max() >= surface.GetNumberOfPoints():
+        raise ValueError("a triangle names a point that is not there")
+    return {
+        "points": vtk_to_numpy(surface.GetPoints().GetData()).astype(np.float64),
+        "triangles": triangles.astype(np.int64),
+    }
+
+
+def _output(reader: Any, path: str) -> Any:
+    """Return what a reader makes of a file; its complaints are exceptions."""
+    complaints: list[str] = []
+    reader.AddObserver("ErrorEvent", lambda *_: complaints.append(""))
+    reader.SetFileName(path)
+    reader.Update()
+    if complaints or reader.GetErrorCode():
+        raise ValueError("VTK cannot make sense of it")
+    return reader.GetOutput()
