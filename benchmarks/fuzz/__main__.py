@@ -60,7 +60,7 @@ def verdict(path: Path) -> str:
     code = os.waitstatus_to_exitcode(status)
     if used.ru_maxrss * 1024 > MEMORY:
         return f"{used.ru_maxrss / 1e6:.1f} GB"
-    if seconds > 2.0 * SECONDS:
+    if seconds > SECONDS:
         return f"{seconds:.0f} s"
     if code not in (0, 2):
         return f"code {code}: {text.splitlines()[-1] if text else ''}"
