@@ -16,6 +16,8 @@ from ccfem.isolated.process import ChildError
 __all__ = ["Surface", "is_surface", "read_surface"]
 
 _SUFFIXES = (".obj", ".ply", ".stl")
+_NOTHING = 1e-12
+"""Volume over area and diagonal that counts as none."""
 
 
 @dataclass(frozen=True)
@@ -30,7 +32,8 @@ class Surface:
     Raises
     ------
     InputError
-        When the surface has no triangle, a coordinate that is not finite, or is open.
+        When the surface has no triangle, a coordinate that is not finite, is open, or encloses
+        nothing.
     """
 
     points: FloatArray
@@ -50,6 +53,13 @@ class Surface:
                 f"{self.triangles.min()} to {self.triangles.max()}: repair the file"
             )
         _check_closed(self.points, self.triangles)
+        if abs(self.volume) <= _NOTHING * float(
+            np.prod(_size_and_area(self.points, self.triangles))
+        ):
+            raise InputError(
+                f"the surface encloses no volume ({abs(self.volume):.3g} mm^3): give the outside "
+                "of a solid, each wall once"
+            )
         if self.volume < 0.0:
             object.__setattr__(self, "triangles", read_only(self.triangles[:, ::-1], np.int64))
 
@@ -116,6 +126,13 @@ def _merged(points: FloatArray, triangles: IntArray) -> tuple[FloatArray, IntArr
     triangles = place.reshape(-1)[triangles]
     a, b, c = triangles.T
     return points[first], triangles[(a != b) & (b != c) & (c != a)]
+
+
+def _size_and_area(points: FloatArray, triangles: IntArray) -> tuple[float, float]:
+    """Diagonal, mm, and area, mm^2."""
+    a, b, c = np.moveaxis(points[triangles], 1, 0)
+    area = 0.5 * float(np.linalg.norm(np.cross(b - a, c - a), axis=1).sum())
+    return float(np.linalg.norm(np.ptp(points[triangles], axis=(0, 1)))), area
 
 
 def _check_near(points: FloatArray) -> None:
