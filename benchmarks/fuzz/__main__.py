@@ -6,6 +6,7 @@ formats. Whatever else a file does is printed, and the file is kept under ``resu
 
 import os
 import resource
+import signal
 import sys
 import tempfile
 import time
@@ -37,6 +38,7 @@ def verdict(path: Path, see: Callable[[Path], None] = read) -> str:
     with tempfile.TemporaryFile() as said:
         child = os.fork()
         if child == 0:
+            os.setsid()
             os.dup2(said.fileno(), 1)
             os.dup2(said.fileno(), 2)
             code = 1
@@ -55,8 +57,14 @@ def verdict(path: Path, see: Callable[[Path], None] = read) -> str:
                 sys.stderr.flush()
                 os._exit(code)
         start = time.perf_counter()
-        _, status, used = os.wait4(child, 0)
-        seconds = time.perf_counter() - start
+        while True:
+            ended, status, used = os.wait4(child, os.WNOHANG)
+            seconds = time.perf_counter() - start
+            if ended:
+                break
+            if seconds > 2.0 * SECONDS:
+                os.killpg(child, signal.SIGKILL)
+            time.sleep(0.002 if seconds < 1.0 else 0.05)
         said.seek(0)
         text = said.read().decode(errors="replace").strip()
     code = os.waitstatus_to_exitcode(status)

@@ -1,4 +1,4 @@
-"""Odd meshes and surfaces, by name: what no mesher should make, and what people send all the same."""
+"""Odd meshes and surfaces, by name: what no mesher should make, and what people send."""
 
 from collections.abc import Iterator
 
@@ -116,12 +116,12 @@ def _spoiled_boxes() -> Iterator[Shape]:
     middle = points[cells].mean(axis=1)
     where = (middle // 5.0).astype(int).sum(axis=1) % 2 == 0
     yield "cubes that touch at edges", points, cells[where]
-    other = np.concatenate([points, points + [20.0, 10.0, 5.0]])
+    other = np.concatenate([points, points + np.array([20.0, 10.0, 5.0])])
     yield "boxes that touch at a corner", other, np.concatenate([cells, cells + len(points)])
     fine = box_mesh((20.0, 10.0, 5.0), (7, 3, 3))
-    both = np.concatenate([points, fine.points + [20.0, 0, 0]])
+    both = np.concatenate([points, fine.points + np.array([20.0, 0, 0])])
     yield "boxes whose nodes do not meet", both, np.concatenate([cells, fine.cells + len(points)])
-    many = np.concatenate([points + [30.0 * k, 0, 0] for k in range(50)])
+    many = np.concatenate([points + np.array([30.0 * k, 0, 0]) for k in range(50)])
     pieces = np.concatenate([cells + k * len(points) for k in range(50)])
     yield "fifty boxes", many, pieces
     mesh = box_mesh((20.0, 10.0, 5.0), (4, 2, 2)).quadratic()

@@ -233,9 +233,10 @@ def _take_place(folder: Path, directory: Path) -> None:
         raise
     written = _written(old) or {}
     for late in sorted(old.iterdir()):  # what others put there in the last moment
-        if late.name != _MARKER and not (directory / late.name).exists():
-            if not (late.is_file() and _is_ours(old, late.name, written)):
-                late.rename(directory / late.name)
+        if late.name == _MARKER or (late.is_file() and _is_ours(old, late.name, written)):
+            continue
+        if not (directory / late.name).exists():
+            late.rename(directory / late.name)
     shutil.rmtree(old, ignore_errors=True)
 
 
