@@ -8,7 +8,17 @@ from typing import Any, Literal, get_args, get_origin, get_type_hints
 
 from ccfem.errors import InputError, known_names
 
-__all__ = ["check_choices", "check_fields", "check_known", "check_number", "member_name"]
+__all__ = [
+    "FARTHEST",
+    "check_choices",
+    "check_fields",
+    "check_known",
+    "check_number",
+    "member_name",
+]
+
+FARTHEST = 1e9
+"""Largest coordinate that is taken for meant, mm: a thousand kilometres."""
 
 
 def check_number(

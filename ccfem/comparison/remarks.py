@@ -62,19 +62,22 @@ def _about(run: Run, wanted: float | None, bounded: bool) -> list[str]:
 
 
 def _about_orders(tested: Sequence[Run]) -> list[str]:
-    """Say which runs, best first, cannot be put in an order."""
+    """Say which runs, best first, cannot be put in an order; each reason once."""
     both = any(run.tested is not None and run.tested.alternative is not None for run in tested)
     of = "tension-only and bonded fibres" + (", or both models of the supports," if both else "")
     reasons = {
-        UNDECIDED: f"undecided against {{}}, for {of} do not agree on an order",
-        SAME: f"no difference to {{}}: less than {RESOLUTION:.0%}, the resolution of the test",
+        UNDECIDED: ("undecided against", f", for {of} do not agree on an order"),
+        SAME: ("no difference to", f": less than {RESOLUTION:.0%}, the resolution of the test"),
     }
     lines = []
-    for k, run in enumerate(tested):
-        for found, reason in reasons.items():
+    for found, (words, reason) in reasons.items():
+        pairs = []
+        for k, run in enumerate(tested):
             others = [other.name for other in tested[k + 1 :] if order_of(run, other) == found]
             if others:
-                lines.append(f"{run.name}: {reason.format(', '.join(others))}")
+                pairs.append(f"{run.name}: {words} {', '.join(others)}")
+        if pairs:
+            lines.append("; ".join(pairs) + reason)
     return lines
 
 

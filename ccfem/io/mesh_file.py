@@ -71,7 +71,9 @@ def read_mesh(path: str | os.PathLike[str], scale: float = 1.0, check: bool = Tr
     try:
         mesh = _READERS[suffix](path)
         if scale != 1.0:
-            mesh = TetMesh(mesh.points * scale, mesh.cells, mesh.patches)
+            with np.errstate(over="ignore"):  # what overflows is refused as infinite
+                points = mesh.points * scale
+            mesh = TetMesh(points, mesh.cells, mesh.patches)
         if not check:
             return mesh
         mesh, report = check_mesh(mesh)

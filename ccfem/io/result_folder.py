@@ -46,17 +46,19 @@ def whole_folder(directory: Path, force: bool = False) -> Iterator[Path]:
     directory = Path(directory)
     try:
         parent = _existing_parent(directory)
-        _sweep(parent)
-        if not force:
-            _refuse_foreign(directory)
+        with _alone(parent):
+            _sweep(parent)
+            if not force:
+                _refuse_foreign(directory)
         folder = Path(tempfile.mkdtemp(prefix=_prefix(), dir=parent))
     except OSError as error:
         raise _unwritable(directory, error) from error
     try:
         yield folder
         _mark(folder)
-        _keep_foreign(directory, folder, force)
-        _take_place(folder, directory)
+        with _alone(parent):
+            _keep_foreign(directory, folder, force)
+            _take_place(folder, directory)
     except OSError as error:
         raise _unwritable(directory, error) from error
     finally:
@@ -71,6 +73,28 @@ def _existing_parent(directory: Path) -> Path:
     while not parent.exists() and parent != parent.parent:
         parent = parent.parent
     return parent
+
+
+@contextmanager
+def _alone(parent: Path) -> Iterator[None]:
+    """Keep other runs from changing places in the same parent folder meanwhile.
+
+    Without it a run could fill its folder while another one has the old results set aside, and so
+    miss what others put there. Where a system or file system has no such locks, do without.
+    """
+    handle = None
+    try:
+        import fcntl
+
+        handle = os.open(parent, os.O_RDONLY)
+        fcntl.flock(handle, fcntl.LOCK_EX)
+    except (ImportError, OSError):
+        pass
+    try:
+        yield
+    finally:
+        if handle is not None:
+            os.close(handle)
 
 
 def _prefix() -> str:
@@ -207,6 +231,12 @@ def _take_place(folder: Path, directory: Path) -> None:
     except OSError:
         old.rename(directory)
         raise
+    written = _written(old) or {}
+    for late in sorted(old.iterdir()):  # what others put there in the last moment
+        if late.name == _MARKER or (late.is_file() and _is_ours(old, late.name, written)):
+            continue
+        if not (directory / late.name).exists():
+            late.rename(directory / late.name)
     shutil.rmtree(old, ignore_errors=True)
 
 

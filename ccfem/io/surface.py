@@ -7,7 +7,7 @@ from pathlib import Path
 import numpy as np
 
 from ccfem.arrays import FloatArray, IntArray, freeze, read_only
-from ccfem.checks import check_number
+from ccfem.checks import FARTHEST, check_number
 from ccfem.errors import InputError
 from ccfem.io.whole import existing_file
 from ccfem.isolated.limited import read_isolated
@@ -16,6 +16,8 @@ from ccfem.isolated.process import ChildError
 __all__ = ["Surface", "is_surface", "read_surface"]
 
 _SUFFIXES = (".obj", ".ply", ".stl")
+_NOTHING = 1e-12
+"""Volume over area and diagonal that counts as none."""
 
 
 @dataclass(frozen=True)
@@ -30,7 +32,8 @@ class Surface:
     Raises
     ------
     InputError
-        When the surface has no triangle, a coordinate that is not finite, or is open.
+        When the surface has no triangle, a coordinate that is not finite, is open, or encloses
+        nothing.
     """
 
     points: FloatArray
@@ -43,14 +46,20 @@ class Surface:
                 f"a surface needs points (n, 3) and triangles (t, 3); got {self.points.shape} "
                 f"and {self.triangles.shape}: give a triangulated surface"
             )
-        if not np.isfinite(self.points).all():
-            raise InputError("surface points must be finite; got NaN or infinity: repair the file")
+        _check_near(self.points)
         if self.triangles.min() < 0 or self.triangles.max() >= len(self.points):
             raise InputError(
                 f"triangles must name points 0 to {len(self.points) - 1}; got "
                 f"{self.triangles.min()} to {self.triangles.max()}: repair the file"
             )
         _check_closed(self.points, self.triangles)
+        if abs(self.volume) <= _NOTHING * float(
+            np.prod(_size_and_area(self.points, self.triangles))
+        ):
+            raise InputError(
+                f"the surface encloses no volume ({abs(self.volume):.3g} mm^3): give the outside "
+                "of a solid, each wall once"
+            )
         if self.volume < 0.0:
             object.__setattr__(self, "triangles", read_only(self.triangles[:, ::-1], np.int64))
 
@@ -95,8 +104,10 @@ def read_surface(path: str | os.PathLike[str], scale: float = 1.0) -> Surface:
         raise InputError(
             f"{path} is not a surface that can be read: {error}: export it again as binary STL"
         ) from None
+    with np.errstate(over="ignore"):  # what overflows is refused as infinite
+        points = found["points"] * scale
     try:
-        return Surface(*_merged(found["points"] * scale, found["triangles"]))
+        return Surface(*_merged(points, found["triangles"]))
     except InputError as error:
         raise InputError(f"{path}: {error}") from None
 
@@ -104,8 +115,7 @@ def read_surface(path: str | os.PathLike[str], scale: float = 1.0) -> Surface:
 def _merged(points: FloatArray, triangles: IntArray) -> tuple[FloatArray, IntArray]:
     """Merge points that agree to 1e-6 of the size; drop triangles that lose a side by it."""
     points, triangles = np.asarray(points), np.asarray(triangles, dtype=np.int64)
-    if not np.isfinite(points).all():
-        raise InputError("surface points must be finite; got NaN or infinity: repair the file")
+    _check_near(points)
     size = float(np.linalg.norm(np.ptp(points, axis=0))) or 1.0
     _, first, place = np.unique(
         np.round(points / (1e-6 * size)).astype(np.int64),
@@ -116,6 +126,24 @@ def _merged(points: FloatArray, triangles: IntArray) -> tuple[FloatArray, IntArr
     triangles = place.reshape(-1)[triangles]
     a, b, c = triangles.T
     return points[first], triangles[(a != b) & (b != c) & (c != a)]
+
+
+def _size_and_area(points: FloatArray, triangles: IntArray) -> tuple[float, float]:
+    """Diagonal, mm, and area, mm^2."""
+    a, b, c = np.moveaxis(points[triangles], 1, 0)
+    area = 0.5 * float(np.linalg.norm(np.cross(b - a, c - a), axis=1).sum())
+    return float(np.linalg.norm(np.ptp(points[triangles], axis=(0, 1)))), area
+
+
+def _check_near(points: FloatArray) -> None:
+    """Raise on coordinates that are not finite, or so large that their squares overflow."""
+    if not np.isfinite(points).all():
+        raise InputError("surface points must be finite; got NaN or infinity: repair the file")
+    if len(points) and np.abs(points).max() > FARTHEST:
+        raise InputError(
+            f"surface points must lie within {FARTHEST:g} mm; got a coordinate of "
+            f"{np.abs(points).max():.3g} mm: repair the file, or correct its scale"
+        )
 
 
 def _check_closed(points: FloatArray, triangles: IntArray) -> None:

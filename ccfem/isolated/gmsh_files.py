@@ -15,7 +15,10 @@ def read(path: str) -> dict[str, Any]:
     import meshio
 
     mesh = meshio.gmsh.read(path)
-    found: dict[str, Any] = {"points": np.asarray(mesh.points, dtype=np.float64)}
+    points = np.asarray(mesh.points, dtype=np.float64)
+    if points.ndim != 2 or points.shape[1] != 3:  # meshio makes no complaint of a file without
+        raise ValueError("it holds no nodes")
+    found: dict[str, Any] = {"points": points}
     names = {int(tag): name for name, (tag, size) in mesh.field_data.items() if size == 2}
     tags = mesh.cell_data.get("gmsh:physical", [None] * len(mesh.cells))
     for k, block in enumerate(mesh.cells):

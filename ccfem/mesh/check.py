@@ -6,6 +6,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from ccfem.arrays import BoolArray, FloatArray, IntArray
+from ccfem.checks import FARTHEST
 from ccfem.errors import InputError
 from ccfem.mesh.facets import are_among, facet_keys
 from ccfem.mesh.flaws import STRAIGHT
@@ -144,6 +145,12 @@ def check_mesh(mesh: TetMesh, merge: bool = False) -> tuple[TetMesh, MeshReport]
         raise InputError(
             f"mesh coordinates must be finite; {len(wrong)} nodes have NaN or infinity, the first "
             f"is node {wrong[0]} (from 0): repair the file"
+        )
+    far = np.flatnonzero(used & (np.abs(mesh.points) > FARTHEST).any(axis=1))
+    if len(far):
+        raise InputError(
+            f"mesh coordinates must lie within {FARTHEST:g} mm; {len(far)} nodes lie farther, the "
+            f"first is node {far[0]} (from 0): repair the file, or correct its scale"
         )
     diagonal = float(np.linalg.norm(np.ptp(mesh.points[used], axis=0)))
     leader, coincident = _leaders(mesh.points, used, diagonal)

@@ -12,7 +12,7 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from ccfem.arrays import BoolArray, FloatArray, IntArray
-from ccfem.checks import check_fields
+from ccfem.checks import FARTHEST, check_fields, check_number
 from ccfem.errors import InputError
 from ccfem.mesh.facets import are_among
 
@@ -197,7 +197,7 @@ class Cylinder:
     half: str | Vector | None = None
 
     def __post_init__(self) -> None:
-        _vector(self.point, "cylinder point")
+        _place(self.point, "cylinder point")
         axis = unit_vector(self.axis, "cylinder axis")
         check_fields(self, "tolerance", at_least=0.0, unit="mm")
         check_fields(self, "radius", above=0.0, unit="mm")
@@ -240,7 +240,7 @@ class Nearest:
     radius: float | None = None
 
     def __post_init__(self) -> None:
-        _vector(self.point, "nearest point")
+        _place(self.point, "nearest point")
         if self.count is not None and self.radius is not None:
             raise InputError("nearest takes count or radius; got both: drop one")
         check_fields(self, "count", at_least=1)
@@ -352,6 +352,11 @@ def _vector(value: ArrayLike, what: str) -> FloatArray:
     if vector.shape != (3,) or np.isnan(vector).any():
         raise InputError(f"{what} must be 3 numbers; got {value!r}: correct it")
     return vector
+
+
+def _place(value: ArrayLike, what: str) -> None:
+    for coordinate in _vector(value, what):
+        check_number(what, float(coordinate), at_least=-FARTHEST, at_most=FARTHEST, unit="mm")
 
 
 def _diagonal(mesh: Bounded) -> float:

@@ -232,6 +232,8 @@ def _face(surface: _Surface, rows: IntArray) -> Face:
         away = 2.0 * (1.0 - np.clip(normal @ direction, -1.0, 1.0))  # angle^2
         if area @ away <= np.radians(_FLAT) ** 2 * total:
             return Face(rows, "plane", total, centre, direction)
+    if total == 0.0:  # triangles whose corners lie on a line
+        return Face(rows, "other", total, centre, direction)
     return _cylinder(surface, rows) or Face(rows, "other", total, centre, direction)
 
 

@@ -127,6 +127,9 @@ def _by_gmsh(surface: Surface, edge_length: float, seconds: float | None) -> Tet
     piece = connected(edges, len(surface.points))
     if len(np.unique(piece[surface.triangles[:, 0]])) > 1:
         raise InputError("it has several pieces or a cavity")
+    sides = np.sort(surface.triangles[:, [[0, 1], [1, 2], [2, 0]]].reshape(-1, 2), axis=1)
+    if np.unique(sides, axis=0, return_counts=True)[1].max() > 2:
+        raise InputError("it touches itself along an edge")
     made = in_own_process(
         "gmsh_meshing:fill",
         seconds,

@@ -117,6 +117,11 @@ def test_opposite_orders_are_undecided(compared):
     turned = replace(compared, runs=(first, replace(second, tested=tested)))
     assert turned.verdict.startswith(f"Undecided between {first.name} and {second.name}")
     assert any(f"{first.name}: undecided against" in line for line in turned.remarks)
+    twin = replace(turned.runs[1], name="twin")
+    said = [line for line in replace(turned, runs=(*turned.runs, twin)).remarks if "order" in line]
+    assert len(said) == 1  # the reason once, whoever it is for
+    assert said[0].count("undecided against") >= 1
+    assert "twin" in said[0]
     same = replace(compared, runs=(first, second))
     assert not any("undecided" in line for line in same.remarks)
     assert same.verdict.startswith(f"{first.name} makes the stiffest part")

@@ -144,7 +144,7 @@ import sys
 from pathlib import Path
 from ccfem.io.result_folder import whole_folder
 print("started", flush=True)
-for k in range(100000):
+for k in range(int(sys.argv[2])):
     with whole_folder(Path(sys.argv[1])) as folder:
         for name in "abc":
             (folder / name).write_text(str(k))
@@ -156,7 +156,7 @@ def test_a_kill_at_any_moment_leaves_whole_results(tmp_path, delay):
     where = tmp_path / "results"
     write(where, a="first", b="first", c="first")
     (where / "thesis.docx").write_text("three years")
-    run = subprocess.Popen([sys.executable, "-c", RUNS, where], stdout=subprocess.PIPE)
+    run = subprocess.Popen([sys.executable, "-c", RUNS, where, "100000"], stdout=subprocess.PIPE)
     run.stdout.readline()
     time.sleep(delay)
     run.send_signal(signal.SIGKILL)
@@ -168,3 +168,29 @@ def test_a_kill_at_any_moment_leaves_whole_results(tmp_path, delay):
     assert found.keys() == {"a", "b", "c"}
     assert len(set(found.values())) == 1
     assert leftovers(tmp_path) == []
+
+
+def test_runs_into_one_folder_at_once_lose_nothing(tmp_path):
+    pytest.importorskip("fcntl")
+    where = tmp_path / "results"
+    write(where, a="first", b="first", c="first")
+    (where / "thesis.docx").write_text("three years")
+    command = [sys.executable, "-c", RUNS, where, "60"]
+    runs = [subprocess.Popen(command, stdout=subprocess.PIPE) for _ in range(2)]
+    assert [(run.communicate()[0], run.returncode) for run in runs] == [(b"started\n", 0)] * 2
+    assert contents(where) == {"a": "59", "b": "59", "c": "59", "thesis.docx": "three years"}
+    assert leftovers(tmp_path) == []
+
+
+def test_a_file_that_comes_in_the_last_moment_stays(tmp_path, monkeypatch):
+    where = tmp_path / "results"
+    write(where, a="first", b="first")
+    chmod = type(where).chmod
+
+    def late(path, mode):
+        (where / "thesis.docx").write_text("three years")
+        chmod(path, mode)
+
+    monkeypatch.setattr(type(where), "chmod", late)
+    write(where, a="second")
+    assert contents(where) == {"a": "second", "thesis.docx": "three years"}

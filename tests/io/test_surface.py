@@ -29,6 +29,23 @@ def test_surfaces_read(box, tmp_path, suffix):
     assert len(surface.points) == len(points)
 
 
+@pytest.mark.filterwarnings("error")
+def test_a_point_beyond_all_measure_is_refused(box):
+    points, triangles = box_surface(box)
+    for far, message in ((1e308, "must lie within 1e.09 mm"), (np.inf, "must be finite")):
+        with pytest.raises(InputError, match=message):
+            Surface(np.where(points == points.max(), far, points), triangles)
+
+
+def test_a_surface_round_nothing_is_refused(box):
+    points, triangles = box_surface(box)
+    both = np.concatenate([triangles, triangles[:, ::-1]])
+    for flat, rows in ((points, both), (points * [1, 1, 0], triangles)):
+        with pytest.raises(InputError, match="encloses no volume"):
+            Surface(flat, rows)
+    assert Surface(points * [1, 1, 1e-6], triangles).volume == pytest.approx(6e-6)
+
+
 def test_inside_out_surface_is_turned(box):
     points, triangles = box_surface(box)
     assert Surface(points, triangles[:, ::-1]).volume == pytest.approx(6.0)

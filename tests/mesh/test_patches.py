@@ -137,6 +137,8 @@ def test_empty_patch_lists_the_groups_of_the_mesh(box):
         lambda: Nearest((0, 0, 0), radius=-1.0),
         lambda: Nearest((0, 0, 0), count=1, radius=1.0),
         lambda: Nearest(("a", 0, 0)),
+        lambda: Nearest((0, 1e308, 0)),
+        lambda: Cylinder((0, 0, float("inf")), "x", 1.0),
     ],
 )
 def test_bad_rules_are_refused_when_made(make):

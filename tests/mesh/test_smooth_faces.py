@@ -59,6 +59,13 @@ def test_faces_of_a_box():
     np.testing.assert_array_equal(np.sort(rows), np.arange(len(mesh.boundary)))
 
 
+@pytest.mark.filterwarnings("error")
+def test_a_triangle_without_an_area_is_no_cylinder():
+    points = np.array([[0.0, 0, 0], [2, 0, 0], [1, 0, 0], [1, 1, 0]])
+    faces = smooth_faces(points, np.array([[0, 1, 2], [0, 1, 3]]))
+    assert sorted((face.kind, face.area) for face in faces) == [("other", 0.0), ("plane", 1.0)]
+
+
 @pytest.mark.parametrize("turn", [np.eye(3), ROTATION, MIRROR])
 def test_holes_are_found_wherever_the_part_lies(plate, turn):
     mesh = moved(plate, turn)
