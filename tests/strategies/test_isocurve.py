@@ -1,5 +1,6 @@
 """The isocurve strategy on fields whose paths are known, and on the authors' part."""
 
+import itertools
 import os
 from dataclasses import replace
 from pathlib import Path
@@ -13,6 +14,7 @@ from ccfem.elasticity.problem import Problem, Support, Traction
 from ccfem.elasticity.stress_field import SolveRecord, StressField
 from ccfem.errors import InputError
 from ccfem.evaluation import evaluate
+from ccfem.evaluation.printable import why_not
 from ccfem.layers.slicing.planar import Planar
 from ccfem.machine import Machine
 from ccfem.materials import isotropic
@@ -306,4 +308,21 @@ def test_figures_on_the_authors_loop() -> None:
     assert total["curvature_95"] <= 0.12
     assert total["outside_depth"] <= 0.02
     assert total["crossings"] == total["self_crossings"] == 0
-    assert np.bincount(paths.layer).max() <= 16
+    assert total["curvature_ok"] >= 0.99  # at most 1 % turns tighter than 3.85 mm
+    assert total["outside_width"] <= 0.005
+    assert why_not(total, case.machine) == ()
+    assert sharpest_strand(paths) <= 90.0
+    linked = plan(Isocurve(smooth=False, link_limit=7.0, inset=0.0), layers, field, MACHINE)
+    assert np.bincount(linked.layer).max() <= 16
+
+
+def sharpest_strand(paths: Toolpaths) -> float:
+    """Largest turn, degrees, at a point that no step marked as a link touches."""
+    most = 0.0
+    for start, end in itertools.pairwise(paths.offsets):
+        steps = np.diff(paths.points[start:end], axis=0)
+        steps /= np.linalg.norm(steps, axis=1)[:, None]
+        strand = ~paths.link[start : end - 1]
+        cosine = (steps[1:] * steps[:-1]).sum(axis=1)[strand[1:] & strand[:-1]]
+        most = max(most, float(np.degrees(np.arccos(np.clip(cosine.min(initial=1.0), -1.0, 1.0)))))
+    return most
