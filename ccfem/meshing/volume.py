@@ -24,8 +24,10 @@ _MOST = 2e7
 """Number of cells above which an edge length is taken for a mistake of units."""
 _LOST = 0.2
 """Share of the volume that no mesh may lose or gain."""
-_PATIENCE = 120.0
-"""Seconds after which fTetWild is tried in place of Gmsh."""
+_PATIENCE = {"gmsh": 30.0, "ftetwild": 300.0}
+"""Seconds after which a mesher has lost its way, as on a surface that cuts itself."""
+_PER_SECOND = 500.0
+"""Cells to be expected, and triangles given, for which it gets a second more."""
 
 
 def tetrahedralise(surface: Surface, edge_length: float, mesher: Mesher = "auto") -> TetMesh:
@@ -61,12 +63,13 @@ def fill(
     surface: Surface, edge_length: float, mesher: Mesher = "auto"
 ) -> tuple[TetMesh, Fidelity, str]:
     """Mesh of a surface, how well it fits, and who made it: see `tetrahedralise`."""
-    check_edge_length(surface, edge_length)
+    more = check_edge_length(surface, edge_length) + len(surface.triangles)
+    patience = {name: least + more / _PER_SECOND for name, least in _PATIENCE.items()}
     check_known("mesher", mesher, get_args(Mesher))
     why = "it is not installed (pip install 'ccfem[cad]')"
     if mesher != "ftetwild" and find_spec("gmsh") is not None:
         try:
-            mesh = _by_gmsh(surface, edge_length, None if mesher == "gmsh" else _PATIENCE)
+            mesh = _by_gmsh(surface, edge_length, None if mesher == "gmsh" else patience["gmsh"])
             found = fidelity(surface, mesh)
             if mesher == "gmsh" or found.good:
                 return mesh, found, "Gmsh"
@@ -76,7 +79,11 @@ def fill(
         raise InputError(f"Gmsh cannot mesh the surface: {why}: take mesher = 'ftetwild'")
     try:
         made = in_own_process(
-            "ftetwild:fill", points=surface.points, triangles=surface.triangles, size=edge_length
+            "ftetwild:fill",
+            patience["ftetwild"],
+            points=surface.points,
+            triangles=surface.triangles,
+            size=edge_length,
         )
     except ChildError as error:
         raise InputError(
@@ -98,8 +105,8 @@ def fill(
     return mesh, found, "fTetWild"
 
 
-def check_edge_length(surface: Surface, edge_length: float) -> None:
-    """Raise on an edge length that is too long or too short for a part."""
+def check_edge_length(surface: Surface, edge_length: float) -> float:
+    """Cells to expect; raise on an edge length that is too long or too short for a part."""
     size = float(np.linalg.norm(np.ptp(surface.points, axis=0)))
     check_number("edge length", edge_length, above=0.0, below=size, unit="mm (the part's diagonal)")
     expected = surface.volume / (edge_length**3 / (6.0 * np.sqrt(2.0)))
@@ -108,6 +115,7 @@ def check_edge_length(surface: Surface, edge_length: float) -> None:
             f"an edge length of {edge_length:g} mm would make about {expected:.1g} cells of a "
             f"part {size:.3g} mm across: choose a longer one"
         )
+    return float(expected)
 
 
 def _walls(surface: Surface) -> FloatArray:

@@ -5,6 +5,7 @@ from hypothesis import strategies as st
 
 from ccfem.errors import InputError
 from ccfem.io import Surface, read_surface
+from ccfem.isolated.process import ChildError
 from ccfem.mesh.check import check_mesh
 from ccfem.meshing import tetrahedralise
 
@@ -131,6 +132,29 @@ def test_edge_length_has_to_suit(box, edge_length):
     points, triangles = box_surface(box)
     with pytest.raises(InputError, match="edge length"):
         tetrahedralise(Surface(points, triangles), edge_length)
+
+
+def test_no_mesher_works_for_ever(box, monkeypatch):
+    patience = {}
+
+    def endless(function, seconds=None, **arguments):
+        patience[function] = seconds
+        raise ChildError(f"it takes more than {seconds:.0f} s")
+
+    monkeypatch.setattr("ccfem.meshing.volume.find_spec", lambda name: name)
+    monkeypatch.setattr("ccfem.meshing.volume.in_own_process", endless)
+    with pytest.raises(InputError, match="meshing failed: it takes more than 300 s"):
+        tetrahedralise(Surface(*box_surface(box)), 1.0)
+    assert 30.0 < patience["gmsh_meshing:fill"] < 31.0 < patience["ftetwild:fill"] < 301.0
+    points, triangles = box_surface(box)
+    beside = points + np.ptp(points, axis=0) * [1, 1, 0]
+    place = np.concatenate([points, beside])
+    place, number = np.unique(np.round(place, 9), axis=0, return_inverse=True)
+    both = number.reshape(-1)[np.concatenate([triangles, triangles + len(points)])]
+    patience.clear()
+    with pytest.raises(InputError, match="meshing failed"):
+        tetrahedralise(Surface(place, both), 1.0)
+    assert list(patience) == ["ftetwild:fill"]  # Gmsh is not for what touches itself
 
 
 def test_a_mesh_that_lost_the_part_is_refused(box, monkeypatch):
