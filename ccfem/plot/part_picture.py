@@ -76,11 +76,18 @@ def _marks(checked: Check) -> FloatArray:
         for name in patches_of(support):
             facets = problem.mesh.patches.get(name, np.zeros((0, 3), dtype=np.int64))
             middles = problem.mesh.points[facets].mean(axis=1)
-            if len(middles):
-                order = np.lexsort(np.round(middles, 6).T)
-                step = np.linspace(0, len(order) - 1, min(_MARKS, len(order))).astype(int)
-                found.append(middles[order[step]])
+            found.append(_spread(middles[np.lexsort(np.round(middles, 6).T)], _MARKS))
     return np.concatenate([np.zeros((0, 3)), *found])
+
+
+def _spread(points: FloatArray, count: int) -> FloatArray:
+    """Up to `count` of some points (k, 3), each the farthest from those before it."""
+    chosen: list[int] = []
+    away = np.full(len(points), np.inf)
+    while len(chosen) < min(count, len(points)):
+        chosen.append(int(np.argmax(np.round(away, 6))))
+        away = np.minimum(away, np.linalg.norm(points - points[chosen[-1]], axis=1))
+    return points[chosen]
 
 
 def part_page(checked: Check) -> str:
