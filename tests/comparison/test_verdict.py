@@ -111,6 +111,7 @@ def test_verdicts_of_the_cases_are_true(compared):
     assert check(compared)
 
 
+@pytest.mark.parametrize("compared", ["bar"], indirect=True)
 def test_verdicts_of_made_up_tables_are_true(compared):
     """All orders of three runs by stiffness, tension only and bonded, far and near."""
     runs = [run for run in compared.runs if run.tested is not None][:3]
