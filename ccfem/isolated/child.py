@@ -15,14 +15,16 @@ def main() -> None:
     with np.load(folder / "in.npz", allow_pickle=False) as file:
         given = {name: file[name] for name in file.files}
     module, function = str(given.pop("function")).split(":")
-    memory = float(given.pop("memory"))
-    if memory > 0.0:
-        try:
-            import resource
-        except ImportError:  # not on Windows: there the limit of time alone holds
-            pass
-        else:
+    memory, work = float(given.pop("memory")), float(given.pop("work"))
+    try:
+        import resource
+    except ImportError:  # not on Windows: there the limit of time alone holds
+        pass
+    else:
+        if memory > 0.0:
             resource.setrlimit(resource.RLIMIT_AS, (int(memory), int(memory)))
+        if work > 0.0:
+            resource.setrlimit(resource.RLIMIT_CPU, (int(work) + 1, int(work) + 2))
     arguments = {name: value[()] if value.ndim == 0 else value for name, value in given.items()}
     try:
         found = getattr(importlib.import_module(f"ccfem.isolated.{module}"), function)(**arguments)

@@ -8,7 +8,9 @@ from ccfem.isolated.process import in_own_process
 __all__ = ["read_isolated"]
 
 _SECONDS, _PER_SECOND = 15.0, 2e6
-"""Time for any file, and bytes that are given a second more."""
+"""Time of the processor for any file, and bytes that are given a second more."""
+_BUSY = 4.0
+"""How much more may go by until a busy machine gives it that time."""
 _MEMORY, _PER_BYTE = 1.5e9, 40.0
 """Address space for any file, and what each of its bytes may take more."""
 
@@ -16,9 +18,11 @@ _MEMORY, _PER_BYTE = 1.5e9, 40.0
 def read_isolated(function: str, path: Path) -> dict[str, Any]:
     """Call a reader of `ccfem.isolated` with a file: see `in_own_process`."""
     size = path.stat().st_size
+    work = _SECONDS + size / _PER_SECOND
     return in_own_process(
         function,
-        seconds=_SECONDS + size / _PER_SECOND,
+        seconds=_BUSY * work,
+        work=work,
         memory=_MEMORY + _PER_BYTE * size,
         path=str(path.absolute()),
     )

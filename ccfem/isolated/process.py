@@ -23,7 +23,11 @@ class ChildError(RuntimeError):
 
 
 def in_own_process(
-    function: str, seconds: float | None = None, memory: float = 0.0, **arguments: Any
+    function: str,
+    seconds: float | None = None,
+    memory: float = 0.0,
+    work: float = 0.0,
+    **arguments: Any,
 ) -> dict[str, Any]:
     """Call a function of `ccfem.isolated` in a process of its own, on one core, without a word.
 
@@ -35,6 +39,8 @@ def in_own_process(
         The process is ended after this time.
     memory : float, bytes, optional
         Most address space that it may take; 0 for no limit.
+    work : float, s, optional
+        Most time of the processor that it may take, however busy the machine; 0 for no limit.
     **arguments : arrays, numbers and strings
 
     Returns
@@ -54,7 +60,8 @@ def in_own_process(
     for library in ("OMP", "OPENBLAS", "MKL"):
         environment[f"{library}_NUM_THREADS"] = "1"
     with TemporaryDirectory(prefix="ccfem-", ignore_cleanup_errors=True) as folder:
-        np.savez(Path(folder) / "in.npz", function=function, memory=memory, **arguments)
+        given = {"function": function, "memory": memory, "work": work, **arguments}
+        np.savez(Path(folder) / "in.npz", **given)
         command = [sys.executable, "-P", "-m", "ccfem.isolated.child", folder]
         try:
             done = subprocess.run(
@@ -70,6 +77,8 @@ def in_own_process(
         except subprocess.TimeoutExpired:
             raise ChildError(f"it takes more than {seconds:.0f} s") from None
         out = Path(folder) / "out.npz"
+        if work > 0.0 and done.returncode == -getattr(signal, "SIGXCPU", 0):
+            raise ChildError(f"it takes more than {work:.0f} s")
         if not out.exists():
             raise ChildError(f"the library crashed ({_ending(done.returncode)})")
         with np.load(out, allow_pickle=False) as file:

@@ -23,6 +23,10 @@ def crash():
 def hang():
     time.sleep(60)
 
+def spin():
+    while True:
+        pass
+
 def flood():
     return {"size": len(bytearray(4_000_000_000))}
 
@@ -86,3 +90,8 @@ def test_a_reader_that_crashes_is_one_line(monkeypatch, tmp_path, read):
         read(path)
     assert "\n" not in str(caught.value)
     assert process._ending(-11) == "SIGSEGV"
+
+
+def test_a_call_that_never_ends_is_ended_by_the_work_it_does(stranger):
+    with pytest.raises(ChildError, match="takes more than 1 s"):
+        in_own_process("stranger:spin", seconds=50.0, work=1.0)
