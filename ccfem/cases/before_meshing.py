@@ -6,7 +6,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from ccfem.elasticity.body import LoadedBody
-from ccfem.elasticity.load_kinds import Load, PointForce, patches_in_use
+from ccfem.elasticity.load_kinds import Load, PointForce, SurfaceLoad, patches_in_use
 from ccfem.elasticity.loads import nodal_forces
 from ccfem.elasticity.support_kinds import AnySupport
 from ccfem.elasticity.supports import held
@@ -65,7 +65,7 @@ def check_before_meshing(
         held(outline)
     for those in loads.values():
         for load in those:
-            if not isinstance(load, PointForce):
+            if isinstance(load, SurfaceLoad) and not isinstance(load, PointForce):
                 with found.noted():
-                    nodal_forces(shell, load)  # type: ignore[arg-type]
+                    nodal_forces(shell, load)
     found.complain()
