@@ -1,8 +1,6 @@
 """The evaluator: every index of a set of paths, for each layer and in total."""
 
-import os
 from collections.abc import Mapping, Sequence
-from concurrent.futures import ThreadPoolExecutor
 from dataclasses import dataclass, replace
 from typing import TYPE_CHECKING, NamedTuple
 
@@ -44,6 +42,7 @@ from ccfem.geometry.nearest_on_triangles import nearest_on_triangles
 from ccfem.layers.layer import Layer
 from ccfem.layers.layer_stress import stress_on
 from ccfem.machine.machine import Machine
+from ccfem.threads import in_threads
 from ccfem.toolpaths import FIBRE, Toolpaths
 
 if TYPE_CHECKING:
@@ -70,8 +69,6 @@ COLUMNS: tuple[Column, ...] = (
 
 _ROUNDING = 1e-3
 """Rounding, mm, of coordinates in path files."""
-_MOST_THREADS = 4
-"""Layers that are evaluated at a time; much of the work waits for the interpreter's lock."""
 
 
 @dataclass(frozen=True)
@@ -191,8 +188,7 @@ def evaluate(
         on_layer = toolpaths.on_layer(layer.index)
         return _sample(on_layer, layer, stress, machine, _below(layer, layers), behind)
 
-    with ThreadPoolExecutor(min(os.cpu_count() or 1, _MOST_THREADS)) as pool:
-        samples = list(pool.map(sampled, layers))
+    samples = in_threads(sampled, layers)
     rows = [_indices(each, machine) for each in samples]
     rows.append(_indices(_pooled(samples), machine))
     return Evaluation(

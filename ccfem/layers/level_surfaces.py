@@ -1,7 +1,5 @@
 """Curved layers: level surfaces of a field on the mesh, cleaned, each point with its thickness."""
 
-import os
-from concurrent.futures import ThreadPoolExecutor
 from dataclasses import dataclass
 from typing import Any
 
@@ -15,6 +13,7 @@ from ccfem.layers.cleaning import clean
 from ccfem.layers.layer import Layer
 from ccfem.layers.level_cut import border_edges, chain, cut_at_zero
 from ccfem.mesh.tet_mesh import TetMesh
+from ccfem.threads import in_threads
 
 __all__ = ["LevelSurfaces", "level_surfaces"]
 
@@ -85,8 +84,7 @@ def level_surfaces(
         signed[np.abs(signed) < _SNAP * step] = 0.0
         return _surface(mesh, signed, gradient, thickness, on_patch, shortest, least_area)
 
-    with ThreadPoolExecutor(os.cpu_count() or 1) as pool:
-        found = list(pool.map(cut, levels.tolist()))
+    found = in_threads(cut, levels.tolist(), most=None)
     kept = [surface for surface, _, _ in found if surface is not None]
     layers = tuple(Layer(index=k, **surface) for k, surface in enumerate(kept))
     return LevelSurfaces(layers, sum(b for _, b, _ in found), sum(s for _, _, s in found))

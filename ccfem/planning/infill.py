@@ -1,9 +1,7 @@
 """What strategies have in common that fill a section with strands at a spacing."""
 
-import os
 from abc import ABC, abstractmethod
 from collections.abc import Sequence
-from concurrent.futures import ThreadPoolExecutor
 from dataclasses import dataclass
 from functools import partial
 from typing import Any, ClassVar, Literal
@@ -20,6 +18,7 @@ from ccfem.planning.strategy import Amount, LayerPlanner
 from ccfem.raster.bitmap import Bitmap, bitmap
 from ccfem.raster.patterns import Regions
 from ccfem.raster.raster_plan import RasterPlan, raster_plan
+from ccfem.threads import in_threads
 from ccfem.toolpaths import Toolpaths
 
 __all__ = ["SPACING", "Infill", "check_fill", "check_shells", "long_enough"]
@@ -106,8 +105,7 @@ class Infill(ABC):
             return _Prepared(self, {})
         sections = [corners_only(layer.plane.polygon) for layer in layers]
         unequal = list(dict.fromkeys(sections))
-        with ThreadPoolExecutor(os.cpu_count()) as pool:
-            made = list(pool.map(partial(self.prepare, machine=machine), unequal))
+        made = in_threads(partial(self.prepare, machine=machine), unequal)
         known = dict(zip(unequal, made, strict=True))
         index = [layer.index for layer in layers]
         return _Prepared(self, {k: known[s] for k, s in zip(index, sections, strict=True)})

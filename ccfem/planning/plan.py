@@ -1,8 +1,6 @@
 """Planning the paths of a whole part."""
 
-import os
 from collections.abc import Sequence
-from concurrent.futures import ThreadPoolExecutor
 
 from ccfem.elasticity.part_stress import PartStress
 from ccfem.errors import InputError
@@ -13,12 +11,10 @@ from ccfem.layers.pitch import check_pitch
 from ccfem.machine.machine import Machine
 from ccfem.planning.steps import in_even_steps
 from ccfem.planning.strategy import LayerPlanner, PartStrategy, Strategy
+from ccfem.threads import in_threads
 from ccfem.toolpaths import Toolpaths
 
 __all__ = ["check_layers", "plan", "plan_layers"]
-
-_MOST_THREADS = 4
-"""Layers that are planned at a time; much of the work waits for the interpreter's lock."""
 
 
 def plan(
@@ -52,8 +48,7 @@ def plan(
     in_plane = getattr(strategy, "in_plane", False)
     views: Sequence[Layer] = layers
     if in_plane:
-        with ThreadPoolExecutor(min(os.cpu_count() or 1, _MOST_THREADS)) as pool:
-            views = tuple(pool.map(flat_view, layers))
+        views = in_threads(flat_view, layers)
     if isinstance(strategy, PartStrategy):
         planner: LayerPlanner = strategy.for_part(stress, views, machine)
     else:
@@ -80,14 +75,13 @@ def plan_layers(
     stress : PartStress
     machine : Machine
     """
-    with ThreadPoolExecutor(min(os.cpu_count() or 1, _MOST_THREADS)) as pool:
 
-        def planned(layer: Layer, view: Layer) -> Toolpaths:
-            paths = planner(view, stress_on(view, stress), machine)
-            paths = in_even_steps(paths, machine.fibre_width)
-            return paths if view is layer else chart_of(layer).lifted(paths)
+    def planned(layer: Layer, view: Layer) -> Toolpaths:
+        paths = planner(view, stress_on(view, stress), machine)
+        paths = in_even_steps(paths, machine.fibre_width)
+        return paths if view is layer else chart_of(layer).lifted(paths)
 
-        return Toolpaths.concatenate(pool.map(planned, layers, views))
+    return Toolpaths.concatenate(in_threads(planned, layers, views))
 
 
 def check_layers(strategy: Strategy, layers: Sequence[Layer], machine: Machine) -> None:

@@ -2,7 +2,6 @@
 
 import os
 from collections.abc import Callable
-from concurrent.futures import ThreadPoolExecutor
 from dataclasses import dataclass
 from functools import cached_property
 from typing import Any, TypeVar
@@ -13,6 +12,7 @@ from ccfem.arrays import FloatArray, IntArray, read_only
 from ccfem.elasticity.assembly import cell_gradients
 from ccfem.mesh.tet_mesh import TetMesh
 from ccfem.principal_lines.cell_walk import collect, count_crossings, survey
+from ccfem.threads import in_threads
 
 __all__ = ["Traced", "Tracer", "mean_edge", "trace"]
 
@@ -125,7 +125,7 @@ class Tracer:
         def part(a: int, b: int) -> None:
             survey(start[a:b], *self._arguments, touching, mask[a:b], length[a:b], ends[a:b])
 
-        _in_threads(part, len(start))
+        _in_parts(part, len(start))
         back = np.argsort(order)
         return Traced(seeds, mask[back], length[back], ends[back])
 
@@ -138,7 +138,7 @@ class Tracer:
             count_crossings(start[a:b], *self._arguments, count)
             return count
 
-        count = np.sum(_in_threads(part, len(start)), axis=0, dtype=np.int64)
+        count = np.sum(_in_parts(part, len(start)), axis=0, dtype=np.int64)
         return np.asarray(count)[self._place]
 
     def lines(self, seeds: IntArray) -> list[FloatArray]:
@@ -164,12 +164,10 @@ def _along_curve(points: FloatArray) -> IntArray:
     return np.argsort(code, kind="stable")
 
 
-def _in_threads(part: Callable[[int, int], Part], count: int) -> list[Part]:
+def _in_parts(part: Callable[[int, int], Part], count: int) -> list[Part]:
     """Do a range of work in as many parts as there are processors, in order."""
-    workers = os.cpu_count() or 1
-    bounds = np.linspace(0, count, workers + 1).astype(int).tolist()
-    with ThreadPoolExecutor(workers) as pool:
-        return list(pool.map(part, bounds[:-1], bounds[1:]))
+    bounds = np.linspace(0, count, (os.cpu_count() or 1) + 1).astype(int).tolist()
+    return in_threads(part, bounds[:-1], bounds[1:], most=None)
 
 
 def trace(mesh: TetMesh, direction: FloatArray, seeds: IntArray) -> list[FloatArray]:

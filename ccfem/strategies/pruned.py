@@ -8,8 +8,6 @@ from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field, replace
 from typing import Any, ClassVar
 
-import numpy as np
-
 from ccfem.arrays import freeze
 from ccfem.checks import check_fields
 from ccfem.elasticity.part_stress import PartStress
@@ -17,12 +15,11 @@ from ccfem.elasticity.stress_field import solved
 from ccfem.errors import InputError
 from ccfem.fibre_aware.prune import prune
 from ccfem.layers.layer import Layer
-from ccfem.layers.layer_stress import LayerStress
 from ccfem.machine.machine import Machine
 from ccfem.planning.equal_fibre import plan_to_length
 from ccfem.planning.strategy import Amount, LayerPlanner, Strategy
+from ccfem.planning.whole_part import WholePart, full_length
 from ccfem.strategies import create
-from ccfem.toolpaths import Toolpaths
 from ccfem.virtual_testing.specimen import Specimen
 from ccfem.virtual_testing.strand import RHO, Strand
 
@@ -82,7 +79,7 @@ class Pruned:
 
     def natural_length(self, layers: Sequence[Layer], machine: Machine) -> float:
         """Length that the coverage asks for, mm per layer."""
-        return self.coverage * _mean_area(layers) / machine.fibre_width
+        return self.coverage * full_length(layers, machine)
 
     def for_part(
         self, stress: PartStress, layers: Sequence[Layer], machine: Machine
@@ -113,7 +110,7 @@ class Pruned:
         InputError
             As `for_part`.
         """
-        full = _mean_area(layers) / machine.fibre_width
+        full = full_length(layers, machine)
         most = max(self.amount.most, self.coverage) * full
         lengths = [min(length, most) for length in lengths]
         planned = self.overfill * max(lengths)
@@ -126,19 +123,5 @@ class Pruned:
                 kept = prune(paths, part, length * len(layers), machine, strand, self.rounds)
             coverage = length / full
             overfill = max(planned / full / coverage, 1.0)
-            found.append((replace(self, coverage=coverage, overfill=overfill), _Planned(kept)))
+            found.append((replace(self, coverage=coverage, overfill=overfill), WholePart(kept)))
         return found
-
-
-def _mean_area(layers: Sequence[Layer]) -> float:
-    return float(np.mean([layer.areas.sum() for layer in layers]))
-
-
-@dataclass(frozen=True)
-class _Planned:
-    """Paths of the whole part, handed out layer by layer."""
-
-    toolpaths: Toolpaths
-
-    def __call__(self, layer: Layer, stress: LayerStress, machine: Machine) -> Toolpaths:
-        return self.toolpaths.on_layer(layer.index)

@@ -30,11 +30,12 @@ from ccfem.fibre_aware.stream_start import plane_axes, start_field
 from ccfem.fields.layer_tension import layer_tension
 from ccfem.geometry.isocontours import isocontours, triangle_edges
 from ccfem.layers.layer import Layer
-from ccfem.layers.layer_stress import LayerStress, stress_on
+from ccfem.layers.layer_stress import stress_on
 from ccfem.linking.clearance import trim_to_clearance
 from ccfem.linking.finishing import keep_off_border, linked_paths
 from ccfem.machine.machine import Machine
 from ccfem.planning.strategy import Amount, LayerPlanner
+from ccfem.planning.whole_part import WholePart, full_length
 from ccfem.toolpaths import Toolpaths
 from ccfem.virtual_testing.bars import bars
 from ccfem.virtual_testing.strand import RHO
@@ -130,7 +131,7 @@ class StreamFunction:
 
     def natural_length(self, layers: Sequence[Layer], machine: Machine) -> float:
         """Length that the coverage asks for, mm per layer."""
-        return self.coverage * _mean_area(layers) / machine.fibre_width
+        return self.coverage * full_length(layers, machine)
 
     def for_part(
         self, stress: PartStress, layers: Sequence[Layer], machine: Machine
@@ -145,7 +146,7 @@ class StreamFunction:
             When no layer has a tensile direction.
         """
         length = self.natural_length(layers, machine)
-        return _Planned(self._cut(stress, layers, machine, (length,))[0])
+        return WholePart(self._cut(stress, layers, machine, (length,))[0])
 
     def to_lengths(
         self,
@@ -164,7 +165,7 @@ class StreamFunction:
         InputError
             As `for_part`.
         """
-        full = _mean_area(layers) / machine.fibre_width
+        full = full_length(layers, machine)
         most = max(self.amount.most, self.coverage) * full
         lengths = [min(length, most) for length in lengths]
         longest = max(lengths)
@@ -178,7 +179,7 @@ class StreamFunction:
                 told, found = more, again
         designed = told.overfill * told.coverage
         return [
-            (_designed_for(told, length / full, designed), _Planned(paths))
+            (_designed_for(told, length / full, designed), WholePart(paths))
             for length, paths in zip(lengths, found, strict=True)
         ]
 
@@ -237,10 +238,6 @@ class StreamFunction:
         return problem, group, design(problem, start, self.evaluations)
 
 
-def _mean_area(layers: Sequence[Layer]) -> float:
-    return float(np.mean([layer.areas.sum() for layer in layers]))
-
-
 def _designed_for(strategy: StreamFunction, coverage: float, designed: float) -> StreamFunction:
     """Strategy that lays a coverage of what is designed for another, overfill included."""
     return replace(strategy, coverage=coverage, overfill=max(designed / coverage, 1.0))
@@ -248,16 +245,6 @@ def _designed_for(strategy: StreamFunction, coverage: float, designed: float) ->
 
 def _middle(numbers: IntArray) -> int:
     return int(numbers[len(numbers) // 2])
-
-
-@dataclass(frozen=True)
-class _Planned:
-    """All layers of the part, planned."""
-
-    toolpaths: Toolpaths
-
-    def __call__(self, layer: Layer, stress: LayerStress, machine: Machine) -> Toolpaths:
-        return self.toolpaths.on_layer(layer.index)
 
 
 @dataclass(frozen=True)
