@@ -10,6 +10,7 @@ from dataclasses import dataclass, replace
 from typing import Any, ClassVar
 
 import numpy as np
+import shapely
 
 from ccfem.arrays import FloatArray, IntArray
 from ccfem.checks import check_fields
@@ -58,6 +59,10 @@ _ALIKE = 0.8
 
 _MOST_GROUPS = 6
 
+_SAME = 0.5
+"""Distance, in strand widths, up to which the borders of two sections count as the same: the levels
+that are best for one layer are then taken for the other."""
+
 _ENOUGH = 0.99
 """Share of a wanted length below which the design is made once more."""
 
@@ -92,7 +97,7 @@ class StreamFunction:
     cap : float, default 90
         Percentile of the stress above which the density of the first field grows no more.
     phases : int, default 5
-        Positions of the levels of which the best is taken, layer by layer.
+        Positions of the levels of which the best is taken, for all layers of the same section.
     link_limit : float, default 10
         Largest distance of two ends that are linked, in strand widths. Links keep the machine's
         minimum radius; those with corners join only what is too short to be cut alone, and are
@@ -261,41 +266,58 @@ class _Extraction:
         self, layers: Sequence[Layer], group: IntArray, lengths: Sequence[float]
     ) -> list[Toolpaths]:
         """Paths of all layers, cut to each of some lengths, mm in all."""
-        s = self.strategy
+        alike = _alike(layers, group, self.problem.width)
         fields = [self.field(k) for k in range(self.problem.groups)]
-        shifts = (np.arange(s.phases) + 0.5) / s.phases
-        variants = [
-            self.layer_paths(layer, fields[k], shift)
-            for layer, k in zip(layers, group, strict=True)
-            for shift in shifts
-        ]
-        toolpaths = Toolpaths.concatenate(variants)
-        if not len(toolpaths):
-            return [toolpaths for _ in lengths]
-        along = self.profiles(toolpaths)
-        variant = np.repeat(np.arange(len(variants)), [len(paths) for paths in variants])
-        return [self.best(toolpaths, along, variant, len(variants), length) for length in lengths]
+        drawn: dict[tuple[int, int], Toolpaths] = {}
 
-    def best(
-        self,
-        toolpaths: Toolpaths,
-        along: list[Profile],
-        variant: IntArray,
-        count: int,
-        length: float,
-    ) -> Toolpaths:
-        """Stretches worth most, mm in all, of the variant of each layer that is worth most."""
-        phases, minimum = self.strategy.phases, self.machine.minimum_length
-        middle = [one for one in along if variant[one.path] % phases == phases // 2]
-        price = least_price(middle, length, minimum, _CUT_COST) if middle else 0.0
-        gain = np.zeros(count)
-        for one in along:
-            gain[variant[one.path]] += one.kept(price, minimum, _CUT_COST)[1]
-        best = np.argmax(gain.reshape(-1, phases), axis=1) + phases * np.arange(count // phases)
-        wanted = np.isin(variant, best)
-        number = np.cumsum(wanted) - 1
-        kept = [replace(one, path=int(number[one.path])) for one in along if wanted[one.path]]
-        return shorten(toolpaths.select(wanted), kept, length, minimum, _CUT_COST)
+        def paths(number: int, phase: int) -> Toolpaths:
+            if (number, phase) not in drawn:
+                shift = (phase + 0.5) / self.strategy.phases
+                field = fields[group[number]]
+                drawn[number, phase] = self.layer_paths(layers[number], field, shift)
+            return drawn[number, phase]
+
+        tried = [
+            [self.profiles(paths(_middle(numbers), phase)) for phase in range(self.strategy.phases)]
+            for numbers in alike
+        ]
+        counts = [len(numbers) for numbers in alike]
+        chosen = [self.phases(tried, counts, length) for length in lengths]
+        planned: dict[tuple[int, ...], tuple[Toolpaths, list[Profile]]] = {}
+        for phases in chosen:
+            if phases not in planned:
+                of = {k: p for some, p in zip(alike, phases, strict=True) for k in some.tolist()}
+                whole = Toolpaths.concatenate([paths(k, of[k]) for k in range(len(layers))])
+                planned[phases] = whole, self.profiles(whole)
+        least = self.machine.minimum_length
+        return [
+            shorten(*planned[phases], length, least, _CUT_COST)
+            for phases, length in zip(chosen, lengths, strict=True)
+        ]
+
+    def phases(
+        self, tried: list[list[list[Profile]]], counts: Sequence[int], length: float
+    ) -> tuple[int, ...]:
+        """For each kind of layers the position of the levels that is worth most.
+
+        Parameters
+        ----------
+        tried : list of list of list of Profile
+            Of one layer of each kind at each position of the levels.
+        counts : sequence of int
+            Layers of each kind.
+        length : float, mm
+            Of all layers together.
+        """
+        minimum = self.machine.minimum_length
+        middle = [one[self.strategy.phases // 2] for one in tried]
+        along = [p for one, count in zip(middle, counts, strict=True) for p in count * one]
+        price = least_price(along, length, minimum, _CUT_COST) if along else 0.0
+
+        def gain(along: list[Profile]) -> float:
+            return sum(one.kept(price, minimum, _CUT_COST)[1] for one in along)
+
+        return tuple(int(np.argmax([gain(along) for along in one])) for one in tried)
 
     def field(self, group: int) -> FloatArray:
         """Coefficients of one field, with the sign that does not depend on the axes."""
@@ -322,11 +344,28 @@ class _Extraction:
 
     def profiles(self, toolpaths: Toolpaths) -> list[Profile]:
         """Value of the paths at the strains of the designed part."""
+        if not len(toolpaths):
+            return []
         mesh = self.problem.part.mesh
         strands = cut_strands(toolpaths, mesh)
         displacement = self.design.objective.solution.displacement
         strain = bars(strands, mesh).strain(displacement)
         return profiles(toolpaths, strands, np.maximum(strain, 0.0) ** 2)
+
+
+def _alike(layers: Sequence[Layer], group: IntArray, width: float) -> list[IntArray]:
+    """Numbers of the layers of each kind: of one field, and of about the same section."""
+    kinds: list[list[int]] = []
+    borders = [shapely.boundary(layer.plane.polygon) for layer in layers]
+    for k, border in enumerate(borders):
+        for kind in kinds:
+            same = group[kind[0]] == group[k]
+            if same and shapely.hausdorff_distance(borders[kind[0]], border) < _SAME * width:
+                kind.append(k)
+                break
+        else:
+            kinds.append([k])
+    return [np.array(kind) for kind in kinds]
 
 
 def _refined(layer: Layer) -> tuple[FloatArray, IntArray]:
