@@ -96,6 +96,7 @@ def plan_to_length(
     machine: Machine,
     wanted: float,
     start: Planned | None = None,
+    tolerance: float = TOLERANCE,
 ) -> Planned:
     """Plan to a wanted length of fibre.
 
@@ -112,11 +113,13 @@ def plan_to_length(
     stress : PartStress
     machine : Machine
     wanted : float, mm
-        Fibre per layer: mean over the stack. It is met within the share `TOLERANCE`, and not
+        Fibre per layer: mean over the stack. It is met within the share `tolerance`, and not
         exceeded, wherever the least that the strategy lays is no more and the most no less;
         otherwise that is what it lays, and `Planned.reached` and `note` say so.
     start : Planned, optional
         The strategy's plan with its own value, where there is one already.
+    tolerance : float, default 0.01
+        Share by which it may lay less.
 
     Returns
     -------
@@ -128,7 +131,7 @@ def plan_to_length(
         When `wanted` is not a positive number, or whatever the strategy raises.
     """
     known = () if start is None else (start,)
-    return plan_to_lengths(strategy, layers, stress, machine, (wanted,), known)[0]
+    return plan_to_lengths(strategy, layers, stress, machine, (wanted,), known, tolerance)[0]
 
 
 def plan_to_lengths(
@@ -138,6 +141,7 @@ def plan_to_lengths(
     machine: Machine,
     lengths: Sequence[float],
     known: Sequence[Planned] = (),
+    tolerance: float = TOLERANCE,
 ) -> list[Planned]:
     """Plan to several lengths of fibre, mm per layer: what is planned for one serves the others.
 
@@ -148,6 +152,8 @@ def plan_to_lengths(
     lengths : sequence of float, mm
     known : sequence of Planned
         Plans of the strategy with its own value or at its extremes, where there are any.
+    tolerance : float, default 0.01
+        Share by which less may be laid.
     """
     for wanted in lengths:
         check_wanted(wanted)
@@ -158,7 +164,7 @@ def plan_to_lengths(
             _told(told, plan_layers(planner, layers, layers, stress, machine), layers, wanted)
             for (told, planner), wanted in zip(found, lengths, strict=True)
         ]
-    search = _Search(Dial(strategy), layers, stress, machine)
+    search = _Search(Dial(strategy), layers, stress, machine, tolerance)
     search.learn(known)
     return [search.to(wanted) for wanted in lengths]
 
@@ -192,8 +198,8 @@ def _told(
     return Planned(strategy, toolpaths, length, note, reached=False)
 
 
-def _meets(length: float, wanted: float) -> bool:
-    return (1.0 - TOLERANCE) * wanted <= length <= wanted * (1.0 + 1e-9)
+def _meets(length: float, wanted: float, tolerance: float = TOLERANCE) -> bool:
+    return (1.0 - tolerance) * wanted <= length <= wanted * (1.0 + 1e-9)
 
 
 @dataclass
@@ -204,6 +210,7 @@ class _Search:
     layers: Sequence[Layer]
     stress: PartStress
     machine: Machine
+    tolerance: float = TOLERANCE
     tried: dict[float, Planned] = field(default_factory=dict)
     sampled: dict[float, float] = field(default_factory=dict)
 
@@ -246,6 +253,9 @@ class _Search:
                 self.sampled[turn] = float(layer_lengths(known.toolpaths, self.few).mean())
         return self.sampled[turn]
 
+    def meets(self, length: float, wanted: float) -> bool:
+        return _meets(length, wanted, self.tolerance)
+
     def lengths(self) -> Mapping[float, float]:
         return {turn: one.length_per_layer for turn, one in self.tried.items()}
 
@@ -275,7 +285,7 @@ class _Search:
                 found = self.between(wanted, _CLOSE)
                 if found is not None:
                     return found
-                turn = self.dial.guess(self.lengths(), (1.0 - 0.5 * TOLERANCE) * wanted)
+                turn = self.dial.guess(self.lengths(), (1.0 - 0.5 * self.tolerance) * wanted)
                 if turn in self.tried:
                     break
                 self.whole(turn)
@@ -310,7 +320,7 @@ class _Search:
 
     def bracket(self, target: float) -> tuple[float | None, float | None]:
         """Find turns on either side of a length on the few layers, as near as a few steps come."""
-        known, enough = self.sampled, (1.0 - 0.5 * TOLERANCE) * target
+        known, enough = self.sampled, (1.0 - 0.5 * self.tolerance) * target
         turn = min(self.dial.own, 1.0)
         low = high = None
         for step in range(_STEPS):
@@ -335,7 +345,7 @@ class _Search:
         above = [one for one in self.tried.values() if one.length_per_layer > wanted * (1 + 1e-9)]
         less = max(below, key=_length, default=None)
         more = min(above, key=_length, default=None)
-        if less is not None and _meets(less.length_per_layer, wanted) and self.filled(less):
+        if less is not None and self.meets(less.length_per_layer, wanted) and self.filled(less):
             return less
         if less is None or more is None:
             return None
@@ -350,17 +360,17 @@ class _Search:
             self.machine.minimum_length,
         )
         length = length_per_layer(found.toolpaths, self.layers)
-        if not _meets(length, wanted) and np.isfinite(close):
+        if not self.meets(length, wanted) and np.isfinite(close):
             return None
         said = f"{self.dial.says(more.strategy)} on {found.more} of {count} layers"
         if found.cut:
             said += f", strands cut back on {found.cut}"
-        if not _meets(length, wanted):
+        if not self.meets(length, wanted):
             said += (
                 f"; lays {length:.0f} of {wanted:.0f} mm per layer: the nearest that strands of "
             )
             said += f"{self.machine.minimum_length:g} mm allow"
-        return Planned(less.strategy, found.toolpaths, length, said, _meets(length, wanted))
+        return Planned(less.strategy, found.toolpaths, length, said, self.meets(length, wanted))
 
     def off(self, wanted: float) -> Planned:
         """Return the extreme that is nearest to a length that the strategy does not reach."""

@@ -19,12 +19,10 @@ from ccfem.checks import check_choices, check_fields
 from ccfem.elasticity.part_stress import PartStress
 from ccfem.errors import InputError
 from ccfem.fields.compatibility import Incompatible
-from ccfem.fields.crease import orient_along
-from ccfem.fields.fill import fill_laplacian, fill_screened
+from ccfem.fields.directed import Directed, directed
 from ccfem.fields.layer_elements import Surface
 from ccfem.fields.layer_tension import layer_tension, mesh_tension
 from ccfem.fields.levels import extract_levels, unit_levels
-from ccfem.fields.orientation import orient
 from ccfem.fields.scalar import fit_cone, fit_constrained, fit_literal, fit_weighted
 from ccfem.fields.tensile import Tension
 from ccfem.geometry.isocontours import Isocontours
@@ -216,7 +214,8 @@ class Isocurve:
             part = mesh_tension(
                 stress, self.stress, self.sense, self.compression_limit, self.incompatible
             )
-        planner = _Planner(self, part)
+        known: _Known = stress.__dict__.setdefault("isocurve_directions", {})
+        planner = _Planner(self, part, known)
         if not any(
             planner.tension(layer, stress_on(layer, stress)).defined.any() for layer in layers
         ):
@@ -229,12 +228,18 @@ class Isocurve:
         return planner
 
 
+_Known = dict[tuple[Any, ...], Directed]
+"""What is known of the layers of a part, by layer and the parameters that it depends on: however
+often a part is planned with more or less fibre, its layers are directed once."""
+
+
 @dataclass(frozen=True)
 class _Planner:
     """The strategy once it has seen the whole part."""
 
     strategy: Isocurve
     part: Tension | None
+    known: _Known
 
     def tension(self, layer: Layer, stress: LayerStress) -> Tension:
         s = self.strategy
@@ -243,36 +248,26 @@ class _Planner:
         return layer_tension(stress, s.stress, s.sense, s.compression_limit)
 
     def __call__(self, layer: Layer, stress: LayerStress, machine: Machine) -> Toolpaths:
-        tension = self.tension(layer, stress)
-        if not tension.defined.any():
-            return Toolpaths.empty()
-        surface = Surface.of(layer)
-        lines = self.isocurves(surface, tension, machine.fibre_width)
-        paths = self.connected(lines, layer, tension, stress.held_or_loaded, machine)
+        s = self.strategy
+        # What is known keeps its layer, so that no other one takes its identity.
+        key: tuple[Any, ...] = (id(layer), s.cap, s.fill, s.fill_length, s.stress, s.field)
+        key = (*key, s.sense, s.compression_limit, s.incompatible)
+        if key not in self.known:
+            tension = self.tension(layer, stress)
+            if not tension.defined.any():
+                return Toolpaths.empty()
+            self.known[key] = directed(layer, tension, s.cap, s.fill, s.fill_length)
+        found = self.known[key]
+        lines = self.isocurves(found, machine.fibre_width)
+        paths = self.connected(lines, layer, found.tension, stress.held_or_loaded, machine)
         return Toolpaths.from_plane(paths.lines, layer, link=paths.link)
 
-    def isocurves(self, surface: Surface, tension: Tension, width: float) -> list[FloatArray]:
+    def isocurves(self, found: Directed, width: float) -> list[FloatArray]:
         """Isocurves of the field, at least a width apart."""
-        s = self.strategy
-        percentile = np.quantile(
-            tension.stress,
-            s.cap / 100.0 * (1.0 - 1e-12),
-            weights=surface.areas,
-            method="inverted_cdf",
-        )
-        cap = max(float(percentile), 1e-300)
-        confidence = np.where(tension.defined, np.minimum(tension.stress / cap, 1.0), 0.0)
-        direction = tension.direction
-        if s.fill == "screened":
-            direction, size = fill_screened(
-                surface, direction, tension.stress, confidence, s.fill_length
-            )
-            direction = orient_along(surface, direction, confidence)
-        else:
-            if not tension.oriented:
-                direction = orient(direction, surface.neighbours)
-            direction, size = fill_laplacian(surface, direction, tension.stress, tension.defined)
-        density = np.clip(s.density * np.clip(size / cap, 1e-9, None) ** s.power, None, 1.0)
+        s, surface, direction = self.strategy, found.surface, found.direction
+        confidence = found.confidence
+        share = np.clip(found.size / found.cap, 1e-9, None)
+        density = np.clip(s.density * share**s.power, None, 1.0)
         weight = np.maximum(confidence, _LEAST_WEIGHT)
         if s.spacing != "search":
             fit = fit_constrained if s.spacing == "constrained" else fit_cone

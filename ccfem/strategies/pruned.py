@@ -28,6 +28,9 @@ __all__ = ["Pruned"]
 _BASES: Mapping[str, Mapping[str, Any]] = {"isocurve": {"link_limit": 10.0}}
 """Parameters with which strategies plan better when they are pruned."""
 
+_SLACK = 0.05
+"""Share by which more may be planned than the overfill asks for: it is found in fewer steps."""
+
 
 @dataclass(frozen=True)
 class Pruned:
@@ -114,7 +117,10 @@ class Pruned:
         most = max(self.amount.most, self.coverage) * full
         lengths = [min(length, most) for length in lengths]
         planned = self.overfill * max(lengths)
-        paths = plan_to_length(self._planner(), layers, stress, machine, planned).toolpaths
+        whole = plan_to_length(
+            self._planner(), layers, stress, machine, (1.0 + _SLACK) * planned, tolerance=_SLACK
+        )
+        paths = whole.toolpaths
         found: list[tuple[Pruned, LayerPlanner]] = []
         for length in lengths:
             kept = paths
