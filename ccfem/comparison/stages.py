@@ -43,6 +43,9 @@ __all__ = [
 Tell = Callable[[str], None]
 """Told what is done next."""
 
+_TOLERANCE = 1e-6
+"""Relative residual of the virtual tests: the error of the stiffness is of its square."""
+
 
 @dataclass(frozen=True)
 class Part:
@@ -260,8 +263,10 @@ def _test(
     span: Sequence[float],
 ) -> Tested:
     """Both tests of strands, and what fails first."""
-    tension = virtual_test(strands, specimen, strand, TENSION, span)
-    bracket = Bracket(tension, virtual_test(strands, specimen, strand, BONDED, span=()))
+    tension = virtual_test(strands, specimen, strand, TENSION, span, tolerance=_TOLERANCE)
+    near = (specimen.unreinforced.displacement, tension.solution.displacement)
+    bonded = virtual_test(strands, specimen, strand, BONDED, (), known=near, tolerance=_TOLERANCE)
+    bracket = Bracket(tension, bonded)
     try:
         failure = first_failure(tension, strand, layers=part.layers)
     except InputError as error:

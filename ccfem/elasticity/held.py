@@ -167,7 +167,13 @@ class Held:
         """Sum forces (3k,), N, on the free components, of nodal forces (n, 3)."""
         if self.ties is not None:
             forces = self.ties.gather(forces)
-        return np.where(self.free, forces, 0.0)[self.nodes].reshape(-1)
+        own = forces[self.nodes]
+        return (own if self._whole else own * self.free[self.nodes]).reshape(-1)
+
+    @cached_property
+    def _whole(self) -> bool:
+        """Whether every node that can move can do so in all components."""
+        return bool(self.free[self.nodes].all())
 
     def expand(self, solution: FloatArray) -> FloatArray:
         """Displacement (n, 3) of a solution (3k,) of the reduced system, mm."""
@@ -178,8 +184,8 @@ class Held:
         return self._displacement(np.zeros_like(self.value), solution)
 
     def _displacement(self, result: FloatArray, solution: FloatArray) -> FloatArray:
-        free = self.free[self.nodes]
-        result[self.nodes] += np.where(free, solution.reshape(free.shape), 0.0)
+        values = solution.reshape(-1, self.free.shape[1])
+        result[self.nodes] += values if self._whole else values * self.free[self.nodes]
         return result if self.ties is None else self.ties.expand(result)
 
     def restrict(self, displacement: FloatArray) -> FloatArray:

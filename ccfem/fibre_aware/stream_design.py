@@ -41,7 +41,7 @@ _MEMORY = 20
 _REACH = 1.0
 """Radius of the filter in squares of the grid."""
 
-_TOLERANCE = 1e-3
+_TOLERANCE = 5e-3
 """Relative residual of the solves of a design. The error of the compliance is its square."""
 
 

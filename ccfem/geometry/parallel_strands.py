@@ -105,6 +105,8 @@ def _parallels(
         strings = np.array([shapely.multilinestrings(strings)])
         owners = np.zeros_like(owners)
     cap, half = "round" if whole else "flat", 0.5 * closest * pitch
+    near = shapely.buffer(region, pitch)
+    shapely.prepare(near)
     lines: list[FloatArray] = []
     level = idle = 0
     # Where a channel is closed there may be no line at one distance and some at the next.
@@ -116,13 +118,17 @@ def _parallels(
         )
         # Channels that are too narrow are closed.
         covered = shapely.buffer(shapely.buffer(covered, half, quad_segs=4), -half, quad_segs=4)
-        found = [
-            shapely.LineString(line)
+        fronts = [
+            shapely.get_coordinates(ring)
             for part in shapely.get_parts(covered)
             for ring in (part.exterior, *part.interiors)
-            for line in _own_pieces(
-                shapely.get_coordinates(ring), sides, owners, distance, _OFF * pitch
+        ]
+        found = [
+            shapely.LineString(line)
+            for ring, owner in zip(
+                fronts, _owners(fronts, near, sides, owners, distance, pitch), strict=True
             )
+            for line in _own_pieces(ring, owner, 3.0 * _OFF * pitch)
         ]
         smooth = shapely.simplify(np.array(found, dtype=object), _TOLERANCE * pitch)
         inside = open_lines(shapely.intersection(smooth, region))
@@ -131,17 +137,36 @@ def _parallels(
     return lines
 
 
-def _own_pieces(
-    ring: FloatArray, sides: shapely.STRtree, owners: IntArray, distance: float, tolerance: float
-) -> list[FloatArray]:
-    """Pieces of a ring that lie at a distance from their nearest curve, split where that changes.
+def _owners(
+    rings: Sequence[FloatArray],
+    near: Region,
+    sides: shapely.STRtree,
+    owners: IntArray,
+    distance: float,
+    pitch: float,
+) -> list[IntArray]:
+    """Curve that each step of some rings lies at a distance from, -1 where it is none.
 
     `sides` holds the straight pieces of all curves, `owners` the curve of each. Straight ends of
-    buffers and rounded cusps drop out.
+    buffers and rounded cusps have none, and nothing has one that lies far from a region.
     """
-    middle = shapely.points(0.5 * (ring[1:] + ring[:-1]))
+    if not rings:
+        return []
+    steps = straight_pieces(rings)
+    owner = np.full(len(steps), -1)
+    # Steps that end far from the region may still lead through it.
+    inside = np.flatnonzero(shapely.intersects(near, shapely.linestrings(steps)))
+    middle = shapely.points(steps[inside].mean(axis=1))
     (_, side), gaps = sides.query_nearest(middle, return_distance=True, all_matches=False)
-    owner = np.where(np.abs(gaps - distance) > tolerance, -1, owners[side])
+    owner[inside] = np.where(np.abs(gaps - distance) > _OFF * pitch, -1, owners[side])
+    return np.split(owner, np.cumsum([len(ring) - 1 for ring in rings])[:-1])
+
+
+def _own_pieces(ring: FloatArray, owner: IntArray, least: float) -> list[FloatArray]:
+    """Pieces of a ring whose steps (n,) have an owner, split where that changes.
+
+    Steps shorter than `least` at their ends are left out.
+    """
     change = np.flatnonzero(np.diff(owner)) + 1
     if not len(change):
         return [ring] if owner[0] >= 0 else []
@@ -150,7 +175,7 @@ def _own_pieces(
     owner = np.roll(owner, -change[0])
     cuts = [0, *(np.flatnonzero(np.diff(owner)) + 1).tolist(), len(owner)]
     pieces = [ring[a : b + 1] for a, b in pairwise(cuts) if owner[a] >= 0]
-    return [_without_hooks(piece, 3.0 * tolerance) for piece in pieces]
+    return [_without_hooks(piece, least) for piece in pieces]
 
 
 def _without_hooks(line: FloatArray, least: float) -> FloatArray:

@@ -49,7 +49,7 @@ class Pruned:
     coverage : float, default 0.45
         Fibre length times strand width over area of the layers, in (0, 1].
     overfill : float, default 1.25
-        Fibre length that is planned over that kept, at least 1.
+        Fibre length that is planned over that kept, at least 1; up to 5 % more is taken.
     rounds : int, default 2
         Virtual tests; each takes off half of the excess, the last one all of it.
     rho : float, mm^2, default 4

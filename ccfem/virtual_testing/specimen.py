@@ -16,6 +16,9 @@ from ccfem.errors import InputError
 
 __all__ = ["Specimen"]
 
+_SOLVES = 3
+"""Right-hand sides to expect: at least, and what a better preconditioner needs to be worth it."""
+
 
 @dataclass(frozen=True)
 class Specimen:
@@ -44,7 +47,8 @@ class Specimen:
     def of(cls, unreinforced: StressField, backend: str = "auto") -> "Specimen":
         """Make the specimen of a solved problem, or return the one that was made before.
 
-        The field keeps it, so that all who plan and test on it share one factorisation.
+        The field keeps it, so that all who plan and test on it share one factorisation. The
+        backend "auto" is the one that solved it.
 
         Raises
         ------
@@ -52,6 +56,8 @@ class Specimen:
             When forces act and supports move too: no single stiffness describes that.
         """
         known = unreinforced.__dict__.setdefault("specimens", {})
+        if backend == "auto":
+            backend = unreinforced.record.backend
         if backend not in known:
             known[backend] = cls._made(unreinforced, backend)
         found: Specimen = known[backend]
@@ -82,7 +88,7 @@ class Specimen:
     @cached_property
     def solver(self) -> Solver:
         """Factorisation, or preconditioner, of the part without fibres."""
-        return self.system.factorise(self.matrix, self.backend, held=self.held)
+        return self.system.factorise(self.matrix, self.backend, _SOLVES, held=self.held)
 
     @property
     def forces(self) -> FloatArray:

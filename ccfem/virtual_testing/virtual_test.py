@@ -102,6 +102,8 @@ def virtual_test(
     mode: str = TENSION,
     span: Sequence[float] = RHO_SPAN,
     machine: Machine | None = None,
+    known: Sequence[FloatArray] = (),
+    tolerance: float = 1e-8,
 ) -> VirtualTest:
     """Test a part with its fibres under the load case that it was solved for.
 
@@ -124,6 +126,10 @@ def virtual_test(
     machine : Machine, optional
         Whose strands keep their room, where `fibres` are Toolpaths: fibre on other fibre lends
         nothing. Default: every strand counts in full.
+    known : sequence of (n, 3) arrays, mm, optional
+        Displacements that this one may be near to, the nearest last.
+    tolerance : float, default 1e-8
+        Largest relative residual; the error of the stiffness is of its square.
 
     Returns
     -------
@@ -140,7 +146,7 @@ def virtual_test(
     before = specimen.unreinforced
     axial = (Strand() if strand is None else strand).stiffness(specimen.modulus)
     started = perf_counter()
-    found = equilibrium(specimen, strands, axial, mode)
+    found = equilibrium(specimen, strands, axial, mode, known, tolerance)
     record = SolveRecord(
         backend=specimen.solver.backend,
         iterations=found.iterations,
@@ -202,4 +208,5 @@ def virtual_bracket(
     """Both tests of `virtual_test`, with one factorisation; parameters as there."""
     specimen, strands = _prepared(fibres, part, machine)
     tension = virtual_test(strands, specimen, strand, TENSION, span)
-    return Bracket(tension, virtual_test(strands, specimen, strand, BONDED, span))
+    known = (specimen.unreinforced.displacement, tension.solution.displacement)
+    return Bracket(tension, virtual_test(strands, specimen, strand, BONDED, span, known=known))
