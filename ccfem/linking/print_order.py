@@ -25,15 +25,19 @@ def nearest_end_order(starts: FloatArray, ends: FloatArray) -> tuple[IntArray, B
     """
     count = len(starts)
     order, backward = np.zeros(count, dtype=np.int64), np.zeros(count, dtype=bool)
-    left = np.ones(count, dtype=bool)
-    travel = 0.0
+    points = np.concatenate([starts, ends])
+    entry = np.arange(2 * count)  # k: path k at its start; count + k: at its end
+    x, y = points.T.copy()
+    chosen, travel = 0, 0.0
     for k in range(count):
         if k:
-            here = starts[order[k - 1]] if backward[k - 1] else ends[order[k - 1]]
-            off = np.stack([np.linalg.norm(p - here, axis=1) for p in (starts, ends)])
-            off[:, ~left] = np.inf
-            side, best = divmod(int(off.argmin()), count)
-            order[k], backward[k] = best, bool(side)
-            travel += float(off[side, best])
-        left[order[k]] = False
+            here = points[(chosen + count) % (2 * count)]
+            chosen = int(entry[np.argmin((x - here[0]) ** 2 + (y - here[1]) ** 2)])
+            travel += float(np.linalg.norm(points[chosen] - here))
+        backward[k], order[k] = divmod(chosen, count)
+        taken = np.searchsorted(entry, [order[k], count + order[k]])
+        x[taken] = np.inf
+        if k % 64 == 63:
+            left = np.isfinite(x)
+            x, y, entry = x[left], y[left], entry[left]
     return order, backward, travel
