@@ -12,7 +12,7 @@ def nearest_end_order(starts: FloatArray, ends: FloatArray) -> tuple[IntArray, B
 
     Parameters
     ----------
-    starts, ends : (k, 2) arrays, mm
+    starts, ends : (k, 2) or (k, 3) arrays, mm
         Ends of the paths; of a closed one the same point twice. The first path comes first.
 
     Returns
@@ -27,17 +27,18 @@ def nearest_end_order(starts: FloatArray, ends: FloatArray) -> tuple[IntArray, B
     order, backward = np.zeros(count, dtype=np.int64), np.zeros(count, dtype=bool)
     points = np.concatenate([starts, ends])
     entry = np.arange(2 * count)  # k: path k at its start; count + k: at its end
-    x, y = points.T.copy()
+    left = points.T.copy()
     chosen, travel = 0, 0.0
     for k in range(count):
         if k:
             here = points[(chosen + count) % (2 * count)]
-            chosen = int(entry[np.argmin((x - here[0]) ** 2 + (y - here[1]) ** 2)])
+            way = left - here[:, None]
+            chosen = int(entry[np.einsum("ij,ij->j", way, way).argmin()])
             travel += float(np.linalg.norm(points[chosen] - here))
         backward[k], order[k] = divmod(chosen, count)
         taken = np.searchsorted(entry, [order[k], count + order[k]])
-        x[taken] = np.inf
+        left[:, taken] = np.inf
         if k % 64 == 63:
-            left = np.isfinite(x)
-            x, y, entry = x[left], y[left], entry[left]
+            kept = np.isfinite(left[0])
+            left, entry = left[:, kept], entry[kept]
     return order, backward, travel
