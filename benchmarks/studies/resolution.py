@@ -139,7 +139,7 @@ def ratios(name: str) -> dict[Setting, FloatArray]:
         tests = [
             virtual_bracket(cut_strands(run.toolpaths, field.mesh), specimen, span=())
             for run in runs
-            if run.failure is None or not run.failure
+            if not run.failure
         ]
         found[setting] = np.array(
             [[t.tension.stiffness for t in tests], [t.bonded.stiffness for t in tests]]
