@@ -46,11 +46,12 @@ Tell = Callable[[str], None]
 
 @dataclass(frozen=True)
 class Part:
-    """What all runs share: the stress that counts, the layers and the machine."""
+    """What all runs share: the stress that counts, the layers, the machine and the strand."""
 
     stress: PartStress
     layers: tuple[Layer, ...]
     machine: Machine
+    strand: Strand | None = None
 
 
 def planned(
@@ -169,7 +170,7 @@ def evaluated(run: Run, part: Part, tell: Tell) -> Run:
         return replace(run, failure=_no_fibre(part.machine))
 
     def work() -> Run:
-        found = evaluate(run.toolpaths, part.layers, part.stress, part.machine)
+        found = evaluate(run.toolpaths, part.layers, part.stress, part.machine, part.strand)
         broken = why_not(found.total, part.machine)
         return replace(run, evaluation=found, why_not="; ".join(broken))
 

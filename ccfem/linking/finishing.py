@@ -86,7 +86,7 @@ def linked_paths(
 
 
 def _run_on(link: BoolArray, again: int) -> BoolArray:
-    """Marks of the steps of a ring that runs on over the first `again` of them."""
+    """Mark the steps of a ring that runs on over the first `again` of them."""
     longer = np.concatenate([link[:-1], link[: again + 1]])
     longer[-1] = False  # no step leaves the last point
     return longer
