@@ -36,6 +36,7 @@ def grow(
     closest: float,
     count: int | None = None,
     whole: bool = False,
+    pair: bool = False,
 ) -> list[FloatArray]:
     """Fill a region with strands: curves, strands parallel to them, concentric ones in the rest.
 
@@ -54,6 +55,8 @@ def grow(
     whole : bool, default False
         Whether strands go round the free ends of curves and on from one curve to the next. By
         default each belongs to one curve, and nothing is laid beyond the ends of that.
+    pair : bool, default False
+        Whether strands lie half a pitch to both sides of the curves, and none on them.
 
     Returns
     -------
@@ -64,9 +67,9 @@ def grow(
     strings = [shapely.LineString(curve).simplify(_TOLERANCE * pitch) for curve in curves]
     slack = (closest - 0.5) * pitch
     room = shapely.buffer(region, -slack, join_style="mitre")
-    inner = open_lines(shapely.intersection(strings, room))
+    inner = [] if pair else open_lines(shapely.intersection(strings, room))
     smooth = [shapely.get_coordinates(string) for string in strings]
-    inner += _parallels(smooth, room, pitch, closest, count, whole)
+    inner += _parallels(smooth, room, pitch, closest, count, whole, 0.5 if pair else 1.0)
     # The sides of a strand keep their distance to the border; its ends may reach it.
     lines = [
         line
@@ -89,8 +92,9 @@ def _parallels(
     closest: float,
     count: int | None,
     whole: bool,
+    first: float,
 ) -> list[FloatArray]:
-    """Lines in a region at whole multiples of a pitch from the nearest of several curves.
+    """Lines in a region a pitch apart, from `first` pitches off the nearest of several curves on.
 
     The borders of the buffers of all curves together, so that lines of different distance never
     come nearer to each other than the pitch; where two fronts of one distance come nearer than
@@ -110,7 +114,7 @@ def _parallels(
     # Where a channel is closed there may be no line at one distance and some at the next.
     while (count is None or level < count) and idle < 3:
         level += 1
-        distance = level * pitch
+        distance = (level - 1 + first) * pitch
         covered = shapely.union_all(
             shapely.buffer(strings, distance, cap_style=cap, quad_segs=_ARC)
         )

@@ -195,8 +195,8 @@ def test_a_layer_has_the_same_indices_at_any_place_in_the_list(part):
 
 
 def test_everything_scales_with_the_fibre_width(make_part):
-    # Part, paths, strand and machine twice as large: pure numbers stay, lengths double. Only the 40 mm of
-    # over_40 stay too, so they are left out.
+    # Part, paths, strand and machine twice as large: pure numbers stay, lengths double. Only the
+    # 40 mm of over_40 stay too, so they are left out.
     small = make_part(bent)
     mesh = small.stress.mesh
     large = make_part(
