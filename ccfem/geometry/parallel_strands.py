@@ -9,7 +9,7 @@ import shapely
 from ccfem.arrays import FloatArray, IntArray
 from ccfem.geometry.free_ends import extend_free_ends
 from ccfem.geometry.polylines import is_closed, line_length, straight_pieces
-from ccfem.geometry.shapes import Region, open_lines
+from ccfem.geometry.shapes import Region, open_lines, strings
 from ccfem.geometry.shells import concentric
 
 __all__ = ["grow", "lengthened"]
@@ -25,6 +25,8 @@ _OFF = 0.02
 counts as parallel to that curve."""
 _REACH = 2.0
 """Maximum length, in pitches, by which the free end of a strand is extended."""
+_ROUND = 1.5
+"""Least radius, in pitches, of the convex corners of what is filled with concentric strands."""
 _TOLERANCE = 2e-3
 """Deviation, in pitches, up to which points of a curve are left out."""
 
@@ -81,8 +83,31 @@ def grow(
         )
         if line_length(line) >= pitch
     ]
+    lines = _without_crossings(lines, 0.1 * pitch)
     lines, rest = extend_free_ends(lines, region, pitch, closest, _REACH * pitch)
-    return lines + _fill_rest(rest, pitch, closest)
+    core = _opened(rest, _ROUND * pitch)
+    if shapely.is_empty(core):
+        return lines + _fill_rest(rest, pitch, closest)
+    # Ends stand in steps: they go on to a smooth border of the rest.
+    outside = shapely.difference(region, core)
+    lines, rest = extend_free_ends(lines, outside, pitch, closest, _REACH * pitch)
+    return lines + _fill_rest(core, pitch, closest) + _fill_rest(rest, pitch, closest)
+
+
+def _opened(rest: Region, radius: float) -> Region:
+    """Morphological opening: what a disc reaches of a rest."""
+    return shapely.buffer(shapely.buffer(rest, -radius), radius)
+
+
+def _without_crossings(lines: list[FloatArray], gap: float) -> list[FloatArray]:
+    """Lines, the shorter of two that cross cut back by a gap: ends that meet head on overlap."""
+    curves = strings(lines)
+    one, other = shapely.STRtree(curves).query(curves, predicate="crosses")
+    for k, j in zip(one.tolist(), other.tolist(), strict=True):
+        if (curves[k].length, k) < (curves[j].length, j):
+            curves[k] = shapely.difference(curves[k], shapely.buffer(curves[j], gap))
+    found = open_lines(curves)
+    return [line for line in found if line_length(line) >= gap]
 
 
 def _parallels(
