@@ -85,13 +85,25 @@ def grow(
     ]
     lines = _without_crossings(lines, 0.1 * pitch)
     lines, rest = extend_free_ends(lines, region, pitch, closest, _REACH * pitch)
-    core = _opened(rest, _ROUND * pitch)
+    core = shapely.Polygon() if whole else _opened(rest, _ROUND * pitch)
     if shapely.is_empty(core):
         return lines + _fill_rest(rest, pitch, closest)
-    # Ends stand in steps: they go on to a smooth border of the rest.
+    # Ends stand in steps where one curve takes over from another: they go on to a smooth border.
     outside = shapely.difference(region, core)
     lines, rest = extend_free_ends(lines, outside, pitch, closest, _REACH * pitch)
-    return lines + _fill_rest(core, pitch, closest) + _fill_rest(rest, pitch, closest)
+    inner = _fill_rest(core, pitch, closest)
+    between = _kept_off(_fill_rest(rest, pitch, closest), inner, 0.5 * pitch)
+    return lines + inner + [line for line in between if line_length(line) >= pitch]
+
+
+def _kept_off(
+    lines: list[FloatArray], others: Sequence[FloatArray], distance: float
+) -> list[FloatArray]:
+    """Lines where they keep a distance from others."""
+    if not lines or not others:
+        return lines
+    taken = shapely.union_all(shapely.buffer(strings(others), distance))
+    return open_lines(shapely.difference(strings(lines), taken))
 
 
 def _opened(rest: Region, radius: float) -> Region:
