@@ -6,8 +6,8 @@ matrix above fills up to its own top: at a place x with rho mm of strand to the 
     t(x) = h_m + h_f - A rho(x),
 
 with the heights h_m of the matrix layer and h_f of the fibre below it, and the section A of a
-strand. All of a layer is then scaled, so that what it lays is what its section has room for: a
-zigzag does not pass everywhere exactly once.
+strand. All of a layer is then scaled, by at most a tenth, so that what it lays is what its section
+has room for: a zigzag does not pass everywhere exactly once.
 """
 
 from collections.abc import Sequence
@@ -36,6 +36,9 @@ _SPREAD = 0.5
 it, in fibre widths: strands a width apart then have the same density everywhere to 1.5 %."""
 _LEAST = 0.05
 """Least height, mm, of matrix over a strand, where its layer is as high. Our choice."""
+_SCALE = 1.1
+"""Most by which a layer is scaled: where lines do not reach a tenth of a section, as between walls
+nearer than a line is wide, more flow would not reach it either. Our choice."""
 _TOO_THIN = 0.1
 """Share of a layer's lines that may be thinner, since fibre below stands too high. Our choice."""
 
@@ -95,7 +98,8 @@ def with_flow(
     laid = np.bincount(run, wanted * length, len(kept)) / np.maximum(long, 1e-300)
     inside = shapely.length(shapely.intersection(strings(strands), section)).sum()
     room = section.area * (height + below) - machine.filament_area * inside
-    laid *= room / (machine.matrix_width * (laid * long).sum())
+    scale = room / (machine.matrix_width * (laid * long).sum())
+    laid *= np.clip(scale, 1.0 / _SCALE, _SCALE)
     fewer = replace(
         paths,
         points=points[kept],

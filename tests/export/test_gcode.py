@@ -11,6 +11,7 @@ from ccfem.errors import InputError
 from ccfem.evaluation.manufacture import manufacture_indices, sample_manufacture
 from ccfem.evaluation.plane_paths import plane_paths
 from ccfem.export.gcode import gcode, write_gcode
+from ccfem.export.matrix_flow import with_flow
 from ccfem.export.print_plan import check_machine, plan_print
 from ccfem.io.toml import from_table
 from ccfem.layers.slicing.planar import Planar
@@ -243,6 +244,27 @@ def test_matrix_leaves_room_where_strands_lie(follow):
     # Below there is no fibre; above, .35 mm stand over fibre and .45 beside it.
     assert share[0.35, "left"] == pytest.approx(share[0.35, "right"], rel=1e-3)
     assert share[0.8, "left"] / share[0.8, "right"] == pytest.approx(0.35 / 0.45, rel=0.01)
+
+
+@pytest.mark.parametrize(
+    ("wide", "scale"), [(0.82, 1.025), (0.76, 0.95), (2.4, 1.1), (0.4, 1 / 1.1)]
+)
+def test_flow_follows_the_section_within_a_tenth(wide, scale):
+    # One line of .8 mm along a strip: too narrow or too wide a strip is not filled by more flow.
+    line = np.array([[0.0, 0.0, 0.5], [50.0, 0.0, 0.5]])
+    up = np.tile([0.0, 0.0, 1.0], (2, 1))
+    paths = Toolpaths(
+        points=line,
+        normals=up,
+        offsets=np.array([0, 2]),
+        layer=np.zeros(1, int),
+        kind=np.full(1, MATRIX),
+        closed=np.zeros(1, bool),
+    )
+    strip = shapely.box(0.0, -0.5 * wide, 50.0, 0.5 * wide)
+    found, laid = with_flow(paths, strip, 0.5, [], 0.0, MACHINE)
+    assert found.lengths.sum() == pytest.approx(50.0)
+    np.testing.assert_allclose(laid[:-1], 0.5 * scale)
 
 
 def test_strands_that_stand_higher_than_the_matrix_above_are_refused():
