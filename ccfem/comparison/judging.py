@@ -58,7 +58,7 @@ class Solved:
 
     def part(self, layers: Sequence[Layer]) -> Part:
         """Return what all runs on a stack of layers share."""
-        return Part(self.planned_on, tuple(layers), self.case.machine)
+        return Part(self.planned_on, tuple(layers), self.case.machine, self.case.build)
 
 
 def judged(

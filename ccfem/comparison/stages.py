@@ -62,11 +62,12 @@ def counted(progress: Progress, first: float, steps: int) -> Tell:
 
 @dataclass(frozen=True)
 class Part:
-    """What all runs share: the stress that counts, the layers and the machine."""
+    """What all runs share: the stress that counts, the layers, the machine, the build direction."""
 
     stress: PartStress
     layers: tuple[Layer, ...]
     machine: Machine
+    build: tuple[float, float, float] | None = None
 
 
 def planned(
@@ -211,7 +212,7 @@ def evaluated(run: Run, part: Part, tell: Tell) -> Run:
         return replace(run, failure=_no_fibre(part.machine))
 
     def work() -> Run:
-        found = evaluate(run.toolpaths, part.layers, part.stress, part.machine)
+        found = evaluate(run.toolpaths, part.layers, part.stress, part.machine, part.build)
         broken = why_not(found.total, part.machine)
         return replace(run, evaluation=found, why_not="; ".join(broken))
 

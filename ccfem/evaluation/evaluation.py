@@ -17,6 +17,7 @@ from ccfem.evaluation import (
     coverage,
     crossings,
     curvature,
+    head,
     links,
     manufacture,
     matching,
@@ -32,6 +33,7 @@ from ccfem.evaluation.containment import ContainmentSamples
 from ccfem.evaluation.coverage import CoverageSamples
 from ccfem.evaluation.crossings import CrossingSamples
 from ccfem.evaluation.curvature import CurvatureSamples
+from ccfem.evaluation.head import HeadSamples
 from ccfem.evaluation.links import LinkSamples
 from ccfem.evaluation.manufacture import ManufactureSamples
 from ccfem.evaluation.plane_paths import PlanePaths, plane_paths, pool
@@ -65,6 +67,7 @@ COLUMNS: tuple[Column, ...] = (
     *links.COLUMNS,
     *crossings.COLUMNS,
     *space.COLUMNS,
+    *head.COLUMNS,
 )
 """Every index in the order of the tables."""
 
@@ -153,7 +156,11 @@ class Evaluation:
 
 
 def evaluate(
-    toolpaths: Toolpaths, layers: Sequence[Layer], stress: PartStress, machine: Machine
+    toolpaths: Toolpaths,
+    layers: Sequence[Layer],
+    stress: PartStress,
+    machine: Machine,
+    build: Sequence[float] | None = None,
 ) -> Evaluation:
     """Evaluate the fibre paths of a part.
 
@@ -169,6 +176,9 @@ def evaluate(
         lengths of the paths in space.
     stress : PartStress
     machine : Machine
+    build : sequence of 3 floats, optional
+        Build direction, which the head's tilt on curved layers is measured from; by default the
+        mean normal of the layers.
 
     Returns
     -------
@@ -185,11 +195,12 @@ def evaluate(
     _check_layers(toolpaths, layers)
     fibre = toolpaths.of_kind(FIBRE).layer
     late = fibre[fibre < np.maximum.accumulate(fibre)]
+    stack = head.printed(layers, build)
 
     def sampled(layer: Layer) -> _Samples:
         behind = int(np.count_nonzero(late == layer.index))
         on_layer = toolpaths.on_layer(layer.index)
-        return _sample(on_layer, layer, stress, machine, _below(layer, layers), behind)
+        return _sample(on_layer, layer, stress, machine, _below(layer, layers), behind, stack)
 
     with ThreadPoolExecutor(min(os.cpu_count() or 1, _MOST_THREADS)) as pool:
         samples = list(pool.map(sampled, layers))
@@ -247,6 +258,7 @@ class _Samples(NamedTuple):
     links: LinkSamples
     crossings: CrossingSamples
     space: SpaceSamples
+    head: HeadSamples
 
 
 def _sample(
@@ -256,6 +268,7 @@ def _sample(
     machine: Machine,
     below: Layer | None,
     late: int,
+    stack: head.Printed | None,
 ) -> _Samples:
     """Take the samples of one layer."""
     width = machine.fibre_width
@@ -284,6 +297,7 @@ def _sample(
         links.sample_links(paths),
         crossings.sample_crossings(paths),
         in_space,
+        head.sample_head(fibre, layer, stack, machine),
     )
 
 
@@ -314,4 +328,5 @@ def _indices(samples: _Samples, machine: Machine) -> dict[str, float]:
         **links.link_indices(samples.links),
         **crossings.crossing_indices(samples.crossings),
         **space.space_indices(samples.space),
+        **head.head_indices(samples.head),
     }
