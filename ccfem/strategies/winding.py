@@ -8,8 +8,8 @@ borders are ours: with the paper's gradients the field rises and falls, and line
 """
 
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass
-from typing import Any, ClassVar, Literal
+from dataclasses import dataclass, replace
+from typing import Any, ClassVar, Literal, NamedTuple
 
 import numpy as np
 
@@ -19,13 +19,14 @@ from ccfem.elasticity.part_stress import PartStress
 from ccfem.errors import InputError
 from ccfem.geometry.isocontours import isocontours
 from ccfem.geometry.nearest_on_triangles import nearest_on_triangles
-from ccfem.guidance.joints import joining_pairs, joints_of
+from ccfem.guidance.joint_lines import joint_lines
+from ccfem.guidance.joints import joints_of
 from ccfem.layers.layer import Layer
 from ccfem.layers.layer_stress import LayerStress
 from ccfem.machine.machine import Machine
 from ccfem.planning.infill import SPACING, check_fill, long_enough
 from ccfem.planning.strategy import Amount, LayerPlanner
-from ccfem.principal_lines.critical import Keep, critical_region
+from ccfem.principal_lines.critical import Keep
 from ccfem.principal_lines.strongest import strongest_stress
 from ccfem.toolpaths import Toolpaths
 from ccfem.winding.annulus import annulus_field
@@ -39,6 +40,8 @@ _CLIP = 5.0
 """Largest weight of a triangle, in means over its layer."""
 _REACH = 4.0
 """How far along the curves the lift of the holes reaches, mm."""
+_KNOWN = "_wound"
+"""Where a layer keeps the fields of its pieces."""
 _KEPT = 0.6
 """Share of the length of the strands that keeps the spacing asked for."""
 
@@ -71,7 +74,7 @@ class Winding:
         Where the field starts: below 0 on the holes, so that the innermost strand keeps off them;
         and below 0 where curves are further from the border than the holes are, so that strands do
         not spread there.
-    sharpest : float, 1/mm, default 0.125
+    sharpest : float, 1/mm, default 0.115
         Strands that bend more sharply are smoothed there.
     joined : int, optional
         Joints that a piece must hold to get fibre; by default as many as any piece of the part
@@ -90,7 +93,7 @@ class Winding:
     repulsion: float = 4.0
     lift: float = 0.1
     rise: float = 0.4
-    sharpest: float = 0.125
+    sharpest: float = 0.115
     joined: int | None = None
     minimum_length: float | None = None
 
@@ -130,22 +133,24 @@ class Winding:
                 f"{', '.join(names) or 'no patch'} does: name others (joints), or choose another "
                 "strategy or slicing"
             )
-        strongest = strongest_stress(stress.stress)
+        least = most if self.joined is None else self.joined
         if self.weight == "lines":
             joints = joints_of(stress, names)
-            weight = critical_region(
-                stress.mesh,
-                strongest.direction,
-                [joint.wall for joint in joints],
-                joining_pairs(joints, stress),
-                self.lines if len(joints) > 1 or self.lines != "joining" else "touching",
-            ).weight
-        elif self.weight == "stress":
-            weight = np.abs(strongest.value)
-        else:
-            weight = np.ones(len(stress.mesh.cells))
-        least = most if self.joined is None else self.joined
+            keep = self.lines if len(joints) > 1 or self.lines != "joining" else "touching"
+            strongest, region = joint_lines(stress, joints, keep)
+            return _Planner(self, tuple(names), strongest.direction, region.weight, least)
+        strongest = strongest_stress(stress.stress)
+        even = np.ones(len(stress.mesh.cells))
+        weight = np.abs(strongest.value) if self.weight == "stress" else even
         return _Planner(self, tuple(names), strongest.direction, weight, least)
+
+
+class _Wound(NamedTuple):
+    """Field on a piece of a layer, and the size of its gradient, 1/mm, that strands go by."""
+
+    piece: Piece
+    field: FloatArray
+    steep: float
 
 
 @dataclass(frozen=True)
@@ -172,9 +177,8 @@ class _Planner:
 
     def __call__(self, layer: Layer, stress: LayerStress, machine: Machine) -> Toolpaths:
         lines: list[FloatArray] = []
-        for piece in pieces_with_joints(layer, self.names):
-            if len(piece.loops) >= self.least:
-                lines += self.strands(piece, self.strategy.spacing * machine.fibre_width)
+        for one in self.fields(layer):
+            lines += self.strands(one, self.strategy.spacing * machine.fibre_width)
         normals = []
         for k, line in enumerate(lines):
             found = nearest_on_triangles(layer.points, layer.triangles, line)
@@ -186,8 +190,22 @@ class _Planner:
         paths = Toolpaths.in_space(lines, normals, layer)
         return long_enough(paths, self.strategy.minimum_length, machine)
 
-    def strands(self, piece: Piece, spacing: float) -> list[FloatArray]:
-        """Level lines of the field on a piece of a layer, near its surface."""
+    def fields(self, layer: Layer) -> "list[_Wound]":
+        """Fields of the pieces of a layer; the layer keeps the last, for another spacing."""
+        same = replace(self.strategy, spacing=1.0, minimum_length=None)
+        known: tuple[_Planner, list[_Wound]] | None = vars(layer).get(_KNOWN)
+        if known is not None:
+            last, found = known
+            given = (last.strategy, last.names, last.least) == (same, self.names, self.least)
+            if given and last.direction is self.direction and last.weight is self.weight:
+                return found
+        pieces = pieces_with_joints(layer, self.names)
+        found = [self.field(piece) for piece in pieces if len(piece.loops) >= self.least]
+        vars(layer)[_KNOWN] = (replace(self, strategy=same), found)
+        return found
+
+    def field(self, piece: Piece) -> "_Wound":
+        """Field of a piece of a layer, cut or not, its values evened out."""
         s = self.strategy
         piece = piece.joined(s.repulsion) if s.cut else piece
         surface = piece.surface
@@ -198,12 +216,15 @@ class _Planner:
         tension = self.tension(piece.layer)[piece.mesh.source]
         field = annulus_field(surface, tension, s.isotropy, s.smoothness, fixed, values)
         field = evened(surface, field)
-        count = max(1, round(1.0 / (steep(surface, field, _KEPT) * spacing)))
-        found = isocontours(
-            piece.mesh.points, piece.mesh.triangles, field, 0.5 / count, 1.0 / count
-        )
+        return _Wound(piece, field, steep(surface, field, _KEPT))
+
+    def strands(self, one: "_Wound", spacing: float) -> list[FloatArray]:
+        """Level lines of the field on a piece of a layer, near its surface."""
+        count = max(1, round(1.0 / (one.steep * spacing)))
+        mesh = one.piece.mesh
+        found = isocontours(mesh.points, mesh.triangles, one.field, 0.5 / count, 1.0 / count)
         return [
-            limit_bends(line, s.sharpest)
+            limit_bends(line, self.strategy.sharpest)
             for line, level in zip(found.lines(), found.level, strict=True)
             if 0 <= level < count and np.array_equal(line[0], line[-1])
         ]
