@@ -4,11 +4,12 @@ G. Fang, T. Zhang, Y. Huang, Z. Zhang, K. Masania, C. C. L. Wang, Exceptional me
 by spatial printing with continuous fiber: Curved slicing, toolpath generation and physical
 verification, Additive Manufacturing 79 (2024) 103903. The layer is cut along curves that join its
 holes, and strands are level lines of a field from there to the outer border. The values on both
-borders are ours: with the paper's gradients the field rises and falls, and lines close on islands.
+borders are ours: with the paper's gradients (``energy = "paper"``) the field rises and falls, and
+lines close on islands or end at the border.
 """
 
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass, replace
+from dataclasses import dataclass, field, replace
 from typing import Any, ClassVar, Literal, NamedTuple
 
 import numpy as np
@@ -17,6 +18,7 @@ from ccfem.arrays import FloatArray
 from ccfem.checks import check_choices, check_fields
 from ccfem.elasticity.part_stress import PartStress
 from ccfem.errors import InputError
+from ccfem.fields.layer_elements import Surface
 from ccfem.geometry.isocontours import isocontours
 from ccfem.geometry.nearest_on_triangles import nearest_on_triangles
 from ccfem.guidance.joint_lines import joint_lines
@@ -32,6 +34,7 @@ from ccfem.toolpaths import Toolpaths
 from ccfem.winding.annulus import annulus_field
 from ccfem.winding.bends import limit_bends
 from ccfem.winding.even_levels import evened, steep
+from ccfem.winding.paper_field import PaperWeights, paper_field
 from ccfem.winding.piece import Piece, pieces_with_joints
 
 __all__ = ["Winding"]
@@ -57,6 +60,11 @@ class Winding:
         on a layer is a hole count there.
     spacing : float, default 2.2
         Distance of strands in fibre widths that 60 % of their length keep.
+    energy : {"annulus", "paper"}
+        What the field minimises: ours, with given values on both borders, or that of the paper
+        (eq. 5 and 6), whose lines may end at the outer border.
+    paper : table
+        Weights of the paper's energy: stress, curves, compatible, zero.
     isotropy : float, default 0.003
         The smaller, the closer strands follow the stress; the larger, the more even they lie.
     smoothness : float, mm^2, default 0.3
@@ -85,6 +93,8 @@ class Winding:
 
     joints: tuple[str, ...] = ()
     spacing: float = 2.2
+    energy: Literal["annulus", "paper"] = "annulus"
+    paper: PaperWeights = field(default_factory=PaperWeights)
     isotropy: float = 0.003
     smoothness: float = 0.3
     weight: Literal["lines", "stress", "even"] = "lines"
@@ -102,6 +112,7 @@ class Winding:
         "stress": {"weight": "stress"},
         "even": {"weight": "even", "isotropy": 1.0, "smoothness": 0.0},
         "uncut": {"cut": False},
+        "paper": {"energy": "paper"},
     }
 
     def __post_init__(self) -> None:
@@ -209,6 +220,11 @@ class _Planner:
         s = self.strategy
         piece = piece.joined(s.repulsion) if s.cut else piece
         surface = piece.surface
+        if s.energy == "paper":
+            inner = np.unique(np.concatenate([*piece.loops, *piece.curves]))
+            tension = self.tension(piece.layer)[piece.mesh.source]
+            field = paper_field(surface, tension, inner, s.paper)
+            return _Wound(piece, field, _median_slope(surface, field))
         inner, low = piece.inner_values(s.lift, s.rise, _REACH)
         outer = np.setdiff1d(np.concatenate(piece.outer), inner)
         fixed = np.concatenate([inner, outer])
@@ -220,8 +236,18 @@ class _Planner:
 
     def strands(self, one: "_Wound", spacing: float) -> list[FloatArray]:
         """Level lines of the field on a piece of a layer, near its surface."""
-        count = max(1, round(1.0 / (one.steep * spacing)))
         mesh = one.piece.mesh
+        if self.strategy.energy == "paper":
+            step = spacing * one.steep
+            every = isocontours(mesh.points, mesh.triangles, one.field, 0.5 * step, step)
+            return [
+                limit_bends(line, self.strategy.sharpest)
+                if np.array_equal(line[0], line[-1])
+                else line
+                for line, level in zip(every.lines(), every.level, strict=True)
+                if level >= 0
+            ]
+        count = max(1, round(1.0 / (one.steep * spacing)))
         found = isocontours(mesh.points, mesh.triangles, one.field, 0.5 / count, 1.0 / count)
         return [
             limit_bends(line, self.strategy.sharpest)
@@ -240,3 +266,11 @@ class _Planner:
             return np.zeros((len(layer.triangles), 3, 3))
         limited = np.minimum(1.0, _CLIP * mean / np.maximum(size, 1e-300)) / mean
         return np.asarray(np.einsum("t,ti,tj->tij", weight * limited, along, along))
+
+
+def _median_slope(surface: Surface, field: FloatArray) -> float:
+    """Median by area of the size of a field's gradient."""
+    size = np.linalg.norm(surface.gradient(field), axis=1)
+    order = np.argsort(size)
+    below = np.cumsum(surface.areas[order])
+    return float(size[order][np.searchsorted(below, 0.5 * below[-1])])
