@@ -112,7 +112,7 @@ class Winding:
         "stress": {"weight": "stress"},
         "even": {"weight": "even", "isotropy": 1.0, "smoothness": 0.0},
         "uncut": {"cut": False},
-        "paper": {"energy": "paper"},
+        "paper": {"energy": "paper", "weight": "stress"},
     }
 
     def __post_init__(self) -> None:
