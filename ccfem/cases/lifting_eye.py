@@ -24,9 +24,8 @@ HOLES = {
     "bolt_left": Cylinder((-_BOLTS, 0.0, 0.0), "y", BOLT_RADIUS),
     "bolt_right": Cylinder((_BOLTS, 0.0, 0.0), "y", BOLT_RADIUS),
     "eye": Cylinder((0.0, _EYE, 0.0), "z", EYE_RADIUS),
-    "lift": Cylinder((0.0, _EYE, 0.0), "z", EYE_RADIUS, half="y"),
 }
-"""Patches: the walls of the holes, and the upper half of the eye's."""
+"""Patches: the walls of the holes."""
 
 
 def lifting_eye_front() -> shapely.Polygon:
@@ -79,7 +78,7 @@ def lifting_eye(
     mesh = mesh_of_case("lifting_eye", element_size, order, lifting_eye_mesh)
     slant = float(np.sqrt(0.5)) * force
     loads = {
-        "lift": (Bearing("lift", (0.0, force, 0.0)),),
+        "lift": (Bearing("eye", (0.0, force, 0.0)),),
         "slant": (Bearing("eye", (slant, slant, 0.0)),),
     }
     supports = (Support("bolt_left"), Support("bolt_right"))

@@ -22,8 +22,9 @@ _DEPTH = 15.0
 """Half of the thickness of the head, along z, and of the width of the base, mm."""
 HEAD_RADIUS = 9.5
 """Radius of the heads of the bolts in the base, mm."""
-_HEAD_LEVEL, _UP = 15.0, 0.9
-"""Height, mm, above which the top of the base lies, and least y of its outward normal."""
+_HEAD_LEVEL, _UP, _FACING = 15.0, 0.9, 0.97
+"""Height, mm, above which the top of the base lies, least y of its outward normal, and least cosine
+of a wall's normals to the way to its axis."""
 HOLES = {
     "base_left": Cylinder((-50.0, 0.0, 0.0), "y", HOLE_RADIUS),
     "base_right": Cylinder((50.0, 0.0, 0.0), "y", HOLE_RADIUS),
@@ -72,6 +73,16 @@ def bolt_heads(mesh: TetMesh) -> dict[str, IntArray]:
     return found
 
 
+def _smooth_wall(mesh: TetMesh, name: str) -> IntArray:
+    """Facets of the wall of a base's hole that face its axis: on the rim the mesh has a fold."""
+    facets, hole = mesh.patch(name), HOLES[name]
+    inward = np.asarray(hole.point) - mesh.points[facets].mean(axis=1)
+    inward[:, 1] = 0.0
+    size = np.linalg.norm(inward, axis=1)
+    along = np.einsum("fd,fd->f", mesh.facet_areas(facets)[1], inward) / size
+    return facets[along > _FACING]
+
+
 def t_bracket_mesh(element_size: float) -> TetMesh:
     """Mesh of what two extrusions have in common; takes minutes.
 
@@ -108,7 +119,8 @@ def t_bracket(
     alternative: tuple[PressingSupport, ...] = ()
     if bolts:
         heads = bolt_heads(mesh)
-        mesh = mesh.with_patches(heads)
+        walls = {name: _smooth_wall(mesh, name) for name in ("base_left", "base_right")}
+        mesh = mesh.with_patches({**heads, **walls})
         pressed = ("base_left", "base_right", *heads)
         alternative = tuple(PressingSupport(name) for name in pressed)
     return Case(
