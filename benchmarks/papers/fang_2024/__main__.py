@@ -7,6 +7,7 @@ with ``CCFEM_FANG2024`` naming the authors' data; half an hour.
 
 import json
 import sys
+from collections.abc import Sequence
 from pathlib import Path
 
 from benchmarks.papers.fang_2024.authors import authors_mesh, authors_stress
@@ -22,8 +23,13 @@ from ccfem.plot.canvas import png
 from ccfem.plot.stack_page import space_picture, turning_page
 
 
-def main(folder: Path) -> None:
+def main(folder: Path, loads: Sequence[str] = ("pull", "side")) -> None:
     folder.mkdir(parents=True, exist_ok=True)
+    tests = {}
+    for load in loads:
+        tests[load] = against(load)
+        (folder / load).mkdir(exist_ok=True)
+        write_slicings(tests[load], folder / load)
     stress = authors_stress(authors_mesh())
     sliced, paths, seconds = timed_chain(stress)
     strands = study(stress, sliced)
@@ -35,10 +41,6 @@ def main(folder: Path) -> None:
     write_robot_waypoints(folder / "waypoints.csv", paths, sliced.layers, Machine())
     field = field_study(sliced)
     print(f"\n{field_table(field)}")
-    tests = {load: against(load) for load in ("pull", "side")}
-    for load, compared in tests.items():
-        (folder / load).mkdir(exist_ok=True)
-        write_slicings(compared, folder / load)
     found = quantities(field, strands, seconds, tests)
     (folder / "quantities.json").write_text(json.dumps(found, indent=1), encoding="utf-8")
     claims = claim_table(verdicts(found))
