@@ -14,7 +14,7 @@ from ccfem.cases.case import Case
 from ccfem.cases.reading import read
 from ccfem.checks import check_known, member_name
 from ccfem.comparison.judging import Solved, judged
-from ccfem.comparison.over_slicings import over_slicings
+from ccfem.comparison.over_slicings import named_slicers, over_slicings
 from ccfem.comparison.result import Comparison
 from ccfem.comparison.runs import Run
 from ccfem.comparison.slicings import SlicingComparison
@@ -297,8 +297,9 @@ def compare(
             )
         if print_plans:
             raise InputError("prints are planned on one slicing: drop print_plans or slicings")
+        slicers = named_slicers(slicings)
         solved, seconds = _solved(case, strand, load_case, backend, stress, progress)
-        return over_slicings(solved, strategies, slicings, fibre, natural, seconds, progress)
+        return over_slicings(solved, strategies, slicers, fibre, natural, seconds, progress)
 
     if foreign and layers is None:
         layers = tuple(foreign[0].heights(plane_frame(case.build)[2]).tolist())

@@ -3,6 +3,7 @@
 from collections.abc import Mapping, Sequence
 from dataclasses import replace
 from itertools import count
+from typing import NamedTuple
 
 import numpy as np
 
@@ -22,7 +23,7 @@ from ccfem.planning.strategy import Strategy
 from ccfem.progress import Progress
 from ccfem.toolpaths import Toolpaths
 
-__all__ = ["over_slicings"]
+__all__ = ["Named", "named_slicers", "over_slicings"]
 
 _OWN = ("count", "thickness", "heights")
 """Parameters of flat layers that say how many there are."""
@@ -31,7 +32,7 @@ _OWN = ("count", "thickness", "heights")
 def over_slicings(
     solved: Solved,
     strategies: Mapping[str, Strategy],
-    slicings: Mapping[str, Slicer] | Sequence[str | Slicer],
+    slicings: "Mapping[str, Named]",
     fibre: float | None,
     natural_amounts: bool,
     seconds: dict[str, float],
@@ -39,14 +40,12 @@ def over_slicings(
 ) -> SlicingComparison:
     """Plan, evaluate and test strategies on several slicings.
 
-    Flat layers named by a text that says nothing of their number are as thick as the layers of the
-    part's own slicing are in the mean: one printer lays them all.
-
     Parameters
     ----------
     solved : Solved
     strategies : mapping of name to Strategy
-    slicings : mapping of name to Slicer, or sequence of str or Slicer
+    slicings : mapping of name to Named
+        From `named_slicers`.
     fibre : float, mm, optional
         Length in all; by default the shortest natural one of any run.
     natural_amounts : bool
@@ -58,11 +57,11 @@ def over_slicings(
     Raises
     ------
     InputError
-        For an unknown slicer, none or one named twice, and where none can cut the part.
+        Where no slicing can cut the part.
     """
     case = solved.case
     with timed(seconds, "slice"):
-        stacks, refused = _stacks(solved, _named(solved, slicings))
+        stacks, refused = _stacks(solved, _as_thick(solved, slicings))
     parts = {name: solved.part(layers) for name, layers in stacks.items()}
     tell = counted(progress, 0.1, 4 * len(strategies) * len(parts) + 1)
     bare = [Run(name, each, Toolpaths.empty(), None) for name, each in strategies.items()]
@@ -76,30 +75,59 @@ def over_slicings(
     return SlicingComparison(case, solved.field, found, length, refused, seconds)
 
 
-def _named(
-    solved: Solved, slicings: Mapping[str, Slicer] | Sequence[str | Slicer]
-) -> dict[str, Slicer]:
-    """Slicers by name: as they were written, or the name of their module."""
-    if isinstance(slicings, Mapping):
-        return dict(slicings)
+class Named(NamedTuple):
+    """A slicer, and whether its flat layers are to be as thick as those of the part's own."""
+
+    slicer: Slicer
+    as_thick: bool = False
+
+
+def named_slicers(
+    slicings: Mapping[str, Slicer] | Sequence[str | Slicer],
+) -> dict[str, Named]:
+    """Slicers by name: as they were written, or the name of their module.
+
+    Flat layers named by a text that says nothing of their number are as thick as the layers of the
+    part's own slicing are in the mean: one printer lays them all.
+
+    Raises
+    ------
+    InputError
+        For an unknown slicer or parameter, none at all, or one named twice.
+    """
     if isinstance(slicings, str) or not slicings:
         raise InputError(
             f"slicings must be a list of at least one, as ['planar:z', 'spatial']; got {slicings!r}"
         )
-    found: dict[str, Slicer] = {}
+    if isinstance(slicings, Mapping):
+        return {name: Named(slicer) for name, slicer in slicings.items()}
+    found: dict[str, Named] = {}
     for each in slicings:
         if isinstance(each, str):
             name, slicer = each.strip(), from_text(each)
             if name in found:
                 raise InputError(f"name each slicing once; got '{name}' more than once")
-            if isinstance(slicer, Planar) and not any(f"{own}=" in name for own in _OWN):
-                slicer = replace(slicer, count=None, thickness=_own_thickness(solved))
+            said = any(f"{own}=" in name for own in _OWN)
+            found[name] = Named(slicer, isinstance(slicer, Planar) and not said)
         else:
-            slicer, name = each, member_name(each)
+            name = member_name(each)
             numbers = (f"{name}_{k}" for k in count(2))
-            name = name if name not in found else next(n for n in numbers if n not in found)
-        found[name] = slicer
+            free = name if name not in found else next(n for n in numbers if n not in found)
+            found[free] = Named(each)
     return found
+
+
+def _as_thick(solved: Solved, slicings: Mapping[str, Named]) -> dict[str, Slicer]:
+    """Slicers with the thickness of the part's own layers where they take that."""
+    if not any(each.as_thick for each in slicings.values()):
+        return {name: each.slicer for name, each in slicings.items()}
+    own = _own_thickness(solved)
+    return {
+        name: replace(each.slicer, count=None, thickness=own)  # type: ignore[type-var]
+        if each.as_thick
+        else each.slicer
+        for name, each in slicings.items()
+    }
 
 
 def _own_thickness(solved: Solved) -> float:

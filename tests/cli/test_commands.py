@@ -399,6 +399,12 @@ def test_bad_parts_end_in_one_line(ccfem, folder, text, message):
         (["part.toml", "--heights", "1,2,9"], "height 9 mm lies outside the part.* from 0 to 4 mm"),
         (["part.toml", "--heights", "1,x"], "expected numbers"),
         (["part.toml", "--layers", "2", "--heights", "1"], "got --layers and --heights"),
+        (
+            ["bar", "--slicings", "planar:z", "--layers", "3"],
+            "over several slicings there are no lay",
+        ),
+        (["bar", "--slicings", "planar:w"], "axis must be one of"),
+        (["bar", "--fibre", "9", "--fibre-per-layer", "9"], "not both: drop one"),
         (["part.toml", "--slicing", "planer"], "no slicer named 'planer'; there are: planar"),
         (["part.toml", "--slicing", "planar:height=1"], "has no parameter 'height'; it has:"),
         (["part.toml", "--slicing", "planar:count=0"], "number of layers must be at least 1"),

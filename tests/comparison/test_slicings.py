@@ -3,11 +3,13 @@
 import json
 import re
 from dataclasses import replace
+from pathlib import Path
 
 import pandas as pd
 import pytest
 
 from ccfem.cases.case import Case
+from ccfem.cli.screen import print_slicings
 from ccfem.comparison.compare import compare
 from ccfem.comparison.ranking import best_values, off_length
 from ccfem.comparison.runs import InAll
@@ -38,8 +40,8 @@ def case():
 def compared(case):
     slicings = {
         "z": Planar(count=4),
-        "y": Planar(count=7, axis="y"),
-        "x": Planar(count=5, axis="x"),
+        "y": Planar(count=3, axis="y"),
+        "x": Planar(count=3, axis="x"),
     }
     return compare(case, ["zigzag", "concentric"], slicings=slicings)
 
@@ -47,7 +49,7 @@ def compared(case):
 def test_every_run_lays_the_same_length_in_all(compared):
     (setter,) = (run for run in compared.runs if "sets the length" in run.note)
     assert compared.fibre == pytest.approx(setter.toolpaths.lengths.sum(), rel=1e-9)
-    assert [len(each.layers) for each in compared.slicings.values()] == [4, 7, 5]
+    assert [len(each.layers) for each in compared.slicings.values()] == [4, 3, 3]
     assert len(compared.runs) == 6
     for run in compared.runs:
         assert not run.failure
@@ -102,7 +104,7 @@ def test_verdict_speaks_of_strategy_and_slicing(compared):
     if " makes the stiffest part" in said:
         assert said.startswith(first.name)
     assert first.name in str(compared)
-    assert "layers: z 4 (4 with fibre), y 7 (7 with fibre), x 5" in " ".join(compared.remarks)
+    assert "layers: z 4 (4 with fibre), y 3 (3 with fibre), x 3" in " ".join(compared.remarks)
 
 
 def test_a_run_that_cannot_be_printed_stands_below_all_that_can(compared):
@@ -133,7 +135,7 @@ def test_files_hold_every_run_and_one_report(compared, tmp_path):
     record = json.loads((tmp_path / "results.json").read_text(encoding="utf-8"))
     assert record["fibre"] == compared.fibre
     assert record["verdict"] == compared.verdict
-    assert {name: each["layers"] for name, each in record["slicings"].items()} == {"z": 4, "x": 5}
+    assert {name: each["layers"] for name, each in record["slicings"].items()} == {"z": 4, "x": 3}
     assert sorted(record["files"]) == sorted(path.name for path in tmp_path.iterdir())
     report = (tmp_path / "report.html").read_text(encoding="utf-8")
     for run in compared.runs:
@@ -143,6 +145,17 @@ def test_files_hold_every_run_and_one_report(compared, tmp_path):
     for name in compared.slicings:
         assert (tmp_path / f"{name}_zigzag_space.html").exists()
         assert (tmp_path / f"{name}_overview.png").stat().st_size > 1000
+
+
+def test_screen_shows_every_run_its_figures_and_the_verdict(compared, capsys):
+    print_slicings(compared, Path("somewhere"), 1.0)
+    said = capsys.readouterr().out
+    for run in compared.runs:
+        assert run.name in said
+        assert f"{run.tested.bracket.tension.ratio:.2f}" in said
+    flat = " ".join(said.split())
+    assert compared.verdict in flat
+    assert "somewhere/report.html" in flat
 
 
 def test_flat_layers_named_alone_are_as_thick_as_the_parts_own(case):
