@@ -67,7 +67,7 @@ assert max(holes_in(each) for each in flat.values()) < 3
 
 # %%
 paths = plan(create("winding"), sliced.layers, stress, case.machine)
-total = evaluate(paths, sliced.layers, stress, case.machine, case.build).total
+total = evaluate(paths, sliced.layers, stress, case.machine, build=case.build).total
 laid = len(np.unique(paths.layer))
 print(f"{len(paths)} strands, {paths.lengths.sum() / 1e3:.1f} m on {laid} layers")
 print(f"joints linked {total['joints_linked']:.2f}")
@@ -87,7 +87,7 @@ print(f"the head tilts by {total['tilt_mean']:.0f} degrees in the mean")
 hits = {}
 for angle in (35.0, 10.0):
     slim = replace(case.machine, head_angle=angle)
-    found = evaluate(paths, sliced.layers, stress, slim, case.build).total
+    found = evaluate(paths, sliced.layers, stress, slim, build=case.build).total
     hits[angle] = found["head_collision"]
     print(f"a cone of {angle:.0f} degrees to its axis meets them at {hits[angle]:.0%} of the fibre")
 assert hits[10.0] < hits[35.0]

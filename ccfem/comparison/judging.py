@@ -58,7 +58,9 @@ class Solved:
 
     def part(self, layers: Sequence[Layer]) -> Part:
         """Return what all runs on a stack of layers share."""
-        return Part(self.planned_on, tuple(layers), self.case.machine, self.case.build)
+        strand = None if self.tests is None else self.tests.strand
+        case = self.case
+        return Part(self.planned_on, tuple(layers), case.machine, strand, case.build)
 
 
 def judged(
