@@ -76,16 +76,23 @@ def _figures(name: str, slicing: SpatialSlicing) -> dict[str, float]:
 
 
 def _between(one: SpatialSlicing, other: SpatialSlicing) -> float:
-    """Mean angle, degrees, by volume, between the normals of two fields on meshes of one part."""
-    mesh = other.field.mesh
-    centre = one.field.mesh.points[one.field.mesh.corners].mean(axis=1)
-    holder, _ = locate(mesh.points, mesh.corners, centre, 2.0)
-    inside = holder >= 0
-    a, b = one.field.gradient[inside], other.field.gradient[holder[inside]]
-    size = np.linalg.norm(a, axis=1) * np.linalg.norm(b, axis=1)
-    cosine = np.abs(np.einsum("ed,ed->e", a, b)) / np.maximum(size, 1e-300)
-    angle = np.degrees(np.arccos(np.clip(cosine, 0.0, 1.0)))
-    return float(np.average(angle, weights=one.field.mesh.volumes[inside]))
+    """Mean angle, degrees, by volume, between the normals of two fields on meshes of one part.
+
+    The part is its own mirror image in z, and so are fields of other signs of as low an energy:
+    the nearer of the two counts.
+    """
+    mesh, own = other.field.mesh, one.field.mesh
+    centre = own.points[own.corners].mean(axis=1)
+    found = []
+    for mirror in ([1.0, 1.0, 1.0], [1.0, 1.0, -1.0]):
+        holder, _ = locate(mesh.points, mesh.corners, centre * mirror, 2.0)
+        inside = holder >= 0
+        a, b = one.field.gradient[inside], other.field.gradient[holder[inside]] * mirror
+        size = np.linalg.norm(a, axis=1) * np.linalg.norm(b, axis=1)
+        cosine = np.abs(np.einsum("ed,ed->e", a, b)) / np.maximum(size, 1e-300)
+        angle = np.degrees(np.arccos(np.clip(cosine, 0.0, 1.0)))
+        found.append(float(np.average(angle, weights=own.volumes[inside])))
+    return min(found)
 
 
 def field_table(found: dict[str, float]) -> str:
