@@ -1,24 +1,18 @@
 """The T-bracket of Fang et al. 2024: a base with two bolt holes and a head with one across them."""
 
-import json
-from contextlib import chdir
-from pathlib import Path
-from tempfile import TemporaryDirectory
-
 import numpy as np
 import shapely
 
-from ccfem.arrays import FloatArray, IntArray
+from ccfem.arrays import IntArray
 from ccfem.cases.case import Case
+from ccfem.cases.crossed import arc, crossed_mesh
 from ccfem.cases.stored import mesh_of_case
 from ccfem.elasticity.problem import Bearing, Force, Order, Problem, Support
 from ccfem.elasticity.support_kinds import PressingSupport
 from ccfem.layers.slicing.spatial import Spatial
 from ccfem.materials import printed_pla
-from ccfem.mesh.check import check_mesh
-from ccfem.mesh.patches import Cylinder, patches_from_rules
+from ccfem.mesh.patches import Cylinder
 from ccfem.mesh.tet_mesh import TetMesh
-from ccfem.meshing import extrude
 
 __all__ = ["bolt_heads", "t_bracket", "t_bracket_front", "t_bracket_mesh", "t_bracket_top"]
 
@@ -28,10 +22,9 @@ _DEPTH = 15.0
 """Half of the thickness of the head, along z, and of the width of the base, mm."""
 HEAD_RADIUS = 9.5
 """Radius of the heads of the bolts in the base, mm."""
-_HEAD_LEVEL, _UP = 15.0, 0.9
-"""Height, mm, above which the top of the base lies, and least y of its outward normal."""
-_TOLERANCE = 5e-4
-"""Of the mesher, in the diagonal of the part."""
+_HEAD_LEVEL, _UP, _FACING = 15.0, 0.9, 0.97
+"""Height, mm, above which the top of the base lies, least y of its outward normal, and least cosine
+of a wall's normals to the way to its axis."""
 HOLES = {
     "base_left": Cylinder((-50.0, 0.0, 0.0), "y", HOLE_RADIUS),
     "base_right": Cylinder((50.0, 0.0, 0.0), "y", HOLE_RADIUS),
@@ -39,12 +32,6 @@ HOLES = {
     "pull": Cylinder((0.0, 50.0, 0.0), "z", HOLE_RADIUS, half="y"),
 }
 """Patches: the walls of the holes, and the half of the head's that a bolt pulls."""
-
-
-def _arc(x: float, y: float, radius: float, first: float, last: float) -> FloatArray:
-    """Points every 6 degrees on an arc from one angle to another, degrees."""
-    angle = np.radians(np.linspace(first, last, int(np.ceil(abs(last - first) / 6.0)) + 1))
-    return np.stack([x + radius * np.cos(angle), y + radius * np.sin(angle)], axis=1)
 
 
 def t_bracket_front() -> shapely.Polygon:
@@ -56,11 +43,11 @@ def t_bracket_front() -> shapely.Polygon:
     end = float(np.degrees(np.arctan2(40.0 - root, 35.0)))
     right = np.concatenate(
         [
-            _arc(0.0, 50.0, 15.0, 90.0, 0.0),
-            _arc(35.0, 40.0, 20.0, 180.0, 270.0),
+            arc(0.0, 50.0, 15.0, 90.0, 0.0),
+            arc(35.0, 40.0, 20.0, 180.0, 270.0),
             [[80.0, 20.0], [80.0, 5.0]],
-            _arc(35.0, 40.0, 35.0, 270.0, 180.0 + end),
-            _arc(0.0, root, 10.0, end, 90.0),
+            arc(35.0, 40.0, 35.0, 270.0, 180.0 + end),
+            arc(0.0, root, 10.0, end, 90.0),
         ]
     )
     outline = shapely.Polygon(np.concatenate([right, right[::-1] * [-1.0, 1.0]])).buffer(0.0)
@@ -86,40 +73,22 @@ def bolt_heads(mesh: TetMesh) -> dict[str, IntArray]:
     return found
 
 
+def _smooth_wall(mesh: TetMesh, name: str) -> IntArray:
+    """Facets of the wall of a base's hole that face its axis: on the rim the mesh has a fold."""
+    facets, hole = mesh.patch(name), HOLES[name]
+    inward = np.asarray(hole.point) - mesh.points[facets].mean(axis=1)
+    inward[:, 1] = 0.0
+    size = np.linalg.norm(inward, axis=1)
+    along = np.einsum("fd,fd->f", mesh.facet_areas(facets)[1], inward) / size
+    return facets[along > _FACING]
+
+
 def t_bracket_mesh(element_size: float) -> TetMesh:
-    """Mesh of what two extrusions have in common; takes a quarter of an hour.
+    """Mesh of what two extrusions have in common; takes minutes.
 
     Patches are the walls of the holes, and `pull`: half of the wall of the head's.
     """
-    import pytetwild
-
-    front = extrude(t_bracket_front(), 44.0, 2.0 * element_size)
-    top = extrude(t_bracket_top(), 84.0, 2.0 * element_size)
-    # The planform of `top` lies in x and z, and is extruded along y.
-    upright = top.points @ np.array([[1.0, 0.0, 0.0], [0.0, 0.0, 1.0], [0.0, -1.0, 0.0]])
-    with TemporaryDirectory() as folder, chdir(folder):
-        _write_surface("front.stl", front.points - [0.0, 0.0, 22.0], front)
-        _write_surface("top.stl", upright - [0.0, -80.0, 0.0], top)
-        tree = {"operation": "intersection", "left": "front.stl", "right": "top.stl"}
-        Path("tree.json").write_text(json.dumps(tree), encoding="utf-8")
-        diagonal = float(np.linalg.norm([160.0, 84.0, 44.0]))
-        grid = pytetwild.tetrahedralize_csg(
-            "tree.json",
-            epsilon=_TOLERANCE,
-            edge_length_r=element_size / diagonal,
-            num_threads=1,
-        )
-    cells = np.asarray(grid.cells).reshape(-1, 5)[:, 1:]
-    mesh = check_mesh(TetMesh(np.asarray(grid.points), cells))[0]
-    return patches_from_rules(mesh, HOLES)
-
-
-def _write_surface(name: str, points: FloatArray, mesh: TetMesh) -> None:
-    """Write the boundary of a mesh, moved to other points, as STL."""
-    import pyvista
-
-    faces = np.column_stack([np.full(len(mesh.boundary), 3), mesh.boundary])
-    pyvista.PolyData(points, faces.ravel()).save(name)
+    return crossed_mesh(t_bracket_front(), t_bracket_top(), element_size, HOLES)
 
 
 def t_bracket(
@@ -137,7 +106,7 @@ def t_bracket(
     Parameters
     ----------
     element_size : float, mm
-        The mesh is stored for the default; any other takes a quarter of an hour.
+        The mesh is stored for the default; making any other takes minutes.
     order : 1, 2 or "auto"
         Linear or quadratic cells, or what their estimated error calls for.
     force : float, N
@@ -150,7 +119,8 @@ def t_bracket(
     alternative: tuple[PressingSupport, ...] = ()
     if bolts:
         heads = bolt_heads(mesh)
-        mesh = mesh.with_patches(heads)
+        walls = {name: _smooth_wall(mesh, name) for name in ("base_left", "base_right")}
+        mesh = mesh.with_patches({**heads, **walls})
         pressed = ("base_left", "base_right", *heads)
         alternative = tuple(PressingSupport(name) for name in pressed)
     return Case(

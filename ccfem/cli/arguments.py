@@ -3,25 +3,20 @@
 A text that cannot be read raises `InputError`.
 """
 
-import tomllib
 from collections.abc import Sequence
 from pathlib import Path
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 import typer
 
 from ccfem.errors import InputError
-
-if TYPE_CHECKING:
-    from ccfem.layers.slicer import Slicer
+from ccfem.io.toml import assignment
 
 __all__ = [
-    "assignment",
     "names_of",
     "numbers_of",
     "parameters_by_strategy",
     "path_of",
-    "slicer_of",
 ]
 
 
@@ -43,17 +38,6 @@ def numbers_of(text: str) -> tuple[float, ...]:
         return tuple(float(number) for number in names_of(text))
     except ValueError:
         raise InputError(f"expected numbers separated by commas; got '{text}'") from None
-
-
-def assignment(text: str) -> tuple[str, Any]:
-    """Split ``name=value``; the value is read as TOML, or else as a plain string."""
-    name, equals, value = (part.strip() for part in text.partition("="))
-    if not equals or not name:
-        raise InputError(f"expected NAME=VALUE; got '{text}': write for example cap=90")
-    try:
-        return name, tomllib.loads(f"value = {value}")["value"]
-    except tomllib.TOMLDecodeError:
-        return name, value
 
 
 def parameters_by_strategy(
@@ -90,11 +74,3 @@ def parameters_by_strategy(
                 raise InputError(f"--set {text}: {owner}.{key} has a value already: give one only")
         table[last] = value
     return found
-
-
-def slicer_of(text: str) -> "Slicer":
-    """Slicer with its parameters, written ``method:name=value,name=value``."""
-    from ccfem.layers.slicing import create
-
-    method, _, rest = text.partition(":")
-    return create(method.strip(), dict(assignment(one) for one in names_of(rest)))

@@ -15,6 +15,7 @@ from ccfem.cli.options import (
     Calibration,
     CasePath,
     Fibre,
+    FibreInAll,
     Force,
     Heights,
     Layers,
@@ -23,11 +24,12 @@ from ccfem.cli.options import (
     Refine,
     SetCase,
     Slicing,
+    Slicings,
     StressFile,
     StressUnit,
     VirtualTest,
 )
-from ccfem.cli.run import foreign_stress, layers_of, load, options_of, run
+from ccfem.cli.run import foreign_stress, layers_of, load, options_of, run, slicings_of
 
 __all__ = ["app"]
 
@@ -179,7 +181,9 @@ def compare(
     layers: Layers = None,
     heights: Heights = None,
     slicing: Slicing = None,
+    slicings: Slicings = None,
     fibre_per_layer: Fibre = None,
+    fibre: FibreInAll = None,
     natural: Annotated[
         bool, typer.Option("--natural", help="Let each strategy lay its own amount of fibre.")
     ] = False,
@@ -228,8 +232,8 @@ def compare(
     parameters = parameters_by_strategy(set_ or ())
     chosen = layers_of(layers, heights, slicing)
     options = options_of(chosen, fibre_per_layer, virtual_test, load_case, backend)
-    options["natural"] = natural
-    options["curve"] = curve
+    options |= {"natural": natural, "curve": curve, "fibre": fibre}
+    options["slicings"] = None if slicings is None else slicings_of(slicings)
     options["stress"] = foreign_stress(stress, stress_unit)
     files = names_of(paths) if paths is not None else ()
     run(

@@ -12,12 +12,14 @@ __all__ = [
     "Calibration",
     "CasePath",
     "Fibre",
+    "FibreInAll",
     "Heights",
     "Layers",
     "LoadCase",
     "Out",
     "SetCase",
     "Slicing",
+    "Slicings",
     "StressFile",
     "StressUnit",
     "VirtualTest",
@@ -66,6 +68,23 @@ Fibre = Annotated[
         metavar="MM",
         help="Fibre length that each strategy is held to, mean over the layers. By default compare "
         "takes the shortest natural length of any of them; plan takes the natural length.",
+    ),
+]
+FibreInAll = Annotated[
+    float | None,
+    typer.Option(
+        "--fibre",
+        metavar="MM",
+        help="Fibre length in all layers together, instead of --fibre-per-layer.",
+    ),
+]
+Slicings = Annotated[
+    str | None,
+    typer.Option(
+        "--slicings",
+        metavar="A,B,..",
+        help="Compare over several slicings at equal fibre in all, as planar:z,planar:x,spatial; "
+        "flat layers are as thick as the part's own unless they say otherwise.",
     ),
 ]
 Force = Annotated[

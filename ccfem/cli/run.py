@@ -11,15 +11,17 @@ from dataclasses import replace
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
-from ccfem.cli.arguments import assignment, numbers_of, slicer_of
+from ccfem.cli.arguments import numbers_of
 from ccfem.errors import InputError
+from ccfem.io.toml import assignment
 from ccfem.progress import Progress, progress_bar
 
 if TYPE_CHECKING:
     from ccfem.cases.case import Case
     from ccfem.comparison.result import Comparison
+    from ccfem.comparison.slicings import SlicingComparison
 
-__all__ = ["foreign_stress", "layers_of", "load", "options_of", "run"]
+__all__ = ["foreign_stress", "layers_of", "load", "options_of", "run", "slicings_of"]
 
 _STARTED = time.perf_counter()
 
@@ -59,7 +61,18 @@ def layers_of(layers: int | None, heights: str | None, slicing: str | None) -> A
         raise InputError(f"give --layers, --heights or --slicing; got {' and '.join(named)}")
     if heights is not None:
         return numbers_of(heights)
-    return layers if slicing is None else slicer_of(slicing)
+    if slicing is None:
+        return layers
+    from ccfem.layers.slicing import from_text
+
+    return from_text(slicing)
+
+
+def slicings_of(text: str) -> tuple[str, ...]:
+    """Read the slicings of a comparison over several."""
+    from ccfem.layers.slicing import split
+
+    return split(text)
 
 
 def foreign_stress(path: Path | None, unit: str | None) -> Any:
@@ -134,9 +147,11 @@ def run(
     """
     if refine and options.get("stress") is not None:
         raise InputError("--refine changes the mesh that the file of --stress is on: drop one")
-    from ccfem.cli.screen import print_comparison
+    from ccfem.cli.screen import print_comparison, print_slicings
     from ccfem.comparison.compare import compare, create_all
     from ccfem.comparison.files import write_results
+    from ccfem.comparison.slicings import SlicingComparison
+    from ccfem.comparison.slicings_files import write_slicings
     from ccfem.io.result_folder import whole_folder
 
     imported = time.perf_counter()
@@ -150,9 +165,16 @@ def run(
     with whole_folder(where, force) as folder, progress_bar() as progress:
         comparison = compare(case, chosen, progress=_part(progress, 0.0, _SOLVED), **options)
         _check(comparison)
-        command = shlex.join(["ccfem", *sys.argv[1:]])
-        write_results(comparison, folder, command, seconds, _part(progress, _SOLVED, 1.0))
-    print_comparison(comparison, where, time.perf_counter() - _STARTED)
+        command, rest = shlex.join(["ccfem", *sys.argv[1:]]), _part(progress, _SOLVED, 1.0)
+        if isinstance(comparison, SlicingComparison):
+            write_slicings(comparison, folder, command, seconds, rest)
+        else:
+            write_results(comparison, folder, command, seconds, rest)
+    spent = time.perf_counter() - _STARTED
+    if isinstance(comparison, SlicingComparison):
+        print_slicings(comparison, where, spent)
+    else:
+        print_comparison(comparison, where, spent)
 
 
 def _given(
@@ -192,7 +214,7 @@ def _calibrated(
     return case, {**options, "strand": strand}
 
 
-def _check(comparison: "Comparison") -> None:
+def _check(comparison: "Comparison | SlicingComparison") -> None:
     """Refuse a comparison in which nothing was planned, or what was cannot be printed as asked."""
     if not comparison.succeeded:
         reasons = "; ".join(f"{run.name}: {run.failure}" for run in comparison.runs)

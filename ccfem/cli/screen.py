@@ -16,15 +16,28 @@ from rich.table import Table
 
 from ccfem.checks import check_known
 from ccfem.cli.docstring import about, attributes
-from ccfem.comparison.headline import HEADLINE, cell_text, headline_values
+from ccfem.comparison.headline import (
+    HEADLINE,
+    HEADLINE_OF_SLICINGS,
+    cell_text,
+    headline_values,
+)
 from ccfem.comparison.ranking import best_values
 from ccfem.comparison.result import Comparison
 from ccfem.comparison.runs import Run
+from ccfem.comparison.slicings import SlicingComparison
 from ccfem.elasticity.stress_field import StressField, about_cells
 from ccfem.tensor import von_mises
 from ccfem.virtual_testing.stiffer import HONEST_PROMISE
 
-__all__ = ["print_cases", "print_comparison", "print_member", "print_members", "print_solution"]
+__all__ = [
+    "print_cases",
+    "print_comparison",
+    "print_member",
+    "print_members",
+    "print_slicings",
+    "print_solution",
+]
 
 _TITLES, _NUMBERS = 30, 20
 """Characters that a table is given for its titles and for each strategy, where neither a terminal
@@ -141,7 +154,7 @@ def _first_line(what: object) -> str:
 
 def print_comparison(comparison: Comparison, where: Path, seconds: float) -> None:
     """Print the headline table, the best of each row in bold, and where the results are."""
-    console = Console(highlight=False)
+    console = Console(highlight=False, emoji=False)
     runs = [run for run in comparison.ranking if run.evaluation is not None]
     if not console.is_terminal and "COLUMNS" not in os.environ:
         console.width = max(console.width, _TITLES + _NUMBERS * len(runs))
@@ -159,9 +172,45 @@ def print_comparison(comparison: Comparison, where: Path, seconds: float) -> Non
     console.print(f"{where / 'report.html'}  ({seconds:.1f} s)", markup=False, soft_wrap=True)
 
 
+def print_slicings(comparison: SlicingComparison, where: Path, seconds: float) -> None:
+    """Print the table over slicings and strategies, the best of each column in bold."""
+    console = Console(highlight=False, emoji=False)
+    if not console.is_terminal and "COLUMNS" not in os.environ:
+        console.width = max(console.width, 160)
+    console.print(comparison.case.title, style="bold", markup=False)
+    runs = comparison.ranking
+    best = best_values(runs, comparison.wanted)
+    values = {run.name: headline_values(run) for run in runs}
+    known = {column for found in values.values() for column in found}
+    heads = [head for head in HEADLINE_OF_SLICINGS if head.column in known]
+    table = Table(header_style="bold", box=box.SIMPLE_HEAD)
+    table.add_column("", no_wrap=True)
+    for head in heads:
+        table.add_column(head.title, justify="right")
+    for run in runs:
+        if run.evaluation is None:
+            table.add_row(run.name, "failed")
+            continue
+        cells = []
+        for head in heads:
+            text, extra = cell_text(run, head)
+            if run.printable and values[run.name].get(head.column) == best.get(head.column, np.nan):
+                text = f"[bold green]{text}[/]"
+            cells.append(f"{text} [dim]({extra})[/]" if extra else text)
+        table.add_row(run.name, *cells)
+    console.print(table)
+    for line in comparison.remarks:
+        console.print(line, style="dim", markup=False)
+    if comparison.verdict:
+        console.print(comparison.verdict, style="bold", markup=False)
+    if any(run.tested is not None for run in runs):
+        console.print(HONEST_PROMISE, style="dim", markup=False)
+    console.print(f"{where / 'report.html'}  ({seconds:.1f} s)", markup=False, soft_wrap=True)
+
+
 def print_solution(field: StressField, findings: Sequence[str], where: Path) -> None:
     """Print what a solve found in one load case, and where it is written."""
-    console = Console(highlight=False)
+    console = Console(highlight=False, emoji=False)
     sizes = np.linalg.norm(field.displacement, axis=1)
     at = ", ".join(f"{x:.4g}" for x in field.mesh.points[sizes.argmax()])
     mises = von_mises(field.stress)

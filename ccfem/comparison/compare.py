@@ -8,32 +8,22 @@ import os
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
 from itertools import count
-from typing import Any
+from typing import Any, overload
 
 from ccfem.cases.case import Case
 from ccfem.cases.reading import read
 from ccfem.checks import check_known, member_name
-from ccfem.comparison.curve_stages import along_curve
-from ccfem.comparison.ranking import off_length
+from ccfem.comparison.judging import Solved, judged
+from ccfem.comparison.over_slicings import named_slicers, over_slicings
 from ccfem.comparison.result import Comparison
 from ccfem.comparison.runs import Run
-from ccfem.comparison.stages import (
-    Part,
-    Tell,
-    all_tested,
-    evaluated,
-    levelled,
-    planned,
-    timed,
-    with_print,
-)
+from ccfem.comparison.slicings import SlicingComparison
+from ccfem.comparison.stages import Tests, counted, levelled, planned, timed
 from ccfem.elasticity.part_stress import GivenStress
 from ccfem.elasticity.solve import solve
 from ccfem.elasticity.stress_field import StressField
-from ccfem.elasticity.support_kinds import PressingSupport
 from ccfem.errors import InputError, known_names
 from ccfem.export.print_plan import check_machine
-from ccfem.fibre_aware.upper_bound import upper_bound
 from ccfem.io.stress_file import read_stress
 from ccfem.layers import Layer
 from ccfem.layers.plane import plane_frame
@@ -61,9 +51,6 @@ STRATEGIES = ("isocurve", "concentric", "zigzag", "contour_zigzag")
 
 DEFAULT_STRAND = Strand()
 """What a strand is worth where nothing else is known."""
-
-_BOUND_ITERATIONS = 7
-"""The bound holds after any number of iterations; more than these lower it by half a per cent."""
 
 
 @dataclass(frozen=True)
@@ -157,6 +144,17 @@ def solve_and_slice(
         For an unknown load case, a problem that cannot be solved or sliced, and stress on another
         mesh.
     """
+    stress, read, seconds = _stress_of(case, load_case, backend, given)
+    with timed(seconds, "slice"):
+        slicer = case.slicing if layers is None else as_slicer(layers)
+        stack = slicer(stress if read is None else read, case.build, case.machine)
+    return stress, read, stack, seconds
+
+
+def _stress_of(
+    case: Case, load_case: str | None, backend: str, given: ForeignStress | None
+) -> tuple[StressField, GivenStress | None, dict[str, float]]:
+    """Stress of one load case, that of another program, and the seconds of it."""
     seconds: dict[str, float] = {}
     name = _load_case(case, load_case)
     with timed(seconds, "solve"):
@@ -164,10 +162,46 @@ def solve_and_slice(
     read = None
     if given is not None:
         read = read_stress(given.path, stress.mesh, given.unit, given.array, stress.held_or_loaded)
-    with timed(seconds, "slice"):
-        slicer = case.slicing if layers is None else as_slicer(layers)
-        stack = slicer(stress if read is None else read, case.build, case.machine)
-    return stress, read, stack, seconds
+    return stress, read, seconds
+
+
+@overload
+def compare(
+    case: Case | str | os.PathLike[str],
+    strategies: Mapping[str, Strategy] | Sequence[str | Strategy] = ...,
+    layers: int | Sequence[float] | str | Slicer | None = ...,
+    fibre_per_layer: float | None = ...,
+    natural: bool = ...,
+    strand: Strand | None = ...,
+    load_case: str | None = ...,
+    backend: str = ...,
+    print_plans: bool = ...,
+    stress: ForeignStress | None = ...,
+    curve: bool | None = ...,
+    progress: Progress = ...,
+    slicings: None = ...,
+    fibre: float | None = ...,
+) -> Comparison: ...
+
+
+@overload
+def compare(
+    case: Case | str | os.PathLike[str],
+    strategies: Mapping[str, Strategy] | Sequence[str | Strategy] = ...,
+    layers: None = ...,
+    fibre_per_layer: None = ...,
+    natural: bool = ...,
+    strand: Strand | None = ...,
+    load_case: str | None = ...,
+    backend: str = ...,
+    print_plans: bool = ...,
+    stress: ForeignStress | None = ...,
+    curve: bool | None = ...,
+    progress: Progress = ...,
+    *,
+    slicings: Mapping[str, Slicer] | Sequence[str | Slicer],
+    fibre: float | None = ...,
+) -> SlicingComparison: ...
 
 
 def compare(
@@ -183,7 +217,9 @@ def compare(
     stress: ForeignStress | None = None,
     curve: bool | None = None,
     progress: Progress = silent,
-) -> Comparison:
+    slicings: Mapping[str, Slicer] | Sequence[str | Slicer] | None = None,
+    fibre: float | None = None,
+) -> Comparison | SlicingComparison:
     """Solve a case once, and plan and evaluate each strategy on it.
 
     Strategies are compared at equal length of fibre: more fibre wins almost any comparison. When no
@@ -193,6 +229,9 @@ def compare(
     those of the layers where no others are given. A strategy that fails stays in the result, with
     the reason. Where one cannot lay the length, the comparison is made along a curve too: stiffness
     over length of fibre.
+
+    With `slicings` the part is cut in several ways, and each strategy is planned on each: all lay
+    the same length of fibre in all, whatever the number of layers.
 
     Parameters
     ----------
@@ -221,12 +260,17 @@ def compare(
     curve : bool, optional
         Test every strategy at three to five lengths of fibre (`Comparison.curve`). By default only
         where a strategy lays neither more nor less than its own, which is not the wanted length.
+        Never over several slicings.
     progress : callable, optional
         Told what is being done, and the share that is done.
+    slicings : sequence of str or Slicer, or mapping of name to Slicer, optional
+        Ways to cut the part, instead of `layers`: as ``["planar:z", "planar:x", "spatial"]``.
+    fibre : float, mm, optional
+        Length that every strategy is held to in all layers together, instead of `fibre_per_layer`.
 
     Returns
     -------
-    Comparison
+    Comparison, or SlicingComparison where `slicings` are given
 
     Raises
     ------
@@ -237,80 +281,81 @@ def compare(
         When the solve misses its tolerance.
     """
     case = read(case)
-    if natural and fibre_per_layer is not None:
-        raise InputError("give either a fibre length per layer or the natural amount, not both")
+    _check_amount(fibre_per_layer, fibre, natural)
     if curve and strand is None:
         raise InputError("the curve is one of stiffness: leave the virtual test in, or it out")
-    if fibre_per_layer is not None:
-        check_wanted(fibre_per_layer)
     if print_plans:
         check_machine(case.machine)
     if not isinstance(strategies, Mapping):
         strategies = create_all(case, strategies)
-
     foreign = [one for one in strategies.values() if isinstance(one, GivenPaths)]
+    if slicings is not None:
+        if layers is not None or fibre_per_layer is not None or foreign or curve:
+            raise InputError(
+                "over several slicings there are no layers, fibre_per_layer, given paths or curve: "
+                "drop them, and give fibre, the length in all"
+            )
+        if print_plans:
+            raise InputError("prints are planned on one slicing: drop print_plans or slicings")
+        slicers = named_slicers(slicings)
+        solved, seconds = _solved(case, strand, load_case, backend, stress, progress)
+        return over_slicings(solved, strategies, slicers, fibre, natural, seconds, progress)
+
     if foreign and layers is None:
         layers = tuple(foreign[0].heights(plane_frame(case.build)[2]).tolist())
-    progress(f"solving {case.name}", 0.0)
-    field, given, stack, seconds = solve_and_slice(case, layers, load_case, backend, stress)
-    part = Part(field if given is None else given, stack, case.machine, strand)
-    tell = _counted(progress, 0.1, (5 if print_plans else 4) * len(strategies) + 1)
+    solved, seconds = _solved(case, strand, load_case, backend, stress, progress)
+    with timed(seconds, "slice"):
+        slicer = case.slicing if layers is None else as_slicer(layers)
+        stack = slicer(solved.planned_on, case.build, case.machine)
+    part = solved.part(stack)
+    tell = counted(progress, 0.1, (5 if print_plans else 4) * len(strategies) + 1)
     runs = [
         Run(name, one.on(stack) if isinstance(one, GivenPaths) else one, Toolpaths.empty(), None)
         for name, one in strategies.items()
     ]
-    asked_for, wanted = runs, fibre_per_layer
+    asked_for = runs
+    wanted = fibre_per_layer if fibre is None else fibre / max(len(stack), 1)
     if wanted is None and not natural:
         runs, wanted = levelled(runs, part, tell)
     else:
         runs = [planned(run, part, wanted, tell) for run in runs]
-    runs = [evaluated(run, part, tell) for run in runs]
-    if print_plans:
-        runs = [with_print(run, part, tell) for run in runs]
-    if strand is not None:
-        alternative = None
-        if case.alternative_supports:
-            with timed(seconds, "solve, alternative supports"):
-                alternative = _otherwise_held(case, field, backend)
-        runs = all_tested(runs, field, part, strand, backend, tell, alternative)
-    along = None
-    if strand is not None and (curve or (curve is None and _misses(runs, wanted))):
-        with timed(seconds, "curve"):
-            along = along_curve(
-                _as_asked(runs, asked_for),
-                part,
-                wanted,
-                lambda some: all_tested(some, field, part, strand, backend, tell, alternative, ()),
-                tell,
-            )
-    equal = [run for run in runs if run.tested is not None and not off_length(run, wanted)]
-    lengths = [float(run.toolpaths.lengths.sum()) for run in equal]
-    bound = None
-    # The bound is one for flat layers, and for supports that hold both ways.
-    pressing = any(isinstance(each, PressingSupport) for each in field.problem.supports)
-    if lengths and not pressing and all(layer.flat is not None for layer in stack):
-        tell("bounding what any paths could reach")
-        with timed(seconds, "bound"):
-            bound = upper_bound(
-                field, stack, max(lengths), case.machine, strand, iterations=_BOUND_ITERATIONS
-            )
-    return Comparison(case, field, stack, tuple(runs), wanted, seconds, bound, given, along)
-
-
-def _misses(runs: Sequence[Run], wanted: float | None) -> bool:
-    """Whether a strategy lays another length than the wanted one, since it cannot lay that."""
-    return any(
-        off_length(run, wanted) and not isinstance(run.strategy, GivenPaths)
-        for run in runs
-        if run.evaluation is not None
+    return judged(
+        solved, part, runs, asked_for, wanted, tell, curve, print_plans=print_plans, seconds=seconds
     )
 
 
-def _as_asked(runs: Sequence[Run], asked_for: Sequence[Run]) -> list[Run]:
-    """Give runs the strategies back that were asked for, before any was brought to a length."""
-    return [
-        replace(run, strategy=asked.strategy) for run, asked in zip(runs, asked_for, strict=True)
-    ]
+def _check_amount(fibre_per_layer: float | None, fibre: float | None, natural: bool) -> None:
+    """Refuse two amounts at once, and one that is none."""
+    if fibre is not None and fibre_per_layer is not None:
+        raise InputError("give the fibre per layer or the fibre in all, not both: drop one")
+    given = fibre if fibre_per_layer is None else fibre_per_layer
+    if given is None:
+        return
+    if natural:
+        raise InputError("give either a fibre length per layer or the natural amount, not both")
+    check_wanted(given)
+
+
+def _solved(
+    case: Case,
+    strand: Strand | None,
+    load_case: str | None,
+    backend: str,
+    stress: ForeignStress | None,
+    progress: Progress,
+) -> tuple[Solved, dict[str, float]]:
+    """Solve a case, and make what virtual tests stand on; the seconds of each."""
+    progress(f"solving {case.name}", 0.0)
+    field, given, seconds = _stress_of(case, load_case, backend, stress)
+    if strand is None:
+        return Solved(case, field, given), seconds
+    alternative = None
+    if case.alternative_supports:
+        with timed(seconds, "solve, alternative supports"):
+            alternative = _otherwise_held(case, field, backend)
+    with timed(seconds, "specimens"):
+        tests = Tests.of(field, alternative, strand, backend)
+    return Solved(case, field, given, tests), seconds
 
 
 def _otherwise_held(case: Case, field: StressField, backend: str) -> StressField:
@@ -332,13 +377,3 @@ def _load_case(case: Case, name: str | None) -> str:
         return known[0]
     check_known("load case", name, known)
     return name
-
-
-def _counted(progress: Progress, first: float, steps: int) -> Tell:
-    """Progress in steps of equal share, from the share `first` on."""
-    number = count()
-
-    def tell(what: str) -> None:
-        progress(what, min(first + (1.0 - first) * next(number) / steps, 1.0))
-
-    return tell

@@ -31,9 +31,10 @@ def write_results(
     ``part.png`` shows the part with its patches, loads and supports, ``part.html`` turns it.
 
     Where layers are curved, also ``STRATEGY_space.png`` and a page that turns,
-    ``STRATEGY_space.html``; with a curve, ``curve.csv`` and ``curve.png``. Runs with a print plan
-    get ``STRATEGY.gcode`` too. In ``paths.vtp`` the cell array "strategy" numbers the strategies
-    that did not fail, in the order of ``results.json``.
+    ``STRATEGY_space.html``, and ``matrix_waypoints.csv``, rings that fill the layers; with a curve,
+    ``curve.csv`` and ``curve.png``. Runs with a print plan get ``STRATEGY.gcode`` too. In
+    ``paths.vtp`` the cell array "strategy" numbers the strategies that did not fail, in the order
+    of ``results.json``.
 
     Parameters
     ----------
@@ -96,6 +97,18 @@ def _write_in_space(comparison: Comparison, folder: Path) -> None:
         (folder / f"{run.name}_space.html").write_text(page, encoding="utf-8")
 
 
+def _write_matrix(comparison: Comparison, folder: Path) -> None:
+    """Write the matrix of curved layers for robots, once for all strategies."""
+    from ccfem.export.layer_matrix import layer_matrix
+    from ccfem.export.robot_waypoints import write_robot_waypoints
+    from ccfem.toolpaths import MATRIX
+
+    file = folder / "matrix_waypoints.csv"
+    if not file.exists():
+        layers, machine = comparison.layers, comparison.case.machine
+        write_robot_waypoints(file, layer_matrix(layers, machine), layers, machine, MATRIX)
+
+
 def _write_paths(comparison: Comparison, folder: Path) -> None:
     """Write the paths of every strategy in the formats of other programs."""
     from ccfem.export.gcode import write_gcode
@@ -111,6 +124,7 @@ def _write_paths(comparison: Comparison, folder: Path) -> None:
         else:
             file = folder / f"{run.name}_waypoints.csv"
             write_robot_waypoints(file, paths, layers, comparison.case.machine)
+            _write_matrix(comparison, folder)
         if run.print_plan is not None:
             write_gcode(folder / f"{run.name}.gcode", run.print_plan, comparison.case.machine)
     every = Toolpaths.concatenate(run.toolpaths for run in runs)

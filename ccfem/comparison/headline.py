@@ -9,7 +9,14 @@ from ccfem.comparison.runs import Run, Tested
 from ccfem.evaluation.column import Column
 from ccfem.virtual_testing.strength import FirstFailure
 
-__all__ = ["HEADLINE", "TEST_COLUMNS", "Headline", "cell_text", "headline_values"]
+__all__ = [
+    "HEADLINE",
+    "HEADLINE_OF_SLICINGS",
+    "TEST_COLUMNS",
+    "Headline",
+    "cell_text",
+    "headline_values",
+]
 
 
 _RATIO = "stiffness of the part with its fibres over that without"
@@ -182,7 +189,7 @@ HEADLINE = (
     Headline("displacement", "displacement, mm", "low", "{:.3g}"),
     Headline("first_failure_load", "first failure, N", "high", "{:.0f}"),
     Headline("first_failure_load_alternative", "first failure, other supports, N", "", "{:.0f}"),
-    Headline("interlayer_load", "layers part, N", "", "{:.0f}"),
+    Headline("interlayer_load", "layers come apart, N", "", "{:.0f}"),
     Headline("fibre_per_layer", "fibre, mm a layer", "", "{:.0f}"),
     Headline("fibre_mass", "fibre, g", "", "{:.3g}"),
     Headline("print_time_nearest", "print time, min", "low", "{:.0f}"),
@@ -196,6 +203,27 @@ HEADLINE = (
     Headline("all_crossings", "crossings", "low", "{:.0f}"),
 )
 """The columns of the headline table; those that no run has are left out."""
+
+_OVER_SLICINGS = (
+    "printable",
+    "stiffness",
+    "stiffness_ratio_tension",
+    "stiffness_ratio_bonded",
+    "stiffness_ratio_tension_alternative",
+    "first_failure_load",
+    "first_failure_load_alternative",
+    "interlayer_load",
+)
+
+HEADLINE_OF_SLICINGS = (
+    *(head for head in HEADLINE if head.column in _OVER_SLICINGS),
+    Headline("interlayer_load_alternative", "layers come apart, other supports, N", "", "{:.0f}"),
+    Headline("joints_linked", "joints linked", "high", "{:.2f}"),
+    Headline("fibre_length", "fibre, mm", "", "{:.0f}"),
+    Headline("space_angle_stress", "angle to stress, degrees", "low", "{:.1f}"),
+    Headline("across_tension", "tension across layers", "low", "{:.1%}"),
+)
+"""The columns of the table over several slicings: nothing per layer, for the layers differ."""
 
 
 def headline_values(run: Run) -> Mapping[str, float]:

@@ -37,7 +37,7 @@ from ccfem.progress import Progress, silent
 if TYPE_CHECKING:
     from matplotlib.figure import Figure
 
-__all__ = ["Pictures", "caption", "draw_pictures"]
+__all__ = ["Pictures", "caption", "draw_pictures", "overview_picture"]
 
 
 @dataclass(frozen=True)
@@ -159,6 +159,17 @@ def _error(stress: StressField, layer: Layer) -> "Figure":
     error = stress.error.densities(stress.mesh.volumes)
     heading = f"estimated error of the cells in layer {layer.index}"
     return error_picture(layer, error, heading, f"{stress.error.relative:.1%} of the whole part")
+
+
+def overview_picture(comparison: Comparison) -> "Figure":
+    """Draw all strategies side by side on the middle one of the layers that have fibre."""
+    runs = [
+        replace(run, toolpaths=in_charts(run.toolpaths, comparison.layers))
+        for run in comparison.succeeded
+    ]
+    drawn = _drawn(comparison)
+    stress = stress_on(flat_view(drawn[len(drawn) // 2]), comparison.planned_on)
+    return _overview(runs, stress, comparison.case.machine.fibre_width, tension_limit(stress))
 
 
 def _overview(runs: Sequence[Run], stress: LayerStress, width: float, limit: float) -> "Figure":

@@ -5,7 +5,7 @@ from collections.abc import Sequence
 import numpy as np
 
 from ccfem.comparison.headline import HEADLINE, headline_values
-from ccfem.comparison.runs import Run
+from ccfem.comparison.runs import InAll, Run, Wanted
 from ccfem.planning.equal_fibre import TOLERANCE
 from ccfem.virtual_testing.stiffer import FIRST, RESOLUTION, SAME, UNDECIDED, stiffer
 
@@ -30,7 +30,7 @@ _STIFFNESSES = (
 """Columns of which the best is that of the stiffest run, where one is."""
 
 
-def ranking(runs: Sequence[Run], wanted: float | None) -> tuple[Run, ...]:
+def ranking(runs: Sequence[Run], wanted: Wanted) -> tuple[Run, ...]:
     """Return the runs from the best to the worst, failed ones last.
 
     By the predicted stiffness with fibres that carry tension only; those without a virtual test
@@ -40,8 +40,8 @@ def ranking(runs: Sequence[Run], wanted: float | None) -> tuple[Run, ...]:
     Parameters
     ----------
     runs : sequence of Run
-    wanted : float, mm, or None
-        Length of fibre per layer that all were held to; None where each laid its own.
+    wanted : float, mm, InAll or None
+        Length of fibre per layer, or in all, that all were held to; None where each laid its own.
     """
 
     def score(run: Run) -> tuple[bool, bool, bool, bool, float, float]:
@@ -58,7 +58,7 @@ def ranking(runs: Sequence[Run], wanted: float | None) -> tuple[Run, ...]:
     return tuple(sorted(runs, key=score))
 
 
-def best_values(runs: Sequence[Run], wanted: float | None) -> dict[str, float]:
+def best_values(runs: Sequence[Run], wanted: Wanted) -> dict[str, float]:
     """Best value of each headline column where a run is really better than another.
 
     Runs that cannot be printed, lay another length than the wanted one or leave layers empty have
@@ -101,11 +101,15 @@ def _strongest(runs: Sequence[Run], load: float) -> bool:
     )
 
 
-def off_length(run: Run, wanted: float | None) -> bool:
+def off_length(run: Run, wanted: Wanted) -> bool:
     """Whether a run lays more or less fibre than all were held to."""
-    return wanted is not None and not (
-        (1.0 - _SAME) * wanted <= run.length_per_layer <= (1.0 + _SAME) * wanted
-    )
+    if wanted is None:
+        return False
+    if isinstance(wanted, InAll):
+        laid, length = run.length, wanted.length
+    else:
+        laid, length = run.length_per_layer, wanted
+    return not (1.0 - _SAME) * length <= laid <= (1.0 + _SAME) * length
 
 
 def stiffness_ratio(run: Run, mode: str = "tension") -> float:

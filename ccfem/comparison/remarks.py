@@ -5,7 +5,7 @@ from collections.abc import Mapping, Sequence
 import numpy as np
 
 from ccfem.comparison.ranking import off_length, order_of, ranking, stiffness_ratio
-from ccfem.comparison.runs import Run
+from ccfem.comparison.runs import Run, Wanted
 from ccfem.evaluation.evaluation import Evaluation
 from ccfem.fibre_aware.upper_bound import UpperBound
 from ccfem.virtual_testing.stiffer import RESOLUTION, SAME, UNDECIDED
@@ -13,16 +13,14 @@ from ccfem.virtual_testing.stiffer import RESOLUTION, SAME, UNDECIDED
 __all__ = ["bound_remark", "remarks"]
 
 
-def remarks(
-    runs: Sequence[Run], wanted: float | None, bound: UpperBound | None = None
-) -> list[str]:
+def remarks(runs: Sequence[Run], wanted: Wanted, bound: UpperBound | None = None) -> list[str]:
     """Say what has to stand next to the numbers, a line each.
 
     Parameters
     ----------
     runs : sequence of Run
-    wanted : float, mm, or None
-        Length of fibre per layer that all were held to; None where each laid its own.
+    wanted : float, mm, InAll or None
+        Length of fibre per layer, or in all, that all were held to; None where each laid its own.
     bound : UpperBound, optional
     """
     order = ranking(runs, wanted)
@@ -36,7 +34,7 @@ def remarks(
     return [*found, bound_remark(tested, bound)] if bound is not None and tested else found
 
 
-def _about(run: Run, wanted: float | None, bounded: bool) -> list[str]:
+def _about(run: Run, wanted: Wanted, bounded: bool) -> list[str]:
     """Say what has to stand next to the numbers of one run."""
     reasons = {
         "failed": run.failure,

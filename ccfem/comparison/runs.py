@@ -13,7 +13,23 @@ from ccfem.toolpaths import Toolpaths
 from ccfem.virtual_testing.strength import FirstFailure
 from ccfem.virtual_testing.virtual_test import Bracket
 
-__all__ = ["Run", "Tested"]
+__all__ = ["InAll", "Run", "Tested", "Wanted"]
+
+
+@dataclass(frozen=True)
+class InAll:
+    """Length of fibre in the whole part, which runs on layers of their own are held to.
+
+    Attributes
+    ----------
+    length : float, mm
+    """
+
+    length: float
+
+
+Wanted = float | InAll | None
+"""Length of fibre that runs are held to: mm per layer, in all, or none where each lays its own."""
 
 
 @dataclass(frozen=True)
@@ -100,6 +116,12 @@ class Run:
         if self.tested is None:
             return f"Run {self.name!r}: {laid}"
         return f"Run {self.name!r}: {laid}, {self.tested.bracket.tension.ratio:.2f} times as stiff"
+
+    @property
+    def length(self) -> float:
+        """Length of fibre in all layers, mm; 0 where nothing was evaluated."""
+        layers = 0 if self.evaluation is None else len(self.evaluation.layers)
+        return self.length_per_layer * layers
 
     @property
     def printable(self) -> bool:

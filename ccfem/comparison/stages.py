@@ -1,9 +1,10 @@
 """Stages of a comparison: each makes of a `Run` one that holds more, or the reason why not."""
 
 import time
-from collections.abc import Callable, Iterator, Sequence
+from collections.abc import Callable, Iterator, Mapping, Sequence
 from contextlib import contextmanager
 from dataclasses import dataclass, replace
+from itertools import count
 from typing import Any
 
 from ccfem.comparison.runs import Run, Tested
@@ -19,6 +20,7 @@ from ccfem.planning.equal_fibre import TOLERANCE, Planned, length_per_layer, pla
 from ccfem.planning.given_paths import GivenPaths
 from ccfem.planning.plan import plan
 from ccfem.planning.strategy import LengthStrategy
+from ccfem.progress import Progress
 from ccfem.toolpaths import Toolpaths
 from ccfem.virtual_testing.equilibrium import BONDED, TENSION
 from ccfem.virtual_testing.specimen import Specimen
@@ -30,12 +32,16 @@ from ccfem.virtual_testing.virtual_test import Bracket, virtual_test
 __all__ = [
     "Part",
     "Tell",
+    "Tests",
     "all_tested",
     "attempted",
+    "counted",
     "evaluated",
     "levelled",
+    "natural",
     "planned",
     "timed",
+    "to_length",
     "with_plan",
     "with_print",
 ]
@@ -47,14 +53,25 @@ _TOLERANCE = 1e-6
 """Relative residual of the virtual tests: the error of the stiffness is of its square."""
 
 
+def counted(progress: Progress, first: float, steps: int) -> Tell:
+    """Progress in steps of equal share, from the share `first` on."""
+    number = count()
+
+    def tell(what: str) -> None:
+        progress(what, min(first + (1.0 - first) * next(number) / steps, 1.0))
+
+    return tell
+
+
 @dataclass(frozen=True)
 class Part:
-    """What all runs share: the stress that counts, the layers, the machine and the strand."""
+    """What all runs share: stress that counts, layers, machine, strand and build direction."""
 
     stress: PartStress
     layers: tuple[Layer, ...]
     machine: Machine
     strand: Strand | None = None
+    build: tuple[float, float, float] | None = None
 
 
 def planned(
@@ -116,26 +133,52 @@ def levelled(runs: Sequence[Run], part: Part, tell: Tell) -> tuple[list[Run], fl
     float, mm, or None
         The length per layer; None where nobody lays fibre.
     """
+    own, setter = natural(runs, part, tell)
+    length = None if setter is None else own[setter].length_per_layer
+    return to_length(own, setter, length, part, tell), length
+
+
+def natural(runs: Sequence[Run], part: Part, tell: Tell) -> tuple[dict[str, Run], str | None]:
+    """Plan runs to their natural amounts: by name, and the name of the one that lays least.
+
+    Strategies that take the length itself are planned only where they lay least; the name is None
+    where nobody lays fibre.
+    """
     own = {
         run.name: run
         if isinstance(run.strategy, LengthStrategy)
         else planned(run, part, None, tell)
         for run in runs
     }
-    setter = _setter(own, part, tell)
-    if setter is None:
-        return list(own.values()), None
-    length = own[setter].length_per_layer
-    given = isinstance(own[setter].strategy, GivenPaths)
+    return own, _setter(own, part, tell)
+
+
+def to_length(
+    own: Mapping[str, Run], setter: str | None, length: float | None, part: Part, tell: Tell
+) -> list[Run]:
+    """Plan runs to a length per layer, mm, from their natural amounts.
+
+    Parameters
+    ----------
+    own : mapping of name to Run
+        From `natural`.
+    setter : str, optional
+        Name of the run whose natural length that is: it stays as it is.
+    length : float, mm, optional
+        None where nobody lays fibre.
+    part : Part
+    tell : callable
+    """
 
     def level(run: Run) -> Run:
         if run.name == setter:
+            given = isinstance(run.strategy, GivenPaths)
             how = "given" if given else "has the shortest natural length"
             return replace(run, note=f"{how}: sets the length")
         start = Planned(run.strategy, run.toolpaths, run.length_per_layer)
         return planned(run, part, length, tell, start if len(run.toolpaths) else None)
 
-    return [level(run) for run in own.values()], length
+    return list(own.values()) if length is None else [level(run) for run in own.values()]
 
 
 def _setter(own: dict[str, Run], part: Part, tell: Tell) -> str | None:
@@ -173,7 +216,9 @@ def evaluated(run: Run, part: Part, tell: Tell) -> Run:
         return replace(run, failure=_no_fibre(part.machine))
 
     def work() -> Run:
-        found = evaluate(run.toolpaths, part.layers, part.stress, part.machine, part.strand)
+        found = evaluate(
+            run.toolpaths, part.layers, part.stress, part.machine, part.strand, part.build
+        )
         broken = why_not(found.total, part.machine)
         return replace(run, evaluation=found, why_not="; ".join(broken))
 
@@ -193,28 +238,46 @@ def with_print(run: Run, part: Part, tell: Tell) -> Run:
     return replace(run, print_plan=found, printed_volume=share)
 
 
-def all_tested(
-    runs: Sequence[Run],
-    stress: StressField,
-    part: Part,
-    strand: Strand,
-    backend: str,
-    tell: Tell,
-    alternative: StressField | None = None,
-    span: Sequence[float] = RHO_SPAN,
-) -> list[Run]:
-    """Test every run that did not fail virtually, all on one factorisation.
+@dataclass(frozen=True)
+class Tests:
+    """What virtual tests of a part stand on: made once, with one factorisation a model.
 
-    Where there is a solution under alternative supports, every run is tested under these too.
+    Attributes
+    ----------
+    strand : Strand
+    models : sequence of (Specimen, float)
+        The part under its supports, and under alternative ones where it has some, each with the
+        peak of the averaged von Mises stress without fibre, MPa.
+    refused : str
+        Why the part cannot be tested; else empty.
     """
-    fields = [stress] if alternative is None else [stress, alternative]
-    try:
-        specimens = [Specimen.of(field, backend) for field in fields]
-    except InputError as error:
-        return [replace(run, untested=str(error)) for run in runs]
-    before = [_peak(field) for field in fields]
-    models = list(zip(specimens, before, strict=True))
-    return [_tested(run, models, strand, part, tell, span) for run in runs]
+
+    strand: Strand
+    models: Sequence[tuple[Specimen, float]] = ()
+    refused: str = ""
+
+    @classmethod
+    def of(
+        cls, stress: StressField, alternative: StressField | None, strand: Strand, backend: str
+    ) -> "Tests":
+        """Make the specimens of a solution, and of that under alternative supports."""
+        fields = [stress] if alternative is None else [stress, alternative]
+        try:
+            return cls(strand, [(Specimen.of(each, backend), _peak(each)) for each in fields])
+        except InputError as error:
+            return cls(strand, refused=str(error))
+
+
+def all_tested(
+    runs: Sequence[Run], tests: Tests, part: Part, tell: Tell, span: Sequence[float] = RHO_SPAN
+) -> list[Run]:
+    """Test every run that did not fail virtually.
+
+    Where there is a model of alternative supports, every run is tested under these too.
+    """
+    if tests.refused:
+        return [replace(run, untested=tests.refused) for run in runs]
+    return [_tested(run, tests, part, tell, span) for run in runs]
 
 
 def _peak(stress: StressField) -> float:
@@ -225,23 +288,16 @@ def _peak(stress: StressField) -> float:
         return float("nan")
 
 
-def _tested(
-    run: Run,
-    models: Sequence[tuple[Specimen, float]],
-    strand: Strand,
-    part: Part,
-    tell: Tell,
-    span: Sequence[float],
-) -> Run:
+def _tested(run: Run, tests: Tests, part: Part, tell: Tell, span: Sequence[float]) -> Run:
     """Test a run virtually under one or two models of the supports, or say why it cannot be."""
     tell(f"testing {run.name}")
     if run.evaluation is None:
         return run
 
     def work() -> Run:
-        mesh = models[0][0].unreinforced.mesh
+        mesh = tests.models[0][0].unreinforced.mesh
         strands = cut_strands(run.toolpaths, mesh, machine=part.machine)
-        found = [_test(strands, *model, strand, part, span) for model in models]
+        found = [_test(strands, *model, tests.strand, part, span) for model in tests.models]
         return replace(run, tested=replace(found[0], alternative=[*found[1:], None][0]))
 
     return _stage(run, "virtual test", work, reason="untested")

@@ -6,7 +6,7 @@ from html import escape
 from ccfem.comparison.headline import Headline, cell_text, headline_values
 from ccfem.comparison.runs import Run
 
-__all__ = ["SUMMARY", "summary_html", "summary_text"]
+__all__ = ["SUMMARY", "SUMMARY_OF_SLICINGS", "summary_html", "summary_text"]
 
 SUMMARY = (
     Headline("printable", "printable", "", "{}"),
@@ -18,8 +18,18 @@ SUMMARY = (
 )
 """The columns of the summary; those that no run has are left out."""
 
+SUMMARY_OF_SLICINGS = (
+    *SUMMARY[:4],
+    Headline("interlayer_load", "layers come apart, N", "high", "{:.0f}"),
+    Headline("fibre_length", "fibre, mm", "", "{:.0f}"),
+    Headline("joints_linked", "joints linked", "high", "{:.2f}"),
+)
+"""The columns of the summary over several slicings."""
 
-def summary_text(ranking: Sequence[Run], verdict: str = "") -> str:
+
+def summary_text(
+    ranking: Sequence[Run], verdict: str = "", columns: Sequence[Headline] = SUMMARY
+) -> str:
     """Summary as plain text.
 
     Parameters
@@ -28,8 +38,9 @@ def summary_text(ranking: Sequence[Run], verdict: str = "") -> str:
         From the best to the worst.
     verdict : str
         A sentence to end with.
+    columns : sequence of Headline
     """
-    rows = _rows(ranking)
+    rows = _rows(ranking, columns)
     widths = [max(map(len, column)) for column in zip(*rows, strict=True)]
     lines = []
     for row, run in zip(rows, [None, *ranking], strict=True):
@@ -42,9 +53,11 @@ def summary_text(ranking: Sequence[Run], verdict: str = "") -> str:
     return "\n".join([*lines, verdict] if verdict else lines)
 
 
-def summary_html(ranking: Sequence[Run], verdict: str = "") -> str:
+def summary_html(
+    ranking: Sequence[Run], verdict: str = "", columns: Sequence[Headline] = SUMMARY
+) -> str:
     """Summary as an HTML table; parameters as of `summary_text`."""
-    head, *body = _rows(ranking)
+    head, *body = _rows(ranking, columns)
     rows = ["".join(f"<th>{escape(text)}</th>" for text in head)]
     for row, run in zip(body, ranking, strict=True):
         cells = [f"<td>{escape(text)}</td>" for text in row]
@@ -56,10 +69,10 @@ def summary_html(ranking: Sequence[Run], verdict: str = "") -> str:
     return f"<table>{table}</table>" + (f"<p>{escape(verdict)}</p>" if verdict else "")
 
 
-def _rows(ranking: Sequence[Run]) -> list[list[str]]:
+def _rows(ranking: Sequence[Run], columns: Sequence[Headline]) -> list[list[str]]:
     """Titles, and the cells of each run."""
     found = [headline_values(run) for run in ranking]
-    heads = [head for head in SUMMARY if any(head.column in values for values in found)]
+    heads = [head for head in columns if any(head.column in values for values in found)]
     rows = [["strategy", *(head.title for head in heads)]]
     for run in ranking:
         cells = [cell_text(run, head) for head in heads]

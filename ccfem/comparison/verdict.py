@@ -6,13 +6,13 @@ import numpy as np
 
 from ccfem.comparison.headline import headline_values
 from ccfem.comparison.ranking import off_length, order_of, ranking, stiffness_ratio
-from ccfem.comparison.runs import Run
+from ccfem.comparison.runs import InAll, Run, Wanted
 from ccfem.virtual_testing.stiffer import RESOLUTION, SAME, UNDECIDED
 
 __all__ = ["verdict"]
 
 
-def verdict(runs: Sequence[Run], wanted: float | None) -> str:
+def verdict(runs: Sequence[Run], wanted: Wanted) -> str:
     """Say in one sentence which strategy is best, by what, and at how much fibre.
 
     It speaks of the runs that can be printed and keep to the wanted length. "No difference" where
@@ -23,8 +23,8 @@ def verdict(runs: Sequence[Run], wanted: float | None) -> str:
     Parameters
     ----------
     runs : sequence of Run
-    wanted : float, mm, or None
-        Length of fibre per layer that all were held to; None where each laid its own.
+    wanted : float, mm, InAll or None
+        Length of fibre per layer, or in all, that all were held to; None where each laid its own.
 
     Returns
     -------
@@ -37,7 +37,7 @@ def verdict(runs: Sequence[Run], wanted: float | None) -> str:
         return ""
     said = _of_printable(kept, wanted)
     off = [
-        f"{run.name} (lays {run.length_per_layer:.0f} mm)"
+        f"{run.name} (lays {_laid(run, wanted)})"
         for run in order
         if run.printable and off_length(run, wanted)
     ]
@@ -47,7 +47,7 @@ def verdict(runs: Sequence[Run], wanted: float | None) -> str:
     return f"{said} Not printable as planned: {', '.join(left)}." if said and left else said
 
 
-def _of_printable(order: Sequence[Run], wanted: float | None) -> str:
+def _of_printable(order: Sequence[Run], wanted: Wanted) -> str:
     first, second = order[0], order[1]
     if first.tested is None or second.tested is None:
         return _by_efficiency(first, second, wanted)
@@ -78,7 +78,7 @@ def _of_printable(order: Sequence[Run], wanted: float | None) -> str:
     )
 
 
-def _by_efficiency(first: Run, second: Run, wanted: float | None) -> str:
+def _by_efficiency(first: Run, second: Run, wanted: Wanted) -> str:
     best, following = (headline_values(run)["efficiency"] for run in (first, second))
     if not np.isfinite(best):
         return "No verdict: there is no virtual test, and no fibre lies in tension."
@@ -109,8 +109,17 @@ def _under_other(runs: Sequence[Run]) -> str:
     )
 
 
-def _amount(wanted: float | None) -> str:
-    """Say how much fibre runs lay, mm per layer, where they were held to a length."""
+def _laid(run: Run, wanted: Wanted) -> str:
+    """Say how much fibre a run lays, in the terms of what was wanted."""
+    if isinstance(wanted, InAll):
+        return f"{1e-3 * run.length:.2f} m"
+    return f"{run.length_per_layer:.0f} mm"
+
+
+def _amount(wanted: Wanted) -> str:
+    """Say how much fibre runs lay, where they were held to a length."""
     if wanted is None:
         return "each with its own amount of fibre"
+    if isinstance(wanted, InAll):
+        return f"with {1e-3 * wanted.length:.2f} m of fibre in all"
     return f"at {wanted:.0f} mm of fibre per layer"

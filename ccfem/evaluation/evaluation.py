@@ -16,6 +16,7 @@ from ccfem.evaluation import (
     coverage,
     crossings,
     curvature,
+    head,
     links,
     manufacture,
     matching,
@@ -31,6 +32,7 @@ from ccfem.evaluation.containment import ContainmentSamples
 from ccfem.evaluation.coverage import CoverageSamples
 from ccfem.evaluation.crossings import CrossingSamples
 from ccfem.evaluation.curvature import CurvatureSamples
+from ccfem.evaluation.head import HeadSamples
 from ccfem.evaluation.links import LinkSamples
 from ccfem.evaluation.manufacture import ManufactureSamples
 from ccfem.evaluation.plane_paths import PlanePaths, plane_paths, pool
@@ -68,6 +70,7 @@ COLUMNS: tuple[Column, ...] = (
     *links.COLUMNS,
     *crossings.COLUMNS,
     *space.COLUMNS,
+    *head.COLUMNS,
 )
 """Every index in the order of the tables."""
 
@@ -159,6 +162,7 @@ def evaluate(
     stress: PartStress,
     machine: Machine,
     strand: Strand | None = None,
+    build: Sequence[float] | None = None,
 ) -> Evaluation:
     """Evaluate the fibre paths of a part.
 
@@ -177,6 +181,9 @@ def evaluate(
     strand : Strand, optional
         How stiff the fibre is in the index of stiffness alignment; by default as in the virtual
         test. It counts where `stress` is a `StressField`, which knows the matrix.
+    build : sequence of 3 floats, optional
+        Build direction, which the head's tilt on curved layers is measured from; by default the
+        mean normal of the layers.
 
     Returns
     -------
@@ -193,11 +200,12 @@ def evaluate(
     _check_layers(toolpaths, layers)
     fibre = toolpaths.of_kind(FIBRE).layer
     late = fibre[fibre < np.maximum.accumulate(fibre)]
+    stack = head.printed(layers, build)
 
     def sampled(layer: Layer) -> _Samples:
         behind = int(np.count_nonzero(late == layer.index))
         on_layer = toolpaths.on_layer(layer.index)
-        return _sample(on_layer, layer, stress, machine, _below(layer, layers), behind)
+        return _sample(on_layer, layer, stress, machine, _below(layer, layers), behind, stack)
 
     samples = in_threads(sampled, layers)
     material = _material(layers, stress, machine, strand or Strand())
@@ -254,6 +262,7 @@ class _Samples(NamedTuple):
     links: LinkSamples
     crossings: CrossingSamples
     space: SpaceSamples
+    head: HeadSamples
 
 
 def _sample(
@@ -263,6 +272,7 @@ def _sample(
     machine: Machine,
     below: Layer | None,
     late: int,
+    stack: head.Printed | None,
 ) -> _Samples:
     """Take the samples of one layer."""
     width = machine.fibre_width
@@ -291,6 +301,7 @@ def _sample(
         links.sample_links(paths),
         crossings.sample_crossings(paths),
         in_space,
+        head.sample_head(fibre, layer, stack, machine),
     )
 
 
@@ -331,4 +342,5 @@ def _indices(samples: _Samples, machine: Machine, material: Material) -> dict[st
         **links.link_indices(samples.links),
         **crossings.crossing_indices(samples.crossings),
         **space.space_indices(samples.space),
+        **head.head_indices(samples.head),
     }

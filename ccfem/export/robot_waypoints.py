@@ -22,19 +22,25 @@ _JUMP = 3.0
 
 
 def write_robot_waypoints(
-    path: str | Path, toolpaths: Toolpaths, layers: Sequence[Layer], machine: Machine
+    path: str | Path,
+    toolpaths: Toolpaths,
+    layers: Sequence[Layer],
+    machine: Machine,
+    kind: int = FIBRE,
 ) -> None:
-    """Write fibre paths as CSV: ``layer, path, x, y, z, nx, ny, nz, height, feed``.
+    """Write paths of one kind as CSV: ``layer, path, x, y, z, nx, ny, nz, height, feed``.
 
     Parameters
     ----------
     path : str or Path
     toolpaths : Toolpaths
-        Paths of other kinds than fibre are left out.
+        Paths of other kinds are left out.
     layers : sequence of Layer
         Layers that the paths lie on.
     machine : Machine
         Says the feed, mm/s, with which the step from each point to the next is laid.
+    kind : int, default FIBRE
+        As in `ccfem.toolpaths`: MATRIX for the paths of `layer_matrix`.
 
     Notes
     -----
@@ -45,7 +51,7 @@ def write_robot_waypoints(
     InputError
         When a path lies on a layer that is not given, or the file cannot be written.
     """
-    fibre, known = toolpaths.of_kind(FIBRE), {layer.index: layer for layer in layers}
+    fibre, known = toolpaths.of_kind(kind), {layer.index: layer for layer in layers}
     missing = set(fibre.layer.tolist()) - set(known)
     if missing:
         raise InputError(

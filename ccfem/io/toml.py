@@ -3,6 +3,7 @@
 import dataclasses
 import inspect
 import math
+import tomllib
 import types
 import typing
 from collections.abc import Callable, Mapping
@@ -10,7 +11,7 @@ from typing import Any, Literal, TypeVar, Union, get_args, get_origin
 
 from ccfem.errors import InputError, Mistakes, known_names, shown
 
-__all__ = ["from_table"]
+__all__ = ["assignment", "from_table"]
 
 T = TypeVar("T")
 
@@ -145,3 +146,14 @@ def _described(hint: Any) -> str:
     if origin is dict or _is_dataclass(hint):
         return "a table"
     return _WORDS.get(hint, str(hint))
+
+
+def assignment(text: str) -> tuple[str, Any]:
+    """Split ``name=value``; the value is read as TOML, or else as a plain string."""
+    name, equals, value = (part.strip() for part in text.partition("="))
+    if not equals or not name:
+        raise InputError(f"expected NAME=VALUE; got '{text}': write for example cap=90")
+    try:
+        return name, tomllib.loads(f"value = {value}")["value"]
+    except tomllib.TOMLDecodeError:
+        return name, value

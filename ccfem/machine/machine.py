@@ -58,6 +58,9 @@ class Machine:
         Our choice: a data sheet's value for carbon tow in thermoplastic, and that of PLA.
     bed_temperature : float, degrees Celsius
         Our choice, usual for PLA.
+    head_angle, head_length : float, degrees and mm
+        Half of the angle at the tip of the cone that the head is taken for, and the cone's length:
+        what it would run into on curved layers. Our choice.
     gcode : GcodeProfile
         What its firmware wants to be told.
     limits : Limits
@@ -83,6 +86,8 @@ class Machine:
     fibre_density: float = 1.4
     matrix_density: float = 1.24
     bed_temperature: float = 60.0
+    head_angle: float = 35.0
+    head_length: float = 40.0
     gcode: GcodeProfile = field(default_factory=GcodeProfile)
     limits: Limits = field(default_factory=Limits)
 
@@ -90,6 +95,7 @@ class Machine:
         check_fields(self, "fibre_width", "matrix_width", "matrix_diameter", above=0.0, unit="mm")
         numbers = [one.name for one in fields(self) if one.name not in _PARTS]
         check_fields(self, *numbers, at_least=0.0)
+        check_fields(self, "head_angle", below=90.0, unit="degrees")
 
     @property
     def strand_height(self) -> float:

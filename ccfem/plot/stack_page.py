@@ -80,7 +80,7 @@ def space_picture(
         axes.add_collection3d(Line3DCollection(strands, colors=shades, linewidths=0.7))
         axes.set_proj_type("ortho")
         axes.view_init(elevation, azimuth)
-        axes.set_box_aspect(np.maximum(high - low, 1e-3), zoom=1.15)
+        axes.set_box_aspect(np.maximum(high - low, 1e-3), zoom=0.98)
         for axis, a, b in zip("xyz", low, high, strict=True):
             getattr(axes, f"set_{axis}lim")(a, max(b, a + 1e-3))
         axes.set_axis_off()

@@ -4,12 +4,13 @@ G. Fang, T. Zhang, Y. Huang, Z. Zhang, K. Masania, C. C. L. Wang, Exceptional me
 by spatial printing with continuous fiber: Curved slicing, toolpath generation and physical
 verification, Additive Manufacturing 79 (2024) 103903. The layer is cut along curves that join its
 holes, and strands are level lines of a field from there to the outer border. The values on both
-borders are ours: with the paper's gradients the field rises and falls, and lines close on islands.
+borders are ours: with the paper's gradients (``energy = "paper"``) the field rises and falls, and
+lines close on islands or end at the border.
 """
 
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass
-from typing import Any, ClassVar, Literal
+from dataclasses import dataclass, field, replace
+from typing import Any, ClassVar, Literal, NamedTuple
 
 import numpy as np
 
@@ -17,20 +18,23 @@ from ccfem.arrays import FloatArray
 from ccfem.checks import check_choices, check_fields
 from ccfem.elasticity.part_stress import PartStress
 from ccfem.errors import InputError
+from ccfem.fields.layer_elements import Surface
 from ccfem.geometry.isocontours import isocontours
 from ccfem.geometry.nearest_on_triangles import nearest_on_triangles
-from ccfem.guidance.joints import joining_pairs, joints_of
+from ccfem.guidance.joint_lines import joint_lines
+from ccfem.guidance.joints import joints_of
 from ccfem.layers.layer import Layer
 from ccfem.layers.layer_stress import LayerStress
 from ccfem.machine.machine import Machine
 from ccfem.planning.infill import SPACING, check_fill, long_enough
 from ccfem.planning.strategy import Amount, LayerPlanner
-from ccfem.principal_lines.critical import Keep, critical_region
+from ccfem.principal_lines.critical import Keep
 from ccfem.principal_lines.strongest import strongest_stress
 from ccfem.toolpaths import Toolpaths
 from ccfem.winding.annulus import annulus_field
 from ccfem.winding.bends import limit_bends
 from ccfem.winding.even_levels import evened, steep
+from ccfem.winding.paper_field import PaperWeights, paper_field
 from ccfem.winding.piece import Piece, pieces_with_joints
 
 __all__ = ["Winding"]
@@ -39,6 +43,8 @@ _CLIP = 5.0
 """Largest weight of a triangle, in means over its layer."""
 _REACH = 4.0
 """How far along the curves the lift of the holes reaches, mm."""
+_KNOWN = "_wound"
+"""Where a layer keeps the fields of its pieces."""
 _KEPT = 0.6
 """Share of the length of the strands that keeps the spacing asked for."""
 
@@ -54,6 +60,11 @@ class Winding:
         on a layer is a hole count there.
     spacing : float, default 2.2
         Distance of strands in fibre widths that 60 % of their length keep.
+    energy : {"annulus", "paper"}
+        What the field minimises: ours, with given values on both borders, or that of the paper
+        (eq. 5 and 6), whose lines may end at the outer border.
+    paper : table
+        Weights of the paper's energy: stress, curves, compatible, zero.
     isotropy : float, default 0.003
         The smaller, the closer strands follow the stress; the larger, the more even they lie.
     smoothness : float, mm^2, default 0.3
@@ -71,7 +82,7 @@ class Winding:
         Where the field starts: below 0 on the holes, so that the innermost strand keeps off them;
         and below 0 where curves are further from the border than the holes are, so that strands do
         not spread there.
-    sharpest : float, 1/mm, default 0.125
+    sharpest : float, 1/mm, default 0.115
         Strands that bend more sharply are smoothed there.
     joined : int, optional
         Joints that a piece must hold to get fibre; by default as many as any piece of the part
@@ -82,6 +93,8 @@ class Winding:
 
     joints: tuple[str, ...] = ()
     spacing: float = 2.2
+    energy: Literal["annulus", "paper"] = "annulus"
+    paper: PaperWeights = field(default_factory=PaperWeights)
     isotropy: float = 0.003
     smoothness: float = 0.3
     weight: Literal["lines", "stress", "even"] = "lines"
@@ -90,7 +103,7 @@ class Winding:
     repulsion: float = 4.0
     lift: float = 0.1
     rise: float = 0.4
-    sharpest: float = 0.125
+    sharpest: float = 0.115
     joined: int | None = None
     minimum_length: float | None = None
 
@@ -99,6 +112,7 @@ class Winding:
         "stress": {"weight": "stress"},
         "even": {"weight": "even", "isotropy": 1.0, "smoothness": 0.0},
         "uncut": {"cut": False},
+        "paper": {"energy": "paper", "weight": "stress"},
     }
 
     def __post_init__(self) -> None:
@@ -130,22 +144,24 @@ class Winding:
                 f"{', '.join(names) or 'no patch'} does: name others (joints), or choose another "
                 "strategy or slicing"
             )
-        strongest = strongest_stress(stress.stress)
+        least = most if self.joined is None else self.joined
         if self.weight == "lines":
             joints = joints_of(stress, names)
-            weight = critical_region(
-                stress.mesh,
-                strongest.direction,
-                [joint.wall for joint in joints],
-                joining_pairs(joints, stress),
-                self.lines if len(joints) > 1 or self.lines != "joining" else "touching",
-            ).weight
-        elif self.weight == "stress":
-            weight = np.abs(strongest.value)
-        else:
-            weight = np.ones(len(stress.mesh.cells))
-        least = most if self.joined is None else self.joined
+            keep = self.lines if len(joints) > 1 or self.lines != "joining" else "touching"
+            strongest, region = joint_lines(stress, joints, keep)
+            return _Planner(self, tuple(names), strongest.direction, region.weight, least)
+        strongest = strongest_stress(stress.stress)
+        even = np.ones(len(stress.mesh.cells))
+        weight = np.abs(strongest.value) if self.weight == "stress" else even
         return _Planner(self, tuple(names), strongest.direction, weight, least)
+
+
+class _Wound(NamedTuple):
+    """Field on a piece of a layer, and the size of its gradient, 1/mm, that strands go by."""
+
+    piece: Piece
+    field: FloatArray
+    steep: float
 
 
 @dataclass(frozen=True)
@@ -172,9 +188,8 @@ class _Planner:
 
     def __call__(self, layer: Layer, stress: LayerStress, machine: Machine) -> Toolpaths:
         lines: list[FloatArray] = []
-        for piece in pieces_with_joints(layer, self.names):
-            if len(piece.loops) >= self.least:
-                lines += self.strands(piece, self.strategy.spacing * machine.fibre_width)
+        for one in self.fields(layer):
+            lines += self.strands(one, self.strategy.spacing * machine.fibre_width)
         normals = []
         for k, line in enumerate(lines):
             found = nearest_on_triangles(layer.points, layer.triangles, line)
@@ -186,11 +201,30 @@ class _Planner:
         paths = Toolpaths.in_space(lines, normals, layer)
         return long_enough(paths, self.strategy.minimum_length, machine)
 
-    def strands(self, piece: Piece, spacing: float) -> list[FloatArray]:
-        """Level lines of the field on a piece of a layer, near its surface."""
+    def fields(self, layer: Layer) -> "list[_Wound]":
+        """Fields of the pieces of a layer; the layer keeps the last, for another spacing."""
+        same = replace(self.strategy, spacing=1.0, minimum_length=None)
+        known: tuple[_Planner, list[_Wound]] | None = vars(layer).get(_KNOWN)
+        if known is not None:
+            last, found = known
+            given = (last.strategy, last.names, last.least) == (same, self.names, self.least)
+            if given and last.direction is self.direction and last.weight is self.weight:
+                return found
+        pieces = pieces_with_joints(layer, self.names)
+        found = [self.field(piece) for piece in pieces if len(piece.loops) >= self.least]
+        vars(layer)[_KNOWN] = (replace(self, strategy=same), found)
+        return found
+
+    def field(self, piece: Piece) -> "_Wound":
+        """Field of a piece of a layer, cut or not, its values evened out."""
         s = self.strategy
         piece = piece.joined(s.repulsion) if s.cut else piece
         surface = piece.surface
+        if s.energy == "paper":
+            inner = np.unique(np.concatenate([*piece.loops, *piece.curves]))
+            tension = self.tension(piece.layer)[piece.mesh.source]
+            field = paper_field(surface, tension, inner, s.paper)
+            return _Wound(piece, field, _median_slope(surface, field))
         inner, low = piece.inner_values(s.lift, s.rise, _REACH)
         outer = np.setdiff1d(np.concatenate(piece.outer), inner)
         fixed = np.concatenate([inner, outer])
@@ -198,12 +232,25 @@ class _Planner:
         tension = self.tension(piece.layer)[piece.mesh.source]
         field = annulus_field(surface, tension, s.isotropy, s.smoothness, fixed, values)
         field = evened(surface, field)
-        count = max(1, round(1.0 / (steep(surface, field, _KEPT) * spacing)))
-        found = isocontours(
-            piece.mesh.points, piece.mesh.triangles, field, 0.5 / count, 1.0 / count
-        )
+        return _Wound(piece, field, steep(surface, field, _KEPT))
+
+    def strands(self, one: "_Wound", spacing: float) -> list[FloatArray]:
+        """Level lines of the field on a piece of a layer, near its surface."""
+        mesh = one.piece.mesh
+        if self.strategy.energy == "paper":
+            step = spacing * one.steep
+            every = isocontours(mesh.points, mesh.triangles, one.field, 0.5 * step, step)
+            return [
+                limit_bends(line, self.strategy.sharpest)
+                if np.array_equal(line[0], line[-1])
+                else line
+                for line, level in zip(every.lines(), every.level, strict=True)
+                if level >= 0
+            ]
+        count = max(1, round(1.0 / (one.steep * spacing)))
+        found = isocontours(mesh.points, mesh.triangles, one.field, 0.5 / count, 1.0 / count)
         return [
-            limit_bends(line, s.sharpest)
+            limit_bends(line, self.strategy.sharpest)
             for line, level in zip(found.lines(), found.level, strict=True)
             if 0 <= level < count and np.array_equal(line[0], line[-1])
         ]
@@ -219,3 +266,11 @@ class _Planner:
             return np.zeros((len(layer.triangles), 3, 3))
         limited = np.minimum(1.0, _CLIP * mean / np.maximum(size, 1e-300)) / mean
         return np.asarray(np.einsum("t,ti,tj->tij", weight * limited, along, along))
+
+
+def _median_slope(surface: Surface, field: FloatArray) -> float:
+    """Median by area of the size of a field's gradient."""
+    size = np.linalg.norm(surface.gradient(field), axis=1)
+    order = np.argsort(size)
+    below = np.cumsum(surface.areas[order])
+    return float(size[order][np.searchsorted(below, 0.5 * below[-1])])

@@ -1,7 +1,8 @@
 """Closed curves made smoother where they bend too sharply, and only there."""
 
 import numpy as np
-from scipy.ndimage import gaussian_filter1d, maximum_filter1d
+from numba import njit
+from scipy.ndimage import gaussian_filter1d
 
 from ccfem.arrays import FloatArray
 from ccfem.geometry.polylines import resample
@@ -10,9 +11,11 @@ __all__ = ["limit_bends"]
 
 _STEP = 0.5
 """Distance of points, mm."""
-_ROUNDS = 200
+_ROUNDS = 600
 _SLACK, _LEFT = 1.05, 0.01
 """Done when no more than this share of the points bends by more than this times the limit."""
+_SPREAD = np.exp(-0.5 * (np.arange(-8, 9) / 2.0) ** 2)
+"""Gaussian, a millimetre in standard deviation, over which the movement fades out."""
 
 
 def limit_bends(curve: FloatArray, largest: float, smoothing: float = 0.5) -> FloatArray:
@@ -42,16 +45,55 @@ def limit_bends(curve: FloatArray, largest: float, smoothing: float = 0.5) -> Fl
     points = points[:-1]
     if smoothing > 0.0:
         points = gaussian_filter1d(points, smoothing / _STEP, axis=0, mode="wrap")
-    for _ in range(_ROUNDS):
-        before, after = points - np.roll(points, 2, 0), np.roll(points, -2, 0) - points
-        a, b = np.linalg.norm(before, axis=1), np.linalg.norm(after, axis=1)
-        sine = np.linalg.norm(np.cross(before, after), axis=1) / np.maximum(a * b, 1e-9)
-        bend = sine / (0.5 * (a + b))
-        if (bend > _SLACK * largest).mean() < _LEFT:
-            break
-        where = np.clip(bend / largest - 1.0, 0.0, 1.0)
-        where = gaussian_filter1d(maximum_filter1d(where, 5, mode="wrap"), 2, mode="wrap")
-        off = 0.5 * (np.roll(points, 1, 0) + np.roll(points, -1, 0)) - points
-        step = off - 0.5 * (np.roll(off, 1, 0) + np.roll(off, -1, 0))
-        points = points + 0.5 * where[:, None] * step
+    points = _straightened(np.ascontiguousarray(points), largest, _SPREAD / _SPREAD.sum(), _ROUNDS)
     return np.vstack([points, points[:1]])
+
+
+@njit(cache=True, nogil=True)
+def _straightened(  # type: ignore[no-untyped-def]
+    points, largest, spread, rounds
+):  # pragma: no cover, compiled
+    """Points of a closed curve after so many rounds, or when it bends little enough."""
+    n, half = len(points), len(spread) // 2
+    over, wide, step = np.zeros(n), np.zeros(n + 2 * half), np.zeros((n, 3))
+    for _ in range(rounds):
+        sharp = 0
+        for k in range(n):
+            before, after, dot = 0.0, 0.0, 0.0
+            for i in range(3):
+                one = points[k, i] - points[k - 2, i]
+                two = points[(k + 2) % n, i] - points[k, i]
+                before += one * one
+                after += two * two
+                dot += one * two
+            before, after = np.sqrt(before), np.sqrt(after)
+            square = max((before * after) ** 2 - dot * dot, 0.0)
+            bend = np.sqrt(square) / max(before * after, 1e-9) / (0.5 * (before + after))
+            over[k] = min(max(bend / largest - 1.0, 0.0), 1.0)
+            sharp += bend > _SLACK * largest
+        if sharp < _LEFT * n:
+            break
+        for k in range(n):
+            wide[half + k] = max(
+                over[k - 2], over[k - 1], over[k], over[(k + 1) % n], over[(k + 2) % n]
+            )
+        for k in range(half):
+            wide[k] = wide[n + k]
+            wide[half + n + k] = wide[half + k]
+        for k in range(n):
+            for i in range(3):
+                step[k, i] = 0.5 * (points[k - 1, i] + points[(k + 1) % n, i]) - points[k, i]
+        for k in range(n):
+            much = 0.0
+            for j in range(len(spread)):
+                much += spread[j] * wide[k + j]
+            over[k] = 0.5 * much
+        for i in range(3):
+            last, first = step[n - 1, i], step[0, i]
+            before = last
+            for k in range(n):
+                own = step[k, i]
+                after = first if k == n - 1 else step[k + 1, i]
+                points[k, i] += over[k] * (own - 0.5 * (before + after))
+                before = own
+    return points

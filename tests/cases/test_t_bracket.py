@@ -1,9 +1,12 @@
 """The T-bracket: its size is that of the published layers, its holes are round."""
 
+from dataclasses import replace
+
 import numpy as np
 import pytest
 
 from ccfem.cases.t_bracket import HOLES, t_bracket, t_bracket_front, t_bracket_top
+from ccfem.elasticity import solve
 from ccfem.layers.slicing import Planar, Spatial
 
 
@@ -67,3 +70,16 @@ def test_planar_layers_lie_across_the_axis_asked_for(case, axis, direction):
     for layer in Planar(count=3, axis=axis).cut(case.problem.mesh, (1.0, 1.0, 0.0)):
         assert np.ptp(layer.points[:, direction]) < 1e-9
         assert layer.flat.frame[2][direction] == 1.0
+
+
+def test_pull_is_held_by_bolts_that_only_press():
+    """Where walls and heads meet, on the rims of the holes, they press at right angles."""
+    case = t_bracket(order=1, bolts=True)
+    loads = {"pull": case.problem.loads["pull"]}
+    problem = replace(case.problem, supports=case.alternative_supports, loads=loads)
+    found = solve(problem)["pull"]
+    forces = found.support_forces
+    np.testing.assert_allclose(sum(forces.values()), [0.0, -1000.0, 0.0], atol=1.0)
+    # The heads hold it down; each side its half.
+    for name in ("head_left", "head_right"):
+        assert forces[name][1] == pytest.approx(-500.0, rel=0.1)

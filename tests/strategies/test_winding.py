@@ -110,6 +110,23 @@ def test_on_a_rolled_layer_strands_wind_as_on_the_flat_one(link):
     assert (np.einsum("pd,pd->p", found.normals[:, [0, 2]], out) > 0.99).all()
 
 
+def test_fields_that_a_layer_keeps_are_those_of_the_same_parameters(link):
+    """Another spacing takes the field over; another isotropy, joint or stress does not."""
+    known = Planar(count=1).cut(link.mesh)
+    plan(create("winding"), known, link, MACHINE)
+    other = replace(link.problem, loads={"pull": (Force("pulled", (50.0, 300.0, 0.0)),)})
+    for given, stress in (
+        ({"spacing": 3.0}, link),
+        ({"isotropy": 1.0}, link),
+        ({"joints": ["pulled"]}, link),
+        ({}, solve(other)["pull"]),
+    ):
+        strategy = create("winding", given)
+        fresh = plan(strategy, Planar(count=1).cut(link.mesh), stress, MACHINE)
+        found = plan(strategy, known, stress, MACHINE)
+        np.testing.assert_array_equal(found.points, fresh.points)
+
+
 def rolled(stress, angle):
     c, s, o = np.cos(angle), np.sin(angle), np.zeros_like(angle)
     turn = np.stack([c, o, s, o, o + 1.0, o, -s, o, c], axis=-1).reshape(-1, 3, 3)

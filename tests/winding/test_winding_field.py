@@ -14,6 +14,7 @@ from ccfem.winding.annulus import annulus_field, gradient_jumps
 from ccfem.winding.bends import limit_bends
 from ccfem.winding.even_levels import evened, steep
 from ccfem.winding.joining_curves import join
+from ccfem.winding.paper_field import PaperWeights, paper_field
 from ccfem.winding.triangle_mesh import TriangleMesh
 
 INNER, OUTER = 5.0, 20.0
@@ -182,3 +183,30 @@ def sharpest(curve):
     sides = [np.linalg.norm(p - q, axis=1) for p, q in ((a, b), (b, c), (c, a))]
     bend = 2.0 * np.linalg.norm(np.cross(b - a, c - a), axis=1) / np.prod(sides, axis=0)
     return np.quantile(bend, 0.98)
+
+
+def test_paper_field_is_the_distance_from_a_straight_cut(ring):
+    """All its terms vanish there but that of the stress, which is along the cut."""
+    plane, triangles = triangulate(shapely.box(0.0, 0.0, 30.0, 12.0), 1.0)
+    surface = Surface(in_space(plane), triangles)
+    inner = np.flatnonzero(plane[:, 0] < 1e-9)
+    along = np.tile(np.diag([0.0, 1.0, 0.0]), (len(triangles), 1, 1))
+    found = paper_field(surface, along, inner, PaperWeights())
+    # Zero holds softly, against nothing.
+    np.testing.assert_allclose(found, plane[:, 0], atol=0.01)
+    across = np.zeros((len(triangles), 3, 3))
+    bend = plane[triangles].mean(axis=1)[:, 0] / 40.0
+    axis = np.stack([np.cos(bend), 0.0 * bend, -np.sin(bend)], axis=1)
+    across = np.einsum("ti,tj->tij", axis, axis)
+    flatter = paper_field(surface, across, inner, PaperWeights(stress=10.0))
+    assert flatter.max() < 0.5 * found.max()
+
+
+def test_paper_field_beside_a_hole_is_the_distance_from_it(ring):
+    """Beside the hole, where it is told to have the gradient 1, it is the distance from it."""
+    surface, radius, fixed, _ = ring
+    inner = fixed[radius[fixed] < INNER + 0.01]
+    none = np.zeros((len(surface.triangles), 3, 3))
+    weak = paper_field(surface, none, inner, PaperWeights(compatible=1e-3))
+    near = radius < INNER + 0.9
+    np.testing.assert_allclose(weak[near], (radius - INNER)[near], atol=0.2)

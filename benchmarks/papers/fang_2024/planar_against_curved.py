@@ -1,98 +1,81 @@
-"""The T-bracket from planar and from curved layers, at equal length of fibre, tested virtually.
+"""One part from flat layers and from curved ones: rings on the former, winding strands on both.
 
-    python -m benchmarks.papers.fang_2024.planar_against_curved [ORDER]
+    python -m benchmarks.papers.fang_2024.planar_against_curved [FOLDER]
 
-ORDER of the cells, 1 by default. Prints one table in Markdown for each load; the spatial layers
-with `winding` set the length.
+on the case ``t_bracket`` with linear cells, pulled as in the paper and pushed out of its plane,
+all with the same fibre in all, held by fixed walls and again by bolts that only press. Prints a
+table of each load; into a folder it writes the whole reports.
 """
 
 import sys
-from typing import Any
+from pathlib import Path
 
 from ccfem.cases.t_bracket import t_bracket
 from ccfem.comparison.compare import compare
-from ccfem.comparison.result import Comparison, Run
-from ccfem.layers.slicing.planar import Planar
-from ccfem.layers.slicing.spatial import Spatial
+from ccfem.comparison.slicings import SlicingComparison
+from ccfem.comparison.slicings_files import write_slicings
+from ccfem.layers.slicing import Planar, Spatial
 
-__all__ = ["SLICINGS", "rows"]
+__all__ = ["ROWS", "against", "failure_loads"]
 
-SLICINGS: dict[str, tuple[Any, str]] = {
-    "spatial": (Spatial(), "winding"),
-    "spatial, isocurve": (Spatial(), "isocurve"),
-    "planar z": (Planar(axis="z", thickness=0.5), "concentric"),
-    "planar z, isocurve": (Planar(axis="z", thickness=0.5), "isocurve"),
-    "planar z, winding": (Planar(axis="z", thickness=0.5), "winding"),
-    "planar x": (Planar(axis="x", thickness=1.5), "concentric"),
-    "planar y": (Planar(axis="y", thickness=1.0), "concentric"),
+SLICINGS = {
+    "planar z": Planar(axis="z", thickness=1.0),
+    "planar x": Planar(axis="x", thickness=1.0),
+    "planar y": Planar(axis="y", thickness=1.0),
+    "spatial": Spatial(),
 }
-"""Layers and strategy of each row. The paper's planar layers are filled parallel to the border."""
+"""The paper's fibre layers lie about a millimetre apart, every second one being matrix alone."""
+
+ROWS = {
+    "planar z": "concentric",
+    "planar x": "concentric",
+    "planar y": "concentric",
+    "spatial": "winding",
+}
+"""Strategy of each slicing in the paper: rings parallel to the border on flat layers."""
 
 COLUMNS = (
-    "row",
-    "strategy",
-    "layers",
-    "fibre m",
-    "stiffness, tension only",
-    "bonded",
-    "first failure N",
-    "by",
-    "space angle",
-    "by stress",
-    "across layers",
-    "joints linked",
+    "stiffness_ratio_tension",
+    "stiffness_ratio_tension_alternative",
+    "first_failure_load",
+    "first_failure_load_alternative",
+    "interlayer_load",
+    "interlayer_load_alternative",
+    "joints_linked",
+    "space_angle_stress",
+    "across_tension",
 )
 
 
-def _row(name: str, comparison: Comparison, run: Run) -> str:
-    """Figures of a run as a row of the table."""
-    if run.evaluation is None or run.tested is None:
-        return f"| {name} | {run.name} | {run.failure or run.untested} |"
-    total, bracket = run.evaluation.total, run.tested.bracket
-    failure = run.tested.failure
-    values = [
-        name,
-        run.name,
-        str(len(comparison.layers)),
-        f"{total['fibre_length'] / 1e3:.1f}",
-        f"{bracket.tension.ratio:.3f}",
-        f"{bracket.bonded.ratio:.3f}",
-        "–" if failure is None else f"{failure.load:.0f}",
-        "–" if failure is None else failure.what,
-        f"{total['space_angle_mean']:.1f}",
-        f"{total['space_angle_stress']:.1f}",
-        f"{total['across_tension']:.3f}",
-        f"{total['joints_linked']:.2f}",
-    ]
-    return f"| {' | '.join(values)} |"
+def against(load_case: str) -> SlicingComparison:
+    """Compare under one load, and print the table."""
+    case = t_bracket(order=1, bolts=True)
+    found = compare(case, ["winding", "concentric"], slicings=SLICINGS, load_case=load_case)
+    table = found.frame.set_index(["slicing", "strategy"])
+    heads = ["slicing", "strategy", "printable", "fails in", *COLUMNS]
+    print(f"\n## {load_case}, {found.fibre:.0f} mm of fibre in all\n")
+    print(f"| {' | '.join(heads)} |\n{'|---' * len(heads)}|")
+    for name, row in table.iterrows():
+        if row["failure"]:
+            print(f"| {name[0]} | {name[1]} | {row['failure']} |")
+            continue
+        cells = [f"{row[column]:.4g}" for column in COLUMNS if column in table]
+        said = ["yes" if row["printable"] else f"no: {row['why_not']}", row["fails_in"]]
+        print(f"| {' | '.join([*name, *said, *cells])} |", flush=True)
+    print(f"\n{found.verdict}")
+    return found
 
 
-def rows(load_case: str, order: int = 1) -> None:
-    """Print the table of one load."""
-    case = t_bracket(order=order)
-    print(f"\n## {load_case}\n\n| {' | '.join(COLUMNS)} |\n{'|---' * len(COLUMNS)}|", flush=True)
-    wanted = None
-    for name, (slicer, strategy) in SLICINGS.items():
-        stack = 1.0
-        if wanted is not None:
-            from ccfem.comparison.compare import solve_and_slice
-
-            _, layers, _ = solve_and_slice(case, slicer, load_case)
-            stack = float(len(layers))
-        found = compare(
-            case,
-            [strategy],
-            layers=slicer,
-            fibre_per_layer=None if wanted is None else wanted / stack,
-            natural=wanted is None,
-            load_case=load_case,
-        )
-        run = found.runs[0]
-        if wanted is None:
-            wanted = float(run.toolpaths.lengths.sum())
-        print(_row(name, found, run), flush=True)
+def failure_loads(found: SlicingComparison, column: str) -> dict[str, float]:
+    """Failure load, N, of the paper's rows, by slicing."""
+    table = found.frame.set_index(["slicing", "strategy"])
+    return {slicing: float(table.loc[(slicing, each), column]) for slicing, each in ROWS.items()}
 
 
 if __name__ == "__main__":
-    for each in ("pull", "side"):
-        rows(each, int(sys.argv[1]) if len(sys.argv) > 1 else 1)
+    for load in ("pull", "side"):
+        result = against(load)
+        if len(sys.argv) > 1:
+            where = Path(sys.argv[1]) / load
+            where.mkdir(parents=True, exist_ok=True)
+            write_slicings(result, where)

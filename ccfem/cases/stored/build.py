@@ -13,7 +13,7 @@ from ccfem.mesh.tet_mesh import TetMesh
 
 __all__ = ["CASES", "DESIGNED", "build"]
 
-CASES = ("bar", "loop", "open_hole", "bracket", "t_bracket")
+CASES = ("bar", "loop", "open_hole", "bracket", "t_bracket", "twist_bar", "lifting_eye")
 DESIGNED = ("bridge", "suspension", "cantilever", "m_shape", "l_shape")
 """Cases of optimised plates: an outline and its mesh each."""
 

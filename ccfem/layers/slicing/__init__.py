@@ -5,12 +5,14 @@ from typing import Any
 
 from ccfem import plugins
 from ccfem.elasticity.part_stress import PartStress
+from ccfem.errors import InputError
+from ccfem.io.toml import assignment
 from ccfem.layers.layer import Layer
 from ccfem.layers.slicer import Slicer, Vector
 from ccfem.layers.slicing.planar import Planar
 from ccfem.machine.machine import Machine
 
-__all__ = ["as_slicer", "create", "named", "slice"]
+__all__ = ["as_slicer", "create", "from_text", "named", "slice", "split"]
 
 
 def named() -> Mapping[str, type[Slicer]]:
@@ -29,16 +31,54 @@ def create(name: str, parameters: Mapping[str, Any] | None = None) -> Slicer:
     return plugins.create("slicer", named(), name, parameters)
 
 
+def from_text(text: str) -> Slicer:
+    """Make a slicer of a text, ``method:name=value,name=value``.
+
+    A value without a name is that of the parameter that the slicer names `shorthand`:
+    ``planar:z`` is ``planar:axis=z``.
+
+    Raises
+    ------
+    InputError
+        As of `create`.
+    """
+    method, _, rest = (part.strip() for part in text.partition(":"))
+    parameters = {}
+    for one in (word.strip() for word in rest.split(",") if word.strip()):
+        if "=" in one:
+            name, value = assignment(one)
+        else:
+            name, value = getattr(named().get(method), "shorthand", ""), one
+        if not name:
+            raise InputError(f"slicer '{method}' expects NAME=VALUE; got '{one}': name it")
+        parameters[name] = value
+    return create(method, parameters)
+
+
+def split(text: str) -> tuple[str, ...]:
+    """Split slicings separated by commas; ``name=value`` belongs to the slicing before it."""
+    found: list[str] = []
+    for word in (word.strip() for word in text.split(",")):
+        if not word:
+            continue
+        if found and "=" in word and ":" not in word.partition("=")[0]:
+            found[-1] += f"{',' if ':' in found[-1] else ':'}{word}"
+        else:
+            found.append(word)
+    return tuple(found)
+
+
 def as_slicer(layers: "int | Sequence[float] | str | Slicer") -> Slicer:
     """Make a slicer of what short forms say.
 
     Parameters
     ----------
     layers : int, sequence of float, str or Slicer
-        A number of flat layers, their heights in mm, the name of a slicer, or a slicer itself.
+        A number of flat layers, their heights in mm, the name of a slicer with its parameters as
+        in `from_text`, or a slicer itself.
     """
     if isinstance(layers, str):
-        return create(layers)
+        return from_text(layers)
     if isinstance(layers, Slicer):
         return layers
     return Planar(count=layers) if isinstance(layers, int) else Planar(heights=tuple(layers))

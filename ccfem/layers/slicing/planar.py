@@ -1,7 +1,7 @@
 """Flat layers across the build direction."""
 
 from dataclasses import dataclass
-from typing import Literal
+from typing import ClassVar, Literal
 
 import numpy as np
 
@@ -54,6 +54,8 @@ class Planar:
     thickness: float | None = None
     heights: tuple[float, ...] | None = None
     axis: Literal["build", "x", "y", "z"] = "build"
+
+    shorthand: ClassVar[str] = "axis"
 
     def __post_init__(self) -> None:
         check_choices(self)

@@ -16,15 +16,15 @@ from ccfem.arrays import FloatArray
 from ccfem.elasticity.part_stress import PartStress
 from ccfem.errors import InputError
 from ccfem.guidance.guidance_field import GuidanceField, JointForm, Weights, guidance_field
-from ccfem.guidance.joints import Joint, joining_pairs, joints_of
+from ccfem.guidance.joint_lines import joint_lines
+from ccfem.guidance.joints import Joint, joints_of
 from ccfem.guidance.quality import FieldQuality, field_quality
 from ccfem.layers.layer import Layer
 from ccfem.layers.level_surfaces import level_surfaces
 from ccfem.layers.slicer import Vector
 from ccfem.layers.slicing.planar import Planar
 from ccfem.machine.machine import Machine
-from ccfem.principal_lines.critical import CriticalRegion, Keep, critical_region
-from ccfem.principal_lines.strongest import strongest_stress
+from ccfem.principal_lines.critical import CriticalRegion, Keep
 from ccfem.principal_lines.trace import mean_edge
 
 __all__ = ["Spatial", "SpatialSlicing"]
@@ -164,14 +164,7 @@ class Spatial:
         """
         mesh = stress.mesh
         joints = joints_of(stress, self.joints, self.rings, self.directions)
-        strongest = strongest_stress(stress.stress)
-        region = critical_region(
-            mesh,
-            strongest.direction,
-            [joint.wall for joint in joints],
-            joining_pairs(joints, stress),
-            self.lines,
-        )
+        strongest, region = joint_lines(stress, joints, self.lines)
         diagonal = float(np.linalg.norm(mesh.bounds[1] - mesh.bounds[0]))
         length = diagonal * _SMOOTH_OVER if self.length is None else self.length
         weights = Weights(self.stress_weight, self.smoothness, self.joint_weight, length)

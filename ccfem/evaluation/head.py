@@ -1,0 +1,185 @@
+"""The head on curved layers: how far it tilts, where it would hang over, what it would run into."""
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+
+import numpy as np
+from numba import njit
+
+from ccfem.arrays import BoolArray, FloatArray, read_only
+from ccfem.evaluation.column import Column
+from ccfem.geometry.nearest_on_triangles import nearest_on_triangles
+from ccfem.geometry.polylines import merge_repeated, sample_midpoints
+from ccfem.layers.layer import Layer
+from ccfem.machine.machine import Machine
+from ccfem.toolpaths import Toolpaths
+
+__all__ = ["COLUMNS", "HeadSamples", "Printed", "head_indices", "printed", "sample_head"]
+
+_STEEP = 45.0
+"""Tilt, degrees, from which a layer counts as overhanging."""
+_COARSE = 2.0
+"""Distance, mm, of the points that stand for what is printed, and of the samples of the fibre."""
+_NONE = "0 on flat layers; NaN without fibre"
+
+COLUMNS = (
+    Column(
+        "tilt_mean",
+        "degrees",
+        "Mean over the fibre's length of the angle between the normal of its layer, along which "
+        "the head stands, and the build direction.",
+        f"0 to 180; {_NONE}",
+    ),
+    Column("tilt_95", "degrees", "95th percentile of that angle.", f"0 to 180; {_NONE}"),
+    Column(
+        "overhang",
+        "1",
+        f"Share of the fibre's length whose layer is tilted by more than {_STEEP:.0f} degrees: a "
+        "head that stays upright would lay it on air.",
+        f"0 to 1; {_NONE}",
+    ),
+    Column(
+        "head_collision",
+        "1",
+        "Share of the fibre's length at which the head, a cone along the normal of the layer with "
+        "its tip on the fibre (machine.head_angle, machine.head_length), meets a layer that was "
+        f"printed before; layers are sampled every {_COARSE:g} mm.",
+        f"0 to 1, 0 is best; {_NONE}",
+    ),
+)
+
+
+@dataclass(frozen=True)
+class Printed:
+    """Points of all layers, those of the first ones first.
+
+    Attributes
+    ----------
+    points : (n, 3) array, mm
+    index : (n,) int array
+        Of the layer.
+    build : (3,) array
+        Unit vector.
+    """
+
+    points: FloatArray
+    index: FloatArray
+    build: FloatArray
+
+    def before(self, layer: Layer) -> FloatArray:
+        """Points of the layers under one."""
+        return self.points[: int(np.searchsorted(self.index, layer.index))]
+
+
+@dataclass(frozen=True)
+class HeadSamples:
+    """Samples of the fibre of a layer.
+
+    Attributes
+    ----------
+    length : (s,) array, mm
+    tilt : (s,) array, degrees
+    hits : (s,) bool array
+    """
+
+    length: FloatArray
+    tilt: FloatArray
+    hits: BoolArray
+
+    def __post_init__(self) -> None:
+        for name, values in vars(self).items():
+            object.__setattr__(self, name, read_only(values))
+
+
+def printed(layers: Sequence[Layer], build: Sequence[float] | None = None) -> Printed | None:
+    """Sample a stack of layers; None where all are flat.
+
+    Parameters
+    ----------
+    layers : sequence of Layer
+    build : sequence of 3 floats, optional
+        Build direction; by default the mean normal of the layers.
+    """
+    if all(layer.flat is not None for layer in layers):
+        return None
+    stack = sorted(layers, key=lambda layer: layer.index)
+    points = [np.concatenate([k.points, k.points[k.triangles].mean(axis=1)]) for k in stack]
+    index = np.repeat([layer.index for layer in stack], [len(each) for each in points])
+    every = np.concatenate(points)
+    # In each cube the point that is printed first.
+    _, first = np.unique(np.floor(every / _COARSE).astype(np.int64), axis=0, return_index=True)
+    first = np.sort(first)
+    up = np.zeros(3)
+    if build is None:
+        for layer in stack:
+            up += layer.areas @ layer.normals
+    else:
+        up += np.asarray(build, dtype=np.float64)
+    size = float(np.linalg.norm(up))
+    up = up / size if size > 0.0 else np.array([0.0, 0.0, 1.0])
+    return Printed(np.ascontiguousarray(every[first]), index[first].astype(np.float64), up)
+
+
+def sample_head(
+    fibre: Toolpaths, layer: Layer, stack: Printed | None, machine: Machine
+) -> HeadSamples:
+    """Take the samples of one layer.
+
+    Parameters
+    ----------
+    fibre : Toolpaths
+        On this layer.
+    layer : Layer
+    stack : Printed, optional
+        What `printed` makes of all layers.
+    machine : Machine
+    """
+    if stack is None or layer.flat is not None or not len(fibre):
+        length = fibre.lengths
+        return HeadSamples(length, np.zeros(len(length)), np.zeros(len(length), dtype=bool))
+    points, offsets, _ = merge_repeated(fibre.points, fibre.offsets, 1e-6)
+    middle, _, length, _ = sample_midpoints(points, offsets, _COARSE)
+    found = nearest_on_triangles(layer.points, layer.triangles, middle)
+    corners = layer.point_normals[layer.triangles[found.triangle]]
+    axis = np.einsum("sk,skd->sd", found.weights, corners)
+    axis /= np.maximum(np.linalg.norm(axis, axis=1, keepdims=True), 1e-300)
+    tilt = np.degrees(np.arccos(np.clip(axis @ stack.build, -1.0, 1.0)))
+    slope = float(np.tan(np.radians(machine.head_angle)))
+    hits = _meets(found.points, axis, stack.before(layer), slope, machine.head_length)
+    return HeadSamples(length, tilt, hits)
+
+
+@njit(cache=True, nogil=True)
+def _meets(  # type: ignore[no-untyped-def]
+    tips, axes, points, slope, length
+):  # pragma: no cover, compiled
+    """Whether a point lies in the cone at each tip, slope its radius over its height."""
+    found = np.zeros(len(tips), dtype=np.bool_)
+    for k in range(len(tips)):
+        x, y, z = tips[k]
+        u, v, w = axes[k]
+        for p in range(len(points)):
+            a, b, c = points[p, 0] - x, points[p, 1] - y, points[p, 2] - z
+            high = a * u + b * v + c * w
+            if high <= 0.0 or high > length:
+                continue
+            if a * a + b * b + c * c < high * high * (1.0 + slope * slope):
+                found[k] = True
+                break
+    return found
+
+
+def head_indices(samples: HeadSamples) -> dict[str, float]:
+    """Values of `COLUMNS`."""
+    total = float(samples.length.sum())
+    if not total > 0.0:
+        return {column.name: float("nan") for column in COLUMNS}
+    order = np.argsort(samples.tilt, kind="stable")
+    below = np.cumsum(samples.length[order]) / total
+    at = min(int(np.searchsorted(below, 0.95)), len(order) - 1)
+    return {
+        "tilt_mean": float(samples.length @ samples.tilt) / total,
+        "tilt_95": float(samples.tilt[order][at]),
+        "overhang": float(samples.length @ (samples.tilt > _STEEP)) / total,
+        "head_collision": float(samples.length @ samples.hits) / total,
+    }

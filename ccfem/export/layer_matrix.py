@@ -1,0 +1,46 @@
+"""Matrix of layers, flat or curved: rings parallel to the border that fill it."""
+
+from collections.abc import Sequence
+from dataclasses import replace
+
+import numpy as np
+
+from ccfem.fields.chart import chart_of, flat_view
+from ccfem.geometry.offsets import offset_rings
+from ccfem.layers.layer import Layer
+from ccfem.machine.machine import Machine
+from ccfem.toolpaths import MATRIX, Toolpaths
+
+__all__ = ["layer_matrix"]
+
+_HALF_WIDTHS = 0.5
+"""The outermost ring lies so many widths inside the border."""
+
+
+def layer_matrix(layers: Sequence[Layer], machine: Machine) -> Toolpaths:
+    """Fill layers with matrix: rings a line's width apart, measured in the chart of curved layers.
+
+    A line has the width of the machine and the height that the layer has where it lies, so that
+    its cross-section changes along it: `ccfem.export.robot_waypoints` writes that height.
+
+    Parameters
+    ----------
+    layers : sequence of Layer
+    machine : Machine
+        Its `matrix_width`.
+
+    Returns
+    -------
+    Toolpaths
+        Closed paths of matrix, from the border inwards, layer by layer.
+    """
+    width = machine.matrix_width
+    found = []
+    for layer in layers:
+        view = flat_view(layer)
+        levels = offset_rings(view.plane.polygon, _HALF_WIDTHS * width, width, width)
+        rings = [ring for level in levels for ring in level]
+        paths = Toolpaths.from_plane(rings, view)
+        paths = replace(paths, kind=np.full(len(paths), MATRIX, dtype=paths.kind.dtype))
+        found.append(paths if view is layer else chart_of(layer).lifted(paths))
+    return Toolpaths.concatenate(found)
