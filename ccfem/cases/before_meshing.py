@@ -13,7 +13,7 @@ from ccfem.elasticity.supports import held
 from ccfem.errors import Mistakes
 from ccfem.io.surface import Surface
 from ccfem.mesh.cell_mesh import CellMesh
-from ccfem.mesh.face_rules import GROUP
+from ccfem.mesh.face_names import face_name
 from ccfem.mesh.patches import PatchRule, patches_from_rules
 from ccfem.mesh.shell import Shell, refined
 from ccfem.mesh.smooth_faces import smooth_faces
@@ -49,7 +49,7 @@ def check_before_meshing(
     found = Mistakes()
     points, triangles, origin = refined(surface.points, surface.triangles, 0.5 * edge_length)
     groups = {
-        GROUP.format(k): triangles[np.isin(origin, face.facets)]
+        face_name(k): triangles[np.isin(origin, face.facets)]
         for k, face in enumerate(smooth_faces(surface.points, surface.triangles), 1)
     }
     shell = Shell(points, triangles, groups)

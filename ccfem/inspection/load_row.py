@@ -1,5 +1,6 @@
 """What a load comes to: its resultant, where that acts, and how much of it falls on supports."""
 
+import re
 from dataclasses import dataclass
 
 import numpy as np
@@ -19,7 +20,7 @@ from ccfem.elasticity.loads import nodal_forces
 from ccfem.elasticity.problem import Problem
 from ccfem.elasticity.volume_loads import volume_forces
 
-__all__ = ["LoadRow", "load_row"]
+__all__ = ["LoadRow", "kind_of", "load_row"]
 
 _NONE = 1e-9
 """Resultant over the sum of the sizes of the nodal forces that counts as none."""
@@ -42,7 +43,8 @@ class LoadRow:
         Of attack: on the line of the resultant, nearest to the middle of the forces; their middle
         where they have no resultant.
     held : float
-        Share of the nodal forces that supports take at once.
+        Share of the nodal forces of a load on a patch that supports take at once; 0 for a force of
+        the volume, whose share on held nodes is meant.
     """
 
     case: str
@@ -69,7 +71,7 @@ def load_row(problem: Problem, case: str, load: Load, held: Held | None) -> Load
     InputError
         For a load that its patch cannot take.
     """
-    kind = type(load).__name__.lower()
+    kind = kind_of(load)
     where = "".join(f" on {name}" for name in patches_of(load))
     if isinstance(load, Displacement | Temperature):
         nothing = np.full(3, np.nan)
@@ -90,7 +92,12 @@ def load_row(problem: Problem, case: str, load: Load, held: Held | None) -> Load
         total = np.zeros(3)
     moment = turning - np.cross(point - middle, total)
     lost = 0.0
-    if held is not None and held.ties is None:
+    if held is not None and held.ties is None and isinstance(load, SurfaceLoad):
         free = np.linalg.norm(np.where(held.free[: len(forces)], forces, 0.0), axis=1)
         lost = 1.0 - float(free.sum() / sizes.sum())
     return LoadRow(case, f"{kind}{where}", total, moment, point, lost)
+
+
+def kind_of(value: object) -> str:
+    """Kind of a load or a support in words, as "point force"."""
+    return re.sub(r"(?<=[a-z])(?=[A-Z])", " ", type(value).__name__).lower()

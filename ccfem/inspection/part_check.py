@@ -15,7 +15,7 @@ from ccfem.elasticity.loads import load_case
 from ccfem.elasticity.supports import held, held_in
 from ccfem.errors import Mistakes
 from ccfem.inspection.cost import solve_costs
-from ccfem.inspection.load_row import LoadRow, load_row
+from ccfem.inspection.load_row import LoadRow, kind_of, load_row
 from ccfem.inspection.patch_row import PatchRow, patch_rows
 from ccfem.mesh.check import about_slivers
 from ccfem.mesh.facets import are_among
@@ -187,12 +187,12 @@ def _carried(case: Case) -> dict[str, list[str]]:
     for support in case.problem.supports:
         held_along = getattr(support, "components", "")
         for name in patches_of(support):
-            word = type(support).__name__.lower()
+            word = kind_of(support)
             carried.setdefault(name, []).append(f"{word} {held_along}".strip())
     for label, loads in case.problem.loads.items():
         for load in loads:
             for name in patches_of(load):
-                carried.setdefault(name, []).append(f"{type(load).__name__.lower()} of {label}")
+                carried.setdefault(name, []).append(f"{kind_of(load)} of {label}")
     return carried
 
 

@@ -77,7 +77,7 @@ def in_own_process(
         except subprocess.TimeoutExpired:
             raise ChildError(f"it takes more than {seconds:.0f} s") from None
         out = Path(folder) / "out.npz"
-        if work > 0.0 and done.returncode == -getattr(signal, "SIGXCPU", 0):
+        if work > 0.0 and _ending(done.returncode) == "SIGXCPU":
             raise ChildError(f"it takes more than {work:.0f} s")
         if not out.exists():
             raise ChildError(f"the library crashed ({_ending(done.returncode)})")

@@ -12,7 +12,7 @@ def nearest_end_order(starts: FloatArray, ends: FloatArray) -> tuple[IntArray, B
 
     Parameters
     ----------
-    starts, ends : (k, 2) arrays, mm
+    starts, ends : (k, 2) or (k, 3) arrays, mm
         Ends of the paths; of a closed one the same point twice. The first path comes first.
 
     Returns
@@ -25,15 +25,20 @@ def nearest_end_order(starts: FloatArray, ends: FloatArray) -> tuple[IntArray, B
     """
     count = len(starts)
     order, backward = np.zeros(count, dtype=np.int64), np.zeros(count, dtype=bool)
-    left = np.ones(count, dtype=bool)
-    travel = 0.0
+    points = np.concatenate([starts, ends])
+    entry = np.arange(2 * count)  # k: path k at its start; count + k: at its end
+    left = points.T.copy()
+    chosen, travel = 0, 0.0
     for k in range(count):
         if k:
-            here = starts[order[k - 1]] if backward[k - 1] else ends[order[k - 1]]
-            off = np.stack([np.linalg.norm(p - here, axis=1) for p in (starts, ends)])
-            off[:, ~left] = np.inf
-            side, best = divmod(int(off.argmin()), count)
-            order[k], backward[k] = best, bool(side)
-            travel += float(off[side, best])
-        left[order[k]] = False
+            here = points[(chosen + count) % (2 * count)]
+            way = left - here[:, None]
+            chosen = int(entry[np.einsum("ij,ij->j", way, way).argmin()])
+            travel += float(np.linalg.norm(points[chosen] - here))
+        backward[k], order[k] = divmod(chosen, count)
+        taken = np.searchsorted(entry, [order[k], count + order[k]])
+        left[:, taken] = np.inf
+        if k % 64 == 63:
+            kept = np.isfinite(left[0])
+            left, entry = left[:, kept], entry[kept]
     return order, backward, travel

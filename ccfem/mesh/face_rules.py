@@ -8,15 +8,14 @@ import numpy as np
 from ccfem.arrays import IntArray
 from ccfem.checks import check_fields
 from ccfem.errors import InputError
+from ccfem.mesh.face_names import face_name, number_of_face
 from ccfem.mesh.facets import are_among
 from ccfem.mesh.patches import Bounded, Vector, match_boundary, unit_vector
 from ccfem.mesh.smooth_faces import FEATURE_ANGLE, Face, given_faces, smooth_faces
 from ccfem.mesh.tet_mesh import TetMesh
 
-__all__ = ["GROUP", "Faces", "Holes", "faces_of", "without_faces"]
+__all__ = ["Faces", "Holes", "faces_of", "without_faces"]
 
-GROUP = "face_{}"
-"""Name of the group that holds a numbered face of the surface that a mesh was made from."""
 _PARALLEL = 0.02
 """Sine of the largest angle between the axis of a hole and the one that is wanted."""
 
@@ -52,10 +51,9 @@ class Faces:
 
         Where the mesh was made from a surface whose faces came with it as groups, of these.
         """
-        if GROUP.format(1) in mesh.patches:
-            count = sum(name.startswith(GROUP.format("")) for name in mesh.patches)
-            _check_count(self._numbers, count)
-            groups = [mesh.patches.get(GROUP.format(number)) for number in self._numbers]
+        if face_name(1) in mesh.patches:
+            _check_count(self._numbers, max(number_of_face(n) or 0 for n in mesh.patches))
+            groups = [mesh.patches.get(face_name(number)) for number in self._numbers]
             found = [group for group in groups if group is not None]
             return match_boundary(mesh, np.concatenate(found or [np.zeros((0, 3), np.int64)]))
         faces = smooth_faces(mesh.points, mesh.boundary, self.angle)
@@ -121,8 +119,8 @@ def faces_of(mesh: Bounded, angle: float = FEATURE_ANGLE) -> tuple[Face, ...]:
     The facets of each are rows of `TetMesh.boundary`. A coarse mesh has corners all round a hole;
     the file that it was made from has not.
     """
-    names = sorted(name for name in mesh.patches if name.startswith(GROUP.format("")))
-    if GROUP.format(1) not in names:
+    names = sorted(name for name in mesh.patches if number_of_face(name))
+    if face_name(1) not in names:
         return smooth_faces(mesh.points, mesh.boundary, angle)
     rows = [np.flatnonzero(are_among(mesh.boundary, mesh.patches[name])) for name in names]
     return given_faces(mesh.points, mesh.boundary, [each for each in rows if len(each)])
@@ -130,8 +128,8 @@ def faces_of(mesh: Bounded, angle: float = FEATURE_ANGLE) -> tuple[Face, ...]:
 
 def without_faces(mesh: TetMesh, kept: Iterable[str]) -> TetMesh:
     """Mesh without the groups of a surface's faces, but for those with a name that is kept."""
-    wanted, prefix = set(kept), GROUP.format("")
-    patches = {n: f for n, f in mesh.patches.items() if n in wanted or not n.startswith(prefix)}
+    wanted = set(kept)
+    patches = {n: f for n, f in mesh.patches.items() if n in wanted or number_of_face(n) is None}
     return replace(mesh, patches=patches)
 
 

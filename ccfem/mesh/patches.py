@@ -14,6 +14,7 @@ from numpy.typing import ArrayLike
 from ccfem.arrays import BoolArray, FloatArray, IntArray
 from ccfem.checks import FARTHEST, check_fields, check_number
 from ccfem.errors import InputError
+from ccfem.mesh.face_names import check_free
 from ccfem.mesh.facets import are_among
 
 __all__ = [
@@ -32,6 +33,8 @@ __all__ = [
 
 Vector = tuple[float, float, float]
 
+FACE_GROUP = "face_{}"
+"""Name of the group that holds a numbered face of the surface that a mesh was made from."""
 _AXES = {"x": (1.0, 0.0, 0.0), "y": (0.0, 1.0, 0.0), "z": (0.0, 0.0, 1.0)}
 _ALONG = np.cos(np.pi / 4)
 """Cosine above which a facet's normal counts as along a direction."""
@@ -294,6 +297,7 @@ def patches_from_rules(mesh: BoundedT, rules: Mapping[str, PatchRule]) -> Bounde
     """
     patches = {}
     for name, rule in rules.items():
+        check_free(name)
         try:
             patches[name] = rule(mesh)
         except InputError as error:
@@ -335,8 +339,7 @@ def unit_vector(value: str | ArrayLike, what: str) -> FloatArray:
                 f"{what} must be 'x', 'y', 'z', one of them with a minus, or 3 numbers; got "
                 f"'{value}': correct it"
             )
-        sign = -1.0 if value.startswith("-") else 1.0
-        return sign * np.array(_AXES[value.removeprefix("-")])
+        return (-1.0 if value.startswith("-") else 1.0) * np.array(_AXES[value.removeprefix("-")])
     vector = _vector(value, what)
     largest = float(np.abs(vector).max())
     if not 0.0 < largest < np.inf:

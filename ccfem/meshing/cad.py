@@ -14,7 +14,7 @@ from ccfem.io.surface import Surface
 from ccfem.io.whole import existing_file
 from ccfem.isolated.process import ChildError, in_own_process
 from ccfem.mesh.check import check_mesh
-from ccfem.mesh.face_rules import GROUP
+from ccfem.mesh.face_names import face_name
 from ccfem.mesh.patches import match_boundary
 from ccfem.mesh.tet_mesh import TetMesh
 from ccfem.meshing.fidelity import fidelity
@@ -97,7 +97,7 @@ def mesh_cad(
     groups: dict[str, list[IntArray]] = {}
     for k, name in enumerate(made["names"].tolist(), 1):
         facets = match_boundary(mesh, made["triangles"][made["face"] == k])
-        for each in (GROUP.format(k), name):
+        for each in (face_name(k), name):
             if each:
                 groups.setdefault(each, []).append(facets)
     mesh = mesh.with_patches({name: np.concatenate(those) for name, those in groups.items()})

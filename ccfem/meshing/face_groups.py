@@ -5,7 +5,7 @@ from dataclasses import replace
 import numpy as np
 
 from ccfem.io.surface import Surface
-from ccfem.mesh.face_rules import GROUP
+from ccfem.mesh.face_names import face_name
 from ccfem.mesh.smooth_faces import FEATURE_ANGLE, smooth_faces
 from ccfem.mesh.tet_mesh import TetMesh
 
@@ -40,5 +40,5 @@ def with_faces_of(surface: Surface, mesh: TetMesh, angle: float = FEATURE_ANGLE)
     shell = pyvista.PolyData.from_regular_faces(surface.points, surface.triangles)
     centres = mesh.points[mesh.boundary].mean(axis=1)
     of = number[np.asarray(shell.find_closest_cell(centres))]
-    groups = {GROUP.format(k): mesh.boundary[of == k] for k in np.unique(of).tolist()}
+    groups = {face_name(k): mesh.boundary[of == k] for k in np.unique(of).tolist()}
     return replace(mesh, patches={**mesh.patches, **groups})

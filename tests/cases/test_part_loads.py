@@ -7,29 +7,37 @@ import numpy as np
 import pytest
 
 import ccfem.cases.part_file
+from ccfem.cases.before_meshing import check_before_meshing
 from ccfem.cases.part_file import read_part
 from ccfem.cases.part_loads import LOADS, SUPPORTS
 from ccfem.cases.part_regions import REGIONS
 from ccfem.elasticity import (
+    Bearing,
     BodyForce,
     Displacement,
     EdgeSupport,
+    Force,
     Foundation,
     Gravity,
     Pin,
+    PointForce,
     PointSpring,
     PointSupport,
     PressingSupport,
+    Pressure,
     RigidPatch,
     SlidingSupport,
     Spring,
     Support,
     Temperature,
+    Traction,
     solve,
 )
 from ccfem.errors import InputError
 from ccfem.io import write_mesh
+from ccfem.io.surface import Surface
 from ccfem.mesh import box_mesh
+from ccfem.mesh.patches import Plane
 
 EXAMPLE = Path(__file__).parents[2] / "docs" / "loads_and_supports.toml"
 
@@ -299,3 +307,41 @@ def test_what_only_the_solve_can_know_is_one_line(folder):
     ]:
         with pytest.raises(InputError, match=message):
             solve(read(folder, text))
+
+
+def test_every_kind_is_weighed_on_a_surface_before_it_is_meshed():
+    """A box of 20 x 2 x 1 mm as a surface: what a mesh of it could carry passes, the rest not."""
+    box = box_mesh((20.0, 2.0, 1.0), (2, 1, 1))
+    surface = Surface(box.points, box.boundary)
+    rules = {"left": Plane("x", "min"), "right": Plane("x", "max"), "below": Plane("y", "min")}
+    loads = (
+        Force("right", (1.0, 0.0, 0.0)),
+        Traction("right", (1.0, 0.0, 0.0)),
+        Pressure("right", 1.0),
+        PointForce((20.0, 0.0, 0.0), (1.0, 0.0, 0.0)),
+        BodyForce((0.0, 0.0, -1.0)),
+        Gravity((0.0, 0.0, -9810.0)),
+        Temperature(20.0),
+        Displacement("right", (0.1, 0.0, 0.0)),
+    )
+    assert {type(load) for load in loads} | {Bearing} == set(LOADS.values())
+    others = (
+        EdgeSupport(("left", "below")),
+        PointSupport((20.0, 0.0, 0.0)),
+        SlidingSupport("below"),
+        RigidPatch("right"),
+        Pin("right", (20.0, 1.0, 0.5), "z"),
+        Spring("right", (1.0, 1.0, 1.0)),
+        PointSpring((20.0, 0.0, 0.0), (1.0, 1.0, 1.0)),
+        Foundation("right", 1.0, 1.0),
+        PressingSupport("below"),
+    )
+    assert {type(each) for each in others} | {Support} == set(SUPPORTS.values())
+    for other in others:
+        cases = {"all": loads}
+        check_before_meshing(surface, 1.0, rules, (Support("left"), other), cases)
+    with pytest.raises(InputError, match="free to"):
+        check_before_meshing(surface, 1.0, rules, (SlidingSupport("left"),), {"all": loads})
+    turned = {"all": (Bearing("right", (0.0, 1.0, 0.0)), *loads)}
+    with pytest.raises(InputError, match="bearing"):
+        check_before_meshing(surface, 1.0, rules, (Support("left"),), turned)

@@ -5,7 +5,7 @@ import pytest
 
 import ccfem
 from ccfem.cases.case import Case
-from ccfem.elasticity import Force, Pressure, Problem, Support, Traction
+from ccfem.elasticity import BodyForce, Force, Pressure, Problem, Support, Traction
 from ccfem.elasticity.problem import PointForce
 from ccfem.errors import InputError
 from ccfem.inspection.cost import solve_costs
@@ -90,6 +90,17 @@ def test_a_load_on_held_nodes_is_a_mistake():
     # Of 9 columns of nodes the first is held; the outer ones carry half of an inner one: 1 / 16.
     assert part.loads[0].held == pytest.approx(1.0 / 16.0)
     assert any("6% of traction on y_min acts on held" in line for line in part.warnings)
+
+
+def test_weight_at_supports_is_no_mistake():
+    """An eighth of the box lies at the held end, and hands its weight to the support."""
+    found = checked([BodyForce((0.0, 0.0, -0.001)), Force("x_max", (1.0, 0.0, 0.0))])
+    assert found.mistakes == ()
+    assert not any("held nodes" in line for line in found.warnings)
+    weight = found.loads[0]
+    assert weight.what == "body force"
+    assert weight.resultant == pytest.approx([0.0, 0.0, -8.0])
+    assert weight.point == pytest.approx([20.0, 10.0, 5.0])
 
 
 def test_patches_that_overlap_are_named():

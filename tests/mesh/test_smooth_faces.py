@@ -179,3 +179,7 @@ def test_a_mesh_takes_the_faces_of_its_surface(plate):
     assert without_faces(mesh, ("face_3",)).patches.keys() == {"face_3"}
     with pytest.raises(InputError, match="the part has 9 faces; got number 10"):
         Faces((1, 10))(mesh)
+    with pytest.raises(InputError, match="'face_2' has a name that is kept for the numbered"):
+        patches_from_rules(mesh, {"face_2": Faces(3)})
+    lost = replace(mesh, patches={n: f for n, f in mesh.patches.items() if n != "face_2"})
+    np.testing.assert_array_equal(Faces(9)(lost), Faces(9)(mesh))

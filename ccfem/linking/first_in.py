@@ -1,0 +1,332 @@
+"""First in, spiral out: the contours of a section as one strand that begins at its middle.
+
+H. Kipping, T. Schueppstuhl, Load-oriented nonplanar additive manufacturing method for optimized
+continuous carbon fiber parts, Materials 16 (2023) 998. The supplement that holds their algorithm is
+not at hand: the strand is laid out here by dynamic programming over the places where the contours
+are opened, so that it steps from each to the next where they lie side by side.
+"""
+
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
+from typing import NamedTuple
+
+import numpy as np
+import shapely
+from scipy.spatial import KDTree
+
+from ccfem.arrays import BoolArray, FloatArray, IntArray
+from ccfem.geometry.contour_tree import SAMPLES, ContourTree
+
+__all__ = ["first_in_spiral_out"]
+
+_STEP = 1.8
+"""Longest step from one contour to the next, in spacings; beyond, all contours are merged."""
+_NEIGHBOURS = 8
+"""Points of the next contour that a step may lead to."""
+_CANDIDATES = 12
+"""Places where two contours are tried to be merged."""
+_APART = 2 * SAMPLES
+"""Samples beside a gap that no other gap touches."""
+_LIPS = 4 * SAMPLES
+"""Samples beside the opening of a lap that no gap touches."""
+_CUBE = 3.0
+"""Power of the length of a step that is made least in sum."""
+_NEAR = 1e-3
+"""Cost of a spacing between a place and the start, in spacings: it decides among equal places."""
+_WIDEST = 3.1
+"""Longest link of a merged contour on average, in spacings: across a ridge that stays open."""
+_BEND = 10.0
+"""Cost of a place where a contour bends away from the chord of a ramp by a spacing."""
+_RAMP = 6.0
+"""Squared length of a ramp over its radius and its height."""
+_TURN = 12
+"""Least number of ramps that would go round a contour."""
+_PASSES = 2
+"""Passes of smoothing."""
+
+
+@dataclass(frozen=True)
+class _Loop:
+    """A closed line of samples (n, 2), which of them no gap may touch, and where it is opened."""
+
+    points: FloatArray
+    kept: BoolArray
+    opening: BoolArray
+
+    def rolled(self, first: int) -> "_Loop":
+        """Return the same from another sample on."""
+        points = np.roll(self.points, -first, axis=0)
+        return _Loop(points, np.roll(self.kept, -first), np.roll(self.opening, -first))
+
+
+def first_in_spiral_out(
+    tree: ContourTree,
+    spacing: float,
+    start: FloatArray,
+    entry: bool = False,
+    radius: float = 0.0,
+) -> list[FloatArray]:
+    """Join the contours of a tree to one open strand from the innermost to the outermost.
+
+    The contours on the way from the outermost to the highest maximum of the distance become laps,
+    each opened by a spacing where the next one is near; as each stops at its opening, one lap runs
+    against the next. All others are merged into the contour that they hang on: both are opened by
+    a spacing at one place and joined crosswise.
+
+    Parameters
+    ----------
+    tree : ContourTree
+    spacing : float, mm
+    start : (2,) array, mm
+        Among places that cost the same the outermost contour is opened nearest to this.
+    entry : bool, default False
+        Whether the strand begins at the outermost contour as well, and goes straight to the middle
+        through the openings, which are two spacings wide then; where it would cross a lap on that
+        way, it begins at the middle all the same.
+    radius : float, mm, default 0
+        With a radius laps all run in one sense, and ramps with no smaller radius lead from each to
+        the next; without `entry`. Where contours are merged, turns stay half a spacing wide.
+
+    Returns
+    -------
+    list of (n, 2) arrays, mm
+        One strand; besides it contours that nowhere lie side by side with another for the length
+        of a gap.
+    """
+    chain = _chain(tree)
+    gap = 2 * SAMPLES if entry else SAMPLES
+    if radius > 0.0:
+        gap = max(int(np.ceil(SAMPLES * np.sqrt(_RAMP * radius / spacing))), SAMPLES)
+    places = _openings([tree.contours[k] for k in chain], gap, spacing, start)
+    wide = np.linalg.norm(np.diff(places.points, axis=0), axis=1).max(initial=0.0) > _STEP * spacing
+    laps = {} if wide else dict(zip(chain, places.before, strict=True))
+    loops, alone = _merged(tree, laps, gap, spacing, start)
+    if wide:
+        strands = [_opened(loops[0], SAMPLES)]
+    elif (
+        entry
+        and len(chain) > 1
+        and shapely.is_simple(shapely.linestrings(through := _entered(loops, places.points)))
+    ):
+        strands = [through]
+    elif radius > 0.0:
+        # On a ring round a small hole a long ramp would cut through the hole.
+        gaps = [max(min(gap, len(tree.contours[k]) // _TURN), SAMPLES) for k in chain]
+        opened = [_opened(loop, each) for loop, each in zip(loops, gaps, strict=True)]
+        strands = [_ramped(opened[::-1])]
+    else:
+        strands = [_laps([_opened(loop, gap) for loop in reversed(loops)])]
+    return [_smooth(line) for line in (*strands, *alone)]
+
+
+class _Openings(NamedTuple):
+    """Where the laps are opened: the samples before, and the places (k, 2), mm."""
+
+    before: list[int]
+    points: FloatArray
+
+
+def _chain(tree: ContourTree) -> list[int]:
+    """Contours from the outermost to the highest maximum, the longest where there are several."""
+    size = np.array([len(ring) for ring in tree.contours])
+    highest = np.flatnonzero(tree.level == tree.level.max())
+    at = int(highest[np.argmax(size[highest])])
+    chain = []
+    while at >= 0:
+        chain.append(at)
+        at = int(tree.parent[at])
+    return chain[::-1]
+
+
+def _openings(
+    rings: Sequence[FloatArray], gap: int, spacing: float, start: FloatArray
+) -> _Openings:
+    """Choose openings, as wide as some samples, whose steps have the least sum of cubes.
+
+    A wide one costs how far the contour bends away from its chord, too.
+    """
+    middles = [_middles(ring) for ring in rings]
+    own = [_NEAR / spacing * np.linalg.norm(line - start, axis=1) for line in middles]
+    if gap > 2 * SAMPLES:
+        for line, cost in zip(middles, own, strict=True):
+            chord = 0.5 * (np.roll(line, gap // 2, axis=0) + np.roll(line, -(gap // 2), axis=0))
+            cost += _BEND * np.linalg.norm(line - chord, axis=1) / spacing
+    cost = own[-1]
+    following: list[IntArray] = []
+    for k in range(len(rings) - 2, -1, -1):
+        outer, inner = middles[k], middles[k + 1]
+        count = min(_NEIGHBOURS, len(inner))
+        off, near = KDTree(inner).query(outer, k=range(1, count + 1))
+        total = (off / spacing) ** _CUBE + cost[near]
+        best = total.argmin(axis=1)
+        rows = np.arange(len(outer))
+        cost = total[rows, best] + own[k]
+        following.append(near[rows, best])
+    index = [int(cost.argmin())]
+    for step in reversed(following):
+        index.append(int(step[index[-1]]))
+    places = np.stack([line[k] for line, k in zip(middles, index, strict=True)])
+    return _Openings(index, places)
+
+
+def _merged(
+    tree: ContourTree,
+    laps: Mapping[int, int],
+    gap: int,
+    spacing: float,
+    start: FloatArray,
+) -> tuple[list[_Loop], list[FloatArray]]:
+    """Laps, or the outermost contour alone, with all that hangs on them; contours left alone."""
+    loops: dict[int, _Loop] = {}
+    for k, ring in enumerate(tree.contours):
+        opening = np.zeros(len(ring), dtype=bool)
+        kept = opening.copy()
+        if k in laps:
+            at = laps[k]
+            opening[at] = True
+            beside = _LIPS + (gap - SAMPLES) // 2
+            kept[np.arange(at - beside + 1, at + beside + 1) % len(ring)] = True
+        loops[k] = _Loop(ring, kept, opening)
+    alone = []
+    # Parents come before their children: from the last on, every contour has all of its own.
+    for k in range(len(tree.contours) - 1, 0, -1):
+        if k in laps:
+            continue
+        parent = int(tree.parent[k])
+        joined = _joined(loops[parent], loops[k], spacing, start)
+        if joined is None:
+            alone.append(np.concatenate([loops[k].points, loops[k].points[:1]]))
+        else:
+            loops[parent] = joined
+    return [loops[k] for k in (laps or (0,))], alone
+
+
+def _joined(line: _Loop, other: _Loop, spacing: float, start: FloatArray) -> _Loop | None:
+    """Two closed lines as one, opened and joined where the two links are shortest; None nowhere."""
+    mine, theirs = (np.flatnonzero(~_touched(each.kept)) for each in (line, other))
+    if min(len(line.points), len(other.points)) < SAMPLES + 2 or not (len(mine) and len(theirs)):
+        return None
+    middles = _middles(line.points)[mine]
+    off, near = KDTree(_middles(other.points)[theirs]).query(middles)
+    late = _NEAR / spacing * np.linalg.norm(middles - start, axis=1)
+    best, choice = np.inf, (0, 0, False)
+    for row in np.argsort(np.round(off / spacing, 6) + late, kind="stable")[:_CANDIDATES].tolist():
+        i, j = int(mine[row]), int(theirs[near[row]])
+        for turned in (False, True):
+            total = _links(line.points, i, other.points, j, turned) / spacing + late[row]
+            if total < best:
+                best, choice = total, (i, j, turned)
+    i, j, turned = choice
+    if _links(line.points, i, other.points, j, turned) > 2.0 * _WIDEST * spacing:
+        return None
+    one, two = _gap(line, i), _gap(other, j)
+    if turned:
+        two = _Loop(two.points[::-1], two.kept[::-1], two.opening[::-1])
+    return _Loop(
+        np.concatenate([one.points, two.points]),
+        np.concatenate([one.kept, two.kept]),
+        np.concatenate([one.opening, two.opening]),
+    )
+
+
+def _links(line: FloatArray, i: int, other: FloatArray, j: int, turned: bool) -> float:
+    """Length of both links of two lines opened about the steps from samples i and j."""
+    lips = [other[(j + 2) % len(other)], other[j - 1]]
+    to, back = reversed(lips) if turned else lips
+    here, on = line[i - 1], line[(i + 2) % len(line)]
+    return float(np.linalg.norm(here - to) + np.linalg.norm(on - back))
+
+
+def _middles(ring: FloatArray) -> FloatArray:
+    """Return the middles of the steps from each sample of a ring to the next."""
+    return 0.5 * (ring + np.roll(ring, -1, axis=0))
+
+
+def _touched(kept: BoolArray) -> BoolArray:
+    """Whether a gap about the step from each sample would touch one that is kept."""
+    return kept | np.roll(kept, 1) | np.roll(kept, -1) | np.roll(kept, -2)
+
+
+def _gap(loop: _Loop, at: int) -> _Loop:
+    """Open a loop by three samples about the step from one sample: its ends are the lips."""
+    opened = loop.rolled((at + 2) % len(loop.points))
+    kept = opened.kept[:-2].copy()
+    kept[:_APART] = kept[-_APART:] = True
+    return _Loop(opened.points[:-2], kept, opened.opening[:-2])
+
+
+def _opened(loop: _Loop, gap: int) -> FloatArray:
+    """Open a loop by a number of samples about its opening; where it has none, at its first."""
+    at = int(np.flatnonzero(loop.opening)[0]) if loop.opening.any() else 0
+    before = (gap - 1) // 2
+    points = loop.rolled((at + 1 + before) % len(loop.points)).points
+    return points[: max(len(points) - gap + 1, 2)]
+
+
+def _laps(lines: Sequence[FloatArray]) -> FloatArray:
+    """Lay laps one after the other, each from the end that is nearer."""
+    path = [lines[0]]
+    if len(lines) > 1:
+        ends = np.linalg.norm(lines[0][[0, -1], None] - lines[1][None, [0, -1]], axis=2)
+        if ends[0].min() < ends[1].min():
+            path = [lines[0][::-1]]
+    for line in lines[1:]:
+        here = path[-1][-1]
+        nearer = np.linalg.norm(line[0] - here) <= np.linalg.norm(line[-1] - here)
+        path.append(line if nearer else line[::-1])
+    return np.concatenate(path)
+
+
+def _ramped(lines: Sequence[FloatArray]) -> FloatArray:
+    """Lay laps one after the other in one sense, with a smooth ramp from each to the next."""
+    path = [lines[0]]
+    for line in lines[1:]:
+        before = path[-1]
+        beyond = line
+        if np.linalg.norm(line[0] - before[-1]) < np.linalg.norm(line[-1] - before[-1]):
+            beyond = line[::-1]
+        path += [_ramp(before, beyond), beyond]
+    return np.concatenate(path)
+
+
+def _ramp(before: FloatArray, beyond: FloatArray) -> FloatArray:
+    """Points between two lines on the cubic that goes on smoothly from one to the other."""
+    (a, b), way = (before[-1], beyond[0]), float(np.linalg.norm(beyond[0] - before[-1]))
+    ahead = [line[1] - line[0] for line in (before[-2:], beyond[:2])]
+    u, v = (way * each / np.linalg.norm(each) for each in ahead)
+    count = max(round(way / float(np.linalg.norm(ahead[1]))), 2)
+    t = np.arange(1, count)[:, None] / count
+    ends = (1.0 - t) ** 2 * (1.0 + 2.0 * t) * a + t**2 * (3.0 - 2.0 * t) * b
+    return np.asarray(ends + t * (1.0 - t) ** 2 * u + t**2 * (t - 1.0) * v)
+
+
+def _entered(loops: Sequence[_Loop], places: FloatArray) -> FloatArray:
+    """Lay laps that a straight way in leads through, from the border to the innermost."""
+    wide, way_in = 2 * SAMPLES, shapely.linestrings(places)
+    inner = loops[-1]
+    at = int(np.flatnonzero(inner.opening)[0])
+    # The innermost lap begins where the way in meets it, and stops a wide gap before.
+    ring = inner.rolled((at + 1) % len(inner.points)).points
+    ring = np.stack([ring, ring[::-1]])[:, : max(len(ring) - wide + 1, 2)]
+    path = [places]
+    for number, loop in enumerate(reversed(loops[:-1])):
+        lap = _opened(loop, wide)
+        heres = ring[:, -1] if number == 0 else path[-1][-1:]
+        links = np.array([[here, lip] for here in heres for lip in lap[[0, -1]]])
+        across = shapely.intersects(shapely.linestrings(links), way_in)
+        best = int(np.lexsort((np.linalg.norm(links[:, 1] - links[:, 0], axis=1), across))[0])
+        if number == 0:
+            path.append(ring[best // 2])
+        path.append(lap if best % 2 == 0 else lap[::-1])
+    return np.concatenate(path)
+
+
+def _smooth(line: FloatArray) -> FloatArray:
+    """Line with every point but its ends moved towards the middle of its neighbours, twice."""
+    closed = bool((line[0] == line[-1]).all())
+    for _ in range(_PASSES):
+        ends = line[[-2, 1]] if closed else line[[0, -1]]
+        around = np.concatenate([ends[:1], line, ends[1:]])
+        moved = 0.25 * (around[:-2] + around[2:]) + 0.5 * line
+        line = moved if closed else np.concatenate([line[:1], moved[1:-1], line[-1:]])
+    return line

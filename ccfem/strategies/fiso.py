@@ -1,0 +1,90 @@
+"""First in, spiral out: one strand that begins in the middle of a region and winds to its border.
+
+H. Kipping, T. Schueppstuhl, Load-oriented nonplanar additive manufacturing method for optimized
+continuous carbon fiber parts, Materials 16 (2023) 998.
+"""
+
+from collections.abc import Mapping
+from dataclasses import dataclass
+from typing import Any, ClassVar
+
+from ccfem.arrays import FloatArray
+from ccfem.checks import check_fields
+from ccfem.errors import InputError
+from ccfem.geometry.contour_tree import contour_trees
+from ccfem.layers.layer import Layer
+from ccfem.layers.layer_stress import LayerStress
+from ccfem.linking.first_in import first_in_spiral_out
+from ccfem.machine.machine import Machine
+from ccfem.planning.infill import SPACING, check_fill, long_enough
+from ccfem.planning.strategy import Amount
+from ccfem.toolpaths import Toolpaths
+
+__all__ = ["Fiso"]
+
+_NARROW = 0.5
+"""Least distance of opposite sides of a contour, in spacings, where laps keep a radius."""
+
+
+@dataclass(frozen=True)
+class Fiso:
+    """Contours of a region joined to one strand, so that it is never cut inside; no stress needed.
+
+    The contours lie half a spacing from the border and at every spacing further in. Those on the
+    way from the border to the point farthest from it become laps: the fibre begins at the
+    innermost and steps outward from each to the next, every lap against the last. All others are
+    merged into their neighbours. A region is what hangs together where it is as wide as a strand.
+
+    Attributes
+    ----------
+    spacing : float, default 1
+        Distance of neighbouring contours in fibre widths, at least 1.
+    closest : float, default 0
+        Least distance of opposite sides of a contour, in spacings, from 0 to 1. As published, 0:
+        along the ridge between two borders two strands may lie nearer than a width. With 1 none
+        does, and a gap up to three spacings wide stays open there.
+    least_radius : float, mm, default 0
+        Least radius of the corners of contours and of what leads from lap to lap, which run in one
+        sense then; it leaves the corners of the section and the middle of small regions open.
+        Where contours are merged, turns stay half a spacing wide. With 0, as published, all turns
+        are so tight.
+    entry : bool, default False
+        Whether the strand begins at the border, too, and goes straight to the middle through the
+        openings of the laps. Not with `least_radius`.
+    minimum_length : float, mm, optional
+        Shorter paths are dropped; by default the shortest that the machine can cut.
+    """
+
+    spacing: float = 1.0
+    closest: float = 0.0
+    least_radius: float = 0.0
+    entry: bool = False
+    minimum_length: float | None = None
+
+    amount: ClassVar[Amount] = SPACING
+    in_plane: ClassVar[bool] = True
+    variants: ClassVar[Mapping[str, Mapping[str, Any]]] = {
+        "apart": {"closest": 1.0},
+        "round": {"least_radius": 3.85},
+        "entry": {"entry": True},
+    }
+
+    def __post_init__(self) -> None:
+        check_fill(self)
+        check_fields(self, "closest", at_least=0.0, at_most=1.0, unit="spacings")
+        check_fields(self, "least_radius", at_least=0.0, unit="mm")
+        if self.entry and self.least_radius > 0.0:
+            raise InputError(
+                "fiso.entry goes through openings that leave no room for ramps: set "
+                "fiso.least_radius to 0, or fiso.entry to false"
+            )
+
+    def __call__(self, layer: Layer, stress: LayerStress, machine: Machine) -> Toolpaths:
+        """Plan the paths of one layer; none where the section is thinner than a fibre."""
+        spacing, radius = self.spacing * machine.fibre_width, self.least_radius
+        closest = max(self.closest, _NARROW) if radius > 0.0 else self.closest
+        start = layer.plane.points[layer.loops[0][:2]].mean(axis=0)
+        lines: list[FloatArray] = []
+        for tree in contour_trees(layer.plane.polygon, spacing, start, closest, radius):
+            lines += first_in_spiral_out(tree, spacing, start, self.entry, radius)
+        return long_enough(Toolpaths.from_plane(lines, layer), self.minimum_length, machine)
