@@ -11,8 +11,8 @@ from ccfem.elasticity.solution import product
 
 __all__ = ["conjugate_gradient", "highest_eigenvalue"]
 
-_LANCZOS = 10
-"""Steps after which the highest eigenvalue is known to a few per cent."""
+_LANCZOS = 6
+"""Steps after which the highest eigenvalue is known to some six per cent."""
 
 
 def conjugate_gradient(

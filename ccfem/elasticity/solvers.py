@@ -35,7 +35,8 @@ _MANY = 4
 """Right-hand sides from which a sparse Cholesky is quicker than a multigrid (measured)."""
 
 _SEVERAL = 3
-"""Right-hand sides from which a multigrid that takes longer to make is worth it (measured)."""
+"""Right-hand sides from which a multigrid that takes several times as long to make is worth it on
+thin parts (measured: from 3 on one cell high, from 9 on two; never on higher ones)."""
 
 _THIN = 12.4
 """Neighbours of a node of linear cells, itself among them, below which a part is so thin that
@@ -298,14 +299,18 @@ def factorise(
     """
     because = "asked for"
     if backend == "auto":
-        neighbours = len(matrix.indices) / max(1, len(matrix.indptr) - 1)
         order = 1 if parents is None else 2
-        backend, because = choose(matrix.shape[0], order, solves, neighbours)
+        backend, because = choose(matrix.shape[0], order, solves, _neighbours(matrix))
     check_known("backend", backend, ["auto", *BACKENDS])
     if backend in _MODULES and find_spec(_MODULES[backend]) is None:
         raise InputError(f"backend '{backend}' is not installed: {_CURES[backend]}")
     make = _maker(backend, matrix, points, parents, solves)
     return Solver(backend, matrix, make(matrix), backend in DIRECT, make, because)
+
+
+def _neighbours(matrix: sp.bsr_array) -> float:
+    """Neighbours of a node, itself among them, in the mean."""
+    return len(matrix.indices) / max(1, len(matrix.indptr) - 1)
 
 
 def _maker(
@@ -323,6 +328,6 @@ def _maker(
             raise InputError("backend 'two-level' is for quadratic meshes: use mesh.quadratic()")
         return partial(multigrid.two_level, points=points, parents=parents)
     if backend == "amg":
-        frugal = solves < _SEVERAL
+        frugal = solves < _SEVERAL or _neighbours(matrix) >= _THIN
         return partial(multigrid.smoothed_aggregation, points=points, frugal=frugal)
     return {"cholmod": direct.cholmod, "superlu": direct.superlu, "skyline": skyline}[backend]

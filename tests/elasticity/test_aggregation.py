@@ -95,7 +95,7 @@ def test_the_highest_eigenvalue_is_found(body):
     sweeps = GaussSeidel(matrix)
     dense = matrix.toarray()
     exact = eigh(dense, blocks(dense), eigvals_only=True)[-1]
-    assert 0.95 * exact < highest_eigenvalue(matrix, sweeps.jacobi) <= exact * (1.0 + 1e-9)
+    assert 0.9 * exact < highest_eigenvalue(matrix, sweeps.jacobi) <= exact * (1.0 + 1e-9)
 
 
 def test_a_matrix_without_strong_connections_is_swept_alone():
