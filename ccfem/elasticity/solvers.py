@@ -42,6 +42,9 @@ _THIN = 12.4
 """Neighbours of a node of linear cells, itself among them, below which a part is so thin that
 PARDISO is quicker than a multigrid for one right-hand side already (measured): two cells high."""
 
+_THIN_LARGEST = 40_000
+"""Unknowns up to which it is (measured on flat and curved sheets: 16,000 and 71,000)."""
+
 _REFINEMENTS = 2
 """Times that a solution is improved by solving for what its residual leaves."""
 
@@ -254,9 +257,9 @@ def choose(unknowns: int, order: int, solves: int = 1, neighbours: float = np.in
     direct = unknowns <= LARGEST_DIRECT and best != "superlu"
     if direct and solves >= _MANY:
         return Choice(best, f"{solves} load cases on at most {LARGEST_DIRECT:,} unknowns")
-    if direct and best == "pypardiso" and neighbours < _THIN:
+    if best == "pypardiso" and neighbours < _THIN and unknowns <= _THIN_LARGEST:
         thin = f"one or two cells high ({neighbours:.1f} neighbours a node, below {_THIN})"
-        return Choice(best, f"{thin}, at most {LARGEST_DIRECT:,} unknowns")
+        return Choice(best, f"{thin}, at most {_THIN_LARGEST:,} unknowns")
     if unknowns > LARGEST_DIRECT:
         return Choice("amg", f"linear cells, more than {LARGEST_DIRECT:,} unknowns")
     if best == "superlu" and (solves >= _MANY or neighbours < _THIN):
