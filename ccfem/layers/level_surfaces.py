@@ -16,7 +16,7 @@ from ccfem.layers.layer import Layer
 from ccfem.layers.level_cut import border_edges, chain, cut_at_zero
 from ccfem.mesh.tet_mesh import TetMesh
 
-__all__ = ["LevelSurfaces", "level_surfaces"]
+__all__ = ["LevelSurfaces", "level_surfaces", "thickness_at_nodes"]
 
 _SNAP = 1e-5
 """Nodes whose value is nearer to the level than this share of the step are taken to lie on it."""
@@ -76,8 +76,7 @@ def level_surfaces(
         patch where both their ends do.
     """
     gradient = np.einsum("eid,ei->ed", cell_gradients(mesh), values[mesh.corners])
-    steep = _at_nodes(mesh, np.linalg.norm(gradient, axis=1))
-    thickness = step / np.maximum(steep, 1e-12)
+    thickness = thickness_at_nodes(mesh, values, step)
     on_patch = {name: _edge_keys(facets, len(mesh.points)) for name, facets in mesh.patches.items()}
 
     def cut(level: float) -> tuple[dict[str, Any] | None, int, int]:
@@ -90,6 +89,12 @@ def level_surfaces(
     kept = [surface for surface, _, _ in found if surface is not None]
     layers = tuple(Layer(index=k, **surface) for k, surface in enumerate(kept))
     return LevelSurfaces(layers, sum(b for _, b, _ in found), sum(s for _, _, s in found))
+
+
+def thickness_at_nodes(mesh: TetMesh, values: FloatArray, step: float) -> FloatArray:
+    """Distance, mm, of layers a step of the field apart, at the corner nodes (n,) of the mesh."""
+    gradient = np.einsum("eid,ei->ed", cell_gradients(mesh), values[mesh.corners])
+    return np.asarray(step / np.maximum(_at_nodes(mesh, np.linalg.norm(gradient, axis=1)), 1e-12))
 
 
 def _at_nodes(mesh: TetMesh, values: FloatArray) -> FloatArray:

@@ -38,7 +38,7 @@ def test_layers_through_mesh_nodes_have_the_whole_section() -> None:
     assert len(middle.triangles) == 2 * 6 * 4
 
 
-@settings(max_examples=25, deadline=None)
+@settings(max_examples=10, deadline=None)
 @given(
     direction=st.tuples(*[st.floats(-1, 1)] * 3).filter(lambda d: np.linalg.norm(d) > 0.1),
     seed=st.integers(0, 1000),

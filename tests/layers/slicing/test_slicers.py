@@ -21,7 +21,7 @@ def test_short_forms():
 @pytest.mark.parametrize(
     ("name", "parameters", "message"),
     [
-        ("planer", {}, "no slicer named 'planer'; there are: planar"),
+        ("planer", {}, "no slicer named 'planer'; there are: load_oriented, planar, "),
         ("planar", {"number": 3}, "slicer 'planar' has no parameter 'number'; it has: "),
         ("planar", {"count": "many"}, "slicer planar.count must be a whole number"),
         ("planar", {"count": 0}, "slicer planar: the number of layers must be at least 1"),

@@ -1,0 +1,179 @@
+"""Normals of layers in the whole part, filled in between regions where they are given.
+
+Kipping and Schueppstuhl 2023 (Materials 16, 998), equations 4 and 5, with weights that approximate
+an integral (area over distance of centres). The sense of each region is the one with which
+neighbours agree best; the filled field is linear in the senses, so that each costs no solve.
+"""
+
+import itertools
+from collections.abc import Iterable
+from dataclasses import dataclass
+
+import numpy as np
+import scipy.sparse as sp
+from numba import njit
+from scipy.sparse.csgraph import breadth_first_order, connected_components, minimum_spanning_tree
+from scipy.sparse.linalg import splu
+
+from ccfem.arrays import FloatArray, IntArray, freeze
+from ccfem.guidance.stress_regions import StressRegions
+from ccfem.mesh.tet_mesh import TetMesh
+
+__all__ = ["NormalField", "normal_field"]
+
+_MOST_TRIED = 10
+"""Regions up to which all senses are tried; above, so many that are best by a quadratic form."""
+_NOTHING = 1e-6
+"""Length of a filled vector below which it has no direction."""
+_NEAREST = 0.3
+"""Least distance of centres that counts, in the cube root of the mean volume."""
+_STARTS = 20
+"""Random starts from which senses are flipped one by one, for the quadratic form."""
+
+
+@dataclass(frozen=True)
+class NormalField:
+    """Directions that the layers are to be square to.
+
+    Attributes
+    ----------
+    direction : (m, 3) array
+        Of length 1.
+    senses : tuple of int
+        1 or -1 for each region.
+    energy : float, mm^2
+        Sum over the faces between cells of area times ``(1 - cosine)^2``.
+    """
+
+    direction: FloatArray
+    senses: tuple[int, ...]
+    energy: float
+
+    def __post_init__(self) -> None:
+        freeze(self, direction=float)
+
+
+def normal_field(mesh: TetMesh, regions: StressRegions, build: FloatArray) -> NormalField:
+    """Fill the part with directions that vary least between the regions of critical stress.
+
+    Parameters
+    ----------
+    mesh : TetMesh
+    regions : StressRegions
+    build : (3,) array
+        Unit vector: the direction of pieces of the part without a region. The field as a whole
+        does not point against it.
+    """
+    one, other, area, apart = _inner_faces(mesh)
+    parts = _filled(regions, one, other, area / apart, build)
+    best: tuple[int, ...] = ()
+    energy = np.inf
+    for senses in _candidates(parts, one, other, area):
+        found = _energy(parts, np.array((*senses, 1.0)), one, other, area)
+        if found < energy * (1.0 - 1e-9):
+            best, energy = senses, found
+    mixed = np.tensordot(np.array((*best, 1.0)), parts, axes=1)
+    size = np.linalg.norm(mixed, axis=1)[:, None]
+    direction = np.where(size > _NOTHING, mixed / np.maximum(size, 1e-300), build)
+    if float(mesh.volumes @ (direction @ build)) < 0.0:
+        direction, best = -direction, tuple(-sense for sense in best)
+    return NormalField(direction, best, energy)
+
+
+def _inner_faces(mesh: TetMesh) -> tuple[IntArray, IntArray, FloatArray, FloatArray]:
+    """Both cells of each face between cells, its area, and the distance of their centres."""
+    one, side = np.nonzero(mesh.across > np.arange(len(mesh.cells))[:, None])
+    other = mesh.across[one, side]
+    area = mesh.facet_areas(mesh.corners[one[:, None], mesh.faces[side]])[0]
+    centres = mesh.points[mesh.corners].mean(axis=1)
+    apart = np.linalg.norm(centres[one] - centres[other], axis=1)
+    least = _NEAREST * float(np.cbrt(mesh.volumes.mean()))
+    return one, other, area, np.maximum(apart, least)
+
+
+def _filled(
+    regions: StressRegions, one: IntArray, other: IntArray, weight: FloatArray, build: FloatArray
+) -> FloatArray:
+    """Fields (r + 1, m, 3) of each region alone, and last of the pieces without a region."""
+    m, count = len(regions.region), regions.count
+    half = sp.coo_array((weight, (one, other)), shape=(m, m))
+    graph = sp.csr_array(half + half.T)
+    piece = connected_components(graph, directed=False)[1]
+    fixed = regions.region >= 0
+    alone = ~np.isin(piece, np.unique(piece[fixed]))
+    parts = np.zeros((count + 1, m, 3))
+    for k in range(count):
+        inside = regions.region == k
+        parts[k, inside] = regions.direction[inside]
+    parts[-1, alone] = build
+    free = np.flatnonzero(~fixed & ~alone)
+    if len(free):
+        degree = sp.diags_array(np.asarray(graph.sum(axis=1)))
+        inner = sp.csc_array((degree - graph)[free][:, free])
+        source = graph[free] @ parts[:-1].transpose(1, 0, 2).reshape(m, -1)
+        options = {"SymmetricMode": True}
+        factor = splu(inner, permc_spec="MMD_AT_PLUS_A", diag_pivot_thresh=0.0, options=options)
+        parts[:-1, free] = factor.solve(source).reshape(-1, count, 3).transpose(1, 0, 2)
+    return parts
+
+
+def _candidates(
+    parts: FloatArray, one: IntArray, other: IntArray, area: FloatArray
+) -> Iterable[tuple[int, ...]]:
+    """Senses to be tried: all, or those of the least sums of area times squared jump."""
+    count = len(parts) - 1
+    if count <= _MOST_TRIED:
+        return ((1, *rest) for rest in itertools.product((1, -1), repeat=count - 1))
+    jump = (parts[:-1, one] - parts[:-1, other]) * np.sqrt(area)[:, None]
+    form = np.tensordot(jump, jump, axes=((1, 2), (1, 2)))
+    random = np.random.default_rng(0)
+    starts = [_agreeing(form), *(random.choice((-1.0, 1.0), count) for _ in range(_STARTS))]
+    found: dict[tuple[int, ...], float] = {}
+    for sense in starts:
+        while True:
+            # What a flip changes: 4 times the sum of the row without its diagonal, and its sign.
+            gain = -4.0 * sense * (form @ sense) + 4.0 * np.diag(form)
+            best = int(gain.argmin())
+            if not gain[best] < -1e-12 * abs(float(sense @ form @ sense)):
+                break
+            sense[best] = -sense[best]
+        for flipped in (None, *range(count)):
+            near = sense.copy()
+            if flipped is not None:
+                near[flipped] = -near[flipped]
+            near = near * near[0]
+            found[tuple(near.astype(int).tolist())] = float(near @ form @ near)
+    return sorted(found, key=lambda senses: found[senses])[:_MOST_TRIED]
+
+
+def _agreeing(form: FloatArray) -> FloatArray:
+    """Senses with which the regions that feel each other most agree, along a spanning tree."""
+    feel = np.abs(form)
+    tree = minimum_spanning_tree(sp.csr_array(np.triu(2.0 * feel.max() - feel, 1)))
+    order, before = breadth_first_order(tree, 0, directed=False)
+    sense = np.ones(len(form))
+    for k in order[1:].tolist():
+        sense[k] = sense[before[k]] * (-1.0 if form[k, before[k]] > 0.0 else 1.0)
+    return sense
+
+
+@njit(cache=True, nogil=True)
+def _energy(parts, senses, one, other, area):  # type: ignore[no-untyped-def]
+    """Sum over faces of area times (1 - cosine)^2 of the mixed field, normalised."""
+    count, m, _ = parts.shape
+    unit = np.zeros((m, 3))
+    for c in range(m):
+        x = y = z = 0.0
+        for k in range(count):
+            x += senses[k] * parts[k, c, 0]
+            y += senses[k] * parts[k, c, 1]
+            z += senses[k] * parts[k, c, 2]
+        size = max(np.sqrt(x * x + y * y + z * z), 1e-300)
+        unit[c, 0], unit[c, 1], unit[c, 2] = x / size, y / size, z / size
+    total = 0.0
+    for f in range(len(one)):
+        cosine = 0.0
+        for d in range(3):
+            cosine += unit[one[f], d] * unit[other[f], d]
+        total += area[f] * (1.0 - cosine) ** 2
+    return total
