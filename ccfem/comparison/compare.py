@@ -253,7 +253,7 @@ def compare(
         layers = tuple(foreign[0].heights(plane_frame(case.build)[2]).tolist())
     progress(f"solving {case.name}", 0.0)
     field, given, stack, seconds = solve_and_slice(case, layers, load_case, backend, stress)
-    part = Part(field if given is None else given, stack, case.machine)
+    part = Part(field if given is None else given, stack, case.machine, strand)
     tell = _counted(progress, 0.1, (5 if print_plans else 4) * len(strategies) + 1)
     runs = [
         Run(name, one.on(stack) if isinstance(one, GivenPaths) else one, Toolpaths.empty(), None)

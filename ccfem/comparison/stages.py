@@ -12,14 +12,14 @@ from ccfem.elasticity.stress_field import StressField
 from ccfem.errors import InputError, SolveError
 from ccfem.evaluation import evaluate
 from ccfem.evaluation.printable import why_not
-from ccfem.export.print_plan import PrintPlan, plan_print
+from ccfem.export.print_plan import plan_print
 from ccfem.layers import Layer
 from ccfem.machine.machine import Machine
 from ccfem.planning.equal_fibre import TOLERANCE, Planned, length_per_layer, plan_to_length
 from ccfem.planning.given_paths import GivenPaths
 from ccfem.planning.plan import plan
 from ccfem.planning.strategy import LengthStrategy
-from ccfem.toolpaths import FIBRE, MATRIX, Toolpaths
+from ccfem.toolpaths import Toolpaths
 from ccfem.virtual_testing.equilibrium import BONDED, TENSION
 from ccfem.virtual_testing.specimen import Specimen
 from ccfem.virtual_testing.strand import RHO_SPAN, Strand
@@ -46,11 +46,12 @@ Tell = Callable[[str], None]
 
 @dataclass(frozen=True)
 class Part:
-    """What all runs share: the stress that counts, the layers and the machine."""
+    """What all runs share: the stress that counts, the layers, the machine and the strand."""
 
     stress: PartStress
     layers: tuple[Layer, ...]
     machine: Machine
+    strand: Strand | None = None
 
 
 def planned(
@@ -169,7 +170,7 @@ def evaluated(run: Run, part: Part, tell: Tell) -> Run:
         return replace(run, failure=_no_fibre(part.machine))
 
     def work() -> Run:
-        found = evaluate(run.toolpaths, part.layers, part.stress, part.machine)
+        found = evaluate(run.toolpaths, part.layers, part.stress, part.machine, part.strand)
         broken = why_not(found.total, part.machine)
         return replace(run, evaluation=found, why_not="; ".join(broken))
 
@@ -185,16 +186,8 @@ def with_print(run: Run, part: Part, tell: Tell) -> Run:
         found = plan_print(run.toolpaths, part.layers, part.stress.mesh, part.machine)
     except InputError as error:
         return replace(run, unprinted=str(error))
-    share = _volume(found, part.machine) / float(part.stress.mesh.volumes.sum())
+    share = found.volume(part.machine) / float(part.stress.mesh.volumes.sum())
     return replace(run, print_plan=found, printed_volume=share)
-
-
-def _volume(print_plan: PrintPlan, machine: Machine) -> float:
-    """Volume that a print lays, mm^3: lines of matrix as high as their layer, and strands."""
-    paths = print_plan.paths
-    matrix = (paths.lengths * print_plan.thickness[paths.layer])[paths.kind == MATRIX].sum()
-    fibre = paths.of_kind(FIBRE).lengths.sum()
-    return float(machine.matrix_width * matrix + machine.filament_area * fibre)
 
 
 def all_tested(

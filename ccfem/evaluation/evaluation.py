@@ -10,6 +10,7 @@ import numpy as np
 
 from ccfem.arrays import FloatArray, IntArray, freeze
 from ccfem.elasticity.part_stress import PartStress
+from ccfem.elasticity.stress_field import StressField
 from ccfem.errors import InputError
 from ccfem.evaluation import (
     alignment,
@@ -36,6 +37,7 @@ from ccfem.evaluation.links import LinkSamples
 from ccfem.evaluation.manufacture import ManufactureSamples
 from ccfem.evaluation.plane_paths import PlanePaths, plane_paths, pool
 from ccfem.evaluation.room import RoomSamples
+from ccfem.evaluation.sensitivity import strand_lamina
 from ccfem.evaluation.sinuosity import SinuositySamples
 from ccfem.evaluation.space import SpaceSamples
 from ccfem.evaluation.spacing import SpacingSamples
@@ -44,7 +46,9 @@ from ccfem.geometry.nearest_on_triangles import nearest_on_triangles
 from ccfem.layers.layer import Layer
 from ccfem.layers.layer_stress import stress_on
 from ccfem.machine.machine import Machine
+from ccfem.materials import Material, named_material
 from ccfem.toolpaths import FIBRE, Toolpaths
+from ccfem.virtual_testing.strand import Strand
 
 if TYPE_CHECKING:
     import pandas as pd
@@ -153,7 +157,11 @@ class Evaluation:
 
 
 def evaluate(
-    toolpaths: Toolpaths, layers: Sequence[Layer], stress: PartStress, machine: Machine
+    toolpaths: Toolpaths,
+    layers: Sequence[Layer],
+    stress: PartStress,
+    machine: Machine,
+    strand: Strand | None = None,
 ) -> Evaluation:
     """Evaluate the fibre paths of a part.
 
@@ -169,6 +177,9 @@ def evaluate(
         lengths of the paths in space.
     stress : PartStress
     machine : Machine
+    strand : Strand, optional
+        How stiff the fibre is in the index of stiffness alignment; by default as in the virtual
+        test. It counts where `stress` is a `StressField`, which knows the matrix.
 
     Returns
     -------
@@ -193,8 +204,8 @@ def evaluate(
 
     with ThreadPoolExecutor(min(os.cpu_count() or 1, _MOST_THREADS)) as pool:
         samples = list(pool.map(sampled, layers))
-    rows = [_indices(each, machine) for each in samples]
-    rows.append(_indices(_pooled(samples), machine))
+    material = _material(layers, stress, machine, strand or Strand())
+    rows = [_indices(each, machine, material) for each in (*samples, _pooled(samples))]
     return Evaluation(
         np.array([layer.index for layer in layers]),
         {column.name: np.array([row[column.name] for row in rows]) for column in COLUMNS},
@@ -298,7 +309,17 @@ def _pooled(samples: Sequence[_Samples]) -> _Samples:
     return _Samples._make(pool(group) for group in zip(*samples, strict=True))
 
 
-def _indices(samples: _Samples, machine: Machine) -> dict[str, float]:
+def _material(
+    layers: Sequence[Layer], stress: PartStress, machine: Machine, strand: Strand
+) -> Material:
+    """Material of a part that is full of strands, fibre along axis 1."""
+    if not isinstance(stress, StressField):
+        return named_material("c_fram")
+    section = machine.fibre_width * float(np.mean([layer.thickness for layer in layers]))
+    return strand_lamina(stress.problem.material, strand.rho / section)
+
+
+def _indices(samples: _Samples, machine: Machine, material: Material) -> dict[str, float]:
     """Value of each of `COLUMNS`."""
     return {
         **manufacture.manufacture_indices(samples.manufacture, machine),
@@ -306,7 +327,7 @@ def _indices(samples: _Samples, machine: Machine) -> dict[str, float]:
         **curvature.curvature_indices(samples.curvature, machine),
         **alignment.alignment_indices(samples.alignment),
         **matching.matching_indices(samples.alignment),
-        **stiffness_alignment.stiffness_alignment_indices(samples.alignment),
+        **stiffness_alignment.stiffness_alignment_indices(samples.alignment, material),
         **spacing.spacing_indices(samples.spacing, machine),
         **room.room_indices(samples.room),
         **coverage.coverage_indices(samples.coverage),

@@ -1,6 +1,6 @@
 """How stiffness falls when the fibre turns away from the stress: the curve f(theta)."""
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from functools import cached_property
 
 import numpy as np
@@ -8,7 +8,7 @@ import numpy as np
 from ccfem.arrays import FloatArray, read_only
 from ccfem.materials import Material
 
-__all__ = ["OffAxis", "acute", "plane_compliance"]
+__all__ = ["OffAxis", "acute", "plane_compliance", "strand_lamina"]
 
 
 def acute(angle: FloatArray) -> FloatArray:
@@ -21,6 +21,23 @@ def plane_compliance(material: Material) -> FloatArray:
     """Compliance (3, 3), 1/MPa, of a sheet in plane stress, fibre along axis 1."""
     wanted = np.array([0, 1, 5])
     return np.linalg.inv(material.stiffness)[np.ix_(wanted, wanted)]
+
+
+def strand_lamina(matrix: Material, share: float) -> Material:
+    """Matrix with parallel strands along its axis 1, as the virtual test sees them.
+
+    Strands are bars: they add stiffness along themselves alone.
+
+    Parameters
+    ----------
+    matrix : Material
+    share : float >= 0
+        EA of a strand over Young's modulus of the matrix along axis 1, in mm^2, over the section
+        that a strand has to itself.
+    """
+    stiffness = matrix.stiffness.copy()
+    stiffness[0, 0] += share / plane_compliance(matrix)[0, 0]
+    return replace(matrix, name=f"{matrix.name} with strands", stiffness=stiffness)
 
 
 @dataclass(frozen=True)

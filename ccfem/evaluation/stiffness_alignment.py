@@ -9,7 +9,7 @@ from ccfem.checks import check_known
 from ccfem.evaluation.alignment import AlignmentSamples
 from ccfem.evaluation.column import Column
 from ccfem.evaluation.sensitivity import OffAxis, acute, plane_compliance
-from ccfem.materials import named_material
+from ccfem.materials import Material
 from ccfem.tensor import strongest
 
 __all__ = [
@@ -24,8 +24,10 @@ Reading = Literal["weighted", "literal", "harmonic"]
 READINGS: tuple[Reading, ...] = ("weighted", "literal", "harmonic")
 
 _CURVE = (
-    "f is the stiffness under tension at an angle to the fibre over the largest at any angle, for "
-    "the continuous-fibre material c_fram; the angle is the one to the direction of the larger "
+    "f is the stiffness under tension at an angle to the fibre over the largest at any angle, of "
+    "the part's own material full of strands: its matrix, and EA / (W h) more along the fibre, "
+    "with EA of a strand, the fibre width W and the mean thickness h of the layers (c_fram where "
+    "only the stress of a part is known); the angle is the one to the direction of the larger "
     "absolute in-plane principal stress (samples as for angle_mean)"
 )
 _NONE = (
@@ -108,9 +110,8 @@ def performance_index(
     return float(np.average(factor, weights=weight * (1.0 + relative**3)))
 
 
-def stiffness_alignment_indices(samples: AlignmentSamples) -> dict[str, float]:
-    """Values of `COLUMNS`."""
-    material = named_material("c_fram")
+def stiffness_alignment_indices(samples: AlignmentSamples, material: Material) -> dict[str, float]:
+    """Values of `COLUMNS`, for fibre along axis 1 of a material."""
     curve = OffAxis(material)
     across, defined = strongest(samples.largest, samples.smallest)
     if not defined.any():

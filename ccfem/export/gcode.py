@@ -2,10 +2,10 @@
 
 Conventions of the file: mm and mm/min; X, Y, Z absolute, E relative (M83). G1 lays material, G0
 only travels. E of the matrix is length of filament, so that a line has the volume of its length,
-its width and the height of its layer. E of the fibre is length of fibre: before a path, the
-distance from the cutter to the nozzle (G1 with E alone), then the distance that the nozzle moves.
-The cut comes that first distance before the end of the path; the rest is dragged out and laid by G1
-without E. In all, exactly the length of the path is fed.
+its width and the height that it lays (`ccfem.export.matrix_flow`). E of the fibre is length of
+fibre: before a path, the distance from the cutter to the nozzle (G1 with E alone), then the
+distance that the nozzle moves. The cut comes that first distance before the end of the path; the
+rest is dragged out and laid by G1 without E. In all, exactly the length of the path is fed.
 """
 
 from importlib.metadata import version
@@ -65,7 +65,7 @@ def gcode(plan: PrintPlan, machine: Machine) -> str:
         if paths.kind[k] == FIBRE:
             program.lay_fibre(line, speed)
         else:
-            program.lay_matrix(line, speed, float(plan.thickness[layer]))
+            program.lay_matrix(line, speed, plan.laid[start : end - 1])
     program.lines += machine.gcode.fill(machine.gcode.end, program.values)
     fibre = paths.of_kind(FIBRE)
     head = [
@@ -114,14 +114,14 @@ class _Program:
             self.lines += self.profile.fill(self.profile.tool, {**self.values, "tool": tool})
             self._tool, self._feed = tool, ""
 
-    def lay_matrix(self, line: FloatArray, speeds: FloatArray, thickness: float) -> None:
-        """Lay a line (n, 2) of matrix."""
+    def lay_matrix(self, line: FloatArray, speeds: FloatArray, heights: FloatArray) -> None:
+        """Lay a line (n, 2) of matrix, so high on each of its steps."""
         profile, machine = self.profile, self.machine
         self._travel(line[0])
         if self._retracted:
             self._extrude(profile.retract, profile.retract_speed)
         area = 0.25 * np.pi * machine.matrix_diameter**2
-        self._lay(line, speeds, machine.matrix_width * thickness / area)
+        self._lay(line, speeds, machine.matrix_width * heights / area)
         self._extrude(-profile.retract, profile.retract_speed)
         self._retracted = True
         self._rise_to(self._top + self.profile.lift)
@@ -132,25 +132,26 @@ class _Program:
         line, speeds, cut = _with_point_at(line, speeds, total - self.machine.tail)
         self._travel(line[0])
         self._extrude(line_length(line[cut:]), self.profile.feed_speed)
-        self._lay(line[: cut + 1], speeds[:cut], 1.0)
+        self._lay(line[: cut + 1], speeds[:cut], np.ones(cut))
         self.lines += self.profile.fill(self.profile.cut, self.values)
         self._feed = ""
         self.seconds += self.machine.cut_wait
-        self._lay(line[cut:], speeds[cut:], 0.0)
+        self._lay(line[cut:], speeds[cut:], np.zeros(len(line) - 1 - cut))
         self._rise_to(self._top + self.profile.lift)
 
-    def _lay(self, line: FloatArray, speeds: FloatArray, feed: float) -> None:
-        """Move along a line (n, 2), feeding so much per mm; the nozzle is at its start."""
-        if feed > 0.0:
+    def _lay(self, line: FloatArray, speeds: FloatArray, feed: FloatArray) -> None:
+        """Move along a line (n, 2) from its start, feeding so much per mm of each step."""
+        fed_at_all = len(feed) > 0 and feed.max() > 0.0
+        if fed_at_all:
             whole = np.array([0, len(line)])
-            line, _, step = subdivide(line, whole, self.profile.longest_feed / feed)
-            speeds = speeds[step[:-1]]
+            line, _, step = subdivide(line, whole, self.profile.longest_feed / float(feed.max()))
+            speeds, feed = speeds[step[:-1]], feed[step[:-1]]
         steps = np.linalg.norm(np.diff(line, axis=0), axis=1)
         self.seconds += float((steps / speeds).sum())
         # Rounded in sum, so that no feed is lost however short the steps are.
         fed = np.diff(np.append(0.0, np.cumsum(feed * steps)).round(_FEED_DIGITS))
         for (x, y), e, speed in zip(line[1:].tolist(), fed.tolist(), speeds.tolist(), strict=True):
-            extrusion = f" E{e:.{_FEED_DIGITS}f}" if feed else ""
+            extrusion = f" E{e:.{_FEED_DIGITS}f}" if fed_at_all else ""
             self.lines.append(f"G1 X{x:.3f} Y{y:.3f}{extrusion}{self._at(speed)}")
         self._place = line[-1]
 

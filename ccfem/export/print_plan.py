@@ -1,17 +1,21 @@
 """A whole part as it is printed: layers of matrix below, between and above the layers of fibre."""
 
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from itertools import pairwise
 
 import numpy as np
+import shapely
 
 from ccfem.arrays import FloatArray, freeze, in_brief
 from ccfem.errors import InputError
+from ccfem.export.matrix_flow import with_flow
 from ccfem.geometry.hatch import zigzag
 from ccfem.geometry.offsets import offset_rings
-from ccfem.geometry.polylines import is_closed, merge_repeated, pack
+from ccfem.geometry.polylines import is_closed, merge_repeated, pack, starts_segment
+from ccfem.geometry.shapes import Region
 from ccfem.layers import Layer
+from ccfem.layers.plane import Plane
 from ccfem.layers.slicing.planar import Planar
 from ccfem.linking.print_order import nearest_end_order
 from ccfem.machine.machine import Machine
@@ -27,8 +31,7 @@ _SAME = 1e-6
 """Heights closer than this, mm, are the same."""
 
 _OVERLAP = 0.25
-"""Overlap of the ends of the zigzag with the contour, in line widths. Our choice: the lines then
-have the volume of the section to 3 % (`tests/export/test_gcode.py`)."""
+"""Overlap of the ends of the zigzag with the contour, in line widths. Our choice."""
 
 _SHORT = 1e-6
 """Share of the cutter's distance by which a path may be too short through rounding."""
@@ -46,16 +49,32 @@ class PrintPlan:
         the layers of this plan. Coordinates are rounded to 0.001 mm.
     top, thickness : (S,) arrays, mm
         Of each layer.
+    laid : (P,) array, mm, optional
+        Height of the matrix, a line wide, that is laid on the step from each point of the paths;
+        by default the thickness of its layer. Of no meaning for fibre, and at the ends of paths.
     """
 
     paths: Toolpaths
     top: FloatArray
     thickness: FloatArray
+    laid: FloatArray = None  # type: ignore[assignment]
 
     __repr__ = in_brief
 
     def __post_init__(self) -> None:
-        freeze(self, top=float, thickness=float)
+        if self.laid is None:
+            whole = np.repeat(self.thickness[self.paths.layer], np.diff(self.paths.offsets))
+            object.__setattr__(self, "laid", whole)
+        freeze(self, top=float, thickness=float, laid=float)
+
+    def volume(self, machine: Machine) -> float:
+        """Volume of matrix and fibre, mm^3."""
+        points, start = self.paths.points, np.flatnonzero(starts_segment(self.paths.offsets))
+        steps = np.linalg.norm(points[start + 1] - points[start], axis=1)
+        matrix = np.repeat(self.paths.kind == MATRIX, np.diff(self.paths.offsets))[start]
+        laid = float((steps * self.laid[start])[matrix].sum())
+        fibre = float(self.paths.of_kind(FIBRE).lengths.sum())
+        return machine.matrix_width * laid + machine.filament_area * fibre
 
 
 @dataclass(frozen=True)
@@ -91,12 +110,14 @@ def plan_print(
 ) -> PrintPlan:
     """Plan the print of a whole part.
 
-    Fibre layers lie at the heights that they were planned at, with `Machine.fibre_height`. The
-    space below, between and above them is filled with matrix layers of equal height, as few as
-    `Machine.matrix_height` allows, so that the part gets its full height. A matrix layer is a
-    contour and a zigzag of the section at its middle, which turns from one matrix layer to the
-    next. A fibre layer holds fibre alone, and a layer without fibre is left out. Within a layer the
-    next path is always the one with the nearest end. The part stands in the middle of the bed.
+    Fibre layers lie at the heights that they were planned at, as high as the filament's section
+    needs (`Machine.strand_height`). The space below, between and above them is filled with matrix
+    layers of equal height, as few as `Machine.matrix_height` allows, so that the part gets its full
+    height. A matrix layer is a contour and a zigzag of the section at its middle, which turns from
+    one matrix layer to the next; over fibre it lays what the strands leave
+    (`ccfem.export.matrix_flow`). A fibre layer holds fibre alone, and a layer without fibre is left
+    out. Within a layer the next path is always the one with the nearest end. The part stands in the
+    middle of the bed.
 
     Parameters
     ----------
@@ -112,8 +133,8 @@ def plan_print(
     ------
     InputError
         Where fibre lies on a layer that is not given, is shorter than the cutter allows, layers
-        are nearer to each other or to the part's ends than their height allows, or the part does
-        not fit on the bed.
+        are nearer to each other or to the part's ends than their height allows, strands stand
+        higher than the matrix above them, or the part does not fit on the bed.
     """
     fibre = toolpaths.of_kind(FIBRE)
     _check_fibre(fibre, layers, machine)
@@ -123,20 +144,34 @@ def plan_print(
     laid = [layer for layer in layers if layer.index in fibre.layer]
     slabs = _slabs(laid, float(lowest[2]), float(highest[2]), machine)
     matrix_slabs = [slab for slab in slabs if slab.fibre is None]
-    matrix = iter(_matrix_lines(matrix_slabs, mesh, frame, machine))
     origin = 0.5 * (lowest[:2] + highest[:2] - machine.gcode.bed[:2])
-    printed = []
+    matrix = iter(_matrix_lines(matrix_slabs, mesh, frame, origin, machine))
+    printed, flow = [], []
+    strands: list[FloatArray] = []  # since the last layer of matrix
+    below = 0.0
     for number, slab in enumerate(slabs):
+        height, thickness = slab.upper - float(lowest[2]), slab.upper - slab.lower
         if slab.fibre is None:
-            kind, lines = MATRIX, next(matrix)
+            section, lines = next(matrix)
+            found = _printed(lines, height, number, MATRIX)
+            heights = np.zeros(0)
+            if len(found):
+                found, heights = with_flow(found, section, thickness, strands, below, machine)
+            strands, below = [], 0.0
         else:
-            kind, lines = FIBRE, [path @ frame[:2].T for path in fibre.on_layer(slab.fibre)]
-        height = slab.upper - float(lowest[2])
-        printed.append(_printed([line - origin for line in lines], height, number, kind))
+            lines = [path @ frame[:2].T - origin for path in fibre.on_layer(slab.fibre)]
+            found = _printed(lines, height, number, FIBRE)
+            heights = np.zeros(len(found.points))
+            strands, below = strands + lines, below + thickness
+        printed.append(found)
+        flow.append(heights)
+    paths = Toolpaths.concatenate(printed)
+    paths = replace(paths, points=paths.points.round(COORDINATE_DIGITS) + 0.0)
     plan = PrintPlan(
-        Toolpaths.concatenate(printed),
+        paths,
         np.array([slab.upper - lowest[2] for slab in slabs]).round(COORDINATE_DIGITS),
         np.array([slab.upper - slab.lower for slab in slabs]),
+        np.concatenate(flow),
     )
     _check_bed(plan, machine)
     return plan
@@ -166,12 +201,12 @@ def _slabs(layers: Sequence[Layer], bottom: float, top: float, machine: Machine)
     slabs: list[_Slab] = []
     level = bottom
     for layer in sorted(layers, key=lambda one: one.plane.height):
-        lower = layer.plane.height - 0.5 * machine.fibre_height
-        upper = layer.plane.height + 0.5 * machine.fibre_height
+        lower = layer.plane.height - 0.5 * machine.strand_height
+        upper = layer.plane.height + 0.5 * machine.strand_height
         if lower < level - _SAME or upper > top + _SAME:
             raise InputError(
                 f"fibre layer {layer.index} at {layer.plane.height:g} mm does not fit with a fibre "
-                f"height of {machine.fibre_height:g} mm between {level:g} and {top:g} mm: move it "
+                f"height of {machine.strand_height:g} mm between {level:g} and {top:g} mm: move it "
                 "with --heights, or take fewer layers"
             )
         slabs += _matrix_slabs(level, lower, machine)
@@ -190,11 +225,15 @@ def _matrix_slabs(lower: float, upper: float, machine: Machine) -> list[_Slab]:
 
 
 def _matrix_lines(
-    slabs: Sequence[_Slab], mesh: TetMesh, frame: FloatArray, machine: Machine
-) -> list[list[FloatArray]]:
-    """Lines (n, 2) of each matrix layer in the plane of `frame`: a contour, a zigzag inside it."""
+    slabs: Sequence[_Slab],
+    mesh: TetMesh,
+    frame: FloatArray,
+    origin: FloatArray,
+    machine: Machine,
+) -> list[tuple[Region, list[FloatArray]]]:
+    """Section and lines (n, 2) of each matrix layer on the bed: a contour, a zigzag inside it."""
     width, profile = machine.matrix_width, machine.gcode
-    lines: list[list[FloatArray]] = [[] for _ in slabs]
+    lines: list[tuple[Region, list[FloatArray]]] = [(shapely.Polygon(), []) for _ in slabs]
     middles = tuple(0.5 * (slab.lower + slab.upper) for slab in slabs)
     for layer in Planar(heights=middles).cut(mesh, frame[2]) if middles else ():
         plane = layer.plane
@@ -202,7 +241,12 @@ def _matrix_lines(
         contours = offset_rings(plane.polygon, 0.5 * width, width, width, 1)
         inside = zigzag(plane.polygon, (1.5 - _OVERLAP) * width, width, width, float(angle))
         found = [ring for level in contours for ring in level] + inside
-        lines[layer.index] = [plane.to_space(line) @ frame[:2].T for line in found]
+
+        def on_bed(points: FloatArray, plane: Plane = plane) -> FloatArray:
+            return plane.to_space(points) @ frame[:2].T - origin
+
+        section = shapely.transform(plane.polygon, on_bed)
+        lines[layer.index] = section, [on_bed(line) for line in found]
     return lines
 
 

@@ -9,7 +9,7 @@ import shapely
 from ccfem.arrays import FloatArray, IntArray
 from ccfem.geometry.free_ends import extend_free_ends
 from ccfem.geometry.polylines import is_closed, line_length, straight_pieces
-from ccfem.geometry.shapes import Region, open_lines
+from ccfem.geometry.shapes import Region, open_lines, strings
 from ccfem.geometry.shells import concentric
 
 __all__ = ["grow", "lengthened"]
@@ -25,6 +25,8 @@ _OFF = 0.02
 counts as parallel to that curve."""
 _REACH = 2.0
 """Maximum length, in pitches, by which the free end of a strand is extended."""
+_ROUND = 1.5
+"""Least radius, in pitches, of the convex corners of what is filled with concentric strands."""
 _TOLERANCE = 2e-3
 """Deviation, in pitches, up to which points of a curve are left out."""
 
@@ -36,6 +38,7 @@ def grow(
     closest: float,
     count: int | None = None,
     whole: bool = False,
+    pair: bool = False,
 ) -> list[FloatArray]:
     """Fill a region with strands: curves, strands parallel to them, concentric ones in the rest.
 
@@ -54,6 +57,8 @@ def grow(
     whole : bool, default False
         Whether strands go round the free ends of curves and on from one curve to the next. By
         default each belongs to one curve, and nothing is laid beyond the ends of that.
+    pair : bool, default False
+        Whether strands lie half a pitch to both sides of the curves, and none on them.
 
     Returns
     -------
@@ -64,9 +69,9 @@ def grow(
     strings = [shapely.LineString(curve).simplify(_TOLERANCE * pitch) for curve in curves]
     slack = (closest - 0.5) * pitch
     room = shapely.buffer(region, -slack, join_style="mitre")
-    inner = open_lines(shapely.intersection(strings, room))
+    inner = [] if pair else open_lines(shapely.intersection(strings, room))
     smooth = [shapely.get_coordinates(string) for string in strings]
-    inner += _parallels(smooth, room, pitch, closest, count, whole)
+    inner += _parallels(smooth, room, pitch, closest, count, whole, 0.5 if pair else 1.0)
     # The sides of a strand keep their distance to the border; its ends may reach it.
     lines = [
         line
@@ -78,8 +83,43 @@ def grow(
         )
         if line_length(line) >= pitch
     ]
+    lines = _without_crossings(lines, 0.1 * pitch)
     lines, rest = extend_free_ends(lines, region, pitch, closest, _REACH * pitch)
-    return lines + _fill_rest(rest, pitch, closest)
+    core = shapely.Polygon() if whole else _opened(rest, _ROUND * pitch)
+    if shapely.is_empty(core):
+        return lines + _fill_rest(rest, pitch, closest)
+    # Ends stand in steps where one curve takes over from another: they go on to a smooth border.
+    outside = shapely.difference(region, core)
+    lines, rest = extend_free_ends(lines, outside, pitch, closest, _REACH * pitch)
+    inner = _fill_rest(core, pitch, closest)
+    between = _kept_off(_fill_rest(rest, pitch, closest), inner, 0.5 * pitch)
+    return lines + inner + [line for line in between if line_length(line) >= pitch]
+
+
+def _kept_off(
+    lines: list[FloatArray], others: Sequence[FloatArray], distance: float
+) -> list[FloatArray]:
+    """Lines where they keep a distance from others."""
+    if not lines or not others:
+        return lines
+    taken = shapely.union_all(shapely.buffer(strings(others), distance))
+    return open_lines(shapely.difference(strings(lines), taken))
+
+
+def _opened(rest: Region, radius: float) -> Region:
+    """Morphological opening: what a disc reaches of a rest."""
+    return shapely.buffer(shapely.buffer(rest, -radius), radius)
+
+
+def _without_crossings(lines: list[FloatArray], gap: float) -> list[FloatArray]:
+    """Lines, the shorter of two that cross cut back by a gap: ends that meet head on overlap."""
+    curves = strings(lines)
+    one, other = shapely.STRtree(curves).query(curves, predicate="crosses")
+    for k, j in zip(one.tolist(), other.tolist(), strict=True):
+        if (curves[k].length, k) < (curves[j].length, j):
+            curves[k] = shapely.difference(curves[k], shapely.buffer(curves[j], gap))
+    found = open_lines(curves)
+    return [line for line in found if line_length(line) >= gap]
 
 
 def _parallels(
@@ -89,8 +129,9 @@ def _parallels(
     closest: float,
     count: int | None,
     whole: bool,
+    first: float,
 ) -> list[FloatArray]:
-    """Lines in a region at whole multiples of a pitch from the nearest of several curves.
+    """Lines in a region a pitch apart, from `first` pitches off the nearest of several curves on.
 
     The borders of the buffers of all curves together, so that lines of different distance never
     come nearer to each other than the pitch; where two fronts of one distance come nearer than
@@ -110,7 +151,7 @@ def _parallels(
     # Where a channel is closed there may be no line at one distance and some at the next.
     while (count is None or level < count) and idle < 3:
         level += 1
-        distance = level * pitch
+        distance = (level - 1 + first) * pitch
         covered = shapely.union_all(
             shapely.buffer(strings, distance, cap_style=cap, quad_segs=_ARC)
         )

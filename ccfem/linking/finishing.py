@@ -5,7 +5,7 @@ from collections.abc import Sequence
 import numpy as np
 import shapely
 
-from ccfem.arrays import FloatArray
+from ccfem.arrays import BoolArray, FloatArray
 from ccfem.geometry.polylines import along_line, is_closed, line_length, points_along
 from ccfem.geometry.shapes import Region, open_lines
 from ccfem.linking.joining import Joined, link_ends
@@ -81,8 +81,15 @@ def linked_paths(
         if line_length(closed) >= least_length:
             again = len(closed) - len(line)
             kept.lines.append(closed)
-            kept.link.append(np.concatenate([link, link[:again]]) if again else link)
+            kept.link.append(_run_on(link, again) if again else link)
     return kept
+
+
+def _run_on(link: BoolArray, again: int) -> BoolArray:
+    """Mark the steps of a ring that runs on over the first `again` of them."""
+    longer = np.concatenate([link[:-1], link[: again + 1]])
+    longer[-1] = False  # no step leaves the last point
+    return longer
 
 
 def close_short_ring(line: FloatArray, least_length: float) -> FloatArray:

@@ -192,8 +192,12 @@ def _accept(
     joints = []
     chain = np.arange(len(lines))
     length = np.array([line_length(line) for line in lines])  # of chains, at their numbers
-    # Corners last: first between paths that are both too short, so that few of them do.
-    for k, most_long in [(k, long) for long in (0, 1) for k in np.flatnonzero(free).tolist()]:
+    # Corners last, first between paths that are both too short. A smooth link needs no second try:
+    # nothing that stood in its way has gone.
+    rounds = [(k, 0) for k in np.flatnonzero(free).tolist()]
+    if mark:
+        rounds += [(k, 1) for k, _ in rounds if not links[k].smooth]
+    for k, most_long in rounds:
         link, path = links[k], paths[k]
         if link.first in taken or link.second in taken:
             continue

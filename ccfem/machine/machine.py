@@ -29,7 +29,8 @@ class Machine:
     fibre_width : float, mm
         W, the minimum distance between neighbouring strands.
     fibre_height : float, mm
-        Height of a fibre layer.
+        Least height of a fibre layer. Where the filament's section needs more at the width of a
+        fibre, it is that: see `strand_height`.
     matrix_height : float, mm
         Height of a matrix layer between two fibre layers.
     filament_area : float, mm^2

@@ -15,6 +15,7 @@ from ccfem.machine import Machine
 from ccfem.mesh import TetMesh
 from ccfem.mesh.box import box_mesh
 from ccfem.toolpaths import Toolpaths
+from ccfem.virtual_testing import Strand
 
 MACHINE = Machine()
 NAMES = [column.name for column in COLUMNS]
@@ -194,8 +195,8 @@ def test_a_layer_has_the_same_indices_at_any_place_in_the_list(part):
 
 
 def test_everything_scales_with_the_fibre_width(make_part):
-    # Part, paths and machine twice as large: pure numbers stay, lengths double. Only the 40 mm of
-    # over_40 stay too, so they are left out.
+    # Part, paths, strand and machine twice as large: pure numbers stay, lengths double. Only the
+    # 40 mm of over_40 stay too, so they are left out.
     small = make_part(bent)
     mesh = small.stress.mesh
     large = make_part(
@@ -207,7 +208,8 @@ def test_everything_scales_with_the_fibre_width(make_part):
     machine = replace(MACHINE, filament_area=4.0 * MACHINE.filament_area, **twice)
     first = evaluate(paths_of(small), small.layers, small.stress, MACHINE).total
     lines = [2.0 * np.array(line) for line in (WAVE, RING, OUT, SHORT)]
-    second = evaluate(large.paths(*lines), large.layers, large.stress, machine).total
+    thick = Strand(4.0 * Strand().rho)
+    second = evaluate(large.paths(*lines), large.layers, large.stress, machine, thick).total
     factor = {"mm": 2.0, "mm^2": 4.0, "g": 8.0, "1/mm": 0.5, "1/m": 0.5, "s": 2.0}
     scaled = {c.name: first[c.name] * factor.get(c.unit, 1.0) for c in COLUMNS}
     scaled |= {name: second[name] for name in ("over_40_count", "over_40_length")}

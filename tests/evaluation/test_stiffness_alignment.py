@@ -3,9 +3,10 @@
 import numpy as np
 import pytest
 
+from ccfem.elasticity import GivenStress
 from ccfem.errors import InputError
 from ccfem.evaluation import evaluate
-from ccfem.evaluation.sensitivity import OffAxis, acute
+from ccfem.evaluation.sensitivity import OffAxis, acute, strand_lamina
 from ccfem.evaluation.stiffness_alignment import (
     READINGS,
     agreement,
@@ -14,6 +15,7 @@ from ccfem.evaluation.stiffness_alignment import (
 )
 from ccfem.machine import Machine
 from ccfem.materials import isotropic, named_material
+from ccfem.virtual_testing import Strand
 
 MACHINE = Machine()
 
@@ -79,18 +81,49 @@ def test_no_sample_and_no_energy_have_no_index():
         assert np.isnan(performance_index(np.ones(3), np.zeros(3), reading))
 
 
-@pytest.mark.parametrize("sign", [1.0, -1.0])
-def test_fibre_along_and_across_uniaxial_stress(make_part, uniform, sign):
-    part = make_part(uniform(10.0 * sign))
-    curve = OffAxis(named_material("c_fram"))
+def full_of_strands(angle, modulus, nu, share):
+    """E(theta) / E1 of an isotropic sheet with E `share` more stiffness along axis 1.
+
+    Axial bars leave nu12 and G12 of the matrix; E1 is the sum of both, and across them strain is
+    hindered: E2 of Q22 - Q12^2 / Q11.
+    """
+    e1 = modulus * (1.0 + share)
+    q22 = modulus / (1.0 - nu**2)
+    e2 = q22 - (nu * q22) ** 2 / (q22 + share * modulus)
+    return engineering_modulus(angle, e1, e2, nu, modulus / (2.0 * (1.0 + nu)))
+
+
+@pytest.mark.parametrize("share", [0.0, 0.5, 2.0, 40.0])
+def test_curve_of_a_matrix_with_strands(share):
+    angle = np.radians(np.linspace(0.0, 90.0, 721))
+    expected = full_of_strands(angle, 3500.0, 0.35, share)
+    found = OffAxis(strand_lamina(isotropic(3500.0, 0.35), share))(angle)
+    np.testing.assert_allclose(found, expected / expected.max(), rtol=1e-5)
+
+
+@pytest.mark.parametrize(("sign", "rho"), [(1.0, None), (-1.0, None), (1.0, 1.0)])
+def test_fibre_along_and_across_uniaxial_stress(make_part, uniform, sign, rho):
+    part = make_part(uniform(10.0 * sign), count=2)
+    # The part is of E 1000, nu .3; its layers are 1 mm high, its strands 1 mm wide with EA 4 E.
+    strand = None if rho is None else Strand(rho)
     for degrees in (0.0, 30.0, 45.0, 90.0):
         d = 10.0 * np.array([np.cos(np.radians(degrees)), np.sin(np.radians(degrees))])
         paths = part.paths(np.array([30.0, 20.0]) + np.array([-d, d]))
-        total = evaluate(paths, part.layers, part.stress, MACHINE).total
-        kept = float(curve(np.radians(degrees)))
+        total = evaluate(paths, part.layers, part.stress, MACHINE, strand).total
+        angles = np.radians([degrees, *np.linspace(0.0, 90.0, 9001)])
+        kept, *all_round = full_of_strands(angles, 1000.0, 0.3, rho or 4.0)
+        kept /= max(all_round)
         assert total["agreement"] == pytest.approx(1.0 - degrees / 90.0, abs=1e-9)
         assert total["stiffness_alignment"] == pytest.approx(kept)
         assert total["stiffness_alignment_harmonic"] == pytest.approx(kept)
+
+
+def test_stress_alone_is_weighed_with_the_material_of_the_paper(make_part, uniform):
+    part = make_part(uniform(10.0))
+    given = GivenStress(part.stress.mesh, part.stress.stress, part.stress.nodal)
+    paths = part.paths(np.array([[30.0, 10.0], [30.0, 30.0]]))
+    total = evaluate(paths, part.layers, given, MACHINE).total
+    assert total["stiffness_alignment"] == pytest.approx(4.1 / 73.2)
 
 
 def test_grids_under_uniaxial_stress_agree_by_half(make_part, uniform):
@@ -118,6 +151,6 @@ def test_harmonic_index_weighs_by_energy(pulled):
     samples = AlignmentSamples(
         np.ones(2), np.array([0.0, np.pi / 2.0]), np.array([2.0, 1.0]), np.zeros(2), np.zeros(2)
     )
-    found = stiffness_alignment_indices(samples)["stiffness_alignment_harmonic"]
+    found = stiffness_alignment_indices(samples, named_material("c_fram"))
     kept = float(OffAxis(named_material("c_fram"))(np.array(np.pi / 2.0)))
-    assert found == pytest.approx(5.0 / (4.0 + 1.0 / kept))
+    assert found["stiffness_alignment_harmonic"] == pytest.approx(5.0 / (4.0 + 1.0 / kept))

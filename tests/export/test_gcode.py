@@ -11,6 +11,7 @@ from ccfem.errors import InputError
 from ccfem.evaluation.manufacture import manufacture_indices, sample_manufacture
 from ccfem.evaluation.plane_paths import plane_paths
 from ccfem.export.gcode import gcode, write_gcode
+from ccfem.export.matrix_flow import with_flow
 from ccfem.export.print_plan import check_machine, plan_print
 from ccfem.io.toml import from_table
 from ccfem.layers.slicing.planar import Planar
@@ -20,7 +21,7 @@ from ccfem.mesh.box import box_mesh
 from ccfem.meshing import extrude
 from ccfem.toolpaths import MATRIX, Toolpaths
 
-MACHINE = Machine(speeds=SpeedTable(), matrix_height=0.7, fibre_height=0.1)
+MACHINE = Machine(speeds=SpeedTable(), matrix_height=0.7, fibre_height=0.1, filament_area=0.1)
 TAIL = 42.0
 HOLE = 8.0
 # A plate of 90 x 50 x 4 mm with a hole; its lower corner lies at (-20, 10, 3).
@@ -190,22 +191,92 @@ def test_layers_fill_the_height_with_the_right_tool(printed):
     ]
 
 
-def test_matrix_has_the_volume_of_the_part_less_the_fibre_layers(printed):
+def laid_volumes(run, tool, area):
+    """Volume of one tool at each height, from filament of a section that it feeds along lines."""
+    found = {}
+    for strand in run.lines(tool):
+        volume = area * (strand.fed + (strand.fed_before if tool else 0.0))
+        found[strand.points[0, 2]] = found.get(strand.points[0, 2], 0.0) + volume
+    return found
+
+
+def test_every_layer_is_full(printed):
     *_, run = printed
-    area = 0.25 * np.pi * 1.75**2
-    strands = run.lines(0)
-    heights = sorted({strand.points[0, 2] for strand in strands})
-    thickness = dict(zip(heights, [0.6167, *[0.6167] * 4, 0.6167], strict=True))
-    for height in heights:
-        fed = sum(strand.fed for strand in strands if strand.points[0, 2] == height)
-        # Lines of 0.8 mm, a whole number of which need not fit: 3 % of the section at most.
-        assert fed * area == pytest.approx(AREA * thickness[height], rel=0.03)
-    total = sum(strand.fed for strand in strands) * area
-    assert total == pytest.approx(AREA * (4.0 - 0.3), rel=0.015)
+    matrix, fibre = laid_volumes(run, 0, 0.25 * np.pi * 1.75**2), laid_volumes(run, 1, 0.1)
+    lower = strand = 0.0
+    for height in sorted({*matrix, *fibre}):
+        if height in fibre:  # is filled by the matrix above
+            strand += fibre[height]
+            continue
+        laid = matrix[height] + strand
+        assert laid == pytest.approx(AREA * (height - lower), rel=2e-3)
+        lower, strand = height, 0.0
+    total = sum(matrix.values()) + sum(fibre.values())
+    assert total == pytest.approx(AREA * 4.0, rel=1e-3)
     # What is drawn back before travel is given back after it.
+    strands = run.lines(0)
     alone = [move.fed for move in run.moves if move.tool == 0 and move.length == 0.0 and move.fed]
     assert set(alone) == {1.0, -1.0}
     assert alone == [-1.0, *[1.0, -1.0] * (len(strands) - 1)]
+
+
+def sheet(lines, height=0.8):
+    """A plate of 90 x 40 mm with one layer in its middle, strands on it, and the printer."""
+    mesh = box_mesh((90.0, 40.0, height), (9, 4, 1))
+    layers = Planar(count=1).cut(mesh)
+    lines = [np.asarray(line, dtype=float) for line in lines]
+    machine = replace(MACHINE, minimum_length=10.0, matrix_height=height)
+    return Toolpaths.from_plane(lines, layers[0]), layers, mesh, machine
+
+
+def test_matrix_leaves_room_where_strands_lie(follow):
+    # Strands a width apart in the left half fill their layer of .1 mm, nothing in the right half.
+    paths, layers, mesh, machine = sheet([[[0, y], [45, y]] for y in np.arange(40) + 0.5])
+    run = follow(gcode(plan_print(paths, layers, mesh, machine), machine))
+    filament = 0.25 * np.pi * 1.75**2
+    share = {}
+    for height in (0.35, 0.8):
+        moves = [m for one in run.lines(0) for m in one.moves if one.points[0, 2] == height]
+        x = np.array([0.5 * (m.start + m.end)[0] for m in moves]) - (150.0 - 45.0)
+        fed, length = np.array([[m.fed * filament, m.length] for m in moves]).T
+        for name, part in (("left", (x > 3) & (x < 42)), ("right", (x > 48) & (x < 87))):
+            share[height, name] = fed[part].sum() / length[part].sum() / 0.8
+    # Below there is no fibre; above, .35 mm stand over fibre and .45 beside it.
+    assert share[0.35, "left"] == pytest.approx(share[0.35, "right"], rel=1e-3)
+    assert share[0.8, "left"] / share[0.8, "right"] == pytest.approx(0.35 / 0.45, rel=0.01)
+
+
+@pytest.mark.parametrize(
+    ("wide", "scale"), [(0.82, 1.025), (0.76, 0.95), (2.4, 1.1), (0.4, 1 / 1.1)]
+)
+def test_flow_follows_the_section_within_a_tenth(wide, scale):
+    # One line of .8 mm along a strip: too narrow or too wide a strip is not filled by more flow.
+    line = np.array([[0.0, 0.0, 0.5], [50.0, 0.0, 0.5]])
+    up = np.tile([0.0, 0.0, 1.0], (2, 1))
+    paths = Toolpaths(
+        points=line,
+        normals=up,
+        offsets=np.array([0, 2]),
+        layer=np.zeros(1, int),
+        kind=np.full(1, MATRIX),
+        closed=np.zeros(1, bool),
+    )
+    strip = shapely.box(0.0, -0.5 * wide, 50.0, 0.5 * wide)
+    found, laid = with_flow(paths, strip, 0.5, [], 0.0, MACHINE)
+    assert found.lengths.sum() == pytest.approx(50.0)
+    np.testing.assert_allclose(laid[:-1], 0.5 * scale)
+
+
+def test_strands_that_stand_higher_than_the_matrix_above_are_refused():
+    # Grids of strands a width apart: twice .1 mm, in .1 mm for the fibre and .07 of matrix.
+    rows = [[[0, y], [90, y]] for y in np.arange(40) + 0.5]
+    columns = [[[x, 0], [x, 40]] for x in np.arange(90) + 0.5]
+    with pytest.raises(InputError, match=r"higher than the 0\.07 mm .*0\.\d+ mm would do") as error:
+        plan_print(*sheet(rows + columns, 0.24))
+    # What it names is room for a strand on a strand, and .05 mm over them.
+    wanted = float(str(error.value).split("layer; ")[1].split(" mm")[0])
+    assert wanted == pytest.approx(0.15, abs=0.01)
+    plan_print(*sheet(rows + columns, 2.0 * wanted + 0.1))
 
 
 def test_the_zigzag_turns_by_45_degrees_from_layer_to_layer(printed):

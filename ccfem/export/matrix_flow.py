@@ -1,0 +1,146 @@
+"""How much matrix a line lays where it passes over fibre: the layer comes out full, not more.
+
+Strands do not fill the layer that they lie in, and where they cross they stand higher than it. The
+matrix above fills up to its own top: at a place x with rho mm of strand to the mm^2 its height is
+
+    t(x) = h_m + h_f - A rho(x),
+
+with the heights h_m of the matrix layer and h_f of the fibre below it, and the section A of a
+strand. All of a layer is then scaled, by at most a tenth, so that what it lays is what its section
+has room for: a zigzag does not pass everywhere exactly once.
+"""
+
+from collections.abc import Sequence
+from dataclasses import replace
+
+import numpy as np
+import shapely
+from scipy.ndimage import gaussian_filter, map_coordinates
+
+from ccfem.arrays import FloatArray
+from ccfem.errors import InputError
+from ccfem.geometry.polylines import pack, sample_midpoints, starts_segment, subdivide
+from ccfem.geometry.shapes import Region, strings
+from ccfem.machine.machine import Machine
+from ccfem.toolpaths import Toolpaths
+
+__all__ = ["with_flow"]
+
+_PIECE = 2.0
+"""Longest piece, mm, over which the height is taken as one."""
+_STEP = 0.05
+"""Steps in which the height changes along a line, over that of the layer."""
+_CELL = 0.25
+_SPREAD = 0.5
+"""Cell of the grid on which fibre is counted, and standard deviation of the bell curve that spreads
+it, in fibre widths: strands a width apart then have the same density everywhere to 1.5 %."""
+_LEAST = 0.05
+"""Least height, mm, of matrix over a strand, where its layer is as high. Our choice."""
+_SCALE = 1.1
+"""Most by which a layer is scaled: where lines do not reach a tenth of a section, as between walls
+nearer than a line is wide, more flow would not reach it either. Our choice."""
+_TOO_THIN = 0.1
+"""Share of a layer's lines that may be thinner, since fibre below stands too high. Our choice."""
+
+
+def with_flow(
+    paths: Toolpaths,
+    section: Region,
+    height: float,
+    strands: Sequence[FloatArray],
+    below: float,
+    machine: Machine,
+) -> tuple[Toolpaths, FloatArray]:
+    """Lines of a matrix layer with the height that each of their steps lays.
+
+    Parameters
+    ----------
+    paths : Toolpaths
+        Of one layer of matrix.
+    section : shapely (Multi)Polygon, mm
+        What the layer has to fill, in the plane of the paths.
+    height : float, mm
+        Of the layer.
+    strands : sequence of (n, 2) arrays, mm
+        Fibre directly below it, none for a layer on matrix.
+    below : float, mm
+        Height of the fibre layers that they lie in.
+    machine : Machine
+
+    Returns
+    -------
+    paths : Toolpaths
+        With a point wherever the height changes by a twentieth.
+    laid : (P,) array, mm
+        Height of matrix, a line wide, on the step from each point; 0 at the end of a line.
+
+    Raises
+    ------
+    InputError
+        Where strands stand higher than the matrix above them on more than a tenth of the layer.
+    """
+    points, offsets, segment = subdivide(paths.points, paths.offsets, _PIECE)
+    start = np.flatnonzero(starts_segment(offsets))
+    length = np.linalg.norm(points[start + 1] - points[start], axis=1)
+    middle = 0.5 * (points[start] + points[start + 1])[:, :2]
+    volume = height + below - machine.filament_area * _density(strands, middle, machine)
+    least = min(_LEAST, height)
+    _check(volume, length, height, below, least)
+    wanted = np.maximum(volume, least)
+    # Of neighbouring pieces in one step of the height only the first keeps its point.
+    level = np.full(len(points), -1)
+    level[start] = np.round(wanted / (_STEP * height)).astype(np.int64)
+    keep = np.append(True, np.diff(segment) > 0)
+    keep[1:] |= level[1:] != level[:-1]
+    kept = np.flatnonzero(keep)
+    run = (np.cumsum(keep) - 1)[start]
+    long = np.bincount(run, length, len(kept))
+    laid = np.bincount(run, wanted * length, len(kept)) / np.maximum(long, 1e-300)
+    inside = shapely.length(shapely.intersection(strings(strands), section)).sum()
+    room = section.area * (height + below) - machine.filament_area * inside
+    scale = room / (machine.matrix_width * (laid * long).sum())
+    laid *= np.clip(scale, 1.0 / _SCALE, _SCALE)
+    fewer = replace(
+        paths,
+        points=points[kept],
+        normals=np.broadcast_to(paths.normals[0], (len(kept), 3)),
+        offsets=np.searchsorted(kept, offsets),
+        link=np.zeros(len(kept), dtype=bool),
+    )
+    return fewer, laid
+
+
+def _density(strands: Sequence[FloatArray], places: FloatArray, machine: Machine) -> FloatArray:
+    """Length of strand per area, 1/mm, round places (k, 2)."""
+    if not len(strands):
+        return np.zeros(len(places))
+    width = machine.fibre_width
+    cell = _CELL * width
+    lines, offsets = pack(strands)
+    samples, _, length, _ = sample_midpoints(lines, offsets, 0.5 * cell)
+    low = places.min(axis=0) - 4.0 * width
+    shape = tuple(np.ceil((places.max(axis=0) + 4.0 * width - low) / cell).astype(int) + 1)
+    index = np.floor((samples - low) / cell).astype(int)
+    inside = ((index >= 0) & (index < shape)).all(axis=1)
+    flat = np.ravel_multi_index(tuple(index[inside].T), shape)
+    count = np.bincount(flat, length[inside], int(np.prod(shape))).reshape(shape)
+    spread = gaussian_filter(count / cell**2, _SPREAD / _CELL, mode="constant")
+    at = (places - low) / cell - 0.5
+    return np.asarray(map_coordinates(spread, at.T, order=1, mode="nearest"))
+
+
+def _check(
+    volume: FloatArray, length: FloatArray, height: float, below: float, least: float
+) -> None:
+    """Raise where strands stand higher than the matrix above them on too much of the layer."""
+    thin = length[volume < least].sum() / length.sum()
+    if thin <= _TOO_THIN:
+        return
+    order = np.argsort(volume)
+    share = np.cumsum(length[order]) / length.sum()
+    missing = least - float(volume[order[np.searchsorted(share, 0.01)]])
+    raise InputError(
+        f"strands stand higher than the {height:.3g} mm of matrix above them on {thin:.0%} of the "
+        f"layer; {height + missing:.3g} mm would do: lay fibre layers at least "
+        f"{height + below + missing:.3g} mm apart"
+    )
