@@ -29,6 +29,14 @@ GAMG = {
 MUMPS = {"ksp_type": "preonly", "pc_type": "cholesky", "pc_factor_mat_solver_type": "mumps"}
 
 
+def blas():
+    """Name the files of the BLAS that this process has loaded: a reference one makes MUMPS slow."""
+    with open("/proc/self/maps") as file:
+        loaded = {line.split()[-1] for line in file if "/" in line}
+    names = {"/".join(path.split("/")[-2:]) for path in loaded}
+    return sorted(name for name in names if any(k in name for k in ("blas", "mkl", "blis")))
+
+
 def clock():
     return np.array([perf_counter(), process_time()])
 
@@ -107,6 +115,7 @@ def main(path, solver, order):
                 "assembly": list(assembled - started),
                 "solve": list(done - assembled),
                 "largest": largest,
+                "blas": blas(),
                 "record": f"{krylov.getIterationNumber()} iterations" if solver == "gamg" else "",
             }
         )

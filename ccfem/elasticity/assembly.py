@@ -188,27 +188,6 @@ def _mark(indptr, indices, i, slot):  # type: ignore[no-untyped-def]
 
 
 @njit(cache=True)
-def _gather_linear(  # type: ignore[no-untyped-def]
-    indptr, indices, start, touching, cells, which, gradients, scale, stiffness, data
-):
-    slot = np.empty(indptr.size - 1, np.int32)
-    t = np.empty((6, 3))
-    for i in range(indptr.size - 1):
-        _mark(indptr, indices, i, slot)
-        for e in range(start[i], start[i + 1]):
-            cell, a = touching[e] // 4, touching[e] % 4
-            _times_gradient(stiffness[which[cell]], gradients[cell, a], scale[cell], t)
-            for b in range(4):
-                x, y, z = gradients[cell, b, 0], gradients[cell, b, 1], gradients[cell, b, 2]
-                s = slot[cells[cell, b]]
-                for p in range(3):
-                    u, v, w = _against(t, p, x, y, z)
-                    data[s, p, 0] += u
-                    data[s, p, 1] += v
-                    data[s, p, 2] += w
-
-
-@njit(cache=True)
 def _mirror(indptr, indices, i, diagonal, data):  # type: ignore[no-untyped-def]
     """Copy the blocks left of the diagonal of row i from the rows above; note its diagonal.
 
@@ -225,6 +204,32 @@ def _mirror(indptr, indices, i, diagonal, data):  # type: ignore[no-untyped-def]
         for p in range(3):
             for r in range(3):
                 data[s, p, r] = data[above, r, p]
+
+
+@njit(cache=True)
+def _gather_linear(  # type: ignore[no-untyped-def]
+    indptr, indices, start, touching, cells, which, gradients, scale, stiffness, data
+):
+    slot = np.empty(indptr.size - 1, np.int32)
+    diagonal = np.empty(indptr.size - 1, np.int32)
+    t = np.empty((6, 3))
+    for i in range(indptr.size - 1):
+        _mark(indptr, indices, i, slot)
+        for e in range(start[i], start[i + 1]):
+            cell, a = touching[e] // 4, touching[e] % 4
+            _times_gradient(stiffness[which[cell]], gradients[cell, a], scale[cell], t)
+            for b in range(4):
+                j = cells[cell, b]
+                if j < i:
+                    continue
+                x, y, z = gradients[cell, b, 0], gradients[cell, b, 1], gradients[cell, b, 2]
+                s = slot[j]
+                for p in range(3):
+                    u, v, w = _against(t, p, x, y, z)
+                    data[s, p, 0] += u
+                    data[s, p, 1] += v
+                    data[s, p, 2] += w
+        _mirror(indptr, indices, i, diagonal, data)
 
 
 @njit(cache=True)

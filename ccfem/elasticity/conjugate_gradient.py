@@ -9,7 +9,10 @@ from scipy.linalg import eigvalsh_tridiagonal
 from ccfem.arrays import FloatArray
 from ccfem.elasticity.solution import product
 
-__all__ = ["conjugate_gradient"]
+__all__ = ["conjugate_gradient", "highest_eigenvalue"]
+
+_LANCZOS = 6
+"""Steps after which the highest eigenvalue is known to some six per cent."""
 
 
 def conjugate_gradient(
@@ -46,6 +49,33 @@ def conjugate_gradient(
         Lowest eigenvalue of the preconditioned matrix that the directions span (Saad, section
         6.7.3), not below the lowest of all; 1 without any iteration.
     """
+    x, steps, ratios = _iterate(matrix, rhs, precondition, x0, tolerance, most)
+    return x, len(steps), float(_eigenvalues(steps, ratios).min())
+
+
+def highest_eigenvalue(matrix: Any, precondition: Callable[[FloatArray], FloatArray]) -> float:
+    """Highest eigenvalue of a preconditioned matrix, or a little less, by the method of Lanczos.
+
+    Parameters
+    ----------
+    matrix : sparse array (n, n)
+    precondition : callable
+        As in `conjugate_gradient`.
+    """
+    rhs = np.random.default_rng(0).normal(size=matrix.shape[0])
+    _, steps, ratios = _iterate(matrix, rhs, precondition, None, 0.0, _LANCZOS)
+    return float(_eigenvalues(steps, ratios).max())
+
+
+def _iterate(
+    matrix: Any,
+    rhs: FloatArray,
+    precondition: Callable[[FloatArray], FloatArray],
+    x0: FloatArray | None,
+    tolerance: float,
+    most: int,
+) -> tuple[FloatArray, FloatArray, FloatArray]:
+    """Solution, and the lengths and ratios of the steps."""
     x = np.zeros_like(rhs) if x0 is None else np.array(x0, dtype=np.float64)
     residual = rhs - matrix @ x if x0 is not None else rhs.copy()
     target = tolerance**2 * product(rhs, rhs)
@@ -70,14 +100,13 @@ def conjugate_gradient(
         residual = residual - step * image
         steps.append(step)
         ratios.append(max(beta, 0.0))
-    return x, len(steps), _lowest(np.array(steps), np.array(ratios))
+    return x, np.array(steps), np.array(ratios)
 
 
-def _lowest(steps: FloatArray, ratios: FloatArray) -> float:
-    """Lowest eigenvalue of the tridiagonal matrix that the coefficients make up."""
+def _eigenvalues(steps: FloatArray, ratios: FloatArray) -> FloatArray:
+    """Eigenvalues of the tridiagonal matrix that the steps make up."""
     if not len(steps):
-        return 1.0
+        return np.ones(1)
     diagonal = 1.0 / steps
     diagonal[1:] += ratios[1:] / steps[:-1]
-    beside = np.sqrt(ratios[1:]) / steps[:-1]
-    return float(eigvalsh_tridiagonal(diagonal, beside, select="i", select_range=(0, 0))[0])
+    return np.asarray(eigvalsh_tridiagonal(diagonal, np.sqrt(ratios[1:]) / steps[:-1]))

@@ -1,4 +1,9 @@
-"""Block Gauss-Seidel sweeps over matrices of 3x3 blocks, compiled."""
+"""Block Gauss-Seidel sweeps over symmetric matrices of which half is kept, compiled.
+
+What lies below the diagonal tells what lies above. A sweep that takes the blocks of row i for both,
+to gather what the rows before it give to row i and to scatter what row i gives back, reads half as
+much memory as one over whole rows.
+"""
 
 from typing import Any
 
@@ -10,57 +15,88 @@ from ccfem.arrays import FloatArray
 
 __all__ = ["GaussSeidel"]
 
-
-# Both sweeps run through the blocks in the order of memory, forward or backward, and read each row
-# whole: three times as fast as reading half rows or ascending within descending rows.
-
-
-@njit(cache=True)
-def _times(data, k, u, v, w):  # type: ignore[no-untyped-def]
-    """Product of the 3x3 block that starts at k with a vector."""
-    return (
-        data[k] * u + data[k + 1] * v + data[k + 2] * w,
-        data[k + 3] * u + data[k + 4] * v + data[k + 5] * w,
-        data[k + 6] * u + data[k + 7] * v + data[k + 8] * w,
-    )
+_CONTRACT = {"contract"}
+"""Products and sums may be fused."""
 
 
 @njit(cache=True)
-def _forward(indptr, indices, data, inverse, rhs, x, residual):  # type: ignore[no-untyped-def]
-    """Sweep from x = 0, and leave the residual ``-U x``, U the strict upper triangle.
-
-    Row i knows x up to i; what it adds to the residual of the rows above comes from its own lower
-    blocks, since the matrix is symmetric.
-    """
+def _halve(indptr, indices, data, start, column, low, diagonal):  # type: ignore[no-untyped-def]
+    """Pick the blocks below the diagonal and on it."""
+    d, place = data.shape[1], 0
     for i in range(indptr.size - 1):
-        a, b, c = rhs[3 * i], rhs[3 * i + 1], rhs[3 * i + 2]
         for s in range(indptr[i], indptr[i + 1]):
-            j = 3 * indices[s]
-            p, q, r = _times(data, 9 * s, x[j], x[j + 1], x[j + 2])
-            a, b, c = a - p, b - q, c - r
-        u, v, w = _times(inverse, 9 * i, a, b, c)
-        x[3 * i], x[3 * i + 1], x[3 * i + 2] = u, v, w
-        for s in range(indptr[i], indptr[i + 1]):
-            if indices[s] >= i:
-                break
-            j, k = 3 * indices[s], 9 * s
-            residual[j] -= data[k] * u + data[k + 3] * v + data[k + 6] * w
-            residual[j + 1] -= data[k + 1] * u + data[k + 4] * v + data[k + 7] * w
-            residual[j + 2] -= data[k + 2] * u + data[k + 5] * v + data[k + 8] * w
+            j = indices[s]
+            if j < i:
+                column[place] = j
+                for p in range(d):
+                    for q in range(d):
+                        low[place, p, q] = data[s, p, q]
+                place += 1
+            elif j == i:
+                for p in range(d):
+                    for q in range(d):
+                        diagonal[i, p, q] = data[s, p, q]
+        start[i + 1] = place
 
 
-@njit(cache=True)
-def _backward(indptr, indices, data, inverse, rhs, x):  # type: ignore[no-untyped-def]
-    """Sweep backward over x, in place."""
-    for i in range(indptr.size - 2, -1, -1):
-        a, b, c = rhs[3 * i], rhs[3 * i + 1], rhs[3 * i + 2]
-        for s in range(indptr[i + 1] - 1, indptr[i] - 1, -1):
-            if indices[s] == i:
-                continue
-            j = 3 * indices[s]
-            p, q, r = _times(data, 9 * s, x[j], x[j + 1], x[j + 2])
-            a, b, c = a - p, b - q, c - r
-        x[3 * i], x[3 * i + 1], x[3 * i + 2] = _times(inverse, 9 * i, a, b, c)
+@njit(cache=True, fastmath=_CONTRACT)
+def _three(start, column, low, inverse, rest, x, backward):  # type: ignore[no-untyped-def]
+    """Sweep over 3x3 blocks.
+
+    Forward, from ``x = 0`` and ``rest = 0``, with the right-hand side in x: `rest` becomes the
+    residual ``-U x``, U the strict upper triangle. Backward `rest` is the right-hand side, which
+    loses ``U x`` on the way.
+    """
+    n = start.size - 1
+    for row in range(n):
+        i = n - 1 - row if backward else row
+        f = rest[i] if backward else x[i]
+        a, b, c = f[0], f[1], f[2]
+        for s in range(start[i], start[i + 1]):
+            m, y = low[s], x[column[s]]
+            u, v, w = y[0], y[1], y[2]
+            a -= m[0, 0] * u + m[0, 1] * v + m[0, 2] * w
+            b -= m[1, 0] * u + m[1, 1] * v + m[1, 2] * w
+            c -= m[2, 0] * u + m[2, 1] * v + m[2, 2] * w
+        m = inverse[i]
+        u = m[0, 0] * a + m[0, 1] * b + m[0, 2] * c
+        v = m[1, 0] * a + m[1, 1] * b + m[1, 2] * c
+        w = m[2, 0] * a + m[2, 1] * b + m[2, 2] * c
+        x[i, 0], x[i, 1], x[i, 2] = u, v, w
+        for s in range(start[i], start[i + 1]):
+            m, y = low[s], rest[column[s]]
+            y[0] -= m[0, 0] * u + m[1, 0] * v + m[2, 0] * w
+            y[1] -= m[0, 1] * u + m[1, 1] * v + m[2, 1] * w
+            y[2] -= m[0, 2] * u + m[1, 2] * v + m[2, 2] * w
+
+
+@njit(cache=True, fastmath=_CONTRACT)
+def _six(start, column, low, inverse, rest, x, backward):  # type: ignore[no-untyped-def]
+    """Do the same over 6x6 blocks."""
+    n, f, u = start.size - 1, np.empty(6), np.empty(6)
+    for row in range(n):
+        i = n - 1 - row if backward else row
+        for p in range(6):
+            f[p] = rest[i, p] if backward else x[i, p]
+        for s in range(start[i], start[i + 1]):
+            m, y = low[s], x[column[s]]
+            for p in range(6):
+                total = f[p]
+                for q in range(6):
+                    total -= m[p, q] * y[q]
+                f[p] = total
+        m = inverse[i]
+        for p in range(6):
+            total = 0.0
+            for q in range(6):
+                total += m[p, q] * f[q]
+            u[p] = total
+            x[i, p] = total
+        for s in range(start[i], start[i + 1]):
+            m, y = low[s], rest[column[s]]
+            for p in range(6):
+                for q in range(6):
+                    y[q] -= m[p, q] * u[p]
 
 
 class GaussSeidel:
@@ -68,30 +104,45 @@ class GaussSeidel:
 
     Parameters
     ----------
-    matrix : bsr_array (3n, 3n) with 3x3 blocks
-        Sorted columns, a positive definite block on each diagonal.
+    matrix : bsr_array (d n, d n) with d x d blocks, d 3 or 6
+        Symmetric, a positive definite block on each diagonal; components without any stiffness
+        stay zero.
+    single : bool, default False
+        Whether to keep what is beside the diagonal in single precision.
     """
 
-    def __init__(self, matrix: sp.bsr_array) -> None:
-        n = len(matrix.indptr) - 1
-        indptr, indices = matrix.indptr.astype(np.int32), matrix.indices.astype(np.int32)
-        rows = np.repeat(np.arange(n), np.diff(indptr))
-        diagonal = np.flatnonzero(indices == rows)
-        inverse = np.linalg.inv(matrix.data[diagonal])
-        self._arguments: tuple[Any, ...] = (
-            indptr,
-            indices,
-            matrix.data.reshape(-1),
-            inverse.reshape(-1),
-        )
+    def __init__(self, matrix: sp.bsr_array, single: bool = False) -> None:
+        n, d = len(matrix.indptr) - 1, matrix.data.shape[1]
+        count = (len(matrix.indices) - n) // 2
+        start = np.zeros(n + 1, dtype=np.uint32)
+        column = np.empty(count, dtype=np.uint32)
+        low = np.empty((count, d, d), dtype=np.float32 if single else np.float64)
+        diagonal = np.empty((n, d, d))
+        indptr = matrix.indptr.astype(np.int32, copy=False)
+        indices = matrix.indices.astype(np.int32, copy=False)
+        _halve(indptr, indices, matrix.data, start, column, low, diagonal)
+        nothing = np.einsum("npp->np", diagonal) == 0.0
+        np.einsum("npp->np", diagonal)[nothing] = 1.0
+        self.inverse: FloatArray = np.linalg.inv(diagonal)
+        self._arguments: tuple[Any, ...] = (start, column, low, self.inverse)
+        self._sweep = _three if d == 3 else _six
 
     def forward(self, rhs: FloatArray) -> tuple[FloatArray, FloatArray]:
-        """Sweep forward from zero: the approximation (3n,) and the residual (3n,) it leaves."""
-        x, residual = np.zeros_like(rhs), np.zeros_like(rhs)
-        _forward(*self._arguments, rhs, x, residual)
+        """Sweep forward from zero: the approximation (d n,) and the residual (d n,) it leaves."""
+        x, residual = rhs.copy(), np.zeros_like(rhs)
+        self._run(residual, x, False)
         return x, residual
 
     def backward(self, rhs: FloatArray, x: FloatArray) -> FloatArray:
-        """Sweep backward over the approximation x (3n,), in place, and return it."""
-        _backward(*self._arguments, rhs, x)
+        """Sweep backward over the approximation x (d n,), in place, and return it."""
+        self._run(rhs.copy(), x, True)
         return x
+
+    def jacobi(self, rhs: FloatArray) -> FloatArray:
+        """Product (d n,) with the inverse of the diagonal blocks."""
+        shape = self.inverse.shape[:2]
+        return np.einsum("npq,nq->np", self.inverse, rhs.reshape(shape)).reshape(-1)
+
+    def _run(self, rest: FloatArray, x: FloatArray, backward: bool) -> None:
+        shape = self.inverse.shape[:2]
+        self._sweep(*self._arguments, rest.reshape(shape), x.reshape(shape), backward)

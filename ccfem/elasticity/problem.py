@@ -84,7 +84,8 @@ class Problem:
     regions : tuple of Region
         Cells of other materials; no cell in two of them.
     combinations : mapping of name to mapping of load case name to factor
-        Further load cases: sums of others, each times its factor.
+        Further load cases: sums of others, each times its factor. Factors are of the loads: on
+        supports that only press the displacements do not add up.
     order : "auto", 1 or 2, default "auto"
         Order of the displacement that `solve` takes on a mesh of linear cells: see
         `ccfem.elasticity.order`. Quadratic cells stay.

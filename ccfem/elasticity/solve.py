@@ -53,8 +53,9 @@ def solve(
     Returns
     -------
     dict of load case name to StressField
-        Combinations of load cases come last. The time of the factorisation counts in the record
-        of the first load case.
+        Combinations of load cases come last. Where supports only press they are solved as load
+        cases of their own, since the contact is another one. The time of the factorisation counts
+        in the record of the first load case.
 
     Raises
     ------
@@ -133,15 +134,16 @@ def solve_system(
     system = prepare()
     matrix = system.assemble()
     assembled = perf_counter()
-    each = 1 if system.held.presses is None else EXPECTED
-    solver = system.factorise(matrix, backend, each * len(system.forces))
+    # Where supports only press, the solutions of load cases do not add up: their loads do.
+    linear = system.held.presses is None
+    sums = system.combinations if linear else {}
+    alone = (*system.forces, *(name for name in system.combinations if name not in sums))
+    each = 1 if linear else EXPECTED
+    solver = system.factorise(matrix, backend, each * len(alone))
     record = SolveRecord(solver.backend, 0, 0.0, assembled - started, 0.0, system.held.unknowns)
     because = solver.because
     fields, found = {}, {}
     started = assembled
-    # What lies on a support that only presses cannot be added up from the load cases.
-    sums = system.combinations if system.held.presses is None else {}
-    alone = [*system.forces, *(name for name in system.combinations if name not in sums)]
     for case in alone:
         work = partial(_solved, matrix, system.held_in(case), system.forces_in(case), tolerance)
         try:

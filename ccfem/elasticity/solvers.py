@@ -35,11 +35,15 @@ _MANY = 4
 """Right-hand sides from which a sparse Cholesky is quicker than a multigrid (measured)."""
 
 _SEVERAL = 3
-"""Right-hand sides from which a multigrid that takes longer to make is worth it (measured)."""
+"""Right-hand sides from which a multigrid that takes several times as long to make is worth it on
+thin parts (measured: from 3 on one cell high, from 9 on two; never on higher ones)."""
 
 _THIN = 12.4
 """Neighbours of a node of linear cells, itself among them, below which a part is so thin that
 PARDISO is quicker than a multigrid for one right-hand side already (measured): two cells high."""
+
+_THIN_LARGEST = 40_000
+"""Unknowns up to which it is (measured on flat and curved sheets: 16,000 and 71,000)."""
 
 _REFINEMENTS = 2
 """Times that a solution is improved by solving for what its residual leaves."""
@@ -253,9 +257,9 @@ def choose(unknowns: int, order: int, solves: int = 1, neighbours: float = np.in
     direct = unknowns <= LARGEST_DIRECT and best != "superlu"
     if direct and solves >= _MANY:
         return Choice(best, f"{solves} load cases on at most {LARGEST_DIRECT:,} unknowns")
-    if direct and best == "pypardiso" and neighbours < _THIN:
+    if best == "pypardiso" and neighbours < _THIN and unknowns <= _THIN_LARGEST:
         thin = f"one or two cells high ({neighbours:.1f} neighbours a node, below {_THIN})"
-        return Choice(best, f"{thin}, at most {LARGEST_DIRECT:,} unknowns")
+        return Choice(best, f"{thin}, at most {_THIN_LARGEST:,} unknowns")
     if unknowns > LARGEST_DIRECT:
         return Choice("amg", f"linear cells, more than {LARGEST_DIRECT:,} unknowns")
     if best == "superlu" and (solves >= _MANY or neighbours < _THIN):
@@ -298,14 +302,18 @@ def factorise(
     """
     because = "asked for"
     if backend == "auto":
-        neighbours = len(matrix.indices) / max(1, len(matrix.indptr) - 1)
         order = 1 if parents is None else 2
-        backend, because = choose(matrix.shape[0], order, solves, neighbours)
+        backend, because = choose(matrix.shape[0], order, solves, _neighbours(matrix))
     check_known("backend", backend, ["auto", *BACKENDS])
     if backend in _MODULES and find_spec(_MODULES[backend]) is None:
         raise InputError(f"backend '{backend}' is not installed: {_CURES[backend]}")
     make = _maker(backend, matrix, points, parents, solves)
     return Solver(backend, matrix, make(matrix), backend in DIRECT, make, because)
+
+
+def _neighbours(matrix: sp.bsr_array) -> float:
+    """Neighbours of a node, itself among them, in the mean."""
+    return len(matrix.indices) / max(1, len(matrix.indptr) - 1)
 
 
 def _maker(
@@ -323,6 +331,6 @@ def _maker(
             raise InputError("backend 'two-level' is for quadratic meshes: use mesh.quadratic()")
         return partial(multigrid.two_level, points=points, parents=parents)
     if backend == "amg":
-        frugal = solves < _SEVERAL
+        frugal = solves < _SEVERAL or _neighbours(matrix) >= _THIN
         return partial(multigrid.smoothed_aggregation, points=points, frugal=frugal)
     return {"cholmod": direct.cholmod, "superlu": direct.superlu, "skyline": skyline}[backend]

@@ -132,7 +132,7 @@ class StressField:
     @property
     def loaded(self) -> tuple[str, ...]:
         """Names of the patches that carry a load in its load case."""
-        return patches_in_use((), {self.case: self.problem.loads[self.case]})
+        return patches_in_use((), {self.case: self.problem.loads_of(self.case)})
 
     def at(self, points: FloatArray, tolerance: float = 1e-3) -> FloatArray:
         """Recovered stress at any points of the part.

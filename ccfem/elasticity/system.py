@@ -20,7 +20,6 @@ from ccfem.elasticity.springs import add_springs, soft_supports, spring_forces
 from ccfem.elasticity.stress_field import SolveRecord, StressField
 from ccfem.elasticity.supports import held, held_in
 from ccfem.elasticity.volume_loads import free_strain, strain_forces
-from ccfem.errors import InputError
 from ccfem.mesh.tet_mesh import TetMesh
 
 __all__ = ["System", "prepare"]
@@ -176,11 +175,6 @@ def prepare(problem: Problem) -> System:
     """
     forces = load_cases(problem)
     at_rest = held(problem)
-    if at_rest.presses is not None and problem.combinations:
-        raise InputError(
-            "load cases do not add up where supports only press; got the combinations "
-            f"{', '.join(problem.combinations)}: make each a load case of its own"
-        )
     moved = {}
     for case in problem.loads:
         here = held_in(problem, case, at_rest)

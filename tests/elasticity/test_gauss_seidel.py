@@ -34,6 +34,20 @@ def test_sweeps_are_triangular_solves(nodes, seed):
     np.testing.assert_allclose(residual, rhs - dense @ x, atol=1e-12)
     expected = start + np.linalg.solve(upper, rhs - dense @ start)
     np.testing.assert_allclose(smoother.backward(rhs, start.copy()), expected, atol=1e-12)
+    single = GaussSeidel(matrix, single=True)
+    np.testing.assert_allclose(single.forward(rhs), (x, residual), atol=1e-6)
+    np.testing.assert_allclose(single.backward(rhs, start.copy()), expected, atol=1e-6)
+    if nodes % 2 == 0:
+        # The same matrix in blocks of six.
+        pair = np.arange(3 * nodes) // 6
+        lower = np.where(pair[:, None] >= pair, dense, 0.0)
+        upper = np.where(pair[:, None] <= pair, dense, 0.0)
+        smoother = GaussSeidel(sp.bsr_array(dense, blocksize=(6, 6)))
+        x, residual = smoother.forward(rhs)
+        np.testing.assert_allclose(x, np.linalg.solve(lower, rhs), atol=1e-12)
+        np.testing.assert_allclose(residual, rhs - dense @ x, atol=1e-12)
+        expected = start + np.linalg.solve(upper, rhs - dense @ start)
+        np.testing.assert_allclose(smoother.backward(rhs, start.copy()), expected, atol=1e-12)
 
 
 @given(st.integers(2, 8), st.integers(0, 10_000))

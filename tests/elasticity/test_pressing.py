@@ -158,6 +158,31 @@ def test_the_solution_is_in_proportion_to_the_load():
     np.testing.assert_allclose(again.displacement, 3.0 * once.displacement, rtol=1e-6, atol=1e-9)
 
 
+def test_a_combination_has_a_contact_of_its_own():
+    problem = block(1, 0.0, Spring("x_max", (0.0, 0.0, 1.0)))
+    press, lift = Pressure("z_max", 0.02), Force("x_max", (0.3, 0.1, 0.4))
+    loads = {"press": (press,), "lift": (press, lift)}
+    combinations = {"more": {"press": -0.5, "lift": 2.0}}
+    problem = replace(problem, loads=loads, combinations=combinations)
+    fields, system = solve(problem), prepare(problem)
+    found = fields["more"]
+    assert tuple(fields) == ("press", "lift", "more")
+    assert found.loaded == ("x_max", "z_max")
+    exact = programme(system.assemble(), system.held, system.forces_in("more"))
+    size = np.abs(exact).max()
+    assert np.abs(found.displacement - exact).max() < 1e-5 * size
+    # The sum of the displacements is something else, and sinks into the table.
+    added = 2.0 * fields["lift"].displacement - 0.5 * fields["press"].displacement
+    assert np.abs(added - exact).max() > 0.01 * size
+    assert system.held.along_pressing(found.displacement).max() <= 1e-7 * size
+    # Its reactions, that of the spring among them, balance its own loads.
+    vertical = found.reactions[:, 2].sum()
+    assert vertical == pytest.approx(1.5 * 0.02 * 16.0 * 4.0 - 2.0 * 0.4, rel=1e-6)
+    # With fibres too the forces are those of the combination.
+    forces = system.forces_in("more")
+    np.testing.assert_allclose(Specimen.of(found).forces, forces, atol=1e-12)
+
+
 @pytest.mark.parametrize("mode", [BONDED, TENSION])
 def test_contact_and_fibres_are_settled_together(mode):
     """Of the stiffness with the fibres that carry, the contact is that of the programme."""
@@ -188,8 +213,6 @@ def test_bad_input_is_refused():
         solve(replace(problem, supports=moved))
     with pytest.raises(InputError, match=r"supports on it hold nothing"):
         solve(replace(problem, loads={"case": (Displacement("z_min", (0.0, 0.0, 0.1)),)}))
-    with pytest.raises(InputError, match="do not add up where supports only press"):
-        solve(replace(problem, combinations={"twice": {"case": 2.0}}))
     with pytest.raises(InputError, match="is free to move along y"):
         solve(replace(problem, supports=(PressingSupport("z_min"), Support("x_min", "x"))))
     with pytest.raises(InputError, match="must have a finite length above 0"):

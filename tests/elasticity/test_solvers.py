@@ -141,6 +141,7 @@ def test_the_choice_follows_size_order_and_what_is_installed(monkeypatch):
     assert choose(500_000, 1, solves=10).backend == "amg"
     assert choose(20_000, 1, neighbours=14.0).backend == "amg"
     assert choose(20_000, 1, neighbours=11.0).backend == "pypardiso"
+    assert choose(41_000, 1, neighbours=11.0).backend == "amg"
     assert choose(500_000, 1, neighbours=11.0).backend == "amg"
     assert choose(20_000, 2, neighbours=11.0).backend == "two-level"
     assert "one or two cells high" in choose(20_000, 1, neighbours=11.0).because
