@@ -19,6 +19,7 @@ from ccfem.cli.docstring import about, attributes
 from ccfem.comparison.headline import (
     HEADLINE,
     HEADLINE_OF_SLICINGS,
+    Headline,
     cell_text,
     headline_values,
 )
@@ -183,6 +184,38 @@ def print_slicings(comparison: SlicingComparison, where: Path, seconds: float) -
     values = {run.name: headline_values(run) for run in runs}
     known = {column for found in values.values() for column in found}
     heads = [head for head in HEADLINE_OF_SLICINGS if head.column in known]
+    shown = list(heads)
+    table = _slicings_table(runs, shown, values, best)
+    while len(shown) > 1 and _is_cut(console, table):
+        del shown[-1]
+        table = _slicings_table(runs, shown, values, best)
+    console.print(table)
+    if len(shown) < len(heads):
+        left = ", ".join(head.title for head in heads[len(shown) :])
+        console.print(f"in the report: {left}", style="dim", markup=False)
+    for line in comparison.remarks:
+        console.print(line, style="dim", markup=False)
+    if comparison.verdict:
+        console.print(comparison.verdict, style="bold", markup=False)
+    if any(run.tested is not None for run in runs):
+        console.print(HONEST_PROMISE, style="dim", markup=False)
+    console.print(f"{where / 'report.html'}  ({seconds:.1f} s)", markup=False, soft_wrap=True)
+
+
+def _is_cut(console: Console, table: Table) -> bool:
+    """Whether a screen is so narrow that words or numbers of a table are cut."""
+    with console.capture() as capture:
+        console.print(table)
+    return "\N{HORIZONTAL ELLIPSIS}" in capture.get()
+
+
+def _slicings_table(
+    runs: Sequence[Run],
+    heads: Sequence[Headline],
+    values: Mapping[str, Mapping[str, float]],
+    best: Mapping[str, float],
+) -> Table:
+    """Make the table over slicings and strategies: a row for each run, numbers in one piece."""
     table = Table(header_style="bold", box=box.SIMPLE_HEAD)
     table.add_column("", no_wrap=True)
     for head in heads:
@@ -198,14 +231,7 @@ def print_slicings(comparison: SlicingComparison, where: Path, seconds: float) -
                 text = f"[bold green]{text}[/]"
             cells.append(f"{text} [dim]({extra})[/]" if extra else text)
         table.add_row(run.name, *cells)
-    console.print(table)
-    for line in comparison.remarks:
-        console.print(line, style="dim", markup=False)
-    if comparison.verdict:
-        console.print(comparison.verdict, style="bold", markup=False)
-    if any(run.tested is not None for run in runs):
-        console.print(HONEST_PROMISE, style="dim", markup=False)
-    console.print(f"{where / 'report.html'}  ({seconds:.1f} s)", markup=False, soft_wrap=True)
+    return table
 
 
 def print_solution(field: StressField, findings: Sequence[str], where: Path) -> None:

@@ -161,7 +161,8 @@ def _stress_of(
         stress = solve(case.problem, backend=backend)[name]
     read = None
     if given is not None:
-        read = read_stress(given.path, stress.mesh, given.unit, given.array, stress.held_or_loaded)
+        found = read_stress(given.path, stress.mesh, given.unit, given.array, stress.held_or_loaded)
+        read = replace(found, material=stress.material)
     return stress, read, seconds
 
 

@@ -5,6 +5,7 @@ from typing import Protocol
 
 from ccfem.arrays import FloatArray, freeze
 from ccfem.errors import InputError
+from ccfem.materials import Material
 from ccfem.mesh.tet_mesh import TetMesh
 
 __all__ = ["GivenStress", "PartStress"]
@@ -38,6 +39,11 @@ class PartStress(Protocol):
         """Those of them that carry a load."""
         ...
 
+    @property
+    def material(self) -> Material | None:
+        """Material of the part; None where only its stress is known."""
+        ...
+
 
 @dataclass(frozen=True)
 class GivenStress:
@@ -54,6 +60,8 @@ class GivenStress:
         Names of the patches that carry a support or a load.
     loaded : tuple of str, default none
         Those of them that carry a load.
+    material : Material, optional
+        Of the part, where it is known.
     """
 
     mesh: TetMesh
@@ -61,6 +69,7 @@ class GivenStress:
     nodal: FloatArray
     held_or_loaded: tuple[str, ...] = ()
     loaded: tuple[str, ...] = ()
+    material: Material | None = None
 
     def __repr__(self) -> str:
         return f"GivenStress on {self.mesh!r}"

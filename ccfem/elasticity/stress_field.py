@@ -17,6 +17,7 @@ from ccfem.elasticity.problem import Problem, patches_in_use
 from ccfem.elasticity.recovery import cell_strain, nodal_stress
 from ccfem.elasticity.volume_loads import free_strain
 from ccfem.errors import InputError
+from ccfem.materials import Material
 from ccfem.mesh.tet_mesh import TetMesh
 from ccfem.tensor import strain_from_voigt, to_voigt
 
@@ -133,6 +134,11 @@ class StressField:
     def loaded(self) -> tuple[str, ...]:
         """Names of the patches that carry a load in its load case."""
         return patches_in_use((), {self.case: self.problem.loads_of(self.case)})
+
+    @property
+    def material(self) -> Material:
+        """Material of the part, outside its regions."""
+        return self.problem.material
 
     def at(self, points: FloatArray, tolerance: float = 1e-3) -> FloatArray:
         """Recovered stress at any points of the part.

@@ -8,7 +8,6 @@ import numpy as np
 
 from ccfem.arrays import FloatArray, IntArray, freeze
 from ccfem.elasticity.part_stress import PartStress
-from ccfem.elasticity.stress_field import StressField
 from ccfem.errors import InputError
 from ccfem.evaluation import (
     alignment,
@@ -180,7 +179,7 @@ def evaluate(
     machine : Machine
     strand : Strand, optional
         How stiff the fibre is in the index of stiffness alignment; by default as in the virtual
-        test. It counts where `stress` is a `StressField`, which knows the matrix.
+        test. It counts where `stress` knows the material of the part.
     build : sequence of 3 floats, optional
         Build direction, which the head's tilt on curved layers is measured from; by default the
         mean normal of the layers.
@@ -320,10 +319,10 @@ def _material(
     layers: Sequence[Layer], stress: PartStress, machine: Machine, strand: Strand
 ) -> Material:
     """Material of a part that is full of strands, fibre along axis 1."""
-    if not isinstance(stress, StressField):
+    if stress.material is None:
         return named_material("c_fram")
     section = machine.fibre_width * float(np.mean([layer.thickness for layer in layers]))
-    return strand_lamina(stress.problem.material, strand.rho / section)
+    return strand_lamina(stress.material, strand.rho / section)
 
 
 def _indices(samples: _Samples, machine: Machine, material: Material) -> dict[str, float]:

@@ -22,8 +22,8 @@ __all__ = ["evenly_spaced_streamlines"]
 
 _STEP = 0.1
 """Step along a streamline, in separations."""
-_LEAST = 0.02
-"""As `least` of `streamlines`."""
+_LEAST = 0.03
+"""As `least` of `streamlines`: where the stress is weaker, rounding decides where a line goes."""
 _SLACK = 1e-3
 """Share of the separation by which a new line may be too near: rounding and finite steps."""
 _MOST_POINTS = 20_000_000

@@ -405,7 +405,10 @@ def test_bad_parts_end_in_one_line(ccfem, folder, text, message):
         ),
         (["bar", "--slicings", "planar:w"], "axis must be one of"),
         (["bar", "--fibre", "9", "--fibre-per-layer", "9"], "not both: drop one"),
-        (["part.toml", "--slicing", "planer"], "no slicer named 'planer'; there are: planar"),
+        (
+            ["part.toml", "--slicing", "planer"],
+            "no slicer named 'planer'; there are: load_oriented",
+        ),
         (["part.toml", "--slicing", "planar:height=1"], "has no parameter 'height'; it has:"),
         (["part.toml", "--slicing", "planar:count=0"], "number of layers must be at least 1"),
         (["part.toml", "--fibre-per-layer", "-3"], "above 0 mm; got -3"),

@@ -147,15 +147,20 @@ def test_files_hold_every_run_and_one_report(compared, tmp_path):
         assert (tmp_path / f"{name}_overview.png").stat().st_size > 1000
 
 
-def test_screen_shows_every_run_its_figures_and_the_verdict(compared, capsys):
+@pytest.mark.parametrize("width", ["200", "90"])
+def test_screen_shows_every_run_its_figures_and_the_verdict(compared, width, capsys, monkeypatch):
+    """On a narrow screen columns are left to the report, and no number is cut in two."""
+    monkeypatch.setenv("COLUMNS", width)
     print_slicings(compared, Path("somewhere"), 1.0)
     said = capsys.readouterr().out
     for run in compared.runs:
         assert run.name in said
-        assert f"{run.tested.bracket.tension.ratio:.2f}" in said
+        assert width == "90" or f"{run.tested.bracket.tension.ratio:.2f}" in said
     flat = " ".join(said.split())
     assert compared.verdict in flat
     assert "somewhere/report.html" in flat
+    assert ("in the report: " in said) == (width == "90")
+    assert "…" not in said
 
 
 def test_flat_layers_named_alone_are_as_thick_as_the_parts_own(case):
