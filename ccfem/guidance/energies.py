@@ -6,7 +6,13 @@ from numba import njit
 
 from ccfem.arrays import FloatArray, IntArray
 
-__all__ = ["alignment_energy", "gradient_energy", "gradient_source", "smoothness_energy"]
+__all__ = [
+    "alignment_energy",
+    "faces_between",
+    "gradient_energy",
+    "gradient_source",
+    "smoothness_energy",
+]
 
 _NEAREST = 0.3
 """Least distance of the centres of neighbouring cells that counts, in the cube root of the mean
@@ -85,18 +91,30 @@ def smoothness_energy(
     n : int
         Number of nodes.
     """
+    first, second, area, apart = faces_between(points, cells, faces, across)
+    size = np.linalg.norm(area, axis=1)
+    normal = area / np.maximum(size, 1e-300)[:, None]
+    weight = np.sqrt(size / apart)
+    nodes, jump = _jumps(cells, gradients, first, second, normal, weight)
+    return _assemble(jump[:, :, None] * jump[:, None, :], nodes, n)
+
+
+def faces_between(
+    points: FloatArray, cells: IntArray, faces: IntArray, across: IntArray
+) -> tuple[IntArray, IntArray, FloatArray, FloatArray]:
+    """Find both cells of each face between cells, its area vector (f, 3), and how far they lie.
+
+    Parameters as in `smoothness_energy`; the distance (f,), mm, is that of the centres, but not
+    less than `_NEAREST` says.
+    """
     first, side = np.nonzero(across > np.arange(len(cells))[:, None])
     second = across[first, side]
     corners = points[cells[first[:, None], faces[side]]]
     area = 0.5 * np.cross(corners[:, 1] - corners[:, 0], corners[:, 2] - corners[:, 0])
-    size = np.linalg.norm(area, axis=1)
-    normal = area / np.maximum(size, 1e-300)[:, None]
     centre = points[cells].mean(axis=1)
     apart = np.linalg.norm(centre[first] - centre[second], axis=1)
     least = _NEAREST * float(np.cbrt(np.abs(_volumes(points, cells)).mean()))
-    weight = np.sqrt(size / np.maximum(apart, least))
-    nodes, jump = _jumps(cells, gradients, first, second, normal, weight)
-    return _assemble(jump[:, :, None] * jump[:, None, :], nodes, n)
+    return first, second, area, np.maximum(apart, least)
 
 
 def _volumes(points: FloatArray, cells: IntArray) -> FloatArray:

@@ -8,12 +8,11 @@ from collections.abc import Callable
 from dataclasses import dataclass
 
 import numpy as np
-import scipy.sparse as sp
 from scipy.sparse.csgraph import connected_components
-from scipy.sparse.linalg import splu
 
 from ccfem.arrays import FloatArray, freeze
 from ccfem.elasticity.assembly import cell_gradients
+from ccfem.elasticity.direct import superlu
 from ccfem.guidance.energies import gradient_energy
 from ccfem.mesh.tet_mesh import TetMesh
 
@@ -120,15 +119,13 @@ def _poisson(mesh: TetMesh) -> Callable[[FloatArray], HeightField]:
     piece = connected_components(matrix, directed=False)[1]
     pinned = used[np.unique(piece[used], return_index=True)[1]]
     free = np.setdiff1d(used, pinned)
-    inner = sp.csc_array(matrix[free][:, free])
-    options = {"SymmetricMode": True}
-    factor = splu(inner, permc_spec="MMD_AT_PLUS_A", diag_pivot_thresh=0.0, options=options)
+    solve_free = superlu(matrix[free][:, free])
 
     def solve(direction: FloatArray) -> HeightField:
         share = volume[:, None] * np.einsum("eid,ed->ei", gradients, direction)
-        source = np.bincount(cells.ravel(), share.ravel(), minlength=n)
+        source = np.bincount(cells.ravel(), share.ravel(), minlength=n).astype(np.float64)
         values = np.zeros(n)
-        values[free] = factor.solve(source[free])
+        values[free] = solve_free(source[free])
         for each in np.unique(piece[used]).tolist():
             own = used[piece[used] == each]
             values[own] -= values[own].min()

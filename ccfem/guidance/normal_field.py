@@ -13,9 +13,10 @@ import numpy as np
 import scipy.sparse as sp
 from numba import njit
 from scipy.sparse.csgraph import breadth_first_order, connected_components, minimum_spanning_tree
-from scipy.sparse.linalg import splu
 
 from ccfem.arrays import FloatArray, IntArray, freeze
+from ccfem.elasticity.direct import superlu
+from ccfem.guidance.energies import faces_between
 from ccfem.guidance.stress_regions import StressRegions
 from ccfem.mesh.tet_mesh import TetMesh
 
@@ -25,8 +26,6 @@ _MOST_TRIED = 10
 """Regions up to which all senses are tried; above, so many that are best by a quadratic form."""
 _NOTHING = 1e-6
 """Length of a filled vector below which it has no direction."""
-_NEAREST = 0.3
-"""Least distance of centres that counts, in the cube root of the mean volume."""
 _STARTS = 20
 """Random starts from which senses are flipped one by one, for the quadratic form."""
 
@@ -64,7 +63,8 @@ def normal_field(mesh: TetMesh, regions: StressRegions, build: FloatArray) -> No
         Unit vector: the direction of pieces of the part without a region. The field as a whole
         does not point against it.
     """
-    one, other, area, apart = _inner_faces(mesh)
+    one, other, vector, apart = faces_between(mesh.points, mesh.corners, mesh.faces, mesh.across)
+    area = np.linalg.norm(vector, axis=1)
     parts = _filled(regions, one, other, area / apart, build)
     best: tuple[int, ...] = ()
     energy = np.inf
@@ -78,17 +78,6 @@ def normal_field(mesh: TetMesh, regions: StressRegions, build: FloatArray) -> No
     if float(mesh.volumes @ (direction @ build)) < 0.0:
         direction, best = -direction, tuple(-sense for sense in best)
     return NormalField(direction, best, energy)
-
-
-def _inner_faces(mesh: TetMesh) -> tuple[IntArray, IntArray, FloatArray, FloatArray]:
-    """Both cells of each face between cells, its area, and the distance of their centres."""
-    one, side = np.nonzero(mesh.across > np.arange(len(mesh.cells))[:, None])
-    other = mesh.across[one, side]
-    area = mesh.facet_areas(mesh.corners[one[:, None], mesh.faces[side]])[0]
-    centres = mesh.points[mesh.corners].mean(axis=1)
-    apart = np.linalg.norm(centres[one] - centres[other], axis=1)
-    least = _NEAREST * float(np.cbrt(mesh.volumes.mean()))
-    return one, other, area, np.maximum(apart, least)
 
 
 def _filled(
@@ -109,11 +98,9 @@ def _filled(
     free = np.flatnonzero(~fixed & ~alone)
     if len(free):
         degree = sp.diags_array(np.asarray(graph.sum(axis=1)))
-        inner = sp.csc_array((degree - graph)[free][:, free])
+        solve = superlu((degree - graph)[free][:, free])
         source = graph[free] @ parts[:-1].transpose(1, 0, 2).reshape(m, -1)
-        options = {"SymmetricMode": True}
-        factor = splu(inner, permc_spec="MMD_AT_PLUS_A", diag_pivot_thresh=0.0, options=options)
-        parts[:-1, free] = factor.solve(source).reshape(-1, count, 3).transpose(1, 0, 2)
+        parts[:-1, free] = solve(source).reshape(-1, count, 3).transpose(1, 0, 2)
     return parts
 
 
