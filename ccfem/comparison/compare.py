@@ -12,7 +12,7 @@ from typing import Any, overload
 
 from ccfem.cases.case import Case
 from ccfem.cases.reading import read
-from ccfem.checks import check_known, member_name
+from ccfem.checks import check_known, check_number, member_name
 from ccfem.comparison.judging import Solved, judged
 from ccfem.comparison.over_slicings import named_slicers, over_slicings
 from ccfem.comparison.result import Comparison
@@ -329,12 +329,14 @@ def _check_amount(fibre_per_layer: float | None, fibre: float | None, natural: b
     """Refuse two amounts at once, and one that is none."""
     if fibre is not None and fibre_per_layer is not None:
         raise InputError("give the fibre per layer or the fibre in all, not both: drop one")
-    given = fibre if fibre_per_layer is None else fibre_per_layer
-    if given is None:
+    if fibre is None and fibre_per_layer is None:
         return
     if natural:
-        raise InputError("give either a fibre length per layer or the natural amount, not both")
-    check_wanted(given)
+        raise InputError("give either a fibre length or the natural amount, not both: drop one")
+    if fibre_per_layer is not None:
+        check_wanted(fibre_per_layer)
+    else:
+        check_number("fibre in all", fibre, above=0.0, unit="mm")
 
 
 def _solved(
