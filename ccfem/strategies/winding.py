@@ -14,7 +14,7 @@ from typing import Any, ClassVar, Literal, NamedTuple
 
 import numpy as np
 
-from ccfem.arrays import FloatArray, IntArray
+from ccfem.arrays import FloatArray
 from ccfem.checks import check_choices, check_fields
 from ccfem.elasticity.part_stress import PartStress
 from ccfem.errors import InputError
@@ -37,7 +37,7 @@ from ccfem.winding.even_levels import evened, steep
 from ccfem.winding.joining_curves import border_tree
 from ccfem.winding.paper_field import PaperWeights, paper_field
 from ccfem.winding.piece import Piece, pieces_with_joints
-from ccfem.winding.spaced import CLOSEST, kept_apart, octaves
+from ccfem.winding.spaced import CLOSEST, kept_apart
 
 __all__ = ["Winding"]
 
@@ -47,8 +47,8 @@ _REACH = 4.0
 """How far along the curves the lift of the holes reaches, mm."""
 _KNOWN = "_wound"
 """Where a layer keeps the fields of its pieces."""
-_BETWEEN = (1.0, 0.25, 0.75)
-"""Where strands may start, in steps above the first level: amid the levels, then at quarters."""
+_BETWEEN = (0.0, 0.125, 0.25, 0.375, 0.625, 0.75, 0.875)
+"""Levels at which strands may start, in steps."""
 _KEPT = 0.6
 """Share of the length of the strands that keeps the spacing asked for."""
 
@@ -249,29 +249,28 @@ class _Planner:
         step = spacing * one.steep
         if s.energy == "annulus":
             step = 1.0 / max(1, round(1.0 / step))
-        lines, level = self.lines(one, 0.5 * step, step)
+        lines = self.lines(one, 0.5 * step, step, 0.0)
         if not s.even:
             return lines
-        lines = [lines[k] for k in octaves(level)]
-        for shift in _BETWEEN:
-            lines += self.lines(one, shift * step, step)[0]
+        between = [
+            line for shift in _BETWEEN for line in self.lines(one, shift * step, step, -np.inf)
+        ]
         border = border_tree(one.piece.mesh.points, [*one.piece.outer, *one.piece.loops])
         least = machine.minimum_length if s.minimum_length is None else s.minimum_length
-        return kept_apart(lines, CLOSEST * spacing, border, least)
+        return kept_apart([lines, between], CLOSEST * spacing, border, least)
 
-    def lines(self, one: "_Wound", first: float, step: float) -> tuple[list[FloatArray], IntArray]:
-        """Level lines with their bends limited, and the number of the level of each."""
+    def lines(self, one: "_Wound", first: float, step: float, least: float) -> list[FloatArray]:
+        """Level lines of values from `least` on, where they are closed with their bends limited."""
         s, mesh = self.strategy, one.piece.mesh
         found = isocontours(mesh.points, mesh.triangles, one.field, first, step)
-        most = np.inf if s.energy == "paper" else 1.0 - 1e-9
-        lines, levels = [], []
+        open_too = s.energy == "paper"
+        most = np.inf if open_too else 1.0 - 1e-9
+        lines = []
         for line, level in zip(found.lines(), found.level.tolist(), strict=True):
             closed = np.array_equal(line[0], line[-1])
-            if level < 0 or first + level * step > most or not (closed or s.energy == "paper"):
-                continue
-            lines.append(limit_bends(line, s.sharpest) if closed else line)
-            levels.append(level)
-        return lines, np.array(levels, dtype=np.int64)
+            if least <= first + level * step <= most and (closed or open_too):
+                lines.append(limit_bends(line, s.sharpest) if closed else line)
+        return lines
 
     def tension(self, layer: Layer) -> FloatArray:
         """``w t t^T`` on each triangle, (t, 3, 3), of mean trace 1: t is the stress along it."""

@@ -1,10 +1,11 @@
 """Strands that end where the field converges, and others that start where it spreads.
 
-Level lines at one step apart lie nearer than wanted where the field is steep. As those of half the
-step lie half as far apart, lines that are kept where their own distance fits, coarse ones first,
-stay within a factor of sqrt(2) of what is wanted: the stripes of F. Knoeppel, K. Crane, U. Pinkall,
-P. Schroeder, Stripe patterns on surfaces, ACM Transactions on Graphics 34 (2015) 39, end and start
-likewise. Here the distance is measured, so that the lower bound holds whatever the field.
+Level lines a step apart lie nearer than wanted where the field is steep, and further where it is
+flat. Of these lines the longest stretches are laid that keep a least distance, then stretches of
+levels between them where there is room. The least distance is measured, so that it holds whatever
+the field; the largest one holds where a stretch that fits is long enough to be cut by the machine.
+Stripes that end and start likewise: F. Knoeppel, K. Crane, U. Pinkall, P. Schroeder, Stripe
+patterns on surfaces, ACM Transactions on Graphics 34 (2015) 39.
 """
 
 from collections.abc import Sequence
@@ -15,7 +16,7 @@ from scipy.spatial import cKDTree
 from ccfem.arrays import BoolArray, FloatArray, IntArray
 from ccfem.geometry.polylines import is_closed, line_length, runs
 
-__all__ = ["CLOSEST", "kept_apart", "octaves"]
+__all__ = ["CLOSEST", "kept_apart"]
 
 CLOSEST = 0.7
 """Least distance of strands, in the spacing asked for. Where it would be 1.4 another one starts."""
@@ -23,59 +24,74 @@ _OWN = 6.0
 """A strand is its own neighbour from so many least distances of arc on."""
 
 
-def octaves(level: IntArray) -> IntArray:
-    """Order of levels, whole numbers from 0 on, in which every second of those left comes last.
-
-    Returns
-    -------
-    (n,) int array
-        Of the rows of `level`: the highest level first, then by halves.
-    """
-    from_top = int(level.max(initial=0)) - level
-    halves = np.where(from_top > 0, from_top & -from_top, np.iinfo(np.int64).max)
-    return np.lexsort((level, -halves))
-
-
 def kept_apart(
-    lines: Sequence[FloatArray], clearance: float, border: cKDTree | None, least: float
+    groups: Sequence[Sequence[FloatArray]],
+    clearance: float,
+    border: cKDTree | None,
+    least: float,
 ) -> list[FloatArray]:
-    """Cut lines where they are nearer than a clearance to those before them, or to themselves.
+    """Choose the longest stretches of lines, one after the other, that keep a clearance.
 
     Parameters
     ----------
-    lines : sequence of (n_i, 3) arrays, mm
-        The first ones stay whole the longest; closed ones repeat their first point. Their steps
-        should not be longer than half the clearance.
+    groups : sequence of sequences of (n_i, 3) arrays, mm
+        Lines of a group are laid before those of the next. Closed ones repeat their first point.
+        Their steps should not be longer than half the clearance.
     clearance : float, mm
     border : cKDTree, optional
         Of points that lines keep half the clearance from.
     least : float, mm
-        Shorter stretches are dropped, and hold no others off.
+        Shorter stretches are not laid.
 
     Returns
     -------
     list of (n, 3) arrays
-        An untouched closed line stays closed.
+        A closed line that nothing is cut from stays closed.
     """
     kept: list[FloatArray] = []
-    for line in lines:
-        free = _free(line, kept, clearance)
-        if border is not None:
-            free &= border.query(line)[0] >= 0.5 * clearance
-        kept += [part for part in _stretches(line, free) if line_length(part) >= least]
+    for group in groups:
+        lines = list(group)
+        free = [_free(line, kept, clearance, border) for line in lines]
+        best = [_longest(line, mask) for line, mask in zip(lines, free, strict=True)]
+        while best:
+            k = int(np.argmax([length for length, _ in best]))
+            length, rows = best[k]
+            if length < least or len(rows) < 2:
+                break
+            new = lines[k][rows]
+            kept.append(new)
+            free[k][rows] = False
+            tree, reach = cKDTree(new), _reach(new, clearance)
+            for other, line in enumerate(lines):
+                mask = free[other]
+                if other != k and mask.any():
+                    near = tree.query(line[mask], distance_upper_bound=reach)[0] < reach
+                    mask[np.flatnonzero(mask)[near]] = False
+                if other == k or not mask[best[other][1]].all():
+                    best[other] = _longest(line, mask)
     return kept
 
 
-def _free(line: FloatArray, kept: Sequence[FloatArray], clearance: float) -> BoolArray:
-    """Which points of a line keep the clearance, those of itself that come before them included."""
+def _reach(line: FloatArray, clearance: float) -> float:
+    """Distance from the points of a line that is surely a clearance from the line between them."""
     step = float(np.linalg.norm(np.diff(line, axis=0), axis=1).max())
-    reach = float(np.hypot(clearance, 0.5 * step))
+    return float(np.hypot(clearance, 0.5 * step))
+
+
+def _free(
+    line: FloatArray, kept: Sequence[FloatArray], clearance: float, border: cKDTree | None
+) -> BoolArray:
+    """Which points of a line keep the clearance, those of itself that come before them included."""
     free = np.ones(len(line), dtype=bool)
+    if border is not None:
+        free = border.query(line)[0] >= 0.5 * clearance
     if kept:
-        free = cKDTree(np.concatenate(kept)).query(line, distance_upper_bound=reach)[0] >= reach
+        every = np.concatenate(kept)
+        reach = max(_reach(one, clearance) for one in kept)
+        free &= cKDTree(every).query(line, distance_upper_bound=reach)[0] >= reach
     along = np.concatenate([[0.0], np.cumsum(np.linalg.norm(np.diff(line, axis=0), axis=1))])
     pairs = cKDTree(line).query_pairs(clearance, output_type="ndarray")
-    apart = along[pairs[:, 1]] - along[pairs[:, 0]]
+    apart = np.abs(along[pairs[:, 1]] - along[pairs[:, 0]])
     if is_closed(line):
         apart = np.minimum(apart, along[-1] - apart)
     near = pairs[apart > _OWN * clearance]
@@ -85,11 +101,13 @@ def _free(line: FloatArray, kept: Sequence[FloatArray], clearance: float) -> Boo
     return np.asarray(free)
 
 
-def _stretches(line: FloatArray, free: BoolArray) -> list[FloatArray]:
-    """Stretches of a line whose points are free."""
-    if free.all():
-        return [line]
-    parts = [line[a:b] for a, b in runs(free) if b - a > 1]
-    if is_closed(line) and len(parts) > 1 and free[0] and free[-1]:
-        parts = [np.concatenate([parts[-1], parts[0][1:]]), *parts[1:-1]]
-    return parts
+def _longest(line: FloatArray, free: BoolArray) -> tuple[float, IntArray]:
+    """Length of the longest stretch of a line whose points are free, and its rows."""
+    rows = [np.arange(a, b) for a, b in runs(free)]
+    if is_closed(line) and len(rows) > 1 and free[0] and free[-1]:
+        rows = [np.concatenate([rows[-1], rows[0][1:]]), *rows[1:-1]]
+    lengths = [line_length(line[each]) if len(each) > 1 else 0.0 for each in rows]
+    if not lengths:
+        return 0.0, np.zeros(0, dtype=np.int64)
+    k = int(np.argmax(lengths))
+    return lengths[k], rows[k]
