@@ -257,7 +257,9 @@ class _Planner:
         ]
         border = border_tree(one.piece.mesh.points, [*one.piece.outer, *one.piece.loops])
         least = machine.minimum_length if s.minimum_length is None else s.minimum_length
-        return kept_apart([lines, between], CLOSEST * spacing, border, least)
+        apart = CLOSEST * spacing
+        lines = kept_apart(lines, apart, least)
+        return lines + kept_apart(between, apart, least, lines, border)
 
     def lines(self, one: "_Wound", first: float, step: float, least: float) -> list[FloatArray]:
         """Level lines of values from `least` on, where they are closed with their bends limited."""

@@ -25,50 +25,51 @@ _OWN = 6.0
 
 
 def kept_apart(
-    groups: Sequence[Sequence[FloatArray]],
+    lines: Sequence[FloatArray],
     clearance: float,
-    border: cKDTree | None,
     least: float,
+    laid: Sequence[FloatArray] = (),
+    border: cKDTree | None = None,
 ) -> list[FloatArray]:
     """Choose the longest stretches of lines, one after the other, that keep a clearance.
 
     Parameters
     ----------
-    groups : sequence of sequences of (n_i, 3) arrays, mm
-        Lines of a group are laid before those of the next. Closed ones repeat their first point.
-        Their steps should not be longer than half the clearance.
+    lines : sequence of (n_i, 3) arrays, mm
+        Closed ones repeat their first point. Their steps should not be longer than half the
+        clearance.
     clearance : float, mm
-    border : cKDTree, optional
-        Of points that lines keep half the clearance from.
     least : float, mm
         Shorter stretches are not laid.
+    laid : sequence of (n_i, 3) arrays, mm
+        Lines that are there already.
+    border : cKDTree, optional
+        Of points that lines keep half the clearance from.
 
     Returns
     -------
     list of (n, 3) arrays
         A closed line that nothing is cut from stays closed.
     """
+    free = [_free(line, laid, clearance, border) for line in lines]
+    best = [_longest(line, mask) for line, mask in zip(lines, free, strict=True)]
     kept: list[FloatArray] = []
-    for group in groups:
-        lines = list(group)
-        free = [_free(line, kept, clearance, border) for line in lines]
-        best = [_longest(line, mask) for line, mask in zip(lines, free, strict=True)]
-        while best:
-            k = int(np.argmax([length for length, _ in best]))
-            length, rows = best[k]
-            if length < least or len(rows) < 2:
-                break
-            new = lines[k][rows]
-            kept.append(new)
-            free[k][rows] = False
-            tree, reach = cKDTree(new), _reach(new, clearance)
-            for other, line in enumerate(lines):
-                mask = free[other]
-                if other != k and mask.any():
-                    near = tree.query(line[mask], distance_upper_bound=reach)[0] < reach
-                    mask[np.flatnonzero(mask)[near]] = False
-                if other == k or not mask[best[other][1]].all():
-                    best[other] = _longest(line, mask)
+    while best:
+        k = int(np.argmax([length for length, _ in best]))
+        length, rows = best[k]
+        if length < least or len(rows) < 2:
+            break
+        new = lines[k][rows]
+        kept.append(new)
+        free[k][rows] = False
+        tree, reach = cKDTree(new), _reach(new, clearance)
+        for other, line in enumerate(lines):
+            mask = free[other]
+            if other != k and mask.any():
+                near = tree.query(line[mask], distance_upper_bound=reach)[0] < reach
+                mask[np.flatnonzero(mask)[near]] = False
+            if other == k or not mask[best[other][1]].all():
+                best[other] = _longest(line, mask)
     return kept
 
 
@@ -79,15 +80,15 @@ def _reach(line: FloatArray, clearance: float) -> float:
 
 
 def _free(
-    line: FloatArray, kept: Sequence[FloatArray], clearance: float, border: cKDTree | None
+    line: FloatArray, laid: Sequence[FloatArray], clearance: float, border: cKDTree | None
 ) -> BoolArray:
     """Which points of a line keep the clearance, those of itself that come before them included."""
     free = np.ones(len(line), dtype=bool)
     if border is not None:
         free = border.query(line)[0] >= 0.5 * clearance
-    if kept:
-        every = np.concatenate(kept)
-        reach = max(_reach(one, clearance) for one in kept)
+    if len(laid):
+        every = np.concatenate(laid)
+        reach = max(_reach(one, clearance) for one in laid)
         free &= cKDTree(every).query(line, distance_upper_bound=reach)[0] >= reach
     along = np.concatenate([[0.0], np.cumsum(np.linalg.norm(np.diff(line, axis=0), axis=1))])
     pairs = cKDTree(line).query_pairs(clearance, output_type="ndarray")
