@@ -61,14 +61,12 @@ def kept_apart(
             break
         new = lines[k][rows]
         kept.append(new)
-        free[k][rows] = False
         tree, reach = cKDTree(new), _reach(new, clearance)
-        for other, line in enumerate(lines):
-            mask = free[other]
-            if other != k and mask.any():
+        for other, (line, mask) in enumerate(zip(lines, free, strict=True)):
+            if mask.any():
                 near = tree.query(line[mask], distance_upper_bound=reach)[0] < reach
                 mask[np.flatnonzero(mask)[near]] = False
-            if other == k or not mask[best[other][1]].all():
+            if not mask[best[other][1]].all():
                 best[other] = _longest(line, mask)
     return kept
 
