@@ -236,12 +236,50 @@ from ccfem.mesh.face_rules import without_faces
 from ccfem.mesh.patch_findings import about_patches
 from ccfem.mesh.patches import Vector, patches_from_rules, unit_vector
 
-__all__ = ["read_part"]
+__all__ = ["Part", "read_part"]
 
 
 @dataclass(frozen=True, kw_only=True)
-class _Part(Body):
-    """The keys of a part file."""
+class Part(Body):
+    """The keys of a part file.
+
+    Attributes
+    ----------
+    material : str or table
+        A name of the table of materials, or moduli.
+    supports : tuple of tables
+        What holds the part; at least one.
+    loads : dict
+        The load cases by name, each a list of loads; at least one.
+    alternative_supports : tuple of tables
+        Another model of how the part is held: strategies are tested under both, and no order is
+        told that the two do not agree on.
+    combinations : dict
+        Load cases that are sums of others times factors.
+    regions : dict
+        Cells of another material.
+    name : str
+        Name of the part; that of the file where there is none.
+    title : str
+        One line for tables and reports; the name where there is none.
+    source : str
+        Where the part comes from.
+    build : str or tuple of 3 floats
+        Build direction.
+    layers : int
+        Number of flat layers of fibre, spread evenly over the height.
+    heights : tuple of floats, mm
+        Heights of flat layers along the build direction, in place of their number.
+    slicing : table
+        A slicer with its parameters, in place of layers and heights; without any of the three,
+        12 flat layers.
+    patches : dict
+        Patches of the boundary, each by a rule. Groups of a mesh file are patches already.
+    machine : table
+        What differs from the default printer.
+    strategies : dict
+        Parameters of strategies on this part.
+    """
 
     material: str | dict[str, Any] | None = None
     supports: tuple[dict[str, Any], ...] = ()
@@ -370,17 +408,17 @@ class _Values:
         return found  # type: ignore[return-value]
 
 
-def _readable(content: Mapping[str, Any], found: Mistakes) -> tuple[_Part, set[str]]:
+def _readable(content: Mapping[str, Any], found: Mistakes) -> tuple[Part, set[str]]:
     """Take of a part file what reads; the rest is noted, and named."""
     good = {}
     for key, value in content.items():
         with found.noted():
-            from_table(_Part, {key: value}, "the part file")
+            from_table(Part, {key: value}, "the part file")
             good[key] = value
-    return from_table(_Part, good, "the part file"), set(content) - set(good)
+    return from_table(Part, good, "the part file"), set(content) - set(good)
 
 
-def _slicing(part: _Part) -> Slicer:
+def _slicing(part: Part) -> Slicer:
     """Slicer of a part file: of its number of layers, their heights, or the table slicing."""
     given = [key for key in ("layers", "heights", "slicing") if getattr(part, key) is not None]
     if len(given) > 1:
