@@ -31,8 +31,8 @@ __all__ = [
 
 PLACES = {"base": (-np.inf, 20.0), "leg": (20.0, 35.0), "head": (35.0, np.inf)}
 """Parts of the T-bracket by height along y, mm."""
-PAPER_LOADS = {"planar z": ("head", 0.87), "planar x": ("base", 3.16)}
-"""Where the paper's flat prints came apart, and at what load, kN."""
+PAPER_LOADS = {"planar z": ("head", 0.87), "planar y": ("head", 0.87), "planar x": ("base", 3.16)}
+"""Where the paper's flat prints came apart, and at what load, kN; its z may be our y."""
 
 
 class Opening(NamedTuple):
