@@ -34,6 +34,7 @@ if TYPE_CHECKING:
     from ccfem.layers.slicing import slice
     from ccfem.machine import Machine
     from ccfem.planning import plan
+    from ccfem.studies import Study, study
     from ccfem.virtual_testing import virtual_test
 
 __all__ = [
@@ -41,6 +42,7 @@ __all__ = [
     "Comparison",
     "Machine",
     "Problem",
+    "Study",
     "check",
     "compare",
     "evaluate",
@@ -48,6 +50,7 @@ __all__ = [
     "read",
     "slice",
     "solve",
+    "study",
     "virtual_test",
 ]
 
@@ -58,6 +61,7 @@ _HOMES = {
     "Comparison": "comparison",
     "Machine": "machine",
     "Problem": "elasticity",
+    "Study": "studies",
     "check": "inspection",
     "compare": "comparison",
     "evaluate": "evaluation",
@@ -65,6 +69,7 @@ _HOMES = {
     "read": "cases",
     "slice": "layers.slicing",
     "solve": "elasticity",
+    "study": "studies",
     "virtual_test": "virtual_testing",
 }
 """Package that each name comes from, imported when the name is first used."""
@@ -74,7 +79,7 @@ _PACKAGES = frozenset(
         *("cases", "comparison", "elasticity", "errors", "evaluation", "export", "fields"),
         *("geometry", "inspection", "io", "layers", "linking", "machine", "materials"),
         *("mesh", "meshing", "planning", "plates", "plot", "progress", "raster", "strategies"),
-        *("tensor", "toolpaths", "topopt", "virtual_testing"),
+        *("studies", "tensor", "toolpaths", "topopt", "virtual_testing"),
     }
 )
 """Packages and modules that need no import of their own."""
