@@ -5,8 +5,8 @@ from html import escape
 
 from ccfem.plot.canvas import png
 from ccfem.studies.front import COST
-from ccfem.studies.result import StudyResult
-from ccfem.studies.table import shown_table
+from ccfem.studies.study_result import StudyResult
+from ccfem.studies.study_table import shown_table
 
 __all__ = ["study_page"]
 

@@ -17,8 +17,8 @@ from ccfem.studies.definition import Study, read_study
 from ccfem.studies.jobs import Job, Jobs, jobs_of
 from ccfem.studies.page import study_page
 from ccfem.studies.processes import in_processes
-from ccfem.studies.result import StudyResult
 from ccfem.studies.store import Store, opened
+from ccfem.studies.study_result import StudyResult
 from ccfem.studies.work import part_bytes
 
 __all__ = ["study"]

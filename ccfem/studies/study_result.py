@@ -11,7 +11,7 @@ from ccfem.arrays import freeze
 from ccfem.errors import InputError
 from ccfem.studies.front import COST, GAIN, with_fronts
 from ccfem.studies.jobs import Job
-from ccfem.studies.table import shown_table
+from ccfem.studies.study_table import shown_table
 
 if TYPE_CHECKING:
     import pandas as pd
