@@ -23,13 +23,17 @@ import importlib
 from importlib.metadata import version
 from typing import TYPE_CHECKING, Any
 
+from ccfem import display
+
 if TYPE_CHECKING:
     from ccfem.cases.case import Case
     from ccfem.cases.reading import read
     from ccfem.comparison.compare import compare
     from ccfem.comparison.result import Comparison
+    from ccfem.comparison.saving import save
     from ccfem.elasticity import Problem, solve
     from ccfem.evaluation import evaluate
+    from ccfem.inspection.body_faces import faces
     from ccfem.inspection.part_check import check
     from ccfem.layers.slicing import slice
     from ccfem.machine import Machine
@@ -46,8 +50,10 @@ __all__ = [
     "check",
     "compare",
     "evaluate",
+    "faces",
     "plan",
     "read",
+    "save",
     "slice",
     "solve",
     "study",
@@ -55,6 +61,8 @@ __all__ = [
 ]
 
 __version__ = version("ccfem")
+
+display.drawn_by("ccfem.plot.values")
 
 _HOMES = {
     "Case": "cases",
@@ -65,8 +73,10 @@ _HOMES = {
     "check": "inspection",
     "compare": "comparison",
     "evaluate": "evaluation",
+    "faces": "inspection",
     "plan": "planning",
     "read": "cases",
+    "save": "comparison",
     "slice": "layers.slicing",
     "solve": "elasticity",
     "study": "studies",

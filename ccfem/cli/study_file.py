@@ -46,7 +46,7 @@ def _run(
 ) -> None:
     """Run a study file and print what came out."""
     from ccfem.studies import study
-    from ccfem.studies.front import COST
+    from ccfem.studies.study_fronts import COST
 
     with progress_bar() as progress:
         result = study(file, out, workers, scheduler, force, progress)

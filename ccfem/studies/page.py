@@ -4,7 +4,7 @@ import base64
 from html import escape
 
 from ccfem.plot.canvas import png
-from ccfem.studies.front import COST
+from ccfem.studies.study_fronts import COST
 from ccfem.studies.study_result import StudyResult
 from ccfem.studies.study_table import shown_table
 

@@ -9,8 +9,8 @@ from typing import TYPE_CHECKING, Any
 
 from ccfem.arrays import freeze
 from ccfem.errors import InputError
-from ccfem.studies.front import COST, GAIN, with_fronts
 from ccfem.studies.jobs import Job
+from ccfem.studies.study_fronts import COST, GAIN, with_fronts
 from ccfem.studies.study_table import shown_table
 
 if TYPE_CHECKING:

@@ -2,9 +2,9 @@ import numpy as np
 import pytest
 
 import ccfem
+from ccfem.comparison.front import on_front
 from ccfem.errors import InputError
 from ccfem.studies.fingerprint import fingerprint
-from ccfem.studies.front import on_front
 from ccfem.studies.jobs import jobs_of
 from ccfem.studies.sweep import variants
 from ccfem.studies.transport import packed, unpacked
