@@ -40,6 +40,7 @@ if TYPE_CHECKING:
     from ccfem.planning import plan
     from ccfem.studies import Study, study
     from ccfem.virtual_testing import virtual_test
+    from ccfem.virtual_testing.calibration import calibrate
 
 __all__ = [
     "Case",
@@ -47,6 +48,7 @@ __all__ = [
     "Machine",
     "Problem",
     "Study",
+    "calibrate",
     "check",
     "compare",
     "evaluate",
@@ -70,6 +72,7 @@ _HOMES = {
     "Machine": "machine",
     "Problem": "elasticity",
     "Study": "studies",
+    "calibrate": "virtual_testing.calibration",
     "check": "inspection",
     "compare": "comparison",
     "evaluate": "evaluation",

@@ -14,7 +14,7 @@ CALLS = {
     "compare": "ccfem.compare(CASE, [A, B]), and ccfem.save(comparison, DIR)",
     "plan": "ccfem.compare(CASE, [S], natural=True), or ccfem.plan(STRATEGY, LAYERS, STRESS)",
     "solve": "ccfem.solve(CASE.problem)",
-    "calibrate": "ccfem.virtual_testing.calibration.calibrate(PROBLEM, CURVE)",
+    "calibrate": "ccfem.calibrate(PROBLEM, CURVE)",
     "study": "ccfem.study(FILE, workers=N)",
 }
 """Call of each command, as its help prints it."""

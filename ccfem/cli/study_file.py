@@ -22,7 +22,7 @@ def study(
     ] = False,
     workers: Annotated[
         int | None,
-        typer.Option(metavar="N", help="Processes; default as many as processors.", min=1),
+        typer.Option(metavar="N", help="Processes; default as many as processors.", min=0),
     ] = None,
     scheduler: Annotated[
         str | None,

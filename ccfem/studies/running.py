@@ -3,11 +3,12 @@
 import json
 import os
 import time
-from collections.abc import Generator
+from collections.abc import Generator, Mapping
 from contextlib import closing
 from importlib.util import find_spec
 from pathlib import Path
 from typing import Any
+from uuid import uuid4
 
 from ccfem.checks import check_number
 from ccfem.io.whole import whole_file
@@ -19,7 +20,7 @@ from ccfem.studies.page import study_page
 from ccfem.studies.processes import in_processes
 from ccfem.studies.store import Store, opened
 from ccfem.studies.study_result import StudyResult
-from ccfem.studies.work import part_bytes
+from ccfem.studies.work import job_bytes, part_bytes, run_job, solve_part
 
 __all__ = ["study"]
 
@@ -48,7 +49,8 @@ def study(
         ``results.parquet`` (where pyarrow is installed), ``times.csv``, ``study.html``,
         ``study.json`` and ``runs/``.
     workers : int, optional
-        Processes of this machine; by default as many as processors.
+        Processes of this machine; by default as many as processors. With 0 this process makes the
+        runs itself.
     scheduler : str, optional
         Address of a Dask scheduler whose workers make the runs instead.
     force : bool, default False
@@ -64,7 +66,7 @@ def study(
     """
     definition = what if isinstance(what, Study) else read_study(what)
     if workers is not None:
-        check_number("workers", workers, at_least=1)
+        check_number("workers", workers, at_least=0)
     jobs = jobs_of(definition, progress)
     folder = Path("results") / definition.name if out is None else Path(out)
     with opened(folder, force) as store:
@@ -72,7 +74,7 @@ def study(
         outcomes = {k: each for k, each in known.items() if each and not each.get("crashed")}
         missing = [job for job in jobs.jobs if job.key not in outcomes]
         _write(folder / "study.json", _about(definition, jobs))
-        count = workers or os.cpu_count() or 1
+        count = (os.cpu_count() or 1) if workers is None else workers
         tell = _Teller(progress, len(jobs.jobs), len(outcomes))
         try:
             with closing(_made(definition, jobs, missing, store, count, scheduler)) as made:
@@ -107,8 +109,21 @@ def _made(
     }
     if address is not None:
         yield from on_cluster(parts, missing, address)
-    else:
+    elif workers:
         yield from in_processes(parts, missing, workers, store.scratch)
+    else:
+        yield from _here(parts, missing)
+
+
+def _here(
+    parts: Mapping[int, bytes], jobs: list[Job]
+) -> Generator[tuple[Job, dict[str, Any]], None, None]:
+    """Make runs in this process."""
+    for number, task in parts.items():
+        stress, name = solve_part(task), uuid4().hex
+        for job in jobs:
+            if job.part == number:
+                yield job, run_job(stress, name, job_bytes(job))
 
 
 def write_tables(result: StudyResult) -> None:

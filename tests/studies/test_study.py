@@ -15,12 +15,37 @@ from ccfem.errors import InputError
 from ccfem.planning import Amount
 from ccfem.studies.store import opened
 
+CELL = """
+from dataclasses import dataclass
+from typing import ClassVar
+import ccfem
+from ccfem.planning import Amount
+
+@dataclass(frozen=True)
+class Rows:
+    spacing: float = 5.0
+    amount: ClassVar[Amount] = Amount("spacing", 1.0, 20.0)
+
+    def __call__(self, layer, stress, machine):
+        return lines(self.spacing)(layer, stress, machine)
+
+def lines(spacing):
+    return ccfem.strategies.Zigzag(spacing, angle=0.0)
+
+@dataclass(frozen=True)
+class Middle:
+    def __call__(self, stress, build, machine):
+        return ccfem.layers.slicing.Planar(count=1)(stress, build, machine)
+"""
+NOTEBOOK = {"__name__": "__main__"}
+exec(CELL, NOTEBOOK)
+
 STUDY = ccfem.Study(
     name="tiny",
     parts=({"name": "bar", "element_size": 12.5},),
-    slicings=("planar:count=1",),
+    slicings=(NOTEBOOK["Middle"](),),
     strategies=(
-        "concentric",
+        NOTEBOOK["Rows"](),
         {"name": "zigzag", "sweep": {"spacing": [3.0, 4.0, 5.0, 6.0], "angle": [0.0, 45.0]}},
     ),
 )
@@ -88,11 +113,24 @@ def test_dask_gives_the_same_table_to_the_last_digit(disturbed, cluster, tmp_pat
         assert (tmp_path / "out" / name).read_bytes() == (result.folder / name).read_bytes()
 
 
+def test_a_strategy_and_a_slicer_of_a_notebook_run_in_other_processes(disturbed):
+    result, *_ = disturbed
+    assert not result.frame["failure"].any()
+    assert result.frame["slicing"].unique().tolist() == ["middle"]
+    row = result.frame.iloc[0]
+    assert row["strategy"] == "rows"
+    case = ccfem.read("bar", element_size=12.5)
+    zigzag = ccfem.strategies.Zigzag(5.0, angle=0.0)
+    own = ccfem.compare(case, [zigzag], layers=1, natural=True, strand=None).runs[0]
+    assert row["fibre_length"] == pytest.approx(own.evaluation.total["fibre_length"], rel=1e-12)
+
+
 def test_the_numbers_are_those_of_a_comparison(disturbed):
     result, *_ = disturbed
     case = ccfem.read("bar", element_size=12.5)
-    own = ccfem.compare(case, ["concentric"], layers=1, natural=True, curve=False).frame.iloc[0]
-    row = result.frame.iloc[0]
+    zigzag = ccfem.strategies.Zigzag(spacing=4.0)
+    own = ccfem.compare(case, [zigzag], layers=1, natural=True, curve=False).frame.iloc[0]
+    row = result.frame[result.frame["strategy"] == "zigzag"].iloc[3]  # 4 mm, 45 degrees
     for name in ("stiffness", "first_failure_load", "fibre_length", "efficiency"):
         assert row[name] == pytest.approx(own[name], rel=1e-9)
 
