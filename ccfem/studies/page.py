@@ -44,7 +44,7 @@ _PAGE = """<!DOCTYPE html>
 <style>body{margin:1.5rem auto;max-width:82rem;padding:0 1rem;font:15px/1.45 sans-serif;
 color:#1d2430}img{max-width:100%}.wide{overflow-x:auto}table{border-collapse:collapse}
 th,td{padding:.25rem .7rem;text-align:left;border-bottom:1px solid #ddd;white-space:nowrap}
-th{cursor:pointer}.failed{white-space:normal;color:#b3261e}.remark{color:#b3261e}</style></head>
+th{cursor:pointer;white-space:normal;vertical-align:bottom}.failed{white-space:normal;color:#b3261e}.remark{color:#b3261e}</style></head>
 <body>
 @BODY@
 <script>

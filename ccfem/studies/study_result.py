@@ -9,6 +9,7 @@ from typing import TYPE_CHECKING, Any
 
 from ccfem.arrays import freeze
 from ccfem.errors import InputError
+from ccfem.plot.values import image
 from ccfem.studies.jobs import Job
 from ccfem.studies.study_fronts import COST, GAIN, with_fronts
 from ccfem.studies.study_table import shown_table
@@ -174,6 +175,8 @@ class StudyResult:
         more = len(self.jobs) - _SHOWN
         rest = f"<p>and {more} more in <code>.frame</code></p>" if more > 0 else ""
         table = shown_table(self.frame.head(_SHOWN))
+        if self.frame["front_fibre_length"].any():
+            rest += image(self.plot())
         return f"<p>{escape(self.name)}: {escape(self.about)}</p>{table}{rest}{remarks}"
 
 
