@@ -78,13 +78,13 @@ def test_what_is_wrong_is_said_with_its_cure(values):
         ccfem.toolpaths.Toolpaths.empty().plot()
 
 
-def test_a_view_in_space_without_a_screen_is_a_picture(values, tmp_path, monkeypatch):
+def test_a_view_in_space_without_a_screen_is_a_picture(values, compared, tmp_path, monkeypatch):
     monkeypatch.delenv("DISPLAY", raising=False)
     monkeypatch.delenv("WAYLAND_DISPLAY", raising=False)
     view = values["stress"].show()
     assert Image.open(io.BytesIO(view._repr_png_())).size == (900, 650)
     assert view.image.min() < 100
-    values["paths"].show(picture=tmp_path / "paths.png")
+    assert compared.show("b", picture=tmp_path / "paths.png").image.shape == (650, 900, 3)
     assert Image.open(tmp_path / "paths.png").size == (900, 650)
     with pytest.raises(InputError, match=r"written as .png"):
         values["case"].show(picture=tmp_path / "case.gif")
@@ -104,7 +104,6 @@ def test_a_comparison_draws_layers_and_fronts(compared):
         compared.pareto("taste")
     assert list(pictures(compared._repr_html_()))
     assert list(pictures(compared.runs[0]._repr_html_()))
-    assert compared.show(picture=None).image.shape == (650, 900, 3)
 
 
 def test_a_strategy_a_slicer_and_a_case_of_a_notebook_are_compared(values):

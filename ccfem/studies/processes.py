@@ -162,11 +162,15 @@ class _Worker:
 
 
 def _environment(workers: int) -> dict[str, str]:
-    """Environment in which the threads of all workers together are as many as processors."""
+    """Environment in which the threads of all workers together are as many as processors.
+
+    Libraries take one thread each: how they share sums among more would change the last digits, and
+    so the table with the number of workers.
+    """
     environment = dict(os.environ)
     before = environment.get("PYTHONPATH")
     environment["PYTHONPATH"] = os.pathsep.join([str(_PACKAGES), *([before] if before else [])])
-    threads = str(max((os.cpu_count() or 1) // workers, 1))
-    for library in ("OMP", "OPENBLAS", "MKL", "NUMBA", "CCFEM"):
-        environment[f"{library}_NUM_THREADS"] = threads
+    for library in ("OMP", "OPENBLAS", "MKL", "NUMBA"):
+        environment[f"{library}_NUM_THREADS"] = "1"
+    environment["CCFEM_NUM_THREADS"] = str(max((os.cpu_count() or 1) // workers, 1))
     return environment

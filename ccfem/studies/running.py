@@ -87,7 +87,8 @@ def study(
             result = StudyResult(
                 definition.name, folder, jobs.jobs, outcomes, jobs.repeated, made_now
             )
-            write_tables(result)
+            if outcomes:
+                write_tables(result)
         return result
 
 

@@ -80,7 +80,7 @@ def disturbed(tmp_path_factory):
     os.kill(started.pid, signal.SIGKILL)
     started.join()
     before = count(folder)
-    result = ccfem.study(STUDY, folder, workers=1, progress=lambda *said: told.append(said))
+    result = ccfem.study(STUDY, folder, workers=0, progress=lambda *said: told.append(said))
     return result, before, told
 
 
