@@ -30,6 +30,7 @@ __all__ = [
     "length_per_layer",
     "plan_to_length",
     "plan_to_lengths",
+    "sampled_length",
 ]
 
 TOLERANCE = 0.01
@@ -39,6 +40,8 @@ _GUESSES = 3
 _CLOSE = 0.1
 """Difference of two plans on either side of the wanted length, as a share of it, up to which some
 layers may take the one and some the other without a further search."""
+_NEAR = 0.05
+"""The same on the few layers that stand for a stack, which lay a little more or less."""
 _ROUNDS = 3
 """Plans of the whole stack after a search on few layers."""
 _STEPS = 8
@@ -97,6 +100,7 @@ def plan_to_length(
     wanted: float,
     start: Planned | None = None,
     tolerance: float = TOLERANCE,
+    sampled: float | None = None,
 ) -> Planned:
     """Plan to a wanted length of fibre.
 
@@ -120,6 +124,8 @@ def plan_to_length(
         The strategy's plan with its own value, where there is one already.
     tolerance : float, default 0.01
         Share by which it may lay less.
+    sampled : float, mm, optional
+        What it lays with its own value on a few layers (`sampled_length`), where that is known.
 
     Returns
     -------
@@ -131,7 +137,19 @@ def plan_to_length(
         When `wanted` is not a positive number, or whatever the strategy raises.
     """
     known = () if start is None else (start,)
-    return plan_to_lengths(strategy, layers, stress, machine, (wanted,), known, tolerance)[0]
+    lengths = (wanted,)
+    return plan_to_lengths(strategy, layers, stress, machine, lengths, known, tolerance, sampled)[0]
+
+
+def sampled_length(
+    strategy: Strategy, layers: Sequence[Layer], stress: PartStress, machine: Machine
+) -> float | None:
+    """Length per layer that a strategy lays with its own value, mm, judged by a few layers.
+
+    None where the stack is small and they are all there are. Parameters as in `plan_to_length`.
+    """
+    search = _Search(Dial(strategy), layers, stress, machine)
+    return None if search.few is layers else search.sample(search.dial.own)
 
 
 def plan_to_lengths(
@@ -142,6 +160,7 @@ def plan_to_lengths(
     lengths: Sequence[float],
     known: Sequence[Planned] = (),
     tolerance: float = TOLERANCE,
+    sampled: float | None = None,
 ) -> list[Planned]:
     """Plan to several lengths of fibre, mm per layer: what is planned for one serves the others.
 
@@ -154,6 +173,8 @@ def plan_to_lengths(
         Plans of the strategy with its own value or at its extremes, where there are any.
     tolerance : float, default 0.01
         Share by which less may be laid.
+    sampled : float, mm, optional
+        As in `plan_to_length`.
     """
     for wanted in lengths:
         check_wanted(wanted)
@@ -166,6 +187,8 @@ def plan_to_lengths(
         ]
     search = _Search(Dial(strategy), layers, stress, machine, tolerance)
     search.learn(known)
+    if sampled is not None:
+        search.sampled[search.dial.own] = sampled
     return [search.to(wanted) for wanted in lengths]
 
 
@@ -328,8 +351,10 @@ class _Search:
             low, high = around(known, target)
             if low is not None and known[low] >= enough:
                 break
-            if low is not None and high is not None and abs(high - low) <= _FINEST:
-                break
+            if low is not None and high is not None:
+                near = known[high] - known[low] <= _NEAR * target and self.few is not self.layers
+                if near or abs(high - low) <= _FINEST:
+                    break
             turn = self.dial.guess(known, target, _BEYOND)
             if low is not None and high is not None and step % 3 == 2:
                 turn = 0.5 * (low + high)  # so that a curved relation cannot stall the search
