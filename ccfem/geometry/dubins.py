@@ -73,8 +73,8 @@ def shortest_curve(start: FloatArray, end: FloatArray, radius: float, step: floa
 
 @njit(cache=True, nogil=True)
 def _sample(pose, turns, sizes, parts, radius):  # type: ignore[no-untyped-def]
-    line = np.empty((parts.sum() + 1, 2))
-    x, y, heading = pose
+    line = np.empty((parts[0] + parts[1] + parts[2] + 1, 2))
+    x, y, heading = pose[0], pose[1], pose[2]
     line[0, 0], line[0, 1] = x, y
     count = 1
     for piece in range(3):
