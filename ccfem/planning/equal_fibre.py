@@ -11,7 +11,6 @@ from functools import cached_property
 
 import numpy as np
 
-from ccfem.arrays import in_brief
 from ccfem.checks import check_number
 from ccfem.elasticity.part_stress import PartStress
 from ccfem.layers.layer import Layer
@@ -19,6 +18,7 @@ from ccfem.machine.machine import Machine
 from ccfem.planning.dial import Dial, around
 from ccfem.planning.mixing import layer_lengths, mixed
 from ccfem.planning.plan import check_layers, plan, plan_layers
+from ccfem.planning.planned import Planned
 from ccfem.planning.strategy import LengthStrategy, Strategy
 from ccfem.toolpaths import FIBRE, Toolpaths
 
@@ -54,32 +54,6 @@ _HALVINGS = 6
 """Plans of the whole stack for the least that leaves no layer empty."""
 _FEW = 4
 """Stacks of at most this many layers are searched as they are."""
-
-
-@dataclass(frozen=True)
-class Planned:
-    """Toolpaths of a part, and the strategy that made them.
-
-    Attributes
-    ----------
-    strategy : Strategy
-        With the values that were found (of most layers, see `note`).
-    toolpaths : Toolpaths
-    length_per_layer : float, mm
-        Fibre length divided by the number of layers.
-    note : str
-        Empty, or one line: which layers have another value, or why the wanted length was missed.
-    reached : bool
-        Whether it lays the wanted length within `TOLERANCE`.
-    """
-
-    strategy: Strategy
-    toolpaths: Toolpaths
-    length_per_layer: float
-    note: str = ""
-    reached: bool = True
-
-    __repr__ = in_brief
 
 
 def length_per_layer(toolpaths: Toolpaths, layers: Sequence[Layer]) -> float:
