@@ -40,8 +40,6 @@ _GUESSES = 3
 _CLOSE = 0.1
 """Difference of two plans on either side of the wanted length, as a share of it, up to which some
 layers may take the one and some the other without a further search."""
-_NEAR = 0.05
-"""The same on the few layers that stand for a stack, which lay a little more or less."""
 _ROUNDS = 3
 """Plans of the whole stack after a search on few layers."""
 _STEPS = 8
@@ -325,10 +323,8 @@ class _Search:
             low, high = around(known, target)
             if low is not None and known[low] >= enough:
                 break
-            if low is not None and high is not None:
-                near = known[high] - known[low] <= _NEAR * target and self.few is not self.layers
-                if near or abs(high - low) <= _FINEST:
-                    break
+            if low is not None and high is not None and abs(high - low) <= _FINEST:
+                break
             turn = self.dial.guess(known, target, _BEYOND)
             if low is not None and high is not None and step % 3 == 2:
                 turn = 0.5 * (low + high)  # so that a curved relation cannot stall the search
