@@ -209,6 +209,6 @@ def test_what_cannot_be_is_said(block):
 
     stress = part_stress(block, turning)
     with pytest.raises(InputError, match=r"upside down in .* raise load_oriented.blend"):
-        create("load_oriented", {"blend": 0.0})(stress, (0.0, 0.0, 1.0), Machine())
+        create("load_oriented", {"blend": 0.0, "even": False})(stress, (0.0, 0.0, 1.0), Machine())
     layers = create("load_oriented")(stress, (0.0, 0.0, 1.0), Machine())
     assert len(layers) > 10
