@@ -93,7 +93,7 @@ def part_figures(name: str, run: "Chain") -> dict[str, bytes]:
 
 
 def senses_figure() -> tuple[bytes, float, float]:
-    """Figures 1 and 3 on a cube: senses that agree beside such that do not, and their energies."""
+    """Figures 1 and 3 on a cube: the same field, and energy, whatever the sense of a region."""
     mesh = box_mesh((10.0, 10.0, 10.0), (8, 8, 8))
     centre = mesh.points[mesh.corners].mean(axis=1)
     tilt = np.radians(20.0)
@@ -110,7 +110,7 @@ def senses_figure() -> tuple[bytes, float, float]:
         regions = StressRegions(region >= 0, region, turned, np.ones(len(centre)))
         found = normal_field(mesh, regions, up)
         energies.append(found.energy)
-        axes = _space(figure, place, f"sense of one region {sense:+.0f}", mesh.points)
+        axes = _space(figure, place, f"field, one region given with {sense:+.0f}", mesh.points)
         axes.quiver(*centre[middle].T, *found.direction[middle].T, length=0.8, lw=0.6)
         if sense > 0.0:
             values = height_field(mesh, found.direction).values
