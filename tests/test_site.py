@@ -72,7 +72,10 @@ def test_groups_of_gmsh_are_patches(tmp_path):
     (geometry,), (part,) = fenced(page, "text"), fenced(page, "toml")
     (tmp_path / "beam.geo").write_text(geometry)
     (tmp_path / "beam.toml").write_text(part)
-    gmsh.initialize(["gmsh", "-v", "1"], readConfigFiles=False, interruptible=False)
+    try:
+        gmsh.initialize(["gmsh", "-v", "1"], readConfigFiles=False, interruptible=False)
+    except (AttributeError, OSError):
+        pytest.skip("the library of Gmsh is missing")
     try:
         gmsh.open(str(tmp_path / "beam.geo"))
         gmsh.model.mesh.generate(3)
