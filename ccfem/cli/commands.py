@@ -10,6 +10,7 @@ from typing import Annotated, Any
 import typer
 
 from ccfem.cli.arguments import names_of, parameters_by_strategy, path_of
+from ccfem.cli.machines import MachineName, SetMachine, machine_choice, machines
 from ccfem.cli.options import (
     Backend,
     Calibration,
@@ -91,6 +92,9 @@ def _list(kind: str, name: str | None) -> None:
         print_member(kind, name)
 
 
+app.command()(machines)
+
+
 @app.command()
 def faces(
     body: Annotated[
@@ -123,6 +127,8 @@ def faces(
 def check(
     case: CasePath,
     set_case: SetCase = None,
+    machine: MachineName = None,
+    set_machine: SetMachine = None,
     out: Annotated[
         Path | None,
         typer.Option(
@@ -136,7 +142,7 @@ def check(
     """Say and draw all that is known of a part before it is solved; all mistakes at once."""
     from ccfem.cli.check_part import check_part
 
-    code = check_part(case, set_case, out)
+    code = check_part(case, set_case, out, machine_choice(machine, set_machine))
     if code:
         raise typer.Exit(code)
 
@@ -219,6 +225,8 @@ def compare(
     load_case: LoadCase = None,
     refine: Refine = False,
     calibration: Calibration = None,
+    machine: MachineName = None,
+    set_machine: SetMachine = None,
     backend: Backend = "auto",
     stress: StressFile = None,
     stress_unit: StressUnit = None,
@@ -248,6 +256,7 @@ def compare(
         frame=paths_frame,
         force=force,
         refine=refine,
+        machine=machine_choice(machine, set_machine),
     )
 
 
@@ -268,6 +277,8 @@ def plan(
     load_case: LoadCase = None,
     refine: Refine = False,
     calibration: Calibration = None,
+    machine: MachineName = None,
+    set_machine: SetMachine = None,
     backend: Backend = "auto",
     gcode: Annotated[
         bool,
@@ -297,6 +308,7 @@ def plan(
         suffix,
         force=force,
         refine=refine,
+        machine=machine_choice(machine, set_machine),
     )
 
 
@@ -349,6 +361,8 @@ def calibrate(
     layers: Layers = None,
     fibre_per_layer: Fibre = None,
     load_case: LoadCase = None,
+    machine: MachineName = None,
+    set_machine: SetMachine = None,
     out: Annotated[
         Path,
         typer.Option(
@@ -367,7 +381,9 @@ def calibrate(
     options = options_of(layers, fibre_per_layer, False, load_case, "auto")
     options["natural"] = fibre_per_layer is None
 
+    chosen = machine_choice(machine, set_machine)
+
     def read() -> Any:
-        return load(case, set_case)
+        return load(case, set_case, machine=chosen)
 
     fit_material(read, unreinforced, reinforced, strategy, parameters, options, out)

@@ -99,8 +99,8 @@ def _write_in_space(comparison: Comparison, folder: Path) -> None:
 
 def _write_matrix(comparison: Comparison, folder: Path) -> None:
     """Write the matrix of curved layers for robots, once for all strategies."""
-    from ccfem.export.layer_matrix import layer_matrix
     from ccfem.export.robot_waypoints import write_robot_waypoints
+    from ccfem.printing.layer_matrix import layer_matrix
     from ccfem.toolpaths import MATRIX
 
     file = folder / "matrix_waypoints.csv"

@@ -32,7 +32,7 @@ from ccfem.evaluation.plane_paths import PlanePaths, plane_paths
 from ccfem.evaluation.sinuosity import path_sinuosity, sample_sinuosity, sinuosity_indices
 from ccfem.evaluation.stiffness_alignment import READINGS
 from ccfem.export.gcode import gcode
-from ccfem.export.print_plan import PrintPlan
+from ccfem.printing.print_plan import PrintPlan
 from ccfem.geometry.polylines import lengths, pack
 from ccfem.layers.layer import Layer
 from ccfem.layers.layer_stress import stress_on

@@ -7,12 +7,17 @@ from itertools import pairwise
 import numpy as np
 import shapely
 
-from ccfem.arrays import FloatArray, freeze, in_brief
+from ccfem.arrays import BoolArray, FloatArray, freeze, in_brief
 from ccfem.errors import InputError
-from ccfem.export.matrix_flow import with_flow
 from ccfem.geometry.hatch import zigzag
 from ccfem.geometry.offsets import offset_rings
-from ccfem.geometry.polylines import is_closed, merge_repeated, pack, starts_segment
+from ccfem.geometry.polylines import (
+    is_closed,
+    line_length,
+    merge_repeated,
+    pack,
+    starts_segment,
+)
 from ccfem.geometry.shapes import Region
 from ccfem.layers import Layer
 from ccfem.layers.plane import Plane
@@ -20,6 +25,7 @@ from ccfem.layers.slicing.planar import Planar
 from ccfem.linking.print_order import nearest_end_order
 from ccfem.machine.machine import Machine
 from ccfem.mesh.tet_mesh import TetMesh
+from ccfem.printing.matrix_flow import with_flow
 from ccfem.toolpaths import FIBRE, MATRIX, Toolpaths
 
 __all__ = ["COORDINATE_DIGITS", "PrintPlan", "check_machine", "plan_print"]
@@ -32,6 +38,9 @@ _SAME = 1e-6
 
 _OVERLAP = 0.25
 """Overlap of the ends of the zigzag with the contour, in line widths. Our choice."""
+
+_LOW = 0.1
+"""Least height of a line of matrix, mm. Our choice."""
 
 _SHORT = 1e-6
 """Share of the cutter's distance by which a path may be too short through rounding."""
@@ -52,12 +61,18 @@ class PrintPlan:
     laid : (P,) array, mm, optional
         Height of the matrix, a line wide, that is laid on the step from each point of the paths;
         by default the thickness of its layer. Of no meaning for fibre, and at the ends of paths.
+    short : (K,) bool array, optional
+        Which lines of matrix take the place of strands that are too short for the cutter.
+    dropped : float, mm
+        Length of strands that are too short and left out.
     """
 
     paths: Toolpaths
     top: FloatArray
     thickness: FloatArray
     laid: FloatArray = None  # type: ignore[assignment]
+    short: BoolArray = None  # type: ignore[assignment]
+    dropped: float = 0.0
 
     __repr__ = in_brief
 
@@ -65,7 +80,9 @@ class PrintPlan:
         if self.laid is None:
             whole = np.repeat(self.thickness[self.paths.layer], np.diff(self.paths.offsets))
             object.__setattr__(self, "laid", whole)
-        freeze(self, top=float, thickness=float, laid=float)
+        if self.short is None:
+            object.__setattr__(self, "short", np.zeros(len(self.paths), dtype=bool))
+        freeze(self, top=float, thickness=float, laid=float, short=bool)
 
     def volume(self, machine: Machine) -> float:
         """Volume of matrix and fibre, mm^3."""
@@ -74,7 +91,7 @@ class PrintPlan:
         matrix = np.repeat(self.paths.kind == MATRIX, np.diff(self.paths.offsets))[start]
         laid = float((steps * self.laid[start])[matrix].sum())
         fibre = float(self.paths.of_kind(FIBRE).lengths.sum())
-        return machine.matrix_width * laid + machine.filament_area * fibre
+        return machine.matrix_width * laid + machine.strand_area * fibre
 
 
 @dataclass(frozen=True)
@@ -115,8 +132,10 @@ def plan_print(
     layers of equal height, as few as `Machine.matrix_height` allows, so that the part gets its full
     height. A matrix layer is a contour and a zigzag of the section at its middle, which turns from
     one matrix layer to the next; over fibre it lays what the strands leave
-    (`ccfem.export.matrix_flow`). A fibre layer holds fibre alone, and a layer without fibre is left
-    out. Within a layer the next path is always the one with the nearest end. The part stands in the
+    (`ccfem.printing.matrix_flow`). A fibre layer holds fibre, and lines of matrix in place of
+    strands that are too short for the cutter (`Process.short`); a layer without fibre is left out.
+    The lowest layer is that of `Process.first_layer_height`. Within a layer the next path is always
+    the one with the nearest end. The part stands in the
     middle of the bed.
 
     Parameters
@@ -132,9 +151,9 @@ def plan_print(
     Raises
     ------
     InputError
-        Where fibre lies on a layer that is not given, is shorter than the cutter allows, layers
-        are nearer to each other or to the part's ends than their height allows, strands stand
-        higher than the matrix above them, or the part does not fit on the bed.
+        Where fibre lies on a layer that is not given, is too short and `Process.short` says so,
+        layers are nearer to each other or to the part's ends than their height allows, strands
+        stand higher than the matrix above them, or the part does not fit on the bed.
     """
     fibre = toolpaths.of_kind(FIBRE)
     _check_fibre(fibre, layers, machine)
@@ -146,9 +165,10 @@ def plan_print(
     matrix_slabs = [slab for slab in slabs if slab.fibre is None]
     origin = 0.5 * (lowest[:2] + highest[:2] - machine.gcode.bed[:2])
     matrix = iter(_matrix_lines(matrix_slabs, mesh, frame, origin, machine))
-    printed, flow = [], []
+    printed, flow, short = [], [], []
     strands: list[FloatArray] = []  # since the last layer of matrix
-    below = 0.0
+    sections: list[float] = []
+    below = dropped = 0.0
     for number, slab in enumerate(slabs):
         height, thickness = slab.upper - float(lowest[2]), slab.upper - slab.lower
         if slab.fibre is None:
@@ -156,15 +176,27 @@ def plan_print(
             found = _printed(lines, height, number, MATRIX)
             heights = np.zeros(0)
             if len(found):
-                found, heights = with_flow(found, section, thickness, strands, below, machine)
-            strands, below = [], 0.0
+                found, heights = with_flow(
+                    found, section, thickness, strands, below, machine, sections
+                )
+            strands, sections, below = [], [], 0.0
+            few = np.zeros(len(found), dtype=bool)
         else:
-            lines = [path @ frame[:2].T - origin for path in fibre.on_layer(slab.fibre)]
-            found = _printed(lines, height, number, FIBRE)
-            heights = np.zeros(len(found.points))
-            strands, below = strands + lines, below + thickness
+            here = fibre.on_layer(slab.fibre)
+            lines = [path @ frame[:2].T - origin for path in here]
+            by_matrix, whole = _sorted_by_length(lines, machine)
+            dropped += float(here.lengths.sum()) - sum(map(line_length, by_matrix + whole))
+            parts = (_printed(by_matrix, height, number, MATRIX),)
+            parts += (_printed(whole, height, number, FIBRE),)  # type: ignore[assignment]
+            found = Toolpaths.concatenate(parts)
+            heights = np.full(len(found.points), thickness)
+            few = found.kind == MATRIX
+            sections += [machine.matrix_width * thickness] * len(by_matrix)
+            sections += [machine.strand_area] * len(whole)
+            strands, below = strands + by_matrix + whole, below + thickness
         printed.append(found)
         flow.append(heights)
+        short.append(few)
     paths = Toolpaths.concatenate(printed)
     paths = replace(paths, points=paths.points.round(COORDINATE_DIGITS) + 0.0)
     plan = PrintPlan(
@@ -172,6 +204,8 @@ def plan_print(
         np.array([slab.upper - lowest[2] for slab in slabs]).round(COORDINATE_DIGITS),
         np.array([slab.upper - slab.lower for slab in slabs]),
         np.concatenate(flow),
+        np.concatenate(short),
+        dropped,
     )
     _check_bed(plan, machine)
     return plan
@@ -187,13 +221,29 @@ def _check_fibre(fibre: Toolpaths, layers: Sequence[Layer], machine: Machine) ->
             f"fibre lies on layer {min(missing)}, which is not among the layers given: "
             "give those that it was planned on"
         )
-    short = fibre.lengths < machine.tail * (1.0 - _SHORT)
-    if short.any():
+    limit = max(machine.tail, machine.minimum_length)
+    short = fibre.lengths < limit * (1.0 - _SHORT)
+    if short.any() and machine.process.short == "error":
         raise InputError(
-            f"fibre paths must be no shorter than the {machine.tail:g} mm from the cutter to the "
-            f"nozzle; {int(short.sum())} of {len(fibre)} are, the shortest "
-            f"{fibre.lengths.min():.4g} mm: plan with machine.minimum_length of at least that"
+            f"fibre paths must be no shorter than the {limit:g} mm that the cutter allows; "
+            f"{int(short.sum())} of {len(fibre)} are, the shortest {fibre.lengths.min():.4g} mm: "
+            "plan with machine.minimum_length of at least that, or set process.short = 'matrix'"
         )
+
+
+def _sorted_by_length(
+    lines: list[FloatArray], machine: Machine
+) -> tuple[list[FloatArray], list[FloatArray]]:
+    """Strands that matrix is laid instead of, and those that the cutter allows.
+
+    Of a strand that is left out, and in layers too low for a line of matrix, the matrix above fills
+    the place.
+    """
+    limit = max(machine.tail, machine.minimum_length) * (1.0 - _SHORT)
+    whole = [line for line in lines if line_length(line) >= limit]
+    if machine.process.short != "matrix" or machine.strand_height < _LOW:
+        return [], whole
+    return [line for line in lines if line_length(line) < limit], whole
 
 
 def _slabs(layers: Sequence[Layer], bottom: float, top: float, machine: Machine) -> list[_Slab]:
@@ -209,16 +259,20 @@ def _slabs(layers: Sequence[Layer], bottom: float, top: float, machine: Machine)
                 f"height of {machine.strand_height:g} mm between {level:g} and {top:g} mm: move it "
                 "with --heights, or take fewer layers"
             )
-        slabs += _matrix_slabs(level, lower, machine)
+        slabs += _matrix_slabs(level, lower, machine, first=not slabs)
         slabs.append(_Slab(lower, upper, layer.index))
         level = upper
-    return slabs + _matrix_slabs(level, top, machine)
+    return slabs + _matrix_slabs(level, top, machine, first=not slabs)
 
 
-def _matrix_slabs(lower: float, upper: float, machine: Machine) -> list[_Slab]:
-    """Matrix layers of equal height that fill a gap; none where there is no gap."""
+def _matrix_slabs(lower: float, upper: float, machine: Machine, first: bool) -> list[_Slab]:
+    """Matrix layers of equal height that fill a gap, the first of all lower; none without a gap."""
     if upper - lower <= _SAME:
         return []
+    low = min(machine.process.first_layer_height, machine.matrix_height)
+    if first and low > 0.0 and upper - lower > low + _LOW:
+        start = _Slab(lower, lower + low)
+        return [start, *_matrix_slabs(lower + low, upper, machine, first=False)]
     count = int(np.ceil((upper - lower) / machine.matrix_height - _SAME))
     edges = np.linspace(lower, upper, count + 1).tolist()
     return [_Slab(a, b) for a, b in pairwise(edges)]

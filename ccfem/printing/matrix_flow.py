@@ -50,6 +50,7 @@ def with_flow(
     strands: Sequence[FloatArray],
     below: float,
     machine: Machine,
+    sections: Sequence[float] | None = None,
 ) -> tuple[Toolpaths, FloatArray]:
     """Lines of a matrix layer with the height that each of their steps lays.
 
@@ -66,6 +67,8 @@ def with_flow(
     below : float, mm
         Height of the fibre layers that they lie in.
     machine : Machine
+    sections : sequence of float, mm^2, optional
+        Section of each strand; by default `Machine.strand_area`.
 
     Returns
     -------
@@ -83,7 +86,9 @@ def with_flow(
     start = np.flatnonzero(starts_segment(offsets))
     length = np.linalg.norm(points[start + 1] - points[start], axis=1)
     middle = 0.5 * (points[start] + points[start + 1])[:, :2]
-    volume = height + below - machine.filament_area * _density(strands, middle, machine)
+    if sections is None:
+        sections = [machine.strand_area] * len(strands)
+    volume = height + below - _density(strands, sections, middle, machine)
     least = min(_LEAST, height)
     _check(volume, length, height, below, least)
     wanted = np.maximum(volume, least)
@@ -96,8 +101,8 @@ def with_flow(
     run = (np.cumsum(keep) - 1)[start]
     long = np.bincount(run, length, len(kept))
     laid = np.bincount(run, wanted * length, len(kept)) / np.maximum(long, 1e-300)
-    inside = shapely.length(shapely.intersection(strings(strands), section)).sum()
-    room = section.area * (height + below) - machine.filament_area * inside
+    inside = shapely.length(shapely.intersection(strings(strands), section))
+    room = section.area * (height + below) - float(inside @ np.asarray(sections))
     scale = room / (machine.matrix_width * (laid * long).sum())
     laid *= np.clip(scale, 1.0 / _SCALE, _SCALE)
     fewer = replace(
@@ -110,20 +115,26 @@ def with_flow(
     return fewer, laid
 
 
-def _density(strands: Sequence[FloatArray], places: FloatArray, machine: Machine) -> FloatArray:
-    """Length of strand per area, 1/mm, round places (k, 2)."""
+def _density(
+    strands: Sequence[FloatArray],
+    sections: Sequence[float],
+    places: FloatArray,
+    machine: Machine,
+) -> FloatArray:
+    """Volume of strands per area, mm, round places (k, 2)."""
     if not len(strands):
         return np.zeros(len(places))
     width = machine.fibre_width
     cell = _CELL * width
     lines, offsets = pack(strands)
-    samples, _, length, _ = sample_midpoints(lines, offsets, 0.5 * cell)
+    samples, _, length, line = sample_midpoints(lines, offsets, 0.5 * cell)
     low = places.min(axis=0) - 4.0 * width
     shape = tuple(np.ceil((places.max(axis=0) + 4.0 * width - low) / cell).astype(int) + 1)
     index = np.floor((samples - low) / cell).astype(int)
     inside = ((index >= 0) & (index < shape)).all(axis=1)
     flat = np.ravel_multi_index(tuple(index[inside].T), shape)
-    count = np.bincount(flat, length[inside], int(np.prod(shape))).reshape(shape)
+    weight = (length * np.asarray(sections)[line])[inside]
+    count = np.bincount(flat, weight, int(np.prod(shape))).reshape(shape)
     spread = gaussian_filter(count / cell**2, _SPREAD / _CELL, mode="constant")
     at = (places - low) / cell - 0.5
     return np.asarray(map_coordinates(spread, at.T, order=1, mode="nearest"))
