@@ -32,7 +32,6 @@ from ccfem.evaluation.plane_paths import PlanePaths, plane_paths
 from ccfem.evaluation.sinuosity import path_sinuosity, sample_sinuosity, sinuosity_indices
 from ccfem.evaluation.stiffness_alignment import READINGS
 from ccfem.export.gcode import gcode
-from ccfem.printing.print_plan import PrintPlan
 from ccfem.geometry.polylines import lengths, pack
 from ccfem.layers.layer import Layer
 from ccfem.layers.layer_stress import stress_on
@@ -41,6 +40,7 @@ from ccfem.machine import Machine
 from ccfem.materials import named_material
 from ccfem.planning import plan
 from ccfem.plates import solve_plane
+from ccfem.printing.print_plan import PrintPlan
 from ccfem.raster.raster_plan import RasterPlan
 from ccfem.strategies import create
 from ccfem.toolpaths import FIBRE, Toolpaths
