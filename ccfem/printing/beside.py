@@ -6,7 +6,6 @@ import numpy as np
 import shapely
 
 from ccfem.arrays import FloatArray
-from ccfem.geometry.offsets import offset_rings
 from ccfem.geometry.shapes import Region
 from ccfem.machine.machine import Machine
 from ccfem.printing.print_plan import COORDINATE_DIGITS, PrintPlan
@@ -88,9 +87,11 @@ def _block(right: float, middle: float, machine: Machine) -> list[FloatArray]:
     process, width = machine.process, machine.matrix_width
     size = process.prime_size
     if process.prime == "block":
-        square = shapely.box(right - size, middle - 0.5 * size, right, middle + 0.5 * size)
-        levels = offset_rings(square, 0.5 * width, width, width)
-        return [ring.round(COORDINATE_DIGITS) for level in levels for ring in level]
+        insets = (np.arange(max(int(0.5 * size / width), 1)) + 0.5) * width
+        half = 0.5 * size - insets[insets < 0.5 * size]
+        corners = np.array([[1, -1], [1, 1], [-1, 1], [-1, -1], [1, -1]])
+        centre = np.array([right - 0.5 * size, middle])
+        return [(centre + reach * corners).round(COORDINATE_DIGITS) for reach in half.tolist()]
     lines = []
     for k in range(int(max(size // width, 2.0))):
         x = right - (k + 0.5) * width

@@ -50,7 +50,8 @@ class Recorder:
             level = max(self.top, float(place[2])) + lift
         above = place + lift * normal
         self._to(np.append(above[:2], level), normal, across=True)
-        self._to(above, normal)
+        if normal[2] < 1.0 - _SAME:
+            self._to(above, normal)
         self._to(place, normal)
 
     def retreat(self, more: float = 0.0) -> None:

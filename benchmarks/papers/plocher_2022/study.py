@@ -36,7 +36,7 @@ from ccfem.geometry.polylines import lengths, pack
 from ccfem.layers.layer import Layer
 from ccfem.layers.layer_stress import stress_on
 from ccfem.linking.print_order import nearest_end_order
-from ccfem.machine import Machine
+from ccfem.machine import Machine, Process
 from ccfem.materials import named_material
 from ccfem.planning import plan
 from ccfem.plates import solve_plane
@@ -127,6 +127,7 @@ def machine_of(plate: Plate) -> Machine:
         cutter_distance=0.0,
         fibre_speed=PRINT_SPEED,
         travel_speed=TRAVEL_SPEED,
+        process=Process(prime="none", skirt_loops=0),
     )
 
 

@@ -1,0 +1,389 @@
+"""What is written can be printed: a small part with every machine, and files that are spoiled.
+
+The numbers come from the file alone, by the printer on paper of `conftest`.
+"""
+
+import numpy as np
+import pytest
+import shapely
+
+from ccfem.export.gcode import gcode
+from ccfem.layers.slicing.planar import Planar
+from ccfem.machine import Machine, machine_names, machine_table, updated
+from ccfem.mesh.box import box_mesh
+from ccfem.printing.print_plan import plan_print
+from ccfem.toolpaths import Toolpaths
+
+SIZE = (85.0, 26.0, 1.8)
+HEIGHTS = (0.7, 1.3)
+HALF = 0.5 * np.array(SIZE[:2])
+AREA = SIZE[0] * SIZE[1]
+FILAMENT = 0.25 * np.pi * 1.75**2
+PART = ("External perimeter", "Solid infill", "Internal infill")
+
+
+def ring(radius):
+    turn = np.linspace(0.0, 2.0 * np.pi, 61)
+    line = np.array([15.0, 13.0]) + radius * np.stack([np.cos(turn), np.sin(turn)], axis=1)
+    line[-1] = line[0]
+    return line
+
+
+LINES = [
+    ring(10.0),
+    np.array([[31.0, 4.0], [80.0, 4.0], [80.0, 22.0]]),
+    np.array([[28.0, 10.0], [76.0, 10.0]]),
+    np.array([[50.0, 18.0], [70.0, 18.0]]),
+]
+
+
+class Print:
+    """A part with strands on two layers: its file, what the printer did, and what was planned."""
+
+    def __init__(self, name, follow, values=None, lines=LINES):
+        self.name, self.machine = name, updated(Machine(), machine_table(name), values or {})
+        mesh = box_mesh(SIZE, (8, 3, 1))
+        layers = Planar(heights=HEIGHTS).cut(mesh)
+        paths = [Toolpaths.from_plane(lines, layer) for layer in layers]
+        self.plan = plan_print(Toolpaths.concatenate(paths), layers, mesh, self.machine)
+        self.text = gcode(self.plan, self.machine)
+        self.planned = sum(float(path.lengths.sum()) for path in paths)
+        centre = 0.5 * np.array(self.machine.gcode.bed[:2])
+        self.section = shapely.box(*(centre - HALF), *(centre + HALF))
+        self.centre, self.follow = centre, follow
+        self.done = self.run()
+
+    def run(self, text=None):
+        profile = self.machine.gcode
+        unknown = profile.offset if profile.offset_by == "gcode" else (0.0, 0.0, 0.0)
+        return self.follow(self.text if text is None else text, self.name, unknown)
+
+
+@pytest.fixture(scope="module", params=machine_names())
+def printed(request, follow):
+    return Print(request.param, follow)
+
+
+def arc(steps):
+    return np.cumsum([0.0, *(step.length for step in steps)])
+
+
+def own(run):
+    return {name: steps for name, steps in run.strands().items() if "beside" not in name}
+
+
+def volume(job, run):
+    """Each layer of matrix fills its height, and what the fibre below it leaves."""
+    matrix, fibre, machine = {}, {}, job.machine
+    for step in run.steps:
+        inside = step.lays and step.kind in PART and job.section.covers(shapely.Point(step.end[:2]))
+        if inside:
+            found = fibre if step.tool or step.kind == "Internal infill" else matrix
+            laid = FILAMENT * (step.beside if step.tool else step.fed)
+            laid += machine.filament_area * step.length * (step.tool == 1)
+            found[step.end[2]] = found.get(step.end[2], 0.0) + laid
+    wrong, lower, strands = [], 0.0, 0.0
+    for height in sorted({*matrix, *fibre}):
+        strands += fibre.get(height, 0.0)
+        if height in matrix:
+            share = (matrix[height] + strands) / (AREA * (height - lower))
+            if not 0.96 < share < 1.04:
+                wrong.append(f"layer at {height:g} is {share:.3f} full")
+            lower, strands = height, 0.0
+    share = (sum(matrix.values()) + sum(fibre.values())) / (AREA * SIZE[2])
+    return wrong + ([] if 0.98 < share < 1.02 else [f"the part is {share:.3f} full"])
+
+
+def feeding(job, run):
+    """A strand gets its tail, a little more, and its way to the cut; matrix what was planned."""
+    wrong, machine, process = [], job.machine, job.machine.process
+    for name, steps in run.strands().items():
+        total, fed = sum(s.length for s in steps), sum(s.fed for s in steps)
+        wanted = machine.tail + process.restart_extra
+        wanted += process.feed_ratio * (total - machine.tail)
+        if abs(fed - wanted) > 0.01:
+            wrong.append(f"strand {name} of {total:.2f} mm gets {fed:.3f} mm, not {wanted:.3f}")
+    paths, area = job.plan.paths, machine.matrix_width / FILAMENT
+    lengths = np.append(np.linalg.norm(np.diff(paths.points, axis=0), axis=1), 0.0)
+    lengths[paths.offsets[1:] - 1] = 0.0
+    layer = np.repeat(paths.layer, np.diff(paths.offsets))
+    matrix = np.repeat(paths.kind == 1, np.diff(paths.offsets))
+    for number, top in enumerate(job.plan.top.tolist()):
+        here = matrix & (layer == number)
+        wanted = float((lengths * job.plan.laid)[here].sum()) * area
+        fed = sum(
+            s.fed
+            for s in run.steps
+            if s.lays and s.tool == 0 and s.kind in PART and abs(s.end[2] - top) < 1e-6
+        )
+        if abs(fed - wanted) > 1e-3 * wanted + 1e-9:
+            wrong.append(f"matrix at {top:g} gets {fed:.3f} mm, not {wanted:.3f}")
+    return wrong
+
+
+def speeds(job, run):
+    """Slow at the start, at corners, in turns and behind the cut."""
+    wrong, machine, process = [], job.machine, job.machine.process
+    for name, steps in run.strands().items():
+        steps = [step for step in steps if step.length]
+        along, most = arc(steps), machine.process.speed_limit or np.inf
+        fast = max(step.speed for step in steps)
+        if fast > min(most, machine.fibre_speed) + 1e-6:
+            wrong.append(f"strand {name} is laid at {fast:g} mm/s")
+        ways = [(s.end - s.start) / s.length for s in steps]
+        corners = [
+            along[k + 1]
+            for k in range(len(ways) - 1)
+            if ways[k] @ ways[k + 1] < np.cos(np.radians(process.corner_angle))
+        ]
+        radius = {
+            np.linalg.norm(s.end[:2] - job.centre - [15.0, 13.0] + HALF).round(1) for s in steps
+        }
+        bend = 10.0 if radius == {10.0} else np.inf
+        bent = (bend - machine.minimum_radius) / (process.bend_radius - machine.minimum_radius)
+        allowed = process.start_speed + min(bent, 1.0) * (machine.fibre_speed - process.start_speed)
+        cut = along[-1] - machine.tail
+        for step, start, end in zip(steps, along[:-1], along[1:], strict=True):
+            near, middle = process.corner_length - 0.01, 0.5 * (start + end)
+            slow = start < process.start_length - 0.01
+            slow |= any(start < at + near and end > at - near for at in corners)
+            limit = process.start_speed if slow else allowed * 1.01
+            limit = min(limit, process.finish_speed if middle > cut else np.inf)
+            if step.speed > limit + 1e-6:
+                wrong.append(f"strand {name} at {middle:.1f} mm: {step.speed:g} > {limit:g} mm/s")
+    return wrong
+
+
+def heat(job, run):
+    """Nothing is fed by a tool that was not waited for, and the other one cools."""
+    wrong, machine = [], job.machine
+    work = (machine.matrix_temperature, machine.fibre_temperature)
+    standby = (machine.matrix_standby, machine.fibre_standby)
+    for step in run.steps:
+        ready = step.waited and step.heat >= max(work[max(step.tool, 0)], 170.0)
+        if (step.fed > 0.0 or step.lays) and not ready:
+            wrong.append(f"tool {step.tool} lays at {step.heat:g} degrees: step {step.number}")
+    for change in run.changes:
+        if change.old >= 0 and change.told > standby[change.old]:
+            wrong.append(f"tool {change.old} stays at {change.told:g} degrees")
+    return wrong
+
+
+def changes(job, run):
+    """Up, drawn back, given back, and primed beside the part."""
+    wrong, debt = [], 0.0
+    for step in run.steps:
+        debt -= step.fed if step.tool == 0 and not step.length else 0.0
+        if step.lays and step.tool == 0 and abs(debt) > 1e-4:
+            wrong.append(f"{debt:g} mm are not given back at step {step.number}")
+            break
+    for change in run.changes[1:]:
+        if change.z < change.highest + 5.0 - 1e-6:
+            wrong.append(f"tool {change.new} is taken at {change.z:g} over {change.highest:g}")
+    for change in run.changes:
+        laid = 0.0
+        for step in run.steps[change.at :]:
+            if step.lays and (step.kind in PART or step.tool != change.new):
+                break
+            laid += step.fed * FILAMENT if step.lays else 0.0
+        if change.new == 0 and laid < 10.0:
+            wrong.append(f"{laid:.1f} mm3 are primed before the part")
+    return wrong
+
+
+class HeightMap:
+    """How high what is laid stands, on cells of half a millimetre."""
+
+    def __init__(self, bed):
+        self.top = np.zeros(tuple(int(2 * size) + 2 for size in bed[:2]))
+
+    def cells(self, start, end, half=0.0):
+        count = max(int(np.ceil(np.linalg.norm(end - start) / 0.25)), 1)
+        line = start + np.linspace(0.0, 1.0, count + 1)[:, None] * (end - start)
+        side = np.array([[x, y] for x in (-half, 0, half) for y in (-half, 0, half)])
+        at = np.floor(2.0 * (line[:, None, :2] + side)).astype(int).reshape(-1, 2)
+        return tuple(np.clip(at, 0, np.array(self.top.shape) - 1).T)
+
+    def lay(self, step, width):
+        at = self.cells(step.start, step.end, 0.4 * width)
+        self.top[at] = np.maximum(self.top[at], step.end[2])
+
+
+def travel(job, run):
+    """Above all that is laid, and never with fibre that was not cut."""
+    wrong, lift = [], job.machine.gcode.lift
+    area, hanging = HeightMap(job.machine.gcode.bed), False
+    for step in run.steps:
+        if step.lays:
+            area.lay(step, 0.8)
+        sideways = step.length and np.abs(step.end - step.start)[:2].max() > 0.0
+        if step.rapid and sideways and step.number > 1:
+            over = area.top[area.cells(step.start, step.end)].max()
+            if min(step.start[2], step.end[2]) < over + 0.95 * lift:
+                wrong.append(f"travel at {step.end[2]:g} over {over:g}: step {step.number}")
+        hanging = (hanging or (step.tool == 1 and step.fed > 0.0)) and step.number not in run.cuts
+        if step.tool == 1 and step.cut:
+            hanging = False
+        if step.rapid and hanging:
+            wrong.append(f"fibre is dragged by step {step.number}")
+            hanging = False
+    return wrong
+
+
+def support(job, run):
+    """Fibre has something below it, but for .5 % and short spans."""
+    area, free, total, runs, span = HeightMap(job.machine.gcode.bed), 0.0, 0.0, [0.0], 0.0
+    layer = job.machine.strand_height
+    below = area.top
+    for k, step in enumerate(run.steps):
+        if step.rapid or step.tool == 0:
+            span = 0.0
+        if k and step.tool != run.steps[k - 1].tool and step.tool == 1:
+            below = area.top.copy()
+        if step.lays and step.tool == 1:
+            count = max(int(step.length / 0.5), 1)
+            for part in np.linspace(0.0, 1.0, count + 1)[1:]:
+                at = step.start + part * (step.end - step.start)
+                there = below[area.cells(at, at, 0.2)].max()
+                held = there >= step.end[2] - 1.6 * layer - 1e-6
+                total += step.length / count
+                free += 0.0 if held else step.length / count
+                span = 0.0 if held else span + step.length / count
+                runs.append(span)
+        if step.lays:
+            area.lay(step, 0.8)
+    wrong = [f"{free / total:.3f} of the fibre has nothing below"] if free > 0.005 * total else []
+    return wrong + ([f"a span of {max(runs):.1f} mm"] if max(runs) > 3.0 else [])
+
+
+def bed(job, run):
+    """Both nozzles over the bed wherever either of them works."""
+    place = np.array([step.end for step in run.steps if step.number > 1])
+    low, high = place.min(axis=0), place.max(axis=0)
+    offset = np.array(job.machine.gcode.offset)
+    fibre = np.array([step.end for step in run.steps if step.tool == 1]) - [*offset[:2], 0.0]
+    low, high = np.minimum(low, fibre.min(axis=0)), np.maximum(high, fibre.max(axis=0))
+    inside = (low >= 0.0).all() and (high <= job.machine.gcode.bed).all()
+    return [] if inside else [f"nozzles reach {low} to {high}"]
+
+
+def cuts(job, run):
+    """One cut a strand, the tail before its end, with no feed behind it; none too short."""
+    wrong, machine = [], job.machine
+    strands = run.strands()
+    if len(run.cuts) != len(strands):
+        wrong.append(f"{len(run.cuts)} cuts in {len(strands)} strands")
+    for name, steps in strands.items():
+        along = arc(steps)
+        at = [along[k] for k, step in enumerate(steps) if step.cut][:1] or [along[-1]]
+        if abs(along[-1] - at[0] - machine.tail) > 0.05:
+            wrong.append(f"strand {name} of {along[-1]:.2f} mm is cut at {at[0]:.2f}")
+        if any(step.fed for step in steps if step.cut):
+            wrong.append(f"strand {name} is fed behind its cut")
+        if along[-1] < machine.minimum_length - 0.01:
+            wrong.append(f"strand {name} is {along[-1]:.2f} mm long")
+    return wrong
+
+
+def amount(job, run):
+    """Fibre, matrix in its place and what is left out are what was planned."""
+    fibre = sum(sum(s.length for s in steps) for steps in own(run).values())
+    short = sum(s.length for s in run.steps if s.lays and s.tool == 0 and s.kind == PART[2])
+    found = fibre + short + job.plan.dropped
+    return [] if abs(found / job.planned - 1.0) < 1e-3 else [f"{found:g} of {job.planned:g} mm"]
+
+
+def places(job, run):
+    """Strands lie where they were planned."""
+    lines = [line + job.centre - HALF for line in LINES]
+    shapes = shapely.linestrings(
+        np.concatenate(lines), indices=np.repeat(range(4), list(map(len, lines)))
+    )
+    wrong = []
+    for name, steps in own(run).items():
+        points = np.array([steps[0].start, *(step.end for step in steps)])
+        line = shapely.LineString(points[:, :2])
+        off = min(shapely.hausdorff_distance(line, shape) for shape in shapes)
+        heights = {abs(points[:, 2] - top).max() for top in np.array(HEIGHTS) + half_strand(job)}
+        if off > 1.5e-3 or min(heights) > 1e-3:
+            wrong.append(f"strand {name} lies {off:.3f} mm off, {min(heights):.3f} mm in height")
+    return wrong
+
+
+def half_strand(job):
+    return 0.5 * job.machine.strand_height
+
+
+def words(job, run):
+    return run.wrong
+
+
+CHECKS = (
+    *(volume, feeding, speeds, heat, changes, travel, support, bed, cuts, amount, places, words),
+)
+
+
+@pytest.mark.parametrize("check", CHECKS, ids=lambda check: check.__name__)
+def test_a_part_prints_with_every_machine(printed, check):
+    assert check(printed, printed.done) == []
+
+
+def test_the_checks_see_what_there_is_to_see(printed):
+    run = printed.done
+    assert len(run.strands()) == 2 * 3 + 1
+    assert len(run.changes) == 4 + 1
+    assert {step.kind for step in run.steps if step.lays} >= {*PART, "Wipe tower", "Skirt/Brim"}
+
+
+SHIFTED = {"gcode": {"offset": [18.0, -2.0, 0.0], "offset_by": "gcode"}}
+MUTANTS = {
+    "matrix by a twentieth too much": (volume, lambda text: more(text, 1.05)),
+    "the first wait for fibre": (heat, lambda text: text.replace("M109 T1 S250\n", "", 1)),
+    "the first standby of matrix": (heat, lambda text: text.replace("M104 T0 S100\n", "", 1)),
+    "a cut 1 mm early": (cuts, {"cutter_distance": 43.0, "minimum_length": 43.0}),
+    "no more than the tail fed": (feeding, {"process": {"restart_extra": 0.0}}),
+    "travel .1 mm low": (travel, {"gcode": {"lift": 0.9}, "process": {"strand_lift": 0.0}}),
+    "twice the speed at the start": (speeds, {"process": {"start_speed": 4.0}}),
+    "corners at any speed": (speeds, {"process": {"corner_length": 0.0}}),
+    "tails at any speed": (speeds, {"process": {"finish_speed": 9.0}, "fibre_speed": 5.5}),
+    "the offset of the nozzles left out": (places, {"gcode": {"offset_by": "firmware"}}),
+    "a short strand lost": (amount, {"process": {"short": "drop"}}),
+    "no priming": (changes, {"process": {"prime": "none"}}),
+    "4 mm of lift at changes": (changes, {"process": {"tool_lift": 4.0}}),
+    "a bed too small": (bed, lambda text: text.replace("G0 X", "G0 X-")),
+    "a word of another firmware": (words, lambda text: text.replace("M280", "M340")),
+    "half a strand in the air": (support, lambda text: text.replace("Z0.754", "Z1.154")),
+}
+
+
+def more(text, factor):
+    """Feed more by all lines of matrix, nothing else."""
+    found, tool = [], ""
+    for line in text.splitlines():
+        tool = line if line in ("T0", "T1") else tool
+        words = line.split(" E")
+        if tool == "T0" and line.startswith("G1 ") and " E" in line and "X" in line:
+            fed, _, rest = words[1].partition(" ")
+            line = f"{words[0]} E{factor * float(fed):.5f} {rest}"
+        found.append(line)
+    return "\n".join(found)
+
+
+@pytest.fixture(scope="module")
+def sound(follow):
+    """A print whose firmware does not know the offset of the nozzles."""
+    return Print("marlin_two_tools", follow, SHIFTED)
+
+
+@pytest.mark.parametrize("name", MUTANTS)
+def test_a_spoiled_file_is_seen(sound, follow, name):
+    check, spoil = MUTANTS[name]
+    assert check(sound, sound.done) == []
+    if isinstance(spoil, dict):
+        table = {**SHIFTED, **spoil}
+        table["gcode"] = {**SHIFTED["gcode"], **spoil.get("gcode", {})}
+        text = Print("marlin_two_tools", follow, table).text
+    else:
+        text = spoil(sound.text)
+    assert text != sound.text
+    assert check(sound, sound.run(text)) != []
