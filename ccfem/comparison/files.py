@@ -10,6 +10,7 @@ import numpy as np
 
 from ccfem.comparison.record import record, results_frame
 from ccfem.comparison.result import Comparison
+from ccfem.printing.print_plan import PrintPlan
 from ccfem.progress import Progress, silent
 from ccfem.toolpaths import Toolpaths
 
@@ -109,9 +110,21 @@ def _write_matrix(comparison: Comparison, folder: Path) -> None:
         write_robot_waypoints(file, layer_matrix(layers, machine), layers, machine, MATRIX)
 
 
+def _write_print(folder: Path, name: str, plan: PrintPlan, comparison: Comparison) -> None:
+    """Write what a printer and a cell of robots do to print a part: one chain of moves."""
+    from ccfem.export.gcode import gcode_of_moves
+    from ccfem.export.robot_cell import write_robot_cell
+    from ccfem.printing.part_moves import part_moves
+
+    case = comparison.case
+    moves = part_moves(plan, case.machine)
+    text = gcode_of_moves(moves, plan, case.machine, f"{case.name}, {name}")
+    (folder / f"{name}.gcode").write_text(text, encoding="utf-8", newline="\n")
+    write_robot_cell(folder / f"{name}_cell.csv", moves)
+
+
 def _write_paths(comparison: Comparison, folder: Path) -> None:
     """Write the paths of every strategy in the formats of other programs."""
-    from ccfem.export.gcode import write_gcode
     from ccfem.export.robot_waypoints import write_robot_waypoints
     from ccfem.export.vtk import write_paths
     from ccfem.export.waypoints import write_waypoints
@@ -126,7 +139,7 @@ def _write_paths(comparison: Comparison, folder: Path) -> None:
             write_robot_waypoints(file, paths, layers, comparison.case.machine)
             _write_matrix(comparison, folder)
         if run.print_plan is not None:
-            write_gcode(folder / f"{run.name}.gcode", run.print_plan, comparison.case.machine)
+            _write_print(folder, run.name, run.print_plan, comparison)
     every = Toolpaths.concatenate(run.toolpaths for run in runs)
     number = np.repeat(np.arange(float(len(runs))), [len(run.toolpaths) for run in runs])
     write_paths(every, folder / "paths.vtp", path_data={"strategy": number})

@@ -3,14 +3,21 @@
 The numbers come from the file alone, by the printer on paper of `conftest`.
 """
 
+import csv
+from dataclasses import replace
+
 import numpy as np
 import pytest
 import shapely
 
 from ccfem.export.gcode import gcode
+from ccfem.export.robot_cell import write_robot_cell
 from ccfem.layers.slicing.planar import Planar
 from ccfem.machine import Machine, machine_names, machine_table, updated
 from ccfem.mesh.box import box_mesh
+from ccfem.printing.duration import durations
+from ccfem.printing.moves import FAN, PREHEAT, WORK
+from ccfem.printing.part_moves import part_moves
 from ccfem.printing.print_plan import plan_print
 from ccfem.toolpaths import Toolpaths
 
@@ -387,3 +394,122 @@ def test_a_spoiled_file_is_seen(sound, follow, name):
         text = spoil(sound.text)
     assert text != sound.text
     assert check(sound, sound.run(text)) != []
+
+
+CELL = 0.02
+
+
+def seconds(run, most, deviation):
+    """Time of a run by its phase plane: squares of the speed at the ends of small cells.
+
+    Between corners nothing but the acceleration bounds the change of the square; in a corner the
+    nozzle is on the arc that leaves it by the deviation.
+    """
+    total, chain = 0.0, []
+
+    def finished():
+        if not chain:
+            return 0.0
+        cells, square = [], [0.0]
+        for k, step in enumerate(chain):
+            count = int(np.ceil(step.length / CELL)) + 1
+            if k:
+                ways = [(s.end - s.start) / s.length for s in (chain[k - 1], step)]
+                half = 0.5 * np.arccos(np.clip(ways[0] @ ways[1], -1.0, 1.0))
+                radius = deviation / max(1.0 / max(np.cos(half), 1e-9) - 1.0, 1e-12)
+                square[-1] = min(square[-1], step.speed**2, most * radius)
+            cells += [step.length / count] * count
+            square += [step.speed**2] * count
+        square[-1] = 0.0
+        for k in range(1, len(square)):
+            square[k] = min(square[k], square[k - 1] + 2.0 * most * cells[k - 1])
+        for k in range(len(square) - 2, -1, -1):
+            square[k] = min(square[k], square[k + 1] + 2.0 * most * cells[k])
+        speed = np.sqrt(square)
+        return float((2.0 * np.array(cells) / (speed[1:] + speed[:-1])).sum())
+
+    for step in run.steps[2:]:
+        if step.length and step.number not in run.cuts:
+            chain.append(step)
+            continue
+        total += finished() + (0.0 if step.length else abs(step.fed) / step.speed)
+        chain = [step] if step.length else []
+    return total + finished() + run.waited
+
+
+def test_the_time_is_that_of_another_estimator(follow):
+    # Tools that heat at once: the wait for them has a test of its own.
+    hot = {"matrix_heating": 1e9, "fibre_heating": 1e9, "process": {"acceleration": 20.0}}
+    job = Print("marlin_two_tools", follow, hot)
+    process = job.machine.process
+    found = seconds(job.done, process.acceleration, process.junction)
+    assert float(job.done.head["TIME"]) == pytest.approx(found, rel=0.01)
+    # It does matter: without acceleration the same moves take less.
+    plain = sum((s.length or abs(s.fed)) / s.speed for s in job.done.steps[2:]) + job.done.waited
+    assert plain < 0.95 * found
+
+
+def test_a_waiting_tool_is_hot_in_time(follow):
+    # 100 K at 10 K/s: 10 s ahead; the fibre's 70 K at 1.38 K/s take 51 s, less than its break.
+    job = Print("marlin_two_tools", follow, {"matrix_heating": 10.0})
+    moves = part_moves(job.plan, job.machine)
+    spent = durations(moves, job.machine)
+    begin = np.cumsum(spent) - spent
+    works = np.flatnonzero(moves.event == WORK)
+    for tool, need in ((0, 10.0), (1, 70.0 / 1.38)):
+        preheats = np.flatnonzero((moves.event == PREHEAT) & (moves.tool == tool))
+        mine = [k for k in works.tolist() if moves.tool[k] == tool][1 - tool :]
+        assert len(preheats) == len(mine) == 2
+        for early, late in zip(preheats.tolist(), mine, strict=True):
+            gap = begin[late] - begin[early]
+            assert need <= gap <= need + spent[early + 1] + 1e-9
+            assert spent[late] == pytest.approx(0.0, abs=1e-6)
+            assert moves.amount[early] == moves.amount[late]
+    # Without it the printer waits as long as the tool had cooled, at most 10 s here.
+    cold = replace(moves, event=np.where(moves.event == PREHEAT, FAN, moves.event))
+    waits = durations(cold, job.machine)[(moves.event == WORK) & (moves.tool == 0)]
+    np.testing.assert_allclose(waits, [0.0, 10.0, 10.0], atol=1e-6)
+
+
+def test_the_head_says_what_is_used(printed):
+    head, machine = printed.done.head, printed.machine
+    steps = printed.done.steps
+    fibre = sum(step.fed for step in steps if step.tool == 1)
+    matrix = sum(step.fed for step in steps if step.tool == 0) + sum(s.beside for s in steps)
+    said = [float(one) for one in head["filament used [mm]"].split(",")]
+    np.testing.assert_allclose(said, [matrix, fibre], atol=0.02)
+    grams = [float(one) for one in head["filament used [g]"].split(",")]
+    tex = machine.fibre_tex or machine.filament_area * machine.fibre_density * 1000.0
+    np.testing.assert_allclose(grams, [matrix * FILAMENT * 1.24e-3, fibre * tex * 1e-6], atol=2e-3)
+    clock = head["estimated printing time (normal mode)"].split()
+    parts = [float(one[:-1]) * {"h": 3600, "m": 60, "s": 1}[one[-1]] for one in clock]
+    assert sum(parts) == float(head["TIME"])
+    assert int(head["LAYER_COUNT"]) == len(printed.plan.top)
+    assert head["too short for the cutter"].startswith("40.0 mm in 2 strands are laid") == (
+        machine.strand_height >= 0.1
+    )
+    low = np.array([float(head[f"MIN{axis}"]) for axis in "XYZ"])
+    laid = np.array([step.end for step in steps if step.lays])
+    np.testing.assert_allclose(laid.min(axis=0), low, atol=1e-3)
+
+
+def test_a_cell_of_robots_lays_the_same(printed, tmp_path):
+    write_robot_cell(tmp_path / "cell.csv", part_moves(printed.plan, printed.machine))
+    with (tmp_path / "cell.csv").open() as file:
+        rows = list(csv.DictReader(file))
+    place = np.array([[float(row[axis]) for axis in "xyz"] for row in rows])
+    way = np.linalg.norm(np.diff(place, axis=0, prepend=place[:1]), axis=1)
+    strand = np.array([int(row["path"]) for row in rows])
+    lay = np.array([row["event"] == "lay" for row in rows])
+    for number, steps in enumerate(own(printed.done).values()):
+        here = lay & (strand == number)
+        points = np.array([step.end for step in steps if step.length])
+        np.testing.assert_allclose(place[here], points, atol=1e-3)
+        feed = [float(row["feed"]) for row, mine in zip(rows, here, strict=True) if mine]
+        assert np.dot(feed, way[here]) == pytest.approx(
+            sum(step.fed for step in steps if step.length), abs=1e-3
+        )
+    events = [row["event"] for row in rows]
+    assert events.count("cut") == len(printed.done.cuts) == events.count("start")
+    assert events.count("tool 0") == events.count("tool 1") + 1 == 3
+    assert {(row["nx"], row["ny"], row["nz"]) for row in rows} == {("0", "0", "1")}
