@@ -33,7 +33,9 @@ def write_results(
 
     Where layers are curved, also ``STRATEGY_space.png`` and a page that turns,
     ``STRATEGY_space.html``, and ``matrix_waypoints.csv``, rings that fill the layers; with a curve,
-    ``curve.csv`` and ``curve.png``. Runs with a print plan get ``STRATEGY.gcode`` too. In
+    ``curve.csv`` and ``curve.png``. Runs with a print plan get ``STRATEGY.gcode`` too,
+    ``STRATEGY_cell.csv`` with the same moves for a cell of robots, and ``STRATEGY_trim.csv`` where
+    strands leave the part. In
     ``paths.vtp`` the cell array "strategy" numbers the strategies that did not fail, in the order
     of ``results.json``.
 
@@ -114,6 +116,7 @@ def _write_print(folder: Path, name: str, plan: PrintPlan, comparison: Compariso
     """Write what a printer and a cell of robots do to print a part: one chain of moves."""
     from ccfem.export.gcode import gcode_of_moves
     from ccfem.export.robot_cell import write_robot_cell
+    from ccfem.export.trim_table import write_trims
     from ccfem.printing.part_moves import part_moves
 
     case = comparison.case
@@ -121,6 +124,8 @@ def _write_print(folder: Path, name: str, plan: PrintPlan, comparison: Compariso
     text = gcode_of_moves(moves, plan, case.machine, f"{case.name}, {name}")
     (folder / f"{name}.gcode").write_text(text, encoding="utf-8", newline="\n")
     write_robot_cell(folder / f"{name}_cell.csv", moves)
+    if len(plan.trims):
+        write_trims(folder / f"{name}_trim.csv", plan)
 
 
 def _write_paths(comparison: Comparison, folder: Path) -> None:

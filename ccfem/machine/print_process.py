@@ -7,7 +7,7 @@ from ccfem.checks import check_choices, check_fields
 
 __all__ = ["Process"]
 
-_WORDS = ("short", "prime")
+_WORDS = ("short", "turns", "prime")
 _WHOLE = ("skirt_loops", "brim_loops")
 
 
@@ -49,6 +49,9 @@ class Process:
         matrix filament is drawn back (Aura: 5 and 15).
     short : {"matrix", "drop", "error"}
         Strands below `Machine.minimum_length`: laid by the matrix nozzle, left out, or refused.
+    turns : {"pad", "cut", "inside"}
+        Strands that leave the part: on pads of matrix that are cut off behind the print, cut at the
+        border, or refused.
     prime : {"block", "line", "none"}
         After a change of tools matrix comes first on a block beside the part, or on a line of it
         (as long as the block's contour). The first strand lies beside the part, on a bar of matrix.
@@ -87,6 +90,7 @@ class Process:
     tool_lift: float = 5.0
     tool_retract: float = 15.0
     short: Literal["matrix", "drop", "error"] = "matrix"
+    turns: Literal["pad", "cut", "inside"] = "pad"
     prime: Literal["block", "line", "none"] = "block"
     prime_volume: float = 10.0
     prime_size: float = 10.0

@@ -24,7 +24,7 @@ from ccfem.geometry.shapes import Region, strings
 from ccfem.machine.machine import Machine
 from ccfem.toolpaths import Toolpaths
 
-__all__ = ["with_flow"]
+__all__ = ["pad_flow", "with_flow"]
 
 _PIECE = 2.0
 """Longest piece, mm, over which the height is taken as one."""
@@ -113,6 +113,32 @@ def with_flow(
         link=np.zeros(len(kept), dtype=bool),
     )
     return fewer, laid
+
+
+def pad_flow(
+    paths: Toolpaths,
+    height: float,
+    strands: Sequence[FloatArray],
+    below: float,
+    machine: Machine,
+    sections: Sequence[float],
+) -> tuple[Toolpaths, FloatArray]:
+    """Lines of pads, with the height that strands on the pads below leave to each step.
+
+    Parameters and results are those of `with_flow`; nothing is scaled, and nothing refused.
+    """
+    points, offsets, _ = subdivide(paths.points, paths.offsets, _PIECE)
+    after = np.minimum(np.arange(len(points)) + 1, len(points) - 1)
+    middle = 0.5 * (points + points[after])[:, :2]
+    volume = height + below - _density(strands, sections, middle, machine)
+    finer = replace(
+        paths,
+        points=points,
+        normals=np.broadcast_to(paths.normals[0], (len(points), 3)),
+        offsets=offsets,
+        link=np.zeros(len(points), dtype=bool),
+    )
+    return finer, np.maximum(volume, min(_LEAST, height))
 
 
 def _density(

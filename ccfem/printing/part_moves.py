@@ -13,7 +13,7 @@ from ccfem.printing.preheating import preheated
 from ccfem.printing.print_plan import PrintPlan
 from ccfem.printing.recorder import Recorder
 from ccfem.printing.tools import begin_layer, change_tool, lay_matrix, lay_strand
-from ccfem.toolpaths import FIBRE
+from ccfem.toolpaths import FIBRE, SUPPORT
 
 __all__ = ["part_moves"]
 
@@ -56,6 +56,7 @@ def part_moves(plan: PrintPlan, machine: Machine) -> Moves:
                 lay_strand(recorder, line, normals, thickness, machine)
             else:
                 what = "short" if plan.short[k] else "contour" if paths.closed[k] else "infill"
+                what = "pad" if paths.kind[k] == SUPPORT else what
                 speed = _speed(below, machine)
                 heights = plan.laid[start : end - 1]
                 lay_matrix(recorder, line, normals, heights, what, machine, speed)

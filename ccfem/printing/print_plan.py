@@ -2,7 +2,6 @@
 
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
-from itertools import pairwise
 
 import numpy as np
 import shapely
@@ -25,22 +24,19 @@ from ccfem.layers.slicing.planar import Planar
 from ccfem.linking.print_order import nearest_end_order
 from ccfem.machine.machine import Machine
 from ccfem.mesh.tet_mesh import TetMesh
-from ccfem.printing.matrix_flow import with_flow
-from ccfem.toolpaths import FIBRE, MATRIX, Toolpaths
+from ccfem.printing.matrix_flow import pad_flow, with_flow
+from ccfem.printing.pads import pad_lines, pad_regions
+from ccfem.printing.slabs import LOW, Slab, slabs_of
+from ccfem.printing.turns import turned
+from ccfem.toolpaths import FIBRE, MATRIX, SUPPORT, Toolpaths
 
 __all__ = ["COORDINATE_DIGITS", "PrintPlan", "check_machine", "plan_print"]
 
 COORDINATE_DIGITS = 3
 """Decimals of coordinates, mm."""
 
-_SAME = 1e-6
-"""Heights closer than this, mm, are the same."""
-
 _OVERLAP = 0.25
 """Overlap of the ends of the zigzag with the contour, in line widths. Our choice."""
-
-_LOW = 0.1
-"""Least height of a line of matrix, mm. Our choice."""
 
 _SHORT = 1e-6
 """Share of the cutter's distance by which a path may be too short through rounding."""
@@ -65,6 +61,9 @@ class PrintPlan:
         Which lines of matrix take the place of strands that are too short for the cutter.
     dropped : float, mm
         Length of strands that are too short and left out.
+    trims : (t, 3) array, mm
+        Layer of this plan, X and Y of each place where a strand crosses the part's border: there
+        the knife comes behind the print.
     """
 
     paths: Toolpaths
@@ -73,6 +72,7 @@ class PrintPlan:
     laid: FloatArray = None  # type: ignore[assignment]
     short: BoolArray = None  # type: ignore[assignment]
     dropped: float = 0.0
+    trims: FloatArray = None  # type: ignore[assignment]
 
     __repr__ = in_brief
 
@@ -82,7 +82,9 @@ class PrintPlan:
             object.__setattr__(self, "laid", whole)
         if self.short is None:
             object.__setattr__(self, "short", np.zeros(len(self.paths), dtype=bool))
-        freeze(self, top=float, thickness=float, laid=float, short=bool)
+        if self.trims is None:
+            object.__setattr__(self, "trims", np.zeros((0, 3)))
+        freeze(self, trims=float, top=float, thickness=float, laid=float, short=bool)
 
     def volume(self, machine: Machine) -> float:
         """Volume of matrix and fibre, mm^3."""
@@ -92,15 +94,6 @@ class PrintPlan:
         laid = float((steps * self.laid[start])[matrix].sum())
         fibre = float(self.paths.of_kind(FIBRE).lengths.sum())
         return machine.matrix_width * laid + machine.strand_area * fibre
-
-
-@dataclass(frozen=True)
-class _Slab:
-    """A layer to print: its extent along the build direction, and its fibre layer if it is one."""
-
-    lower: float
-    upper: float
-    fibre: int | None = None
 
 
 def check_machine(machine: Machine) -> None:
@@ -161,31 +154,48 @@ def plan_print(
     corners = mesh.points[np.unique(mesh.corners)] @ frame.T
     lowest, highest = corners.min(axis=0), corners.max(axis=0)
     laid = [layer for layer in layers if layer.index in fibre.layer]
-    slabs = _slabs(laid, float(lowest[2]), float(highest[2]), machine)
+    slabs = slabs_of(laid, float(lowest[2]), float(highest[2]), machine)
     matrix_slabs = [slab for slab in slabs if slab.fibre is None]
     origin = 0.5 * (lowest[:2] + highest[:2] - machine.gcode.bed[:2])
     matrix = iter(_matrix_lines(matrix_slabs, mesh, frame, origin, machine))
+    filled = [next(matrix) if slab.fibre is None else None for slab in slabs]
+    borders = _borders(laid, frame, origin)
+    on_slab: list[list[FloatArray]] = []
+    trims, dropped = [np.zeros((0, 3))], 0.0
+    for number, slab in enumerate(slabs):
+        lines = []
+        if slab.fibre is not None:
+            lines = [path @ frame[:2].T - origin for path in fibre.on_layer(slab.fibre)]
+            planned = sum(map(line_length, lines))
+            lines, crossings = turned(lines, borders[slab.fibre], slab.fibre, machine)
+            dropped += planned - sum(map(line_length, lines))
+            trims.append(np.column_stack([np.full(len(crossings), number), crossings]))
+        on_slab.append(lines)
+    pads = pad_regions([one and one[0] for one in filled], on_slab, machine)
     printed, flow, short = [], [], []
     strands: list[FloatArray] = []  # since the last layer of matrix
     sections: list[float] = []
-    below = dropped = 0.0
+    below = 0.0
     for number, slab in enumerate(slabs):
         height, thickness = slab.upper - float(lowest[2]), slab.upper - slab.lower
         if slab.fibre is None:
-            section, lines = next(matrix)
+            section, lines = filled[number]  # type: ignore[misc]
             found = _printed(lines, height, number, MATRIX)
             heights = np.zeros(0)
             if len(found):
                 found, heights = with_flow(
                     found, section, thickness, strands, below, machine, sections
                 )
+            pad = _printed(pad_lines(*pads[number], machine), height, number, SUPPORT)
+            if len(pad):
+                pad, high = pad_flow(pad, thickness, strands, below, machine, sections)
+                found, heights = Toolpaths.concatenate([found, pad]), np.append(heights, high)
             strands, sections, below = [], [], 0.0
             few = np.zeros(len(found), dtype=bool)
         else:
-            here = fibre.on_layer(slab.fibre)
-            lines = [path @ frame[:2].T - origin for path in here]
+            lines = on_slab[number]
             by_matrix, whole = _sorted_by_length(lines, machine)
-            dropped += float(here.lengths.sum()) - sum(map(line_length, by_matrix + whole))
+            dropped += sum(map(line_length, lines)) - sum(map(line_length, by_matrix + whole))
             parts = (_printed(by_matrix, height, number, MATRIX),)
             parts += (_printed(whole, height, number, FIBRE),)  # type: ignore[assignment]
             found = Toolpaths.concatenate(parts)
@@ -206,6 +216,7 @@ def plan_print(
         np.concatenate(flow),
         np.concatenate(short),
         dropped,
+        np.concatenate(trims),
     )
     _check_bed(plan, machine)
     return plan
@@ -231,6 +242,20 @@ def _check_fibre(fibre: Toolpaths, layers: Sequence[Layer], machine: Machine) ->
         )
 
 
+def _borders(layers: Sequence[Layer], frame: FloatArray, origin: FloatArray) -> dict[int, Region]:
+    """Sections of layers on the bed, by their index."""
+
+    def on_bed(points: FloatArray, plane: Plane) -> FloatArray:
+        return plane.to_space(points) @ frame[:2].T - origin
+
+    return {
+        layer.index: shapely.transform(
+            layer.plane.polygon, lambda points, plane=layer.plane: on_bed(points, plane)
+        )
+        for layer in layers
+    }
+
+
 def _sorted_by_length(
     lines: list[FloatArray], machine: Machine
 ) -> tuple[list[FloatArray], list[FloatArray]]:
@@ -241,45 +266,18 @@ def _sorted_by_length(
     """
     limit = max(machine.tail, machine.minimum_length) * (1.0 - _SHORT)
     whole = [line for line in lines if line_length(line) >= limit]
-    if machine.process.short != "matrix" or machine.strand_height < _LOW:
+    if machine.process.short == "error" and len(whole) < len(lines):
+        raise InputError(
+            f"process.turns cuts strands into pieces below the {limit:g} mm that the cutter "
+            "allows: set it to 'pad', or process.short to 'matrix'"
+        )
+    if machine.process.short != "matrix" or machine.strand_height < LOW:
         return [], whole
     return [line for line in lines if line_length(line) < limit], whole
 
 
-def _slabs(layers: Sequence[Layer], bottom: float, top: float, machine: Machine) -> list[_Slab]:
-    """All layers to print, from the bottom to the top."""
-    slabs: list[_Slab] = []
-    level = bottom
-    for layer in sorted(layers, key=lambda one: one.plane.height):
-        lower = layer.plane.height - 0.5 * machine.strand_height
-        upper = layer.plane.height + 0.5 * machine.strand_height
-        if lower < level - _SAME or upper > top + _SAME:
-            raise InputError(
-                f"fibre layer {layer.index} at {layer.plane.height:g} mm does not fit with a fibre "
-                f"height of {machine.strand_height:g} mm between {level:g} and {top:g} mm: move it "
-                "with --heights, or take fewer layers"
-            )
-        slabs += _matrix_slabs(level, lower, machine, first=not slabs)
-        slabs.append(_Slab(lower, upper, layer.index))
-        level = upper
-    return slabs + _matrix_slabs(level, top, machine, first=not slabs)
-
-
-def _matrix_slabs(lower: float, upper: float, machine: Machine, first: bool) -> list[_Slab]:
-    """Matrix layers of equal height that fill a gap, the first of all lower; none without a gap."""
-    if upper - lower <= _SAME:
-        return []
-    low = min(machine.process.first_layer_height, machine.matrix_height)
-    if first and low > 0.0 and upper - lower > low + _LOW:
-        start = _Slab(lower, lower + low)
-        return [start, *_matrix_slabs(lower + low, upper, machine, first=False)]
-    count = int(np.ceil((upper - lower) / machine.matrix_height - _SAME))
-    edges = np.linspace(lower, upper, count + 1).tolist()
-    return [_Slab(a, b) for a, b in pairwise(edges)]
-
-
 def _matrix_lines(
-    slabs: Sequence[_Slab],
+    slabs: Sequence[Slab],
     mesh: TetMesh,
     frame: FloatArray,
     origin: FloatArray,

@@ -10,8 +10,10 @@ import numpy as np
 import pytest
 import shapely
 
+from ccfem.errors import InputError
 from ccfem.export.gcode import gcode
 from ccfem.export.robot_cell import write_robot_cell
+from ccfem.export.trim_table import write_trims
 from ccfem.layers.slicing.planar import Planar
 from ccfem.machine import Machine, machine_names, machine_table, updated
 from ccfem.mesh.box import box_mesh
@@ -333,6 +335,67 @@ CHECKS = (
 @pytest.mark.parametrize("check", CHECKS, ids=lambda check: check.__name__)
 def test_a_part_prints_with_every_machine(printed, check):
     assert check(printed, printed.done) == []
+
+
+# Two strands joined by a loop 11 mm outside the part; a span of 30 mm over nothing.
+LOOP = np.concatenate(
+    [
+        [[40.0, 8.0]],
+        [85.0, 13.0] + 5.0 * np.array([[np.sin(a), -np.cos(a)] for a in np.linspace(0, np.pi, 25)]),
+        [[40.0, 18.0]],
+    ]
+)
+LOOP[1:-1, 0] += 6.0
+
+
+@pytest.fixture(scope="module")
+def outside(follow):
+    return Print("marlin_two_tools", follow, lines=[LOOP])
+
+
+def test_loops_outside_lie_on_pads(outside, tmp_path):
+    assert support(outside, outside.done) == []
+    assert [check(outside, outside.done) for check in (travel, cuts, heat, bed, volume)] == [[]] * 5
+    pads = [s for s in outside.done.steps if s.lays and s.kind == "Support material"]
+    corner = outside.centre - HALF
+    place = np.array([step.end for step in pads])
+    assert {round(z, 3) for z in place[:, 2]} == {0.2, 0.646, 1.246}
+    # Clear of the part by .7 mm, a line's middle .4 more; round the loop by half a strand and 1 mm.
+    assert place[:, 0].min() - corner[0] > SIZE[0] + 1.1 - 0.05
+    assert place[:, 0].max() - corner[0] == pytest.approx(85.0 + 6.0 + 5.0 + 1.5 - 0.4, abs=0.1)
+    # The knife's places: four, where the strands cross the border at x = 85.
+    trims = outside.plan.trims
+    np.testing.assert_allclose(trims[:, 1] - corner[0], 85.0, atol=1e-3)
+    np.testing.assert_allclose(np.sort(trims[:, 2] - corner[1]), [8, 8, 18, 18], atol=0.01)
+
+    write_trims(tmp_path / "trim.csv", outside.plan)
+    rows = np.loadtxt(tmp_path / "trim.csv", delimiter=",", skiprows=1)
+    np.testing.assert_allclose(rows[:, 1:3], trims[:, 1:], atol=1e-3)
+    tops = np.array(HEIGHTS) + half_strand(outside)
+    np.testing.assert_allclose(np.unique(rows[:, 3]), tops, atol=1e-3)
+
+
+def test_without_pads_the_loops_hang(outside):
+    found, kind = [], ""
+    for line in outside.text.splitlines():
+        kind = line if line.startswith(";TYPE") else kind
+        pad = kind == ";TYPE:Support material" and line.startswith("G1 X")
+        found.append("G0" + line[2:].split(" E")[0] if pad else line)
+    hanging = support(outside, outside.run("\n".join(found)))
+    assert any("a span of" in line for line in hanging)
+
+
+def test_loops_outside_are_cut_or_refused(follow):
+    cut = Print("marlin_two_tools", follow, {"process": {"turns": "cut"}}, [LOOP])
+    assert support(cut, cut.done) == cuts(cut, cut.done) == amount(cut, cut.done) == []
+    assert len(own(cut.done)) == 4
+    assert all(
+        cut.section.buffer(1e-3).covers(shapely.Point(s.end))
+        for s in cut.done.steps
+        if s.lays and s.tool == 1 and not s.strand.startswith("beside")
+    )
+    with pytest.raises(InputError, match=r"leave fibre layer 0 in 2 places, but process\.turns"):
+        Print("marlin_two_tools", follow, {"process": {"turns": "inside"}}, [LOOP])
 
 
 def test_the_checks_see_what_there_is_to_see(printed):
