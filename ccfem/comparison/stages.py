@@ -19,6 +19,7 @@ from ccfem.planning.equal_fibre import TOLERANCE, Planned, length_per_layer, pla
 from ccfem.planning.given_paths import GivenPaths
 from ccfem.planning.plan import plan
 from ccfem.planning.strategy import LengthStrategy
+from ccfem.printing.curved_plan import curved_plan
 from ccfem.printing.print_plan import plan_print
 from ccfem.progress import Progress
 from ccfem.toolpaths import Toolpaths
@@ -231,7 +232,9 @@ def with_print(run: Run, part: Part, tell: Tell) -> Run:
     if run.evaluation is None:
         return run
     try:
-        found = plan_print(run.toolpaths, part.layers, part.stress.mesh, part.machine)
+        what = (run.toolpaths, part.layers, part.stress.mesh, part.machine)
+        flat = all(layer.flat is not None for layer in part.layers)
+        found = plan_print(*what) if flat else curved_plan(*what, part.build or (0.0, 0.0, 1.0))
     except InputError as error:
         return replace(run, unprinted=str(error))
     share = found.volume(part.machine) / float(part.stress.mesh.volumes.sum())

@@ -14,8 +14,10 @@ from pathlib import Path
 
 import numpy as np
 
+from ccfem.arrays import FloatArray
 from ccfem.export.gcode_head import gcode_head
 from ccfem.io.whole import whole_file
+from ccfem.machine.kinematics import axis_values
 from ccfem.machine.machine import Machine
 from ccfem.printing.moves import (
     CUT,
@@ -95,15 +97,15 @@ def gcode(plan: PrintPlan, machine: Machine, title: str = "") -> str:
 def gcode_of_moves(moves: Moves, plan: PrintPlan, machine: Machine, title: str = "") -> str:
     """G-code of moves that were made of a plan."""
     lines = _Lines(machine, plan)
-    start, values = moves.start, {**lines.values}
+    axes, values = _axes(moves, machine), {**lines.values}
+    start = np.concatenate([axes[:1], axes[:-1]])
+    speed = _speeds(moves, axes, start)
     warm = machine.process if machine.process.warm_height > 0.0 else None
     values["bed_temperature"] += warm.warm_bed if warm else 0.0
     values["matrix_temperature"] += warm.warm_matrix if warm else 0.0
     lines.fill("start", **values)
-    columns = (moves.event, moves.tool, moves.feed, moves.beside, moves.speed, moves.amount)
-    rows = zip(
-        *(column.tolist() for column in columns), start.tolist(), moves.place.tolist(), strict=True
-    )
+    columns = (moves.event, moves.tool, moves.feed, moves.beside, speed, moves.amount)
+    rows = zip(*(column.tolist() for column in columns), start.tolist(), axes.tolist(), strict=True)
     about = zip(
         moves.role.tolist(),
         moves.width.tolist(),
@@ -126,6 +128,29 @@ def gcode_of_moves(moves: Moves, plan: PrintPlan, machine: Machine, title: str =
             lines.happen(event, tool, value, strand)
     lines.fill("end")
     return "\n".join([*gcode_head(moves, plan, machine, title), *lines.lines]) + "\n"
+
+
+def _axes(moves: Moves, machine: Machine) -> FloatArray:
+    """Values of X, Y and Z, and of axes that turn, after each row (n, 3) or (n, 5)."""
+    linear, turning = axis_values(machine.kinematics, moves.place, moves.normal)
+    if not machine.kinematics.letters:
+        return moves.place
+    return np.column_stack([linear, turning]).round(COORDINATE_DIGITS)
+
+
+def _speeds(moves: Moves, axes: FloatArray, start: FloatArray) -> FloatArray:
+    """Speed that F tells: along X, Y and Z, while the nozzle goes along the part as it should.
+
+    Firmware takes F for the way of X, Y and Z alone where these move, else for degrees.
+    """
+    if axes.shape[1] == 3:
+        return moves.speed
+    step = np.abs(axes - start)
+    way = np.linalg.norm(step[:, :3], axis=1)
+    way = np.where(way > 0.0, way, step[:, 3:].max(axis=1))
+    length = np.where(moves.length > 0.0, moves.length, way)
+    share = np.divide(way, length, out=np.ones(len(way)), where=(length > 0.0) & (way > 0.0))
+    return np.asarray((moves.speed * share).round(4))
 
 
 class _Lines:
@@ -174,15 +199,16 @@ class _Lines:
         first: bool,
     ) -> None:
         """Add a move; the first one goes up before it goes sideways."""
-        off = self._offset if tool == 1 else (0.0, 0.0, 0.0)
+        off = (*(self._offset if tool == 1 else (0.0, 0.0, 0.0)), 0.0, 0.0)
+        letters = "".join(("X", "Y", "Z", *self.machine.kinematics.letters))
         words = [
             f"{axis}{at - by:.{COORDINATE_DIGITS}f}"
-            for axis, was, at, by in zip("XYZ", old, new, off, strict=True)
+            for axis, was, at, by in zip(letters, old, new, off, strict=False)
             if first or at != was
         ]
         if first:
             self.lines.append(f"G0 {words[2]}{self._at(self.profile.lift_speed)}")
-            words = words[:2]
+            words = words[:2] + words[3:]
         axes = self._fed(tool, feed, beside) if event == LAY else ""
         rapid = "G0" if event == TRAVEL else "G1"
         self.lines.append(f"{rapid} {' '.join(words)}{axes}{self._at(speed)}")

@@ -4,6 +4,7 @@ from dataclasses import dataclass, field, fields
 
 from ccfem.checks import check_fields
 from ccfem.machine.gcode_profile import GcodeProfile
+from ccfem.machine.kinematics import Kinematics
 from ccfem.machine.limits import Limits
 from ccfem.machine.print_process import Process
 from ccfem.machine.speed_table import SpeedTable
@@ -14,7 +15,7 @@ _CUTTER_DISTANCE = 42.0
 """Chen et al. 2021, section 5.2, mm."""
 
 
-_PARTS = ("speeds", "gcode", "limits", "process", "pressed")
+_PARTS = ("speeds", "gcode", "limits", "process", "kinematics", "pressed")
 """Fields that are no numbers."""
 
 
@@ -78,6 +79,8 @@ class Machine:
         What its firmware wants to be told.
     process : Process
         How it prints.
+    kinematics : Kinematics
+        How it turns head and part to each other on curved layers.
     limits : Limits
         What it tolerates: paths beyond are not printable as they are.
     """
@@ -112,6 +115,7 @@ class Machine:
     head_length: float = 40.0
     gcode: GcodeProfile = field(default_factory=GcodeProfile)
     process: Process = field(default_factory=Process)
+    kinematics: Kinematics = field(default_factory=Kinematics)
     limits: Limits = field(default_factory=Limits)
 
     def __post_init__(self) -> None:

@@ -24,7 +24,8 @@ def part_moves(plan: PrintPlan, machine: Machine) -> Moves:
     """Turn the plan of a part into moves.
 
     Layer by layer: tool changes with their lifts and temperatures, first filament on a block beside
-    the part and on a bar, the skirt, lines of matrix, strands with their cuts.
+    the part and on a bar, the skirt, lines of matrix, strands with their cuts. Nothing is laid
+    beside a part of curved layers.
 
     Parameters
     ----------
@@ -37,7 +38,8 @@ def part_moves(plan: PrintPlan, machine: Machine) -> Moves:
     InputError
         Where a nozzle would leave the bed.
     """
-    recorder, around = Recorder(machine), beside(plan, machine)
+    flat = bool((plan.paths.normals[:, 2] > 1.0 - 1e-9).all())
+    recorder, around = Recorder(machine), beside(plan, machine) if flat else Beside()
     paths, site = plan.paths, _Site(around)
     below = 0.0
     for number in np.unique(paths.layer).tolist():
@@ -48,10 +50,11 @@ def part_moves(plan: PrintPlan, machine: Machine) -> Moves:
             line, normals = paths.points[start:end], paths.normals[start:end]
             tool = int(paths.kind[k] == FIBRE)
             changed = change_tool(recorder, tool, top, machine)
-            if tool == 0 and (changed or site.height < top):
+            if flat and tool == 0 and (changed or site.height < top):
                 site.prime(recorder, top, below == 0.0, changed, machine)
-            if tool:
+            if tool and flat:
                 site.first_strand(recorder, top, thickness, machine)
+            if tool:
                 recorder.strand += 1
                 lay_strand(recorder, line, normals, thickness, machine)
             else:
@@ -127,7 +130,7 @@ class _Site:
 
 
 def _check_bed(moves: Moves, machine: Machine) -> None:
-    """Check that both nozzles stay in the space that the carriage reaches."""
+    """Check that both nozzles stay over the bed, and below its height."""
     profile = machine.gcode
     moving = np.isin(moves.event, [TRAVEL, LAY, FEED])
     place = moves.place - np.where(moves.tool[:, None] == 1, profile.offset, 0.0)
