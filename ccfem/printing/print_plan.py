@@ -17,7 +17,7 @@ from ccfem.geometry.polylines import (
     pack,
     starts_segment,
 )
-from ccfem.geometry.shapes import Region
+from ccfem.geometry.shapes import Region, strings
 from ccfem.layers import Layer
 from ccfem.layers.plane import Plane
 from ccfem.layers.slicing.planar import Planar
@@ -61,6 +61,8 @@ class PrintPlan:
         Which lines of matrix take the place of strands that are too short for the cutter.
     dropped : float, mm
         Length of strands that are too short and left out.
+    outside : float, mm
+        Length of strands outside the part, whose volume is not the part's.
     trims : (t, 3) array, mm
         Layer of this plan, X and Y of each place where a strand crosses the part's border: there
         the knife comes behind the print.
@@ -73,6 +75,7 @@ class PrintPlan:
     short: BoolArray = None  # type: ignore[assignment]
     dropped: float = 0.0
     trims: FloatArray = None  # type: ignore[assignment]
+    outside: float = 0.0
 
     __repr__ = in_brief
 
@@ -87,13 +90,13 @@ class PrintPlan:
         freeze(self, trims=float, top=float, thickness=float, laid=float, short=bool)
 
     def volume(self, machine: Machine) -> float:
-        """Volume of matrix and fibre, mm^3."""
+        """Volume of matrix and of fibre inside the part, mm^3."""
         points, start = self.paths.points, np.flatnonzero(starts_segment(self.paths.offsets))
         steps = np.linalg.norm(points[start + 1] - points[start], axis=1)
         matrix = np.repeat(self.paths.kind == MATRIX, np.diff(self.paths.offsets))[start]
         laid = float((steps * self.laid[start])[matrix].sum())
         fibre = float(self.paths.of_kind(FIBRE).lengths.sum())
-        return machine.matrix_width * laid + machine.strand_area * fibre
+        return machine.matrix_width * laid + machine.strand_area * (fibre - self.outside)
 
 
 def check_machine(machine: Machine) -> None:
@@ -161,7 +164,7 @@ def plan_print(
     filled = [next(matrix) if slab.fibre is None else None for slab in slabs]
     borders = _borders(laid, frame, origin)
     on_slab: list[list[FloatArray]] = []
-    trims, dropped = [np.zeros((0, 3))], 0.0
+    trims, dropped, outside = [np.zeros((0, 3))], 0.0, 0.0
     for number, slab in enumerate(slabs):
         lines = []
         if slab.fibre is not None:
@@ -196,6 +199,8 @@ def plan_print(
             lines = on_slab[number]
             by_matrix, whole = _sorted_by_length(lines, machine)
             dropped += sum(map(line_length, lines)) - sum(map(line_length, by_matrix + whole))
+            border = borders[slab.fibre]
+            outside += float(shapely.length(shapely.difference(strings(whole), border)).sum())
             parts = (_printed(by_matrix, height, number, MATRIX),)
             parts += (_printed(whole, height, number, FIBRE),)  # type: ignore[assignment]
             found = Toolpaths.concatenate(parts)
@@ -217,6 +222,7 @@ def plan_print(
         np.concatenate(short),
         dropped,
         np.concatenate(trims),
+        outside,
     )
     _check_bed(plan, machine)
     return plan
