@@ -55,19 +55,8 @@ def gcode_head(moves: Moves, plan: PrintPlan, machine: Machine, title: str) -> l
             f"; {strands.lengths.sum():.1f} mm of fibre in {len(strands)} strands, the shortest "
             f"{strands.lengths.min():.1f} mm, each cut {machine.tail:g} mm before its end"
         )
-    lines += [f"; {line}" for line in short_strands(plan)]
+    lines += [f"; {line}" for line in plan.warnings]
     return lines
-
-
-def short_strands(plan: PrintPlan) -> list[str]:
-    """Say what became of strands that are too short for the cutter, if there are any."""
-    by_matrix = plan.paths.lengths[plan.short]
-    said = []
-    if len(by_matrix):
-        said.append(f"{by_matrix.sum():.1f} mm in {len(by_matrix)} strands are laid as matrix")
-    if plan.dropped > 1e-3:
-        said.append(f"{plan.dropped:.1f} mm are left out and filled with matrix")
-    return [f"too short for the cutter: {'; '.join(said)}"] if said else []
 
 
 def _grams_per_mm(machine: Machine) -> float:

@@ -49,6 +49,8 @@ class Process:
         matrix filament is drawn back (Aura: 5 and 15).
     short : {"matrix", "drop", "error"}
         Strands below `Machine.minimum_length`: laid by the matrix nozzle, left out, or refused.
+    cover : float, mm
+        Least height of matrix below the first and over the last layer of fibre.
     turns : {"pad", "cut", "inside"}
         Strands that leave the part: on pads of matrix that are cut off behind the print, cut at the
         border, or refused.
@@ -90,6 +92,7 @@ class Process:
     tool_lift: float = 5.0
     tool_retract: float = 15.0
     short: Literal["matrix", "drop", "error"] = "matrix"
+    cover: float = 0.15
     turns: Literal["pad", "cut", "inside"] = "pad"
     prime: Literal["block", "line", "none"] = "block"
     prime_volume: float = 10.0

@@ -39,8 +39,9 @@ _LEAST = 0.05
 _SCALE = 1.1
 """Most by which a layer is scaled: where lines do not reach a tenth of a section, as between walls
 nearer than a line is wide, more flow would not reach it either. Our choice."""
-_TOO_THIN = 0.1
-"""Share of a layer's lines that may be thinner, since fibre below stands too high. Our choice."""
+_THIN, _TOO_THIN = 0.01, 0.1
+"""Shares of a layer's lines that may be thinner, since fibre below stands too high, without a word
+and with a warning. Our choice."""
 
 
 def with_flow(
@@ -51,7 +52,7 @@ def with_flow(
     below: float,
     machine: Machine,
     sections: Sequence[float] | None = None,
-) -> tuple[Toolpaths, FloatArray]:
+) -> tuple[Toolpaths, FloatArray, str]:
     """Lines of a matrix layer with the height that each of their steps lays.
 
     Parameters
@@ -76,6 +77,8 @@ def with_flow(
         With a point wherever the height changes by a twentieth.
     laid : (P,) array, mm
         Height of matrix, a line wide, on the step from each point; 0 at the end of a line.
+    warning : str
+        Where strands stand higher on more than a hundredth; else empty.
 
     Raises
     ------
@@ -90,7 +93,7 @@ def with_flow(
         sections = [machine.strand_area] * len(strands)
     volume = height + below - _density(strands, sections, middle, machine)
     least = min(_LEAST, height)
-    _check(volume, length, height, below, least)
+    warning = _check(volume, length, height, below, least)
     wanted = np.maximum(volume, least)
     # Of neighbouring pieces in one step of the height only the first keeps its point.
     level = np.full(len(points), -1)
@@ -112,7 +115,7 @@ def with_flow(
         offsets=np.searchsorted(kept, offsets),
         link=np.zeros(len(kept), dtype=bool),
     )
-    return fewer, laid
+    return fewer, laid, warning
 
 
 def pad_flow(
@@ -168,16 +171,19 @@ def _density(
 
 def _check(
     volume: FloatArray, length: FloatArray, height: float, below: float, least: float
-) -> None:
+) -> str:
     """Raise where strands stand higher than the matrix above them on too much of the layer."""
     thin = length[volume < least].sum() / length.sum()
-    if thin <= _TOO_THIN:
-        return
+    if thin <= _THIN:
+        return ""
     order = np.argsort(volume)
     share = np.cumsum(length[order]) / length.sum()
     missing = least - float(volume[order[np.searchsorted(share, 0.01)]])
-    raise InputError(
+    said = (
         f"strands stand higher than the {height:.3g} mm of matrix above them on {thin:.0%} of the "
         f"layer; {height + missing:.3g} mm would do: lay fibre layers at least "
         f"{height + below + missing:.3g} mm apart"
     )
+    if thin > _TOO_THIN:
+        raise InputError(said)
+    return said

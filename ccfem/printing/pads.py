@@ -44,7 +44,9 @@ def pad_regions(
     list of (Region, Region)
         All of the pads, and their solid part; empty on layers of fibre.
     """
-    reach = 0.5 * machine.fibre_width + _MORE
+    reach, half = 0.5 * machine.fibre_width + _MORE, 0.5 * machine.matrix_width
+    # Where a section is narrower than a line, nothing is laid.
+    sections = [one and _opened(one, half) for one in sections]
     wide: Region = _NONE
     recent: list[Region] = []
     found: list[tuple[Region, Region]] = []
@@ -66,6 +68,12 @@ def pad_regions(
             found.append((shapely.difference(wide, room), shapely.difference(solid, room)))
         recent = [_NONE, *recent[: _SOLID - 1]]
     return found[::-1]
+
+
+def _opened(section: Region, half: float) -> Region:
+    """Part of a section that lines of twice that width reach."""
+    inner = shapely.buffer(section, -half, quad_segs=_ARC)
+    return shapely.buffer(inner, half, quad_segs=_ARC)
 
 
 def free_area(free: shapely.Geometry, reach: float) -> Region:

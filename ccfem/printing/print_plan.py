@@ -26,7 +26,7 @@ from ccfem.machine.machine import Machine
 from ccfem.mesh.tet_mesh import TetMesh
 from ccfem.printing.matrix_flow import pad_flow, with_flow
 from ccfem.printing.pads import pad_lines, pad_regions
-from ccfem.printing.slabs import LOW, Slab, slabs_of
+from ccfem.printing.slabs import LOW, Slab, check_cover, slabs_of
 from ccfem.printing.turns import turned
 from ccfem.toolpaths import FIBRE, MATRIX, SUPPORT, Toolpaths
 
@@ -61,6 +61,8 @@ class PrintPlan:
         Which lines of matrix take the place of strands that are too short for the cutter.
     dropped : float, mm
         Length of strands that are too short and left out.
+    warnings : tuple of str
+        What is doubtful, one line each.
     outside : float, mm
         Length of strands outside the part, whose volume is not the part's.
     trims : (t, 3) array, mm
@@ -76,6 +78,7 @@ class PrintPlan:
     dropped: float = 0.0
     trims: FloatArray = None  # type: ignore[assignment]
     outside: float = 0.0
+    warnings: tuple[str, ...] = ()
 
     __repr__ = in_brief
 
@@ -176,6 +179,7 @@ def plan_print(
         on_slab.append(lines)
     pads = pad_regions([one and one[0] for one in filled], on_slab, machine)
     printed, flow, short = [], [], []
+    warnings: list[str] = []
     strands: list[FloatArray] = []  # since the last layer of matrix
     sections: list[float] = []
     below = 0.0
@@ -186,9 +190,10 @@ def plan_print(
             found = _printed(lines, height, number, MATRIX)
             heights = np.zeros(0)
             if len(found):
-                found, heights = with_flow(
+                found, heights, warning = with_flow(
                     found, section, thickness, strands, below, machine, sections
                 )
+                warnings += [f"at {height:.4g} mm {warning}"] if warning else []
             pad = _printed(pad_lines(*pads[number], machine), height, number, SUPPORT)
             if len(pad):
                 pad, high = pad_flow(pad, thickness, strands, below, machine, sections)
@@ -223,9 +228,21 @@ def plan_print(
         dropped,
         np.concatenate(trims),
         outside,
+        (*warnings, *check_cover(slabs, machine)),
     )
     _check_bed(plan, machine)
-    return plan
+    return replace(plan, warnings=(*_short_strands(plan), *plan.warnings))
+
+
+def _short_strands(plan: PrintPlan) -> list[str]:
+    """Say what became of strands that are too short for the cutter, if there are any."""
+    by_matrix = plan.paths.lengths[plan.short]
+    said = []
+    if len(by_matrix):
+        said.append(f"{by_matrix.sum():.1f} mm in {len(by_matrix)} strands are laid as matrix")
+    if plan.dropped > 1e-3:
+        said.append(f"{plan.dropped:.1f} mm are left out and filled with matrix")
+    return [f"too short for the cutter: {'; '.join(said)}"] if said else []
 
 
 def _check_fibre(fibre: Toolpaths, layers: Sequence[Layer], machine: Machine) -> None:

@@ -10,7 +10,7 @@ from ccfem.errors import InputError
 from ccfem.layers import Layer
 from ccfem.machine.machine import Machine
 
-__all__ = ["LOW", "Slab", "slabs_of"]
+__all__ = ["LOW", "Slab", "check_cover", "slabs_of"]
 
 LOW = 0.1
 """Least height of a line of matrix, mm. Our choice."""
@@ -57,3 +57,35 @@ def _matrix_slabs(lower: float, upper: float, machine: Machine, first: bool) -> 
     count = int(np.ceil((upper - lower) / machine.matrix_height - _SAME))
     edges = np.linspace(lower, upper, count + 1).tolist()
     return [Slab(a, b) for a, b in pairwise(edges)]
+
+
+def check_cover(slabs: Sequence[Slab], machine: Machine) -> list[str]:
+    """Check the matrix below the first and over the last layer of fibre.
+
+    Returns
+    -------
+    list of str
+        A warning for each side where it is one layer alone.
+
+    Raises
+    ------
+    InputError
+        Where it is less than `Process.cover`.
+    """
+    fibre = [k for k, slab in enumerate(slabs) if slab.fibre is not None]
+    if not fibre:
+        return []
+    found, least = [], machine.process.cover
+    sides = {"below the first": slabs[: fibre[0]], "over the last": slabs[fibre[-1] + 1 :]}
+    for side, those in sides.items():
+        height = those[-1].upper - those[0].lower if those else 0.0
+        if height < least - _SAME:
+            raise InputError(
+                f"{height:.3g} mm of matrix {side} fibre layer do not hold it; at least "
+                f"{least:g} mm do: move the layer with --heights, or set process.cover"
+            )
+        if len(those) == 1:
+            found.append(
+                f"one layer of matrix {side} fibre layer, {height:.3g} mm; two hold better"
+            )
+    return found

@@ -32,6 +32,7 @@ PLAIN = Process(
     tool_lift=0.0,
     tool_retract=0.0,
     short="error",
+    cover=0.0,
     prime="none",
     skirt_loops=0,
     first_layer_height=0.0,
@@ -288,9 +289,10 @@ def test_flow_follows_the_section_within_a_tenth(wide, scale):
         closed=np.zeros(1, bool),
     )
     strip = shapely.box(0.0, -0.5 * wide, 50.0, 0.5 * wide)
-    found, laid = with_flow(paths, strip, 0.5, [], 0.0, MACHINE)
+    found, laid, warning = with_flow(paths, strip, 0.5, [], 0.0, MACHINE)
     assert found.lengths.sum() == pytest.approx(50.0)
     np.testing.assert_allclose(laid[:-1], 0.5 * scale)
+    assert not warning
 
 
 def test_strands_that_stand_higher_than_the_matrix_above_are_refused():

@@ -398,6 +398,27 @@ def test_loops_outside_are_cut_or_refused(follow):
         Print("marlin_two_tools", follow, {"process": {"turns": "inside"}}, [LOOP])
 
 
+def strip(height, values, follow):
+    """A strip of 60 x 20 mm with strands a width apart on a tenth of it, in its middle."""
+    mesh, machine = box_mesh((60.0, 20.0, height), (6, 2, 1)), updated(Machine(), values)
+    layers = Planar(count=1).cut(mesh)
+    # Four strands on top of each other.
+    stack = [np.array([[4.0, 10.0], [56.0, 10.0 + 0.01 * k]]) for k in range(4)]
+    return plan_print(Toolpaths.from_plane(stack, layers[0]), layers, mesh, machine)
+
+
+def test_thin_matrix_and_thin_cover_are_said_or_refused(follow):
+    # Stacks of .43 mm, spread over two widths: higher than the matrix above, on a few hundredths.
+    (said, *_) = strip(0.5, {}, follow).warnings
+    assert "strands stand higher than the 0.196 mm of matrix above them on " in said
+    assert 0.01 < 0.01 * float(said.split("them on ")[1].split("%")[0]) < 0.1
+    below = strip(2.0, {}, follow).warnings
+    assert below == ()
+    assert sum("one layer of matrix" in line for line in strip(0.5, {}, follow).warnings) == 2
+    with pytest.raises(InputError, match=r"0\.146 mm of matrix below the first fibre layer do not"):
+        strip(0.4, {"process": {"short": "drop"}}, follow)
+
+
 def test_the_checks_see_what_there_is_to_see(printed):
     run = printed.done
     assert len(run.strands()) == 2 * 3 + 1
