@@ -8,6 +8,7 @@ import shapely
 from ccfem.arrays import FloatArray
 from ccfem.geometry.hatch import zigzag
 from ccfem.geometry.offsets import offset_rings
+from ccfem.geometry.polylines import line_length
 from ccfem.geometry.shapes import Region, open_lines, strings
 from ccfem.machine.machine import Machine
 
@@ -21,6 +22,8 @@ _SHARE = 0.25
 """Share of a pad that is filled (Aura)."""
 _SOLID = 2
 """So many layers of matrix under a strand are solid. Our choice."""
+_SPAN = 3.0
+"""Longest way over the gap between a pad and the part, mm."""
 _ARC = 4
 """Pieces of a quarter of a circle in the borders of pads."""
 _NONE = shapely.Polygon()
@@ -48,6 +51,7 @@ def pad_regions(
     # Where a section is narrower than a line, nothing is laid.
     sections = [one and _opened(one, half) for one in sections]
     wide: Region = _NONE
+    along: Region = _NONE
     recent: list[Region] = []
     found: list[tuple[Region, Region]] = []
     for k in range(len(sections))[::-1]:
@@ -56,6 +60,7 @@ def pad_regions(
             below = next((one for one in sections[:k][::-1] if one is not None), None)
             if below is not None and len(strands[k]):
                 free = shapely.difference(strings(strands[k]), below)
+                along = free_area(_along_border(free, below), reach)
                 recent = [shapely.union(free_area(free, reach), _union(recent[:1])), *recent[1:]]
             found.append((_NONE, _NONE))
             continue
@@ -63,10 +68,12 @@ def pad_regions(
         if wide.is_empty:
             found.append((_NONE, _NONE))
         else:
+            # Clear of the part, but for what lies under strands that run along its border.
             room = shapely.buffer(section, _CLEAR, quad_segs=_ARC)
+            room = shapely.union(shapely.difference(room, along), section)
             solid = _union(recent[:_SOLID])
             found.append((shapely.difference(wide, room), shapely.difference(solid, room)))
-        recent = [_NONE, *recent[: _SOLID - 1]]
+        recent, along = [_NONE, *recent[: _SOLID - 1]], _NONE
     return found[::-1]
 
 
@@ -74,6 +81,13 @@ def _opened(section: Region, half: float) -> Region:
     """Part of a section that lines of twice that width reach."""
     inner = shapely.buffer(section, -half, quad_segs=_ARC)
     return shapely.buffer(inner, half, quad_segs=_ARC)
+
+
+def _along_border(free: shapely.Geometry, below: Region) -> shapely.Geometry:
+    """Pieces of lines that run on in the gap between a pad and the part."""
+    near = shapely.intersection(free, shapely.buffer(below, _CLEAR, quad_segs=_ARC))
+    lines = [line for line in open_lines(near) if line_length(line) > _SPAN]
+    return strings(lines) if lines else np.array([_NONE])
 
 
 def free_area(free: shapely.Geometry, reach: float) -> Region:

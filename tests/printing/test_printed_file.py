@@ -375,6 +375,18 @@ def test_loops_outside_lie_on_pads(outside, tmp_path):
     np.testing.assert_allclose(np.unique(rows[:, 3]), tops, atol=1e-3)
 
 
+def test_a_strand_along_the_border_has_a_pad_that_touches(follow):
+    # Half a millimetre outside, in the gap that pads leave elsewhere: nothing would hold it.
+    line = np.array([[20.0, -0.5], [75.0, -0.5]])
+    job = Print("marlin_two_tools", follow, lines=[line])
+    assert support(job, job.done) == []
+    edge = (job.centre - HALF)[1]
+    pads = np.array([s.end for s in job.done.steps if s.lays and s.kind == "Support material"])
+    for z in np.unique(pads[:, 2]):
+        gap = edge - pads[pads[:, 2] == z][:, 1].max() - 0.4
+        assert gap == pytest.approx(0.0 if z > 0.3 else 0.7, abs=0.05)
+
+
 def test_without_pads_the_loops_hang(outside):
     found, kind = [], ""
     for line in outside.text.splitlines():
