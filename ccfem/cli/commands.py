@@ -10,6 +10,7 @@ from typing import Annotated, Any
 import typer
 
 from ccfem.cli.arguments import names_of, parameters_by_strategy, path_of
+from ccfem.cli.in_python import say_in_python
 from ccfem.cli.machines import MachineName, SetMachine, machine_choice, machines
 from ccfem.cli.options import (
     Backend,
@@ -31,6 +32,7 @@ from ccfem.cli.options import (
     VirtualTest,
 )
 from ccfem.cli.run import foreign_stress, layers_of, load, options_of, run, slicings_of
+from ccfem.cli.study_file import study
 
 __all__ = ["app"]
 
@@ -387,3 +389,7 @@ def calibrate(
         return load(case, set_case, machine=chosen)
 
     fit_material(read, unreinforced, reinforced, strategy, parameters, options, out)
+
+
+app.command()(study)
+say_in_python(app)

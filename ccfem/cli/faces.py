@@ -7,12 +7,9 @@ from rich.console import Console
 from rich.table import Table
 
 from ccfem.arrays import FloatArray, IntArray
-from ccfem.cases.reading import read
-from ccfem.errors import InputError
-from ccfem.io.mesh_file import read_mesh
-from ccfem.io.surface import is_surface, read_surface
-from ccfem.mesh.smooth_faces import Face, given_faces, smooth_faces
-from ccfem.meshing.cad import is_cad, read_cad
+from ccfem.inspection.body_faces import faces as faces_of
+from ccfem.mesh.smooth_faces import Face
+from ccfem.meshing.cad import is_cad
 from ccfem.plot.canvas import check_picture
 from ccfem.plot.part_views import Label, draw_part
 
@@ -38,15 +35,8 @@ def list_faces(body: Path, angle: float, scale: float, picture: Path) -> None:
         File of the picture.
     """
     check_picture(picture)
-    names: tuple[str, ...] = ()
-    if is_cad(body):
-        cad = read_cad(body, scale)
-        points, triangles, names = cad.surface.points, cad.surface.triangles, cad.names
-        rows = [np.flatnonzero(cad.face == k) for k in range(1, len(names) + 1)]
-        faces = given_faces(points, triangles, [each for each in rows if len(each)])
-    else:
-        points, triangles = _boundary(body, scale)
-        faces = smooth_faces(points, triangles, angle)
+    found = faces_of(body, angle, scale)
+    points, triangles, faces, names = found.points, found.triangles, found.faces, found.names
     columns = ("face", "area, mm^2", "what", "name")[: 4 if any(names) else 3]
     table = Table(box=None, padding=(0, 2, 0, 0))
     for column in columns:
@@ -67,21 +57,6 @@ def list_faces(body: Path, angle: float, scale: float, picture: Path) -> None:
         f"{len(faces)} faces{about}; picture: {picture}\n"
         'in a part file: [patches.NAME] with rule = "face", number = [1, 2]; lengths are mm'
     )
-
-
-def _boundary(body: Path, scale: float) -> tuple[FloatArray, IntArray]:
-    """Points and outward triangles of a body's boundary."""
-    if is_surface(body):
-        surface = read_surface(body, scale)
-        return surface.points, surface.triangles
-    is_part = body.suffix in ("", ".toml")
-    if is_part and scale != 1.0:
-        raise InputError(
-            f"--scale is for surface and mesh files; got {scale:g} for the part '{body}': leave it "
-            "out, or scale in the part file"
-        )
-    mesh = read(str(body)).problem.mesh if is_part else read_mesh(body, scale)
-    return mesh.points, mesh.boundary
 
 
 def _label(points: FloatArray, triangles: IntArray, face: Face, number: int) -> Label:

@@ -3,5 +3,6 @@
 from ccfem.comparison.compare import compare
 from ccfem.comparison.result import Comparison
 from ccfem.comparison.runs import Run
+from ccfem.comparison.saving import save
 
-__all__ = ["Comparison", "Run", "compare"]
+__all__ = ["Comparison", "Run", "compare", "save"]

@@ -2,6 +2,7 @@
 
 from dataclasses import dataclass, field, fields
 
+from ccfem.arrays import in_brief
 from ccfem.checks import check_fields
 from ccfem.machine.gcode_profile import GcodeProfile
 from ccfem.machine.kinematics import Kinematics
@@ -117,6 +118,8 @@ class Machine:
     process: Process = field(default_factory=Process)
     kinematics: Kinematics = field(default_factory=Kinematics)
     limits: Limits = field(default_factory=Limits)
+
+    __repr__ = in_brief
 
     def __post_init__(self) -> None:
         check_fields(self, "fibre_width", "matrix_width", "matrix_diameter", above=0.0, unit="mm")
