@@ -8,8 +8,8 @@ from typing import Any
 
 from ccfem.arrays import freeze, in_brief
 from ccfem.evaluation import Evaluation
-from ccfem.export.print_plan import PrintPlan
 from ccfem.planning.strategy import Strategy
+from ccfem.printing.print_plan import PrintPlan
 from ccfem.toolpaths import Toolpaths
 from ccfem.virtual_testing.strength import FirstFailure
 from ccfem.virtual_testing.virtual_test import Bracket

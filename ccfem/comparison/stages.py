@@ -13,7 +13,6 @@ from ccfem.elasticity.stress_field import StressField
 from ccfem.errors import InputError, SolveError
 from ccfem.evaluation import evaluate
 from ccfem.evaluation.printable import why_not
-from ccfem.export.print_plan import plan_print
 from ccfem.layers import Layer
 from ccfem.machine.machine import Machine
 from ccfem.planning.equal_fibre import (
@@ -26,6 +25,8 @@ from ccfem.planning.equal_fibre import (
 from ccfem.planning.given_paths import GivenPaths
 from ccfem.planning.plan import plan
 from ccfem.planning.strategy import LengthStrategy
+from ccfem.printing.curved_plan import curved_plan
+from ccfem.printing.print_plan import plan_print
 from ccfem.progress import Progress
 from ccfem.toolpaths import Toolpaths
 from ccfem.virtual_testing.equilibrium import BONDED, TENSION
@@ -266,7 +267,9 @@ def with_print(run: Run, part: Part, tell: Tell) -> Run:
     if run.evaluation is None:
         return run
     try:
-        found = plan_print(run.toolpaths, part.layers, part.stress.mesh, part.machine)
+        what = (run.toolpaths, part.layers, part.stress.mesh, part.machine)
+        flat = all(layer.flat is not None for layer in part.layers)
+        found = plan_print(*what) if flat else curved_plan(*what, part.build or (0.0, 0.0, 1.0))
     except InputError as error:
         return replace(run, unprinted=str(error))
     share = found.volume(part.machine) / float(part.stress.mesh.volumes.sum())
