@@ -11,6 +11,7 @@ import typer
 
 from ccfem.cli.arguments import names_of, parameters_by_strategy, path_of
 from ccfem.cli.in_python import say_in_python
+from ccfem.cli.machines import MachineName, SetMachine, machine_choice, machines
 from ccfem.cli.options import (
     Backend,
     Calibration,
@@ -93,6 +94,9 @@ def _list(kind: str, name: str | None) -> None:
         print_member(kind, name)
 
 
+app.command()(machines)
+
+
 @app.command()
 def faces(
     body: Annotated[
@@ -125,6 +129,8 @@ def faces(
 def check(
     case: CasePath,
     set_case: SetCase = None,
+    machine: MachineName = None,
+    set_machine: SetMachine = None,
     out: Annotated[
         Path | None,
         typer.Option(
@@ -138,7 +144,7 @@ def check(
     """Say and draw all that is known of a part before it is solved; all mistakes at once."""
     from ccfem.cli.check_part import check_part
 
-    code = check_part(case, set_case, out)
+    code = check_part(case, set_case, out, machine_choice(machine, set_machine))
     if code:
         raise typer.Exit(code)
 
@@ -221,6 +227,8 @@ def compare(
     load_case: LoadCase = None,
     refine: Refine = False,
     calibration: Calibration = None,
+    machine: MachineName = None,
+    set_machine: SetMachine = None,
     backend: Backend = "auto",
     stress: StressFile = None,
     stress_unit: StressUnit = None,
@@ -250,6 +258,7 @@ def compare(
         frame=paths_frame,
         force=force,
         refine=refine,
+        machine=machine_choice(machine, set_machine),
     )
 
 
@@ -270,6 +279,8 @@ def plan(
     load_case: LoadCase = None,
     refine: Refine = False,
     calibration: Calibration = None,
+    machine: MachineName = None,
+    set_machine: SetMachine = None,
     backend: Backend = "auto",
     gcode: Annotated[
         bool,
@@ -299,6 +310,7 @@ def plan(
         suffix,
         force=force,
         refine=refine,
+        machine=machine_choice(machine, set_machine),
     )
 
 
@@ -351,6 +363,8 @@ def calibrate(
     layers: Layers = None,
     fibre_per_layer: Fibre = None,
     load_case: LoadCase = None,
+    machine: MachineName = None,
+    set_machine: SetMachine = None,
     out: Annotated[
         Path,
         typer.Option(
@@ -369,8 +383,10 @@ def calibrate(
     options = options_of(layers, fibre_per_layer, False, load_case, "auto")
     options["natural"] = fibre_per_layer is None
 
+    chosen = machine_choice(machine, set_machine)
+
     def read() -> Any:
-        return load(case, set_case)
+        return load(case, set_case, machine=chosen)
 
     fit_material(read, unreinforced, reinforced, strategy, parameters, options, out)
 

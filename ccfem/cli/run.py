@@ -6,7 +6,7 @@ Everything heavy is imported where it is needed, so that ``ccfem --help`` answer
 import shlex
 import sys
 import time
-from collections.abc import Mapping, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import replace
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
@@ -20,6 +20,7 @@ if TYPE_CHECKING:
     from ccfem.cases.case import Case
     from ccfem.comparison.result import Comparison
     from ccfem.comparison.slicings import SlicingComparison
+    from ccfem.machine.machine import Machine
 
 __all__ = ["foreign_stress", "layers_of", "load", "options_of", "run", "slicings_of"]
 
@@ -29,8 +30,16 @@ _SOLVED = 0.75
 """Share of the progress bar at which the comparison is made and the pictures begin."""
 
 
-def load(name: str, set_case: Sequence[str] | None, refine: bool = False) -> "Case":
-    """Read a part file, or make a case from its name and parameters; refine its cells if wanted."""
+def load(
+    name: str,
+    set_case: Sequence[str] | None,
+    refine: bool = False,
+    machine: "Callable[[Machine], Machine] | None" = None,
+) -> "Case":
+    """Read a part file, or make a case from its name and parameters.
+
+    Its cells are refined if wanted; `machine` changes its machine.
+    """
     from ccfem.cases.reading import read
 
     parameters = dict(assignment(text) for text in set_case or ())
@@ -39,6 +48,8 @@ def load(name: str, set_case: Sequence[str] | None, refine: bool = False) -> "Ca
             f"--set-case is for cases by name; '{name}' is a part file: change the file"
         )
     case = read(name, **parameters)
+    if machine is not None:
+        case = replace(case, machine=machine(case.machine))
     return _refined(case) if refine else case
 
 
@@ -118,6 +129,7 @@ def run(
     frame: str | None = None,
     force: bool = False,
     refine: bool = False,
+    machine: "Callable[[Machine], Machine] | None" = None,
 ) -> None:
     """Compare strategies, write the results and print the table; a failure leaves nothing behind.
 
@@ -144,6 +156,8 @@ def run(
         Replace files in the folder that ccfem did not write, too.
     refine : bool
         Refine the cells by their estimated error first.
+    machine : callable, optional
+        What it makes of the part's machine (`ccfem.cli.machines.machine_choice`).
     """
     if refine and options.get("stress") is not None:
         raise InputError("--refine changes the mesh that the file of --stress is on: drop one")
@@ -155,7 +169,7 @@ def run(
     from ccfem.io.result_folder import whole_folder
 
     imported = time.perf_counter()
-    case = load(name, set_case, refine)
+    case = load(name, set_case, refine, machine)
     seconds = {"start": imported - _STARTED, "mesh": time.perf_counter() - imported}
     if calibration is not None:
         case, options = _calibrated(case, options, calibration)
