@@ -12,6 +12,7 @@ from collections.abc import Callable
 from typing import Any, NamedTuple
 
 import numpy as np
+from ccfem.export.layer_matrix import layer_matrix
 
 from benchmarks.papers.fang_2024.authors import (
     authors_layers,
@@ -21,7 +22,6 @@ from benchmarks.papers.fang_2024.authors import (
 )
 from benchmarks.papers.fang_2024.measures import Strands, measured
 from ccfem.elasticity.part_stress import GivenStress, PartStress
-from ccfem.export.layer_matrix import layer_matrix
 from ccfem.guidance.joint_lines import joint_lines
 from ccfem.guidance.joints import joints_of
 from ccfem.layers.layer import Layer
