@@ -9,10 +9,10 @@ from ccfem.elasticity import Force, Problem, Support
 from ccfem.layers.layer_stress import stress_on
 from ccfem.materials import isotropic
 from ccfem.mesh import box_mesh
-from ccfem.papers.chen_2021.__main__ import write
 from ccfem.papers.chen_2021.claims import EXPECTED, quantities
 from ccfem.papers.chen_2021.large_displacement import turned_by, turns_at
 from ccfem.papers.chen_2021.study import run_study
+from ccfem.papers.chen_2021.whole import write
 from ccfem.strategies.isocurve import Isocurve
 
 

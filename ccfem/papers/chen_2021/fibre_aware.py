@@ -12,6 +12,7 @@ from collections.abc import Callable, Sequence
 from dataclasses import dataclass, replace
 from functools import cache, partial
 from time import perf_counter, process_time
+from typing import Any
 
 from ccfem.cases.case import Case
 from ccfem.elasticity.problem import Bearing
@@ -80,7 +81,7 @@ def pruned(count: int = LAYERS_TABLE_2) -> Toolpaths:
     return prune(paths, specimens["pull"], LENGTH, case.machine)
 
 
-def stream_function(load: str = "pull", count: int = LAYERS_TABLE_2, **options: float) -> Toolpaths:
+def stream_function(load: str = "pull", count: int = LAYERS_TABLE_2, **options: Any) -> Toolpaths:
     """Isocurves of the field designed under a load."""
     case, fields, _ = loop()
     layers = sliced(count)

@@ -17,14 +17,22 @@ from ccfem.plot.canvas import save
 from ccfem.plot.colours import INK, OUTLINE
 from ccfem.toolpaths import Toolpaths
 
-__all__ = ["draw_all"]
+__all__ = ["draw_all", "figures"]
 
 _PATH, _RING, _WRONG = "#0072b2", "#e69f00", "#b3261e"
 
 
 def draw_all(study: Study, folder: Path) -> list[str]:
     """Draw every figure; the names of the files."""
-    made = {
+    made = figures(study)
+    for name, figure in made.items():
+        save(figure, folder / f"{name}.png")
+    return [f"{name}.png" for name in made]
+
+
+def figures(study: Study) -> dict[str, Figure]:
+    """Every figure, by name."""
+    return {
         "figure_04_pipeline": _pipeline(study.loop),
         "figure_05_connection": _connection(study.loop),
         "figure_06_layers_of_a_part": _layers(study.models["lifting_eye"]),
@@ -34,9 +42,6 @@ def draw_all(study: Study, folder: Path) -> list[str]:
         "figure_10_field_processing": _processing(study),
         "figure_14_large_displacement": _turns(study),
     }
-    for name, figure in made.items():
-        save(figure, folder / f"{name}.png")
-    return [f"{name}.png" for name in made]
 
 
 def _middle(model: Model) -> LayerStages:

@@ -52,7 +52,8 @@ def turns_at(
     mesh = problem.mesh
     turn = np.tile(np.eye(3), (len(mesh.cells), 1, 1))
     stress = np.zeros_like(turn)
-    first, moved, found = None, 0.0, {}
+    first = stress
+    moved, found = 0.0, {}
     for stop in stops:
         while moved < stop - 1e-9:
             by = min(step, stop - moved)
@@ -61,8 +62,8 @@ def turns_at(
             stress = increment @ stress @ increment.mT + field.stress
             turn = increment @ turn
             mesh = TetMesh(mesh.points + field.displacement, mesh.cells, mesh.patches)
+            first = stress if moved == 0.0 else first
             moved += by
-            first = stress if first is None else first
         still = np.broadcast_to(np.eye(3), turn.shape)
         found[stop] = Turned(turned_by(first, stress, still), turned_by(first, stress, turn))
     return found
@@ -79,7 +80,8 @@ def turned_by(first: FloatArray, last: FloatArray, turn: FloatArray) -> FloatArr
 def _moved(mesh: TetMesh, problem: Problem, vector: FloatArray) -> StressField:
     """Solve one step: the patch "load" moves by a vector, "support" stays."""
     supports = (Support("support"), Support("load"))
-    move = Displacement("load", tuple(float(v) for v in vector))
+    x, y, z = (float(v) for v in vector)
+    move = Displacement("load", (x, y, z))
     step = Problem(mesh, problem.material, supports, {"step": (move,)}, order=1)
     return solve(step)["step"]
 

@@ -12,7 +12,7 @@ from ccfem.cases.case import Case
 from ccfem.elasticity.problem import Force, Problem, Support
 from ccfem.errors import InputError
 from ccfem.io import read_mesh
-from ccfem.layers.slicing import Planar
+from ccfem.layers.slicing.planar import Planar
 from ccfem.materials import isotropic
 from ccfem.mesh.patches import Cylinder, patches_from_rules
 

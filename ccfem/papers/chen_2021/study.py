@@ -69,7 +69,7 @@ class Study:
     Attributes
     ----------
     models : mapping of name to Model
-        "Loop", "Loop, pushed", "open_hole", "lifting_eye".
+        "Loop", "Loop, pushed", "bar", "open_hole", "lifting_eye".
     powers : mapping of p to Toolpaths
         Figure 9, on the Loop.
     unprocessed : Toolpaths
@@ -110,7 +110,8 @@ def pushed(case: Case) -> Case:
     """Turn the force of a part round."""
     ((name, (load,)),) = case.problem.loads.items()
     assert isinstance(load, Force)
-    back = replace(load, vector=tuple(-v for v in load.vector))
+    x, y, z = load.vector
+    back = replace(load, vector=(-x, -y, -z))
     return replace(case, problem=replace(case.problem, loads={name: (back,)}))
 
 
@@ -130,6 +131,7 @@ def run_study(element_size: float | None = None, layers: int = 12) -> Study:
     models = {
         "Loop": model("Loop", loop_case, layers),
         "Loop, pushed": model("Loop, pushed", pushed(loop_case), layers),
+        "bar": model("bar", create_case("bar", **sized), layers),
         "open_hole": model("open_hole", create_case("open_hole", **sized), layers),
         "lifting_eye": model("lifting_eye", create_case("lifting_eye"), many),
     }
@@ -168,5 +170,6 @@ def _compared(loop: Model) -> dict[str, tuple[Toolpaths, float]]:
 def _pull(case: Case) -> FloatArray:
     """Direction of the one force of a case."""
     ((load,),) = case.problem.loads.values()
+    assert isinstance(load, Force)
     vector = np.array(load.vector)
     return vector / np.linalg.norm(vector)

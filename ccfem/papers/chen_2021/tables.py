@@ -26,8 +26,8 @@ _PAPER_2 = {
 
 def time_table(study: Study) -> str:
     """Table 1 in Markdown: the paper's rows, then ours."""
-    heads = ("model", "cells", "layers", "orientation, s", "removal, s")
-    heads = (*heads, *(f"{stage}, s a layer" for stage in STAGES), "all, s")
+    stages = tuple(f"{stage}, s a layer" for stage in STAGES)
+    heads = ("model", "cells", "layers", "orientation, s", "removal, s", *stages, "all, s")
     lines = [_row(heads), "|---" * len(heads) + "|"]
     for name, values in PAPER_1.items():
         lines.append(_row((f"paper: {name}", *(f"{value:g}" for value in values))))

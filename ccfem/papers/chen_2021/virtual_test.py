@@ -94,9 +94,9 @@ def main() -> None:
         brackets[name] = virtual_bracket(strands[name], specimen, span=())
         failure = first_failure(brackets[name].tension, matrix_strength=MATRIX_STRENGTH)
         print(f"{name:7} {1e-3 * failure.load:5.2f} {_PEAKS[name]:5.2f}  in the {failure.what}")
-    names = {FIRST: "ours", SECOND: "zigzag"}
-    found = stiffer(brackets["ours"], brackets["zigzag"])
-    print(f"stiffer: {names.get(found, found)}")
+    said = {FIRST: "ours", SECOND: "zigzag"}
+    verdict = stiffer(brackets["ours"], brackets["zigzag"])
+    print(f"stiffer: {said.get(verdict, verdict)}")
 
     bearing = replace(case.problem, loads={"bearing": (Bearing("load", (0.0, 0.0, 1000.0)),)})
     pressed = virtual_test(strands["ours"], solve(bearing)["bearing"], span=())

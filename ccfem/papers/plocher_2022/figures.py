@@ -24,7 +24,7 @@ from ccfem.raster.patterns import inside_shells
 from ccfem.raster.skeleton import skeleton
 from ccfem.tensor import strongest_in_plane
 
-__all__ = ["COLOURS", "draw_all"]
+__all__ = ["COLOURS", "draw_all", "figures"]
 
 COLOURS = {
     "grid 45": "#d55e00",
@@ -49,7 +49,15 @@ SPOKES = {
 def draw_all(
     study: Mapping[str, CaseStudy], raster: Mapping[str, CaseStudy], folder: Path
 ) -> list[str]:
-    """Draw every figure that the cases run allow; the names of the files.
+    """Draw every figure that the cases run allow; the names of the files."""
+    made = figures(study, raster)
+    for name, figure in made.items():
+        save(figure, folder / f"{name}.png")
+    return [f"{name}.png" for name in made]
+
+
+def figures(study: Mapping[str, CaseStudy], raster: Mapping[str, CaseStudy]) -> dict[str, Figure]:
+    """Every figure that the cases run allow, by name.
 
     Polylines, but for what the paper shows of pixels: figures 2 to 4, and those named raster.
     """
@@ -82,9 +90,7 @@ def draw_all(
             "figure_13_sensitivity": _sensitivity(beam),
         }
     made["figure_14_both_materials"] = _mixed_bars(study)
-    for name, figure in made.items():
-        save(figure, folder / f"{name}.png")
-    return [f"{name}.png" for name in made]
+    return made
 
 
 def _grid_of(

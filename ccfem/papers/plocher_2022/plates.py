@@ -15,7 +15,8 @@ import shapely
 from scipy import ndimage
 
 from ccfem.arrays import BoolArray, FloatArray, read_only
-from ccfem.elasticity.problem import Force, Load, PointForce, Problem, Support
+from ccfem.elasticity.load_kinds import SurfaceLoad
+from ccfem.elasticity.problem import Force, PointForce, Problem, Support
 from ccfem.elasticity.stress_field import StressField
 from ccfem.errors import InputError
 from ccfem.layers.layer import Layer
@@ -64,7 +65,7 @@ class Plate:
     mask: BoolArray
     bead: float
     supports: tuple[Support, ...]
-    load: tuple[Load, ...]
+    load: tuple[SurfaceLoad, ...]
     points: Mapping[str, tuple[float, float]] = field(default_factory=dict)
     peaks: tuple[tuple[float, float], ...] = ()
 

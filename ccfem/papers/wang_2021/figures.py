@@ -33,7 +33,7 @@ from ccfem.stress_tracing.criterion import Criterion
 from ccfem.stress_tracing.frame import frame
 from ccfem.stress_tracing.main_paths import main_paths
 
-__all__ = ["draw_all"]
+__all__ = ["draw_all", "figures"]
 
 _MOST = 4.0
 """End of the colour scale of curvature, 1/mm."""
@@ -43,6 +43,14 @@ _OTHERS = ("streamline", "offset", "eqs")
 
 def draw_all(study: Mapping[str, PlateStudy], folder: Path) -> list[str]:
     """Draw every figure that the plates and patterns run allow; the names of the files."""
+    made = figures(study)
+    for name, figure in made.items():
+        save(figure, folder / f"{name}.png")
+    return [f"{name}.png" for name in made]
+
+
+def figures(study: Mapping[str, PlateStudy]) -> dict[str, Figure]:
+    """Every figure that the plates and patterns run allow, by name."""
     made: dict[str, Figure] = {}
     if "bridge" in study:
         made["figure_03_voronoi_and_medial_axis"] = _voronoi(study["bridge"])
@@ -66,9 +74,7 @@ def draw_all(study: Mapping[str, PlateStudy], folder: Path) -> list[str]:
             made[f"figure_{others}_{name}_other_methods"] = _other_methods(study[name])
             if "lpp" in study[name].optimised.patterns:
                 made[f"figure_{own}_{name}_lpp"] = _lpp(study[name])
-    for name, figure in made.items():
-        save(figure, folder / f"{name}.png")
-    return [f"{name}.png" for name in made]
+    return made
 
 
 def _voronoi(plate: PlateStudy) -> Figure:

@@ -205,15 +205,15 @@ def run_plate(
     if found is not None:
         outline = plate.outline(found)
         off = outline.symmetric_difference(plate.part).area / outline.area
-    parts = [
+    optimised, original = (
         run_part(
-            create_case(name, optimised=optimised, element_size=element_size),
-            [p for p in patterns if optimised or p in BASELINES],
-            optimised,
+            create_case(name, optimised=whole, element_size=element_size),
+            [p for p in patterns if whole or p in BASELINES],
+            whole,
         )
-        for optimised in (True, False)
-    ]
-    return PlateStudy(plate, *parts, found, off, perf_counter() - begun)
+        for whole in (True, False)
+    )
+    return PlateStudy(plate, optimised, original, found, off, perf_counter() - begun)
 
 
 def run_part(case: Case, patterns: Sequence[str], tested: bool) -> PartStudy:
@@ -236,7 +236,7 @@ def _run_pattern(
     toolpaths = plan(create(strategy, parameters), (layer,), field, machine)
     seconds = perf_counter() - begun
     width = machine.fibre_width
-    rates = {
+    rates: dict[str, FloatArray] = {
         reading: matching_rate(toolpaths, [stress], reading, step=width) for reading in READINGS
     }
     rates["strands"] = matching_rate(toolpaths, [stress], "path", links=False, step=width)

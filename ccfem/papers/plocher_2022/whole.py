@@ -1,10 +1,6 @@
-"""Run the study, and write its figures, tables and the claims beside ours.
-
-python -m ccfem.papers.plocher_2022 FOLDER
-"""
+"""The whole of the paper: its study, figures, tables and claims beside ours."""
 
 import csv
-import sys
 from pathlib import Path
 from time import perf_counter
 
@@ -27,6 +23,8 @@ from ccfem.papers.plocher_2022.variants import (
 )
 from ccfem.papers.verdicts import claim_table
 
+__all__ = ["write_all"]
+
 PROTOTYPE_NOTE = """\
 Both chains follow the same rules; they share no code. Where they differ:
 
@@ -40,7 +38,8 @@ Both chains follow the same rules; they share no code. Where they differ:
 """
 
 
-def main(folder: Path) -> None:
+def write_all(folder: Path) -> None:
+    """Run the study, and write figures, tables and claims into a folder."""
     folder.mkdir(parents=True, exist_ok=True)
     begun = perf_counter()
     study = run_study()
@@ -61,7 +60,7 @@ def main(folder: Path) -> None:
                     )
     parts = [
         "# Infill patterns of Plocher, Wioland and Panesar (2022): ours beside theirs\n",
-        "Written by `python -m ccfem.papers.plocher_2022`.\n",
+        "Written by `ccfem reproduce plocher_2022`.\n",
         f"Study {computed:.1f} s, figures {perf_counter() - begun - computed:.1f} s.\n",
         "## Claims\n",
         claim_table(checks),
@@ -84,9 +83,3 @@ def main(folder: Path) -> None:
     (folder / "report.md").write_text("\n".join(parts))
     print(claim_table(checks))
     print(f"{folder / 'report.md'}: {perf_counter() - begun:.1f} s")
-
-
-if __name__ == "__main__":
-    if len(sys.argv) != 2:
-        sys.exit("usage: python -m ccfem.papers.plocher_2022 FOLDER")
-    main(Path(sys.argv[1]))

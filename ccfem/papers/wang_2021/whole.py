@@ -1,10 +1,6 @@
-"""Run the study, and write its figures, tables and the claims beside ours.
-
-python -m ccfem.papers.wang_2021 FOLDER
-"""
+"""The whole of the paper: its study, figures, tables and claims beside ours."""
 
 import csv
-import sys
 from pathlib import Path
 from time import perf_counter
 
@@ -21,8 +17,11 @@ from ccfem.papers.wang_2021.variants import (
     variant_table,
 )
 
+__all__ = ["write_all"]
 
-def main(folder: Path) -> None:
+
+def write_all(folder: Path) -> None:
+    """Run the study, and write figures, tables and claims into a folder."""
     folder.mkdir(parents=True, exist_ok=True)
     begun = perf_counter()
     study = run_study()
@@ -44,7 +43,7 @@ def main(folder: Path) -> None:
         csv.writer(file).writerows([("quantity", "value"), *found.items()])
     parts = [
         "# Load-dependent paths of Wang et al. (2021): ours beside theirs\n",
-        "Written by `python -m ccfem.papers.wang_2021`. lpp is strategy `svt`; lpp uncrossed "
+        "Written by `ccfem reproduce wang_2021`. lpp is strategy `svt`; lpp uncrossed "
         "ends its strands in the middle of a joint. The slicer's patterns and lpp uncrossed are "
         "laid by this project too.\n",
         f"Study {computed:.1f} s, figures {perf_counter() - begun - computed:.1f} s.\n",
@@ -60,9 +59,3 @@ def main(folder: Path) -> None:
     (folder / "report.md").write_text("\n".join(parts))
     print(claim_table(checks))
     print(f"{folder / 'report.md'}: {perf_counter() - begun:.1f} s")
-
-
-if __name__ == "__main__":
-    if len(sys.argv) != 2:
-        sys.exit("usage: python -m ccfem.papers.wang_2021 FOLDER")
-    main(Path(sys.argv[1]))

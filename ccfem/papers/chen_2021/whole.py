@@ -1,18 +1,15 @@
-"""Run the study, and write its figures, tables and the claims beside ours.
-
-python -m ccfem.papers.chen_2021 FOLDER
-"""
+"""The whole of the paper: its study, figures, tables and claims beside ours."""
 
 import csv
-import sys
 from pathlib import Path
-from time import perf_counter
 
 from ccfem.papers.chen_2021.claims import quantities, verdicts
 from ccfem.papers.chen_2021.figures import draw_all
 from ccfem.papers.chen_2021.study import Study, run_study
 from ccfem.papers.chen_2021.tables import length_table, time_table
 from ccfem.papers.verdicts import claim_table
+
+__all__ = ["write", "write_all"]
 
 
 def write(study: Study, folder: Path) -> str:
@@ -25,7 +22,7 @@ def write(study: Study, folder: Path) -> str:
         csv.writer(file).writerows([("quantity", "value"), *found.items()])
     parts = [
         "# Field-based toolpaths of Chen et al. (2021): ours beside theirs\n",
-        "Written by `python -m ccfem.papers.chen_2021`. The algorithm is the one that the "
+        "Written by `ccfem reproduce chen_2021`. The algorithm is the one that the "
         f"paper prints. Part: {study.loop.case.title}. The paper's Shell, Wrench and Piston are "
         "not published; `open_hole` and `lifting_eye` stand in.\n",
         f"## Claims\n\n{claims}",
@@ -38,9 +35,6 @@ def write(study: Study, folder: Path) -> str:
     return claims
 
 
-if __name__ == "__main__":
-    if len(sys.argv) != 2:
-        sys.exit("usage: python -m ccfem.papers.chen_2021 FOLDER")
-    begun = perf_counter()
-    print(write(run_study(), Path(sys.argv[1])))
-    print(f"{Path(sys.argv[1]) / 'report.md'}: {perf_counter() - begun:.1f} s")
+def write_all(folder: Path) -> None:
+    """Run the study, and write figures, tables and claims into a folder."""
+    print(write(run_study(), folder))
