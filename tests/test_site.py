@@ -11,7 +11,8 @@ import typer
 
 from ccfem import strategies
 from ccfem.cases import named_cases
-from ccfem.cases.part_file import Part, read_part
+from ccfem.cases.part_file import read_part
+from ccfem.cases.part_keys import Part
 from ccfem.cases.part_loads import LOADS, SUPPORTS
 from ccfem.cases.part_tables import RULES
 from ccfem.cli.commands import app

@@ -5,6 +5,7 @@ import textwrap
 from keys import keys, kinds
 
 from ccfem.cases import part_file as reader
+from ccfem.cases.part_keys import Part
 from ccfem.cases.part_loads import LOADS, SUPPORTS
 from ccfem.cases.part_regions import REGIONS
 from ccfem.cases.part_tables import RULES
@@ -20,7 +21,7 @@ def part_file_page() -> str:
     names = ", ".join(f"`{name}`" for name in material_names())
     parts = (
         f"# Part file\n\n{about}\n\n",
-        f"## Keys at the top\n\n{keys(reader.Part)}",
+        f"## Keys at the top\n\n{keys(Part)}",
         f"## Material\n\n`material` is one of {names}, or a table.\n\n",
         f"### Isotropic\n\n{keys(isotropic)}",
         f"### Transversely isotropic\n\n{keys(transversely_isotropic)}",
