@@ -14,7 +14,7 @@
 # patterns of a slice: a grid at 45 degrees, one at 0/90, concentric rings, rings round the medial
 # axis (MAT), and paths along the principal stress (MPS). Here: their plate with one hole, 1 N in
 # tension. The whole study, three plates and all figures, is
-# `python -m ccfem.papers.plocher_2022 FOLDER`.
+# `ccfem reproduce plocher_2022`.
 
 # %%
 import numpy as np
