@@ -13,9 +13,10 @@ __all__ = ["Check", "claim_table", "judged"]
 
 @dataclass(frozen=True)
 class Check:
-    """One number of one claim; `verdict` is "reproduced", "differs" or "not tried".
+    """One number of one claim; `verdict` is "reproduced", "differs", "undecided" or "not tried".
 
-    `low` to `high` counts as reproduced: what the paper says, widened by `tolerance`.
+    `low` to `high` counts as reproduced: what the paper says, widened by `tolerance`. Nearer to
+    either than the resolution of what measured it, a number is undecided.
     """
 
     claim: str
@@ -32,7 +33,10 @@ class Check:
 
 
 def judged(found: Mapping[str, float], path: Path) -> list[Check]:
-    """Judge every check of a file of claims by the quantities found."""
+    """Judge every check of a file of claims by the quantities found.
+
+    A claim's `resolution` is that of its numbers, 0 where none stands there.
+    """
     with path.open("rb") as file:
         claims: list[dict[str, Any]] = tomllib.load(file)["claim"]
     checks = []
@@ -44,7 +48,8 @@ def judged(found: Mapping[str, float], path: Path) -> list[Check]:
                 verdict = "not tried"
             else:
                 inside = low - 1e-9 <= ours <= high + 1e-9
-                verdict = "reproduced" if inside else "differs"
+                near = min(abs(ours - low), abs(ours - high)) < claim.get("resolution", 0.0)
+                verdict = "undecided" if near else "reproduced" if inside else "differs"
             about = (claim["id"], claim["text"], claim["source"])
             why = claim["why"] if verdict != "reproduced" else ""
             said = (check["quantity"], check["paper"], low, high, claim["tolerance"])
@@ -68,7 +73,7 @@ def claim_table(checks: list[Check]) -> str:
     reasons = {c.claim: c.why for c in checks if c.why}
     lines += ["", "Tolerance of each claim:", ""]
     lines += [f"- {claim}: {tolerance}" for claim, tolerance in tolerances.items()]
-    lines += ["", "Where ours differs or was not tried:", ""]
+    lines += ["", "Where ours differs, is undecided or was not tried:", ""]
     lines += [f"- {claim}: {why}" for claim, why in reasons.items()]
     return "\n".join(lines) + "\n"
 
