@@ -90,15 +90,17 @@ def _vectors(study: Study) -> dict[str, float]:
 
 def _paths(study: Study) -> dict[str, float]:
     """Figures 5, 6, 9 and 10, and table 2."""
-    loop, eye = study.loop, study.models["lifting_eye"]
+    loop = study.loop
     curves = sum(len(each.curves.lines()) for each in loop.stages)
-    lengths = [float(each.paths.lengths.sum()) for each in eye.stages]
-    changes = np.abs(np.diff(lengths)) / max(lengths)
     found = {
         "isocurves over paths": curves / len(loop.paths),
         "shortest path, mm": float(loop.paths.lengths.min()),
-        "layers unlike the one below, %": 100.0 * float((changes > 1e-3).mean()),
     }
+    if "lifting_eye" in study.models:
+        stages = study.models["lifting_eye"].stages
+        lengths = [float(each.paths.lengths.sum()) for each in stages]
+        changes = np.abs(np.diff(lengths)) / max(lengths)
+        found["layers unlike the one below, %"] = 100.0 * float((changes > 1e-3).mean())
     by_power = {power: _judged(loop, paths) for power, paths in study.powers.items()}
     low, high = min(by_power), max(by_power)
     for power, each in by_power.items():

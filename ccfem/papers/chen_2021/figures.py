@@ -35,7 +35,7 @@ def figures(study: Study) -> dict[str, Figure]:
     return {
         "figure_04_pipeline": _pipeline(study.loop),
         "figure_05_connection": _connection(study.loop),
-        "figure_06_layers_of_a_part": _layers(study.models["lifting_eye"]),
+        "figure_06_layers_of_a_part": _layers(study.models.get("lifting_eye", study.loop)),
         "figure_07_pushed": _pushed(study),
         "figure_08_agreement_of_vectors": _histograms(study),
         "figure_09_powers": _powers(study),
@@ -98,7 +98,7 @@ def _connection(model: Model) -> Figure:
 
 def _layers(model: Model) -> Figure:
     """Paths of six layers of a part whose section changes."""
-    chosen = np.linspace(0, len(model.stages) - 1, 8).astype(int)[1:-1]
+    chosen = np.unique(np.linspace(0, len(model.stages) - 1, 8).astype(int)[1:-1])
     outlines = [model.stages[k].layer.plane.polygon for k in chosen]
     whole = shapely.union_all([each.layer.plane.polygon for each in model.stages]).bounds
     figure, axes = panels(outlines, 3, 3.6, box=whole)

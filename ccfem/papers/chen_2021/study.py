@@ -115,26 +115,29 @@ def pushed(case: Case) -> Case:
     return replace(case, problem=replace(case.problem, loads={name: (back,)}))
 
 
-def run_study(element_size: float | None = None, layers: int = 12) -> Study:
+def run_study(element_size: float | None = None, layers: int = 12, step: float = 1.0) -> Study:
     """Run everything; a minute and a half with the defaults.
 
     Parameters
     ----------
     element_size : float, mm, optional
-        Of all parts, which then are ccfem's own.
+        Of all parts, which then are ccfem's own; for a quick look, without `lifting_eye`.
     layers : int, default 12
+    step : float, mm, default 1
+        Of the large displacement.
     """
     sized = {} if element_size is None else {"element_size": element_size}
     authors = element_size is None and bool(os.environ.get(FOLDER))
     loop_case = authors_loop(layers) if authors else create_case("loop", **sized)
-    many = PISTON_LAYERS if element_size is None else layers
-    models = {
-        "Loop": model("Loop", loop_case, layers),
-        "Loop, pushed": model("Loop, pushed", pushed(loop_case), layers),
-        "bar": model("bar", create_case("bar", **sized), layers),
-        "open_hole": model("open_hole", create_case("open_hole", **sized), layers),
-        "lifting_eye": model("lifting_eye", create_case("lifting_eye"), many),
+    cases = {
+        "Loop": loop_case,
+        "Loop, pushed": pushed(loop_case),
+        "bar": create_case("bar", **sized),
+        "open_hole": create_case("open_hole", **sized),
     }
+    models = {name: model(name, case, layers) for name, case in cases.items()}
+    if element_size is None:
+        models["lifting_eye"] = model("lifting_eye", create_case("lifting_eye"), PISTON_LAYERS)
     loop = models["Loop"]
     patches, machine = loop.stress.held_or_loaded, loop.case.machine
 
@@ -146,7 +149,7 @@ def run_study(element_size: float | None = None, layers: int = 12) -> Study:
         {power: with_power(power) for power in POWERS},
         joined(planned(loop.layers, loop.vectors.unfiltered, patches, machine)),
         _compared(loop),
-        turns_at(loop.case.problem, _pull(loop.case), DISPLACEMENTS),
+        turns_at(loop.case.problem, _pull(loop.case), DISPLACEMENTS, step),
     )
 
 
