@@ -14,7 +14,7 @@
 # strongest stress and are square to the bolts, and strands of fibre wind round all bolts of a
 # layer. Here: a lifting eye, whose eye lies across the bolts of its flange, so that no flat layer
 # holds all three. The T-bracket with the authors' own layers, all tables and the claims beside ours
-# are `python -m benchmarks.papers.fang_2024 FOLDER`.
+# are `ccfem reproduce fang_2024`.
 
 # %%
 from dataclasses import replace

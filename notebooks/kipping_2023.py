@@ -13,7 +13,7 @@
 # Kipping and Schueppstuhl (Materials 16 (2023) 998): layers are weakest across, so they are laid
 # square to the least principal stress where the part is loaded most, and each is printed as one
 # strand from its middle outwards. Here: an arm bracket of the size of their part B. Both parts,
-# all tables and the claims beside ours are `python -m benchmarks.papers.kipping_2023 FOLDER`.
+# all tables and the claims beside ours are `ccfem reproduce kipping_2023`.
 
 # %%
 import numpy as np

@@ -14,17 +14,17 @@
 # patterns of a slice: a grid at 45 degrees, one at 0/90, concentric rings, rings round the medial
 # axis (MAT), and paths along the principal stress (MPS). Here: their plate with one hole, 1 N in
 # tension. The whole study, three plates and all figures, is
-# `python -m benchmarks.papers.plocher_2022 FOLDER`.
+# `ccfem reproduce plocher_2022`.
 
 # %%
 import numpy as np
 
-from benchmarks.papers.plocher_2022.plates import single_hole
+from ccfem.papers.plocher_2022.plates import single_hole
 from ccfem.layers.layer_stress import stress_on
 from ccfem.evaluation import evaluate
-from benchmarks.papers.plocher_2022.fibre_map import fibre_map
+from ccfem.papers.plocher_2022.fibre_map import fibre_map
 from ccfem.evaluation.plane_paths import plane_paths
-from benchmarks.papers.plocher_2022.plane_study import benchmark, laid_plate, print_seconds, reduced_stiffness
+from ccfem.papers.plocher_2022.plane_study import benchmark, laid_plate, print_seconds, reduced_stiffness
 from ccfem.evaluation.sensitivity import OffAxis
 from ccfem.machine import Machine
 from ccfem.materials import named_material

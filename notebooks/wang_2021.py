@@ -13,7 +13,7 @@
 # Wang et al. (Composites Part A 140 (2021) 106181) first shape a part by topology optimisation,
 # then lay one continuous fibre along its members: stress vector tracing. Here: their bridge in
 # three-point bending, 185 x 50 mm. All five plates, all figures and the claims beside ours are
-# `python -m benchmarks.papers.wang_2021 FOLDER`.
+# `ccfem reproduce wang_2021`.
 
 # %%
 from dataclasses import replace

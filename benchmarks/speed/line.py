@@ -39,7 +39,7 @@ def fine_loop() -> object:
 
 def authors_loop() -> object:
     """Loop of the authors of paper 000, on their mesh."""
-    from benchmarks.papers.chen_2021.loop import authors_loop
+    from ccfem.papers.chen_2021.loop import authors_loop
 
     return authors_loop()
 

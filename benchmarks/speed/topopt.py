@@ -18,13 +18,13 @@ from typing import Any
 import numpy as np
 import typer
 
-from benchmarks.papers.plocher_2022.three_point_bending import three_point_bending
 from ccfem.arrays import IntArray
 from ccfem.cases.bracket import bracket_design
 from ccfem.elasticity import Force, PointForce, Problem, Support
 from ccfem.materials import isotropic, plane_stress
 from ccfem.mesh.box import box_mesh
 from ccfem.mesh.patches import Box, patches_from_rules
+from ccfem.papers.plocher_2022.three_point_bending import three_point_bending
 from ccfem.plates import PlaneProblem, raster_mesh
 from ccfem.topopt import Simp, Somp, as_problem
 

@@ -31,6 +31,7 @@ from ccfem.cli.options import (
     StressUnit,
     VirtualTest,
 )
+from ccfem.cli.papers_again import reproduce
 from ccfem.cli.run import foreign_stress, layers_of, load, options_of, run, slicings_of
 from ccfem.cli.study_file import study
 
@@ -391,5 +392,6 @@ def calibrate(
     fit_material(read, unreinforced, reinforced, strategy, parameters, options, out)
 
 
+app.command()(reproduce)
 app.command()(study)
 say_in_python(app)

@@ -16,6 +16,7 @@ CALLS = {
     "plan": "ccfem.compare(CASE, [S], natural=True), or ccfem.plan(STRATEGY, LAYERS, STRESS)",
     "solve": "ccfem.solve(CASE.problem)",
     "calibrate": "ccfem.calibrate(PROBLEM, CURVE)",
+    "reproduce": "ccfem.papers.reproduce.reproduce(PAPER, PART)",
     "study": "ccfem.study(FILE, workers=N)",
 }
 """Call of each command, as its help prints it."""

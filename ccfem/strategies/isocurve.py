@@ -3,7 +3,7 @@
 X. Chen, G. Fang, W.-H. Liao, C. C. L. Wang, Field-based toolpath generation for 3D printing
 continuous fibre reinforced thermoplastic composites, Additive Manufacturing 49 (2021) 102470
 (Chen et al. 2021). `Isocurve.literal` is the algorithm as printed; the defaults are better by what
-``benchmarks/papers/chen_2021`` measures.
+``ccfem/papers/chen_2021`` measures.
 """
 
 import itertools

@@ -30,7 +30,7 @@ TOLERANCE = {
 
 @pytest.fixture(scope="module")
 def authors():
-    from benchmarks.papers.chen_2021 import authors
+    from ccfem.papers.chen_2021 import authors
 
     return authors
 

@@ -1,24 +1,24 @@
-"""The study of Chen et al. 2021, reduced: coarse meshes, two layers."""
+"""The study of Chen et al. 2021, reduced: coarse meshes, one layer."""
 
 import tomllib
 
 import numpy as np
 import pytest
 
-from benchmarks.papers.chen_2021.__main__ import write
-from benchmarks.papers.chen_2021.claims import EXPECTED, quantities
-from benchmarks.papers.chen_2021.large_displacement import turned_by, turns_at
-from benchmarks.papers.chen_2021.study import run_study
 from ccfem.elasticity import Force, Problem, Support
 from ccfem.layers.layer_stress import stress_on
 from ccfem.materials import isotropic
 from ccfem.mesh import box_mesh
+from ccfem.papers.chen_2021.claims import EXPECTED, quantities
+from ccfem.papers.chen_2021.large_displacement import turned_by, turns_at
+from ccfem.papers.chen_2021.study import run_study
+from ccfem.papers.chen_2021.whole import write
 from ccfem.strategies.isocurve import Isocurve
 
 
 @pytest.fixture(scope="module")
 def study():
-    return run_study(element_size=8.0, layers=2)
+    return run_study(element_size=8.0, layers=1, step=4.0)
 
 
 def test_the_stages_are_the_algorithm_as_printed(study):
@@ -45,7 +45,8 @@ def test_every_quantity_of_the_claims_is_computed(study, tmp_path):
     with EXPECTED.open("rb") as file:
         named = {c["quantity"] for claim in tomllib.load(file)["claim"] for c in claim["checks"]}
     missing = named - set(quantities(study))
-    assert all("authors' paths" in name for name in missing)
+    left_out = ("authors' paths", "lifting_eye", "layers unlike")
+    assert all(any(what in name for what in left_out) for name in missing)
     assert claims.count("| not tried |") == len(missing)
     for k in (4, 5, 6, 7, 8, 9, 10, 14):
         (picture,) = tmp_path.glob(f"figure_{k:02}_*.png")

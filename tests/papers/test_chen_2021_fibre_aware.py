@@ -9,7 +9,7 @@ pytestmark = pytest.mark.skipif("CCFEM_CHEN2021" not in os.environ, reason="need
 
 @pytest.fixture(scope="module")
 def fibre_aware():
-    from benchmarks.papers.chen_2021 import fibre_aware as module
+    from ccfem.papers.chen_2021 import fibre_aware as module
 
     return module
 

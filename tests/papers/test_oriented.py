@@ -3,7 +3,12 @@
 import numpy as np
 import pytest
 
-from benchmarks.papers.chen_2021.oriented import (
+from ccfem.elasticity.problem import Force, Problem, Support
+from ccfem.elasticity.solve import solve
+from ccfem.errors import InputError
+from ccfem.materials import Material, isotropic, transversely_isotropic
+from ccfem.mesh.box import box_mesh
+from ccfem.papers.chen_2021.oriented import (
     fibre_share,
     mix,
     oriented_problem,
@@ -11,11 +16,6 @@ from benchmarks.papers.chen_2021.oriented import (
     oriented_stiffness,
     to_plane_stress,
 )
-from ccfem.elasticity.problem import Force, Problem, Support
-from ccfem.elasticity.solve import solve
-from ccfem.errors import InputError
-from ccfem.materials import Material, isotropic, transversely_isotropic
-from ccfem.mesh.box import box_mesh
 from ccfem.tensor import rotate_stiffness, to_voigt
 from ccfem.toolpaths import Toolpaths
 from ccfem.virtual_testing.strands import cut_strands

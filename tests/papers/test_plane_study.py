@@ -6,8 +6,14 @@ import numpy as np
 import pytest
 import shapely
 
-from benchmarks.papers.plocher_2022.fibre_map import FibreMap, fibre_map
-from benchmarks.papers.plocher_2022.plane_study import (
+from ccfem.elasticity.problem import Force, Support
+from ccfem.evaluation.plane_paths import PlanePaths
+from ccfem.evaluation.sensitivity import OffAxis
+from ccfem.geometry.polylines import pack
+from ccfem.linking.print_order import nearest_end_order
+from ccfem.materials import isotropic, named_material, plane_stress
+from ccfem.papers.plocher_2022.fibre_map import FibreMap, fibre_map
+from ccfem.papers.plocher_2022.plane_study import (
     bead_area,
     benchmark,
     laid_plate,
@@ -16,13 +22,7 @@ from benchmarks.papers.plocher_2022.plane_study import (
     reduced_stiffness,
     turned_energies,
 )
-from benchmarks.papers.plocher_2022.sensitivity import ANGLES
-from ccfem.elasticity.problem import Force, Support
-from ccfem.evaluation.plane_paths import PlanePaths
-from ccfem.evaluation.sensitivity import OffAxis
-from ccfem.geometry.polylines import pack
-from ccfem.linking.print_order import nearest_end_order
-from ccfem.materials import isotropic, named_material, plane_stress
+from ccfem.papers.plocher_2022.sensitivity import ANGLES
 from ccfem.plates import PlaneProblem, raster_mesh, solve_plane
 
 TABLE_5 = {

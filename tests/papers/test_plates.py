@@ -3,9 +3,9 @@
 import numpy as np
 import pytest
 
-from benchmarks.papers.plocher_2022.plates import five_holes, optimised_beam, plates, single_hole
 from ccfem.errors import InputError
 from ccfem.layers.layer_stress import stress_on
+from ccfem.papers.plocher_2022.plates import five_holes, optimised_beam, plates, single_hole
 from ccfem.tensor import in_plane
 
 

@@ -5,11 +5,11 @@ import tomllib
 import numpy as np
 import pytest
 
-from benchmarks.papers.plocher_2022.claims import EXPECTED, quantities, raster_quantities, verdicts
-from benchmarks.papers.plocher_2022.figures import draw_all
-from benchmarks.papers.plocher_2022.plates import five_holes
-from benchmarks.papers.plocher_2022.study import RASTER, run_case
-from benchmarks.papers.plocher_2022.tables import (
+from ccfem.papers.plocher_2022.claims import EXPECTED, quantities, raster_quantities, verdicts
+from ccfem.papers.plocher_2022.figures import draw_all
+from ccfem.papers.plocher_2022.plates import five_holes
+from ccfem.papers.plocher_2022.study import RASTER, run_case
+from ccfem.papers.plocher_2022.tables import (
     ROWS,
     case_table,
     index_table,
@@ -17,8 +17,8 @@ from benchmarks.papers.plocher_2022.tables import (
     rank_table,
     result_table,
 )
-from benchmarks.papers.plocher_2022.variants import metric_table
-from benchmarks.papers.verdicts import claim_table
+from ccfem.papers.plocher_2022.variants import metric_table
+from ccfem.papers.verdicts import claim_table
 from ccfem.raster.patterns import INFILL
 
 

@@ -3,10 +3,10 @@
 import numpy as np
 import pytest
 
-from benchmarks.papers.plocher_2022.sensitivity import ANGLES, Sensitivity
 from ccfem.errors import InputError
 from ccfem.evaluation.sensitivity import OffAxis
 from ccfem.materials import named_material
+from ccfem.papers.plocher_2022.sensitivity import ANGLES, Sensitivity
 
 
 def test_fit_through_the_eleven_angles_stays_near_the_curve():

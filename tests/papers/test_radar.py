@@ -3,8 +3,8 @@
 import numpy as np
 import pytest
 
-from benchmarks.papers.plocher_2022.radar import normalised, radar_picture
 from ccfem.errors import InputError
+from ccfem.papers.plocher_2022.radar import normalised, radar_picture
 from ccfem.plot.canvas import save
 
 

@@ -3,7 +3,7 @@ import pytest
 import shapely
 from scipy import ndimage
 
-from benchmarks.papers.plocher_2022.three_point_bending import (
+from ccfem.papers.plocher_2022.three_point_bending import (
     three_point_bending,
     three_point_bending_problem,
 )

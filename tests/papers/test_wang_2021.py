@@ -5,14 +5,14 @@ import tomllib
 import numpy as np
 import pytest
 
-from benchmarks.papers.verdicts import claim_table
-from benchmarks.papers.wang_2021.claims import EXPECTED, quantities, verdicts
-from benchmarks.papers.wang_2021.figures import draw_all
-from benchmarks.papers.wang_2021.study import PATTERNS, PLATES, curvature_along, run_plate
-from benchmarks.papers.wang_2021.tables import ROWS, plate_table, result_table, speed_table
 from ccfem.cases import create_case
 from ccfem.evaluation.plane_paths import PlanePaths
 from ccfem.layers.slicing.planar import Planar
+from ccfem.papers.verdicts import claim_table
+from ccfem.papers.wang_2021.claims import EXPECTED, quantities, verdicts
+from ccfem.papers.wang_2021.figures import draw_all
+from ccfem.papers.wang_2021.study import PATTERNS, PLATES, curvature_along, run_plate
+from ccfem.papers.wang_2021.tables import ROWS, plate_table, result_table, speed_table
 
 
 @pytest.fixture(scope="module")

@@ -294,7 +294,7 @@ needs_authors_data = pytest.mark.skipif(
 @needs_authors_data
 def test_figures_on_the_authors_loop() -> None:
     """The promises on the authors' Loop, at no more fibre than theirs (34.658 m)."""
-    from benchmarks.papers.chen_2021.loop import authors_loop
+    from ccfem.papers.chen_2021.loop import authors_loop
 
     case = authors_loop()
     field = next(iter(solve(case.problem).values()))

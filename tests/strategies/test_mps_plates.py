@@ -6,12 +6,12 @@ import numpy as np
 import pytest
 import shapely
 
-from benchmarks.papers.plocher_2022.plane_study import bead_area
-from benchmarks.papers.plocher_2022.plates import plates
 from ccfem.evaluation.plane_paths import plane_paths
 from ccfem.evaluation.stiffness_alignment import agreement
 from ccfem.layers.layer_stress import stress_on
 from ccfem.machine import Machine
+from ccfem.papers.plocher_2022.plane_study import bead_area
+from ccfem.papers.plocher_2022.plates import plates
 from ccfem.strategies.mps import Mps
 from ccfem.tensor import strongest_in_plane
 

@@ -18,7 +18,7 @@ pytestmark = pytest.mark.skipif(
 
 @pytest.fixture(scope="module")
 def benchmark():
-    from benchmarks.papers.chen_2021 import virtual_test as module
+    from ccfem.papers.chen_2021 import virtual_test as module
 
     return module
 

@@ -1,0 +1,1 @@
+"""Papers whose figures and tables are made again: ``ccfem reproduce PAPER``."""

@@ -1,0 +1,147 @@
+"""Evaluate the published toolpaths of Chen et al. 2021 beside the figures stated for them.
+
+Run with the environment variable ``CCFEM_CHEN2021`` set::
+
+    python -m ccfem.papers.chen_2021.authors
+"""
+
+from functools import cache
+
+import numpy as np
+
+from ccfem.arrays import FloatArray
+from ccfem.elasticity.solve import solve
+from ccfem.elasticity.stress_field import StressField
+from ccfem.evaluation import Evaluation, evaluate
+from ccfem.export.waypoints import read_waypoints
+from ccfem.geometry.polylines import turning_angles
+from ccfem.layers.layer import Layer
+from ccfem.layers.slicing.planar import Planar
+from ccfem.machine import Machine
+from ccfem.papers.chen_2021.loop import LAYERS_PUBLISHED, authors_folder, authors_loop
+from ccfem.toolpaths import Toolpaths
+
+__all__ = ["STATED", "evaluate_published", "published_paths", "solved_loop", "waypoint_curvature"]
+
+PATHS = {"ours": "GcodeGenerater_Ours_raw.txt", "zigzag": "GcodeGenerater_Zigzag_Contour_raw.txt"}
+"""File of each set of published paths: the authors' own and their zigzag with contours."""
+
+STATED = {
+    "ours": {
+        "length_min": 45.0,
+        "length_median": 168.0,
+        "length_max": 1211.0,
+        "curvature_50": 0.028,
+        "curvature_80": 0.066,
+        "curvature_95": 0.21,
+        "curvature_max": 3.7,
+        "curvature_ok": 0.960,
+        "spacing_1": 0.89,
+        "spacing_5": 1.11,
+        "spacing_50": 1.68,
+        "spacing_below": 0.020,
+        "coverage": 0.472,
+        "coverage_stress": 0.558,
+        "coverage_quartile_1": 0.27,
+        "coverage_quartile_2": 0.43,
+        "coverage_quartile_3": 0.55,
+        "coverage_quartile_4": 0.63,
+        "coverage_top_10": 0.64,
+        "aligned_10": 0.723,
+        "aligned_20": 0.850,
+        "aligned_30": 0.888,
+        "aligned_stress_10": 0.850,
+        "aligned_stress_20": 0.953,
+        "aligned_stress_30": 0.966,
+        "angle_mean": 11.7,
+        "efficiency": 0.918,
+    },
+    "zigzag": {
+        "length_min": 42.0,
+        "length_median": 368.0,
+        "length_max": 1678.0,
+        "curvature_50": 0.008,
+        "curvature_80": 0.10,
+        "curvature_95": 0.72,
+        "curvature_max": 1.5,
+        "curvature_ok": 0.919,
+        "spacing_1": 0.58,
+        "spacing_5": 0.90,
+        "spacing_50": 1.70,
+        "spacing_below": 0.093,
+        "coverage": 0.471,
+        "aligned_10": 0.184,
+        "aligned_20": 0.301,
+        "aligned_30": 0.399,
+        "aligned_stress_10": 0.284,
+        "aligned_stress_20": 0.455,
+        "aligned_stress_30": 0.564,
+        "angle_mean": 41.3,
+        "efficiency": 0.419,
+    },
+}
+"""Figures of the published Loop paths, all 20 layers, as an independent evaluation gave them.
+
+Where it measured another way: curvature at the published waypoints (`waypoint_curvature` does the
+same), not by arc length; spacing from sampled point to sampled point, not to the strand; the
+stress-weighted coverage and its quartiles on a grid whose plain coverage is .467, not .472.
+"""
+
+TABLE_2 = {"ours": 34.658, "zigzag": 35.895}
+"""Length of fibre, m, in the paper's Table 2: the first 12 layers."""
+
+
+@cache
+def solved_loop() -> tuple[StressField, tuple[Layer, ...], Machine]:
+    """Stress of the authors' Loop, its 20 published layers, and the machine."""
+    case = authors_loop()
+    stress = solve(case.problem)["pull"]
+    layers = Planar(count=LAYERS_PUBLISHED).cut(case.problem.mesh, case.build)
+    return stress, layers, case.machine
+
+
+def published_paths(name: str) -> Toolpaths:
+    """Read the published paths of the Loop, "ours" or "zigzag", all 20 layers."""
+    _, layers, _ = solved_loop()
+    return read_waypoints(authors_folder() / "Loop" / PATHS[name], layers[0].plane.frame)
+
+
+def evaluate_published(name: str, count: int = LAYERS_PUBLISHED) -> Evaluation:
+    """Evaluate the first `count` layers of the published paths."""
+    stress, layers, machine = solved_loop()
+    paths = published_paths(name)
+    return evaluate(paths.select(paths.layer < count), layers[:count], stress, machine)
+
+
+def waypoint_curvature(name: str) -> FloatArray:
+    """Curvature at the published waypoints, 1/mm: turning angle over the mean adjoining step."""
+    paths = published_paths(name)
+    angle = turning_angles(paths.points, paths.offsets, paths.closed)
+    step = np.linalg.norm(np.diff(paths.points, axis=0), axis=1)
+    inner = np.ones(len(paths.points), dtype=bool)
+    inner[paths.offsets[:-1]] = inner[paths.offsets[1:] - 1] = False
+    index = np.flatnonzero(inner)
+    return angle[index] / (0.5 * (step[index - 1] + step[index]))
+
+
+def main() -> None:
+    """Print every index of both sets of paths, 12 and 20 layers, beside what is stated."""
+    for name, stated in STATED.items():
+        part, whole = evaluate_published(name, 12).total, evaluate_published(name).total
+        print(f"\n{name}: Table 2 has {TABLE_2[name]} m in the first 12 layers")
+        print(f"{'':22}{'12 layers':>12}{'20 layers':>12}{'stated':>12}")
+        for index, value in whole.items():
+            known = f"{stated[index]:12.4g}" if index in stated else ""
+            print(f"{index:22}{part[index]:12.5g}{value:12.5g}{known}")
+        curvature = waypoint_curvature(name)
+        print(f"{'at the waypoints, 20 layers':46}")
+        for share in (50, 80, 95, 100):
+            index = f"curvature_{share if share < 100 else 'max'}"
+            value = np.percentile(curvature, share)
+            print(f"{index:34}{value:12.5g}{stated[index]:12.4g}")
+        ok = float((curvature < 0.26).mean())
+        print(f"{'curvature_ok':34}{ok:12.5g}{stated['curvature_ok']:12.4g}")
+
+
+if __name__ == "__main__":
+    main()

@@ -1,0 +1,34 @@
+"""What of Kipping and Schueppstuhl 2023 can be made again."""
+
+from ccfem.papers.contents import Contents
+from ccfem.papers.kipping_2023.chain import PARTS, Chain, chain, table_1, table_2
+from ccfem.papers.kipping_2023.claims import support_table
+from ccfem.papers.kipping_2023.fiso_shapes import shapes_table
+from ccfem.papers.kipping_2023.strength import failure_loads, strength_table
+from ccfem.papers.kipping_2023.whole import write_all
+
+__all__ = ["CONTENTS"]
+
+
+def _run() -> dict[str, Chain]:
+    """Both parts, from stress to paths."""
+    return {part: chain(name) for part, name in PARTS.items()}
+
+
+def _strength(chains: dict[str, Chain]) -> str:
+    return strength_table({part: failure_loads(run) for part, run in chains.items()})
+
+
+CONTENTS = Contents(
+    title="Kipping and Schueppstuhl 2023, layers square to the least stress",
+    seconds=600.0,
+    run=_run,
+    whole=write_all,
+    tables={
+        "table1": lambda study: table_1(study()),
+        "table2": lambda study: table_2(study()),
+        "support": lambda study: support_table(study()),
+        "strength": lambda study: _strength(study()),
+        "fiso": lambda study: shapes_table()[0],
+    },
+)

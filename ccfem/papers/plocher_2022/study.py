@@ -1,0 +1,293 @@
+"""Three plates, five infill patterns, two materials: Plocher, Wioland and Panesar (2022).
+
+Rapid Prototyping Journal 28 (2022) 1241. The plates are `plates`; one pixel of the finite
+elements is one bead wide. Every pattern is laid as polylines, and as paths of pixels, which
+is what the paper does.
+"""
+
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
+from time import perf_counter
+from typing import Any
+
+import numpy as np
+
+from ccfem.elasticity.stress_field import StressField
+from ccfem.evaluation import evaluate
+from ccfem.evaluation.plane_paths import PlanePaths, plane_paths
+from ccfem.evaluation.sinuosity import path_sinuosity, sample_sinuosity, sinuosity_indices
+from ccfem.evaluation.stiffness_alignment import READINGS
+from ccfem.export.gcode import gcode
+from ccfem.geometry.polylines import lengths, pack
+from ccfem.layers.layer import Layer
+from ccfem.layers.layer_stress import stress_on
+from ccfem.linking.print_order import nearest_end_order
+from ccfem.machine import Machine, Process
+from ccfem.materials import named_material
+from ccfem.papers.plocher_2022.fibre_map import FibreMap, fibre_map
+from ccfem.papers.plocher_2022.plane_study import (
+    PRINT_SPEED,
+    TRAVEL_SPEED,
+    Benchmark,
+    LaidPlate,
+    bead_area,
+    benchmark,
+    laid_plate,
+    mixed_stiffness,
+    print_seconds,
+    reduced_stiffness,
+)
+from ccfem.papers.plocher_2022.plates import Plate, five_holes, plates
+from ccfem.planning import plan
+from ccfem.plates import solve_plane
+from ccfem.printing.print_plan import PrintPlan
+from ccfem.raster.raster_plan import RasterPlan
+from ccfem.strategies import create
+from ccfem.toolpaths import FIBRE, Toolpaths
+
+__all__ = [
+    "MATERIALS",
+    "PATTERNS",
+    "RASTER",
+    "CaseStudy",
+    "PatternStudy",
+    "Patterns",
+    "machine_of",
+    "run_case",
+    "run_study",
+]
+
+Patterns = Mapping[str, tuple[str, dict[str, Any]]]
+
+MATERIALS = {"C": "c_fram", "S": "s_fram"}
+
+PATTERNS: dict[str, tuple[str, dict[str, Any]]] = {
+    "grid 45": ("grid", {"angle": 45.0}),
+    "grid 0": ("grid", {"angle": 0.0}),
+    "concentric": ("concentric", {"joined": False, "filled": True}),
+    "mat": ("mat", {}),
+    "mps": ("mps", {}),
+}
+"""The patterns in the order of the paper: name, then strategy and its parameters."""
+
+RASTER: dict[str, tuple[str, dict[str, Any]]] = {
+    "grid 45": ("grid", {"angle": 45.0, "lines": "paper", "mode": "raster"}),
+    "grid 0": ("grid", {"angle": 0.0, "lines": "paper", "mode": "raster"}),
+    "concentric": ("concentric", {"joined": False, "mode": "raster"}),
+    "mat": ("mat", {"mode": "raster"}),
+    "mps": ("mps", {"mode": "raster"}),
+}
+"""The same as paths of pixels; every diagonal of pixels is a path of the grid at 45 degrees."""
+
+
+@dataclass(frozen=True)
+class PatternStudy:
+    """One pattern on one plate.
+
+    Attributes
+    ----------
+    toolpaths : Toolpaths
+        Of two layers for the grids, which turn from one to the next, of one for the others.
+    paths : tuple of PlanePaths
+    maps : tuple of FibreMap
+    laid : mapping of "C", "S", "mixed" to LaidPlate
+    values : mapping of index to float
+    raster : tuple of RasterPlan
+        A layer each; none of a pattern of polylines.
+    """
+
+    toolpaths: Toolpaths
+    paths: tuple[PlanePaths, ...]
+    maps: tuple[FibreMap, ...]
+    laid: Mapping[str, LaidPlate]
+    values: Mapping[str, float]
+    raster: tuple[RasterPlan, ...] = ()
+
+
+@dataclass(frozen=True)
+class CaseStudy:
+    """All patterns on one plate; `benchmarks` by material."""
+
+    plate: Plate
+    benchmarks: Mapping[str, Benchmark]
+    patterns: Mapping[str, PatternStudy]
+    seconds: float
+
+    def value(self, pattern: str, index: str) -> float:
+        """One index of one pattern."""
+        return self.patterns[pattern].values[index]
+
+
+def machine_of(plate: Plate) -> Machine:
+    """Printer of the paper's table 4, which cuts nothing off."""
+    return Machine(
+        fibre_width=plate.bead,
+        minimum_length=0.0,
+        minimum_radius=0.0,
+        cutter_distance=0.0,
+        fibre_speed=PRINT_SPEED,
+        travel_speed=TRAVEL_SPEED,
+        process=Process(prime="none", skirt_loops=0),
+    )
+
+
+def run_study(
+    cases: Sequence[str] = ("I", "II", "III"),
+    patterns: Patterns = PATTERNS,
+    known: Mapping[str, CaseStudy] | None = None,
+) -> dict[str, CaseStudy]:
+    """Run the whole study, or a part of it; compiled code is loaded before any clock runs.
+
+    `known` holds the same cases with other patterns: their benchmarks are taken over.
+    """
+    plate = five_holes(bead=1.6)
+    layers, stress = plate.planned_on(1)
+    for strategy, parameters in patterns.values():
+        toolpaths = plan(create(strategy, parameters), layers, stress, machine_of(plate))
+        _printed(toolpaths, machine_of(plate))
+    if known is None:
+        return {name: run_case(plates()[name](), patterns) for name in cases}
+    return {name: run_case(known[name].plate, patterns, known[name].benchmarks) for name in cases}
+
+
+def run_case(
+    plate: Plate,
+    patterns: Patterns = PATTERNS,
+    benchmarks: Mapping[str, Benchmark] | None = None,
+) -> CaseStudy:
+    """Plan, solve and judge all patterns on one plate."""
+    begun = perf_counter()
+    stiffness = {key: reduced_stiffness(named_material(name)) for key, name in MATERIALS.items()}
+    solve_plane(plate.isotropic_field.problem)
+    solved = perf_counter() - begun
+    layers, stress = plate.planned_on(2)
+    if benchmarks is None:
+        field = plate.isotropic_field
+        benchmarks = {key: benchmark(field, matrix) for key, matrix in stiffness.items()}
+    machine = machine_of(plate)
+    found = {}
+    for name, (strategy, parameters) in patterns.items():
+        planner = create(strategy, parameters)
+        chosen = layers[: 2 if strategy == "grid" else 1]
+        start = perf_counter()
+        first = plan(planner, chosen[:1], stress, machine)
+        planned = perf_counter() - start
+        _printed(first, machine)
+        printed = perf_counter() - start
+        toolpaths = Toolpaths.concatenate([first, plan(planner, chosen[1:], stress, machine)])
+        raster = _on_pixels(planner, chosen, stress, machine)
+        paths = tuple(plane_paths(toolpaths, layer) for layer in chosen)
+        maps = tuple(fibre_map(p, plate.mesh.centres, plate.bead) for p in paths)
+        angles = np.stack([m.angle for m in maps])
+        laid = {
+            key: laid_plate(plate.problem(matrix), angles, matrix)
+            for key, matrix in stiffness.items()
+        }
+        mixed = mixed_stiffness(paths, maps, stiffness["C"], stiffness["S"])
+        laid["mixed"] = laid_plate(plate.problem(stiffness["S"]), angles, mixed)
+        values = {
+            "cpu": planned,
+            "cpu_to_gcode": printed,
+            "cpu_with_fe": printed + (solved if strategy == "mps" else 0.0),
+            **_of_paths(toolpaths, chosen, stress, machine, plate),
+            **_of_pixels(raster),
+            **_of_plate(plate, benchmarks, maps, laid),
+        }
+        found[name] = PatternStudy(toolpaths, paths, maps, laid, values, raster)
+    return CaseStudy(plate, benchmarks, found, perf_counter() - begun)
+
+
+def _printed(toolpaths: Toolpaths, machine: Machine) -> str:
+    """G-code of the paths of a layer, in the order of their nearest ends."""
+    lines = list(toolpaths)
+    starts, ends = np.array([line[[0, -1], :2] for line in lines]).swapaxes(0, 1)
+    order, backward, _ = nearest_end_order(starts, ends)
+    points, offsets = pack(
+        [lines[k][::-1] if back else lines[k] for k, back in zip(order, backward, strict=True)]
+    )
+    paths = Toolpaths(
+        points,
+        np.broadcast_to([0.0, 0.0, 1.0], points.shape),
+        offsets,
+        np.zeros(len(lines), dtype=np.int64),
+        np.full(len(lines), FIBRE),
+        toolpaths.closed[order],
+    )
+    return gcode(PrintPlan(paths, np.full(1, 0.2), np.full(1, 0.2)), machine)
+
+
+def _on_pixels(
+    planner: Any, layers: Sequence[Layer], stress: StressField, machine: Machine
+) -> tuple[RasterPlan, ...]:
+    if getattr(planner, "mode", "polyline") != "raster":
+        return ()
+    return tuple(planner.raster(layer, stress_on(layer, stress), machine) for layer in layers)
+
+
+def _of_pixels(raster: Sequence[RasterPlan]) -> dict[str, float]:
+    """Compute the indices of the raw chains of pixels, before they are made straight."""
+    if not raster:
+        return {}
+    winding, length = [], []
+    for one in raster:
+        points, offsets = pack(one.chains)
+        winding.append(path_sinuosity(points, offsets, one.raster.pixel))
+        length.append(lengths(points, offsets))
+    means = [found.mean() for found in winding]
+    weighted = [np.average(w, weights=n) for w, n in zip(winding, length, strict=True)]
+    return {
+        "si_raw": float(np.mean(weighted)),
+        "si_raw_mean": float(np.mean(means)),
+        "isolated": float(np.mean([one.paths.isolated.sum() for one in raster])),
+    }
+
+
+def _of_paths(
+    toolpaths: Toolpaths, layers: Any, stress: Any, machine: Machine, plate: Plate
+) -> dict[str, float]:
+    """Compute the indices of the paths alone, mean of the layers."""
+    total = evaluate(toolpaths, layers, stress, machine).total
+    paths = [plane_paths(toolpaths, layer) for layer in layers]
+    winding = [sinuosity_indices(sample_sinuosity(p, plate.bead)) for p in paths]
+    mean = {key: float(np.mean([found[key] for found in winding])) for key in winding[0]}
+    cover = np.mean([bead_area(p, plate.bead) for p in paths], axis=0)
+    return {
+        "paths": total["paths"] / len(layers),
+        "length": total["fibre_length"] / len(layers),
+        "si": mean["sinuosity"],
+        "si_mean": mean["sinuosity_mean"],
+        "over_40": 100.0 * mean["over_40_count"],
+        "over_40_length": 100.0 * mean["over_40_length"],
+        "print": float(np.mean([print_seconds(p) for p in paths])),
+        "overlap": 100.0 * float(cover[0]),
+        "gaps": 100.0 * float(cover[1]),
+    }
+
+
+def _of_plate(
+    plate: Plate,
+    benchmarks: Mapping[str, Benchmark],
+    maps: Sequence[FibreMap],
+    laid: Mapping[str, LaidPlate],
+) -> dict[str, float]:
+    """Compute the indices of the solved plate."""
+    off = plate.off_peaks
+    values = {"agreement": 100.0 * benchmarks["C"].agreement(maps)}
+    for key, best in benchmarks.items():
+        own = laid[key]
+        values |= {
+            f"energy_{key}": own.strain_energy,
+            f"density_sum_{key}": own.density_sum,
+            f"ratio_{key}": own.strain_energy / best.laid.strain_energy,
+            f"ratio_off_peaks_{key}": own.energy_in(off) / best.laid.energy_in(off),
+            f"stress_{key}": own.stress,
+            f"raw_stress_{key}": own.raw_stress,
+            **{f"pi_{reading}_{key}": best.index(maps, reading) for reading in READINGS},
+        }
+    values |= {
+        "energy_mixed": laid["mixed"].strain_energy,
+        "mixed_over_S": laid["mixed"].strain_energy / laid["S"].strain_energy,
+        "stress_mixed": laid["mixed"].stress,
+        "raw_stress_mixed": laid["mixed"].raw_stress,
+    }
+    return values

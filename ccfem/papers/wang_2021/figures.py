@@ -1,0 +1,289 @@
+"""Figures of the paper that are computations, redrawn from a run."""
+
+from collections.abc import Mapping
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import shapely
+from matplotlib.figure import Figure
+from scipy.spatial import Voronoi
+
+from ccfem.evaluation.matching import THRESHOLDS
+from ccfem.geometry.medial_axis import medial_axis
+from ccfem.linking.print_speed import step_speeds
+from ccfem.papers.wang_2021.panels import (
+    COLOURS,
+    bar,
+    coloured,
+    curves,
+    lines_of,
+    panels,
+    path,
+    section,
+    show_load,
+    strokes,
+    title,
+)
+from ccfem.papers.wang_2021.study import BASELINES, LIMIT, PatternStudy, PlateStudy
+from ccfem.plot.canvas import save
+from ccfem.plot.colours import INK, OUTLINE, palette
+from ccfem.strategies.svt import Svt
+from ccfem.stress_tracing.criterion import Criterion
+from ccfem.stress_tracing.frame import frame
+from ccfem.stress_tracing.main_paths import main_paths
+
+__all__ = ["draw_all", "figures"]
+
+_MOST = 4.0
+"""End of the colour scale of curvature, 1/mm."""
+_FAINT = "#b5bac1"
+_OTHERS = ("streamline", "offset", "eqs")
+
+
+def draw_all(study: Mapping[str, PlateStudy], folder: Path) -> list[str]:
+    """Draw every figure that the plates and patterns run allow; the names of the files."""
+    made = figures(study)
+    for name, figure in made.items():
+        save(figure, folder / f"{name}.png")
+    return [f"{name}.png" for name in made]
+
+
+def figures(study: Mapping[str, PlateStudy]) -> dict[str, Figure]:
+    """Every figure that the plates and patterns run allow, by name."""
+    made: dict[str, Figure] = {}
+    if "bridge" in study:
+        made["figure_03_voronoi_and_medial_axis"] = _voronoi(study["bridge"])
+        made["figure_05_bridge_stress"] = _stresses(study["bridge"])
+    for name, number in (("bridge", "06"), ("suspension", "06b")):
+        if name in study and "lpp" in study[name].optimised.patterns:
+            made[f"figure_{number}_{name}_speeds"] = _speeds(study[name])
+    if "suspension" in study and "lpp" in study["suspension"].optimised.patterns:
+        made["figure_07_suspension"] = _process(study["suspension"])
+    for name, maps, rates in (("bridge", "08", "10"), ("suspension", "09", "11")):
+        if name in study:
+            made[f"figure_{maps}_{name}_curvature"] = _curvature_maps(study[name])
+            made[f"figure_{maps}_{name}_curvature_shares"] = _curvature_shares(study[name])
+            made[f"figure_{rates}_{name}_matching"] = _matching(study[name])
+    for name, others, own in (
+        ("cantilever", 12, 13),
+        ("m_shape", 14, 15),
+        ("l_shape", 16, 17),
+    ):
+        if name in study:
+            made[f"figure_{others}_{name}_other_methods"] = _other_methods(study[name])
+            if "lpp" in study[name].optimised.patterns:
+                made[f"figure_{own}_{name}_lpp"] = _lpp(study[name])
+    return made
+
+
+def _voronoi(plate: PlateStudy) -> Figure:
+    """Voronoi diagram of points on the border of a piece of the bridge, and its medial axis."""
+    part = plate.optimised
+    polygon = part.layer.plane.polygon
+    width, height = plate.plate.border.bounds[2:]
+    window = shapely.box(0.0, 0.0, 0.38 * width, 0.84 * height)
+    figure, axes = panels([window, window], 2)
+    rings = shapely.get_rings(polygon)
+    sites = [shapely.line_interpolate_point(r, np.arange(0.0, r.length, 2.0)) for r in rings]
+    points = np.unique(shapely.get_coordinates(np.concatenate(sites)), axis=0)
+    diagram = Voronoi(points)
+    ridges = [diagram.vertices[ridge] for ridge in diagram.ridge_vertices if min(ridge) >= 0]
+    section(axes[0], polygon)
+    lines_of(axes[0], ridges, OUTLINE, 0.4)
+    axes[0].plot(*points.T, "o", color="#e69f00", ms=2.0, zorder=3.0)
+    title(axes[0], "(a) points of the border every 2 mm, and their Voronoi diagram")
+    axis = medial_axis(polygon, 0.5 * part.machine.fibre_width, object_angle=None, arc_chord=1.6)
+    section(axes[1], polygon)
+    lines_of(axes[1], [segment.points for segment in axis.segments], INK, 1.2)
+    title(axes[1], "(b) medial axis")
+    return figure
+
+
+def _stresses(plate: PlateStudy) -> Figure:
+    """Load, stress of the full plate, and stress of the optimised part."""
+    domain = plate.plate.domain
+    figure, axes = panels([domain] * 3, 1, 7.0)
+    section(axes[0], domain)
+    show_load(axes[0], plate.plate)
+    title(axes[0], "(a) load and supports")
+    for one, part, text in (
+        (axes[1], plate.original, "(b) stress of the full plate: blue pulled, green pressed"),
+        (axes[2], plate.optimised, "(c) stress of the optimised part"),
+    ):
+        section(one, part.layer.plane.polygon)
+        strokes(one, part)
+        title(one, text)
+    return figure
+
+
+def _speeds(plate: PlateStudy) -> Figure:
+    """Path coloured by the speed of table 2."""
+    part = plate.optimised
+    lpp = part.patterns["lpp"]
+    figure, (axes,) = panels([shapely.MultiPoint(lpp.paths.points)], 1, 7.0)
+    section(axes, part.layer.plane.polygon)
+    speed = step_speeds(lpp.toolpaths, part.machine)
+    drawn = coloured(axes, lpp, speed, (0.0, 35.0))
+    bar(figure, axes, drawn, "mm/s")
+    total = lpp.total
+    title(
+        axes,
+        f"{lpp.paths.lengths.sum() / 1000.0:.1f} m in {total['print_time']:.0f} s, "
+        f"{total['mean_speed']:.1f} mm/s",
+    )
+    return figure
+
+
+def _process(plate: PlateStudy) -> Figure:
+    """From the stress of the full plate to the path: four panels."""
+    lpp = plate.optimised.patterns["lpp"]
+    box = shapely.union(plate.plate.domain, shapely.MultiPoint(lpp.paths.points)).bounds
+    figure, axes = panels([plate.plate.domain] * 4, 2, box=box)
+    for one, part, text in (
+        (axes[0], plate.original, "(a) load and stress of the full plate"),
+        (axes[1], plate.optimised, "(b) stress of the optimised part"),
+    ):
+        section(one, part.layer.plane.polygon)
+        strokes(one, part)
+        title(one, text)
+    show_load(axes[0], plate.plate)
+    section(axes[2], plate.optimised.layer.plane.polygon)
+    _main_paths(axes[2], plate)
+    title(axes[2], "(c) main load paths")
+    section(axes[3], plate.optimised.layer.plane.polygon)
+    path(axes[3], lpp)
+    title(axes[3], "(d) one path; links blue")
+    return figure
+
+
+def _main_paths(axes: Any, plate: PlateStudy) -> None:
+    """Draw main load paths as `svt` joins them, one colour each."""
+    part, svt = plate.optimised, Svt()
+    members = frame(part.layer.plane.polygon, 0.5 * part.machine.fibre_width)
+    found = main_paths(members, part.stress, Criterion(turn=svt.turn), svt.width_ratio)
+    names = [str(k) for k in range(len(found))]
+    for one, colour in zip(found, palette(names).values(), strict=True):
+        lines_of(axes, [np.concatenate([m.points for m in one.members])], colour, 2.0)
+
+
+def _compared(plate: PlateStudy) -> dict[str, tuple[Any, PatternStudy]]:
+    """Section and pattern of lpp on the optimised part and of the slicer's on the full plate."""
+    shown = {}
+    if "lpp" in plate.optimised.patterns:
+        shown["lpp"] = (plate.optimised.layer.plane.polygon, plate.optimised.patterns["lpp"])
+    for name in BASELINES:
+        if name in plate.original.patterns:
+            shown[name] = (plate.original.layer.plane.polygon, plate.original.patterns[name])
+    return shown
+
+
+def _curvature_maps(plate: PlateStudy) -> Figure:
+    """Places of four patterns that curve by more than 0.26 / mm, every half millimetre."""
+    shown = _compared(plate)
+    box = shapely.union_all([shapely.MultiPoint(one.paths.points) for _, one in shown.values()])
+    figure, axes = panels([box] * len(shown), 2, 5.0)
+    for letter, one, (name, (polygon, pattern)) in zip("abcd", axes, shown.items(), strict=False):
+        section(one, polygon)
+        path(one, pattern, _FAINT, _FAINT)
+        order = np.argsort(pattern.curvature)
+        order = order[pattern.curvature[order] > LIMIT]
+        drawn = one.scatter(
+            *pattern.places[order].T,
+            c=pattern.curvature[order],
+            s=3.0,
+            lw=0.0,
+            cmap="plasma_r",
+            vmin=0.0,
+            vmax=_MOST,
+            zorder=3.0,
+        )
+        share, vertices = (100.0 * (c < LIMIT).mean() for c in (pattern.curvature, pattern.native))
+        text = f"below {LIMIT} / mm: {share:.0f} % of the length, {vertices:.0f} % of the vertices"
+        title(one, f"({letter}) {name}, {text}")
+    bar(figure, axes, drawn, "curvature, 1/mm")
+    return figure
+
+
+def _curvature_shares(plate: PlateStudy) -> Figure:
+    """Share below each curvature: by length, and by vertices."""
+    texts = (
+        "every 0.5 mm of the path, links too",
+        "at the vertices as planned, links too",
+    )
+    figure, axes = curves(2, [("curvature, 1/mm", "share below it, %")] * 2)
+    for one, reading, text in zip(axes, ("curvature", "native"), texts, strict=True):
+        for name, (_, pattern) in _compared(plate).items():
+            values = np.sort(getattr(pattern, reading))
+            share = 100.0 * np.arange(1, len(values) + 1) / max(len(values), 1)
+            one.step(
+                np.maximum(values, 0.005), share, where="post", color=COLOURS[name], label=name
+            )
+        one.axvline(LIMIT, color=OUTLINE, lw=0.8, ls="--")
+        one.set_xscale("log")
+        one.set_xlim(0.005, 6.0)
+        one.set_ylim(0.0, 101.0)
+        one.set_title(text, size=8, loc="left", color=INK)
+    axes[0].legend(fontsize=7, frameon=False, loc="lower right")
+    return figure
+
+
+def _matching(plate: PlateStudy) -> Figure:
+    """Draw matching rates over the angle, the slicer's on the full plate and on the part."""
+    name = plate.plate.name
+    figure, axes = curves(2, [("angle, degrees", "strands within it of the stress, %")] * 2)
+    sides = (
+        (axes[0], plate.original, f"{name}: the slicer's patterns on the full plate"),
+        (axes[1], plate.optimised, f"{name}: all patterns on the optimised part"),
+    )
+    for one, part, text in sides:
+        own = [p for p in ("lpp", "lpp uncrossed") if p in plate.optimised.patterns]
+        shown = {p: plate.optimised.patterns[p] for p in own}
+        shown |= {p: part.patterns[p] for p in BASELINES if p in part.patterns}
+        for label, pattern in shown.items():
+            style = "--" if label == "lpp uncrossed" else "-"
+            rate = 100.0 * pattern.rates["strands"]
+            one.plot(THRESHOLDS, rate, style, color=COLOURS[label], marker="o", ms=2.5, label=label)
+        one.plot([0.0, 90.0], [0.0, 100.0], color=OUTLINE, lw=0.8, ls=":")
+        one.set_xlim(0.0, 90.0)
+        one.set_ylim(0.0, 101.0)
+        one.set_title(text, size=8, loc="left", color=INK)
+    axes[1].legend(fontsize=7, frameon=False, loc="lower right")
+    return figure
+
+
+def _other_methods(plate: PlateStudy) -> Figure:
+    """Load, and the paths of streamlines, offset and EQS."""
+    part = plate.optimised
+    have = [name for name in _OTHERS if name in part.patterns]
+    figure, axes = panels([plate.plate.domain] * (1 + len(have)), 2)
+    section(axes[0], plate.plate.domain, filled=False)
+    section(axes[0], part.layer.plane.polygon)
+    show_load(axes[0], plate.plate)
+    title(axes[0], "(a) load and supports")
+    for letter, one, name in zip("bcd", axes[1:], have, strict=False):
+        section(one, part.layer.plane.polygon)
+        path(one, part.patterns[name], COLOURS[name])
+        total = part.patterns[name].total
+        text = f"{total['paths']:.0f} pieces, {100.0 * total['coverage']:.0f} % covered"
+        title(one, f"({letter}) {name}: {text}")
+    return figure
+
+
+def _lpp(plate: PlateStudy) -> Figure:
+    """Draw the main directions of tension and compression, and the path."""
+    part = plate.optimised
+    lpp = part.patterns["lpp"]
+    box = shapely.union(part.layer.plane.polygon, shapely.MultiPoint(lpp.paths.points)).bounds
+    figure, axes = panels([part.layer.plane.polygon] * 2, 2, box=box)
+    for one in axes[:2]:
+        section(one, part.layer.plane.polygon)
+    strokes(axes[0], part, 45)
+    axis = frame(part.layer.plane.polygon, 0.5 * part.machine.fibre_width)
+    lines_of(axes[0], [member.points for member in axis.members], INK, 1.2)
+    title(axes[0], "(a) pulled (blue), pressed (green), medial axis")
+    path(axes[1], lpp)
+    total = lpp.total
+    text = f"{total['paths']:.0f} path, {100.0 * total['coverage']:.0f} % covered"
+    title(axes[1], f"(b) lpp: {text}")
+    return figure

@@ -1,0 +1,61 @@
+"""The whole of the paper: its study, figures, tables and claims beside ours."""
+
+import csv
+from pathlib import Path
+from time import perf_counter
+
+from ccfem.evaluation.matching import READINGS, THRESHOLDS
+from ccfem.papers.verdicts import claim_table
+from ccfem.papers.wang_2021.claims import quantities, verdicts
+from ccfem.papers.wang_2021.figures import draw_all
+from ccfem.papers.wang_2021.study import run_study
+from ccfem.papers.wang_2021.tables import plate_table, result_table, speed_table
+from ccfem.papers.wang_2021.variants import (
+    try_hole,
+    try_radii,
+    variant_quantities,
+    variant_table,
+)
+
+__all__ = ["write_all"]
+
+
+def write_all(folder: Path) -> None:
+    """Run the study, and write figures, tables and claims into a folder."""
+    folder.mkdir(parents=True, exist_ok=True)
+    begun = perf_counter()
+    study = run_study()
+    tried = try_radii(study)
+    found = quantities(study) | variant_quantities(tried, try_hole())
+    checks = verdicts(found)
+    computed = perf_counter() - begun
+    drawn = draw_all(study, folder)
+    with (folder / "rates.csv").open("w", newline="") as file:
+        writer = csv.writer(file)
+        writer.writerow(["plate", "part", "pattern", "reading", *(f"{t:g}" for t in THRESHOLDS)])
+        for name, plate in study.items():
+            for which, part in (("optimised", plate.optimised), ("full", plate.original)):
+                for pattern, one in part.patterns.items():
+                    for reading in READINGS:
+                        values = [f"{v:.6g}" for v in one.rates[reading]]
+                        writer.writerow([name, which, pattern, reading, *values])
+    with (folder / "quantities.csv").open("w", newline="") as file:
+        csv.writer(file).writerows([("quantity", "value"), *found.items()])
+    parts = [
+        "# Load-dependent paths of Wang et al. (2021): ours beside theirs\n",
+        "Written by `ccfem reproduce wang_2021`. lpp is strategy `svt`; lpp uncrossed "
+        "ends its strands in the middle of a joint. The slicer's patterns and lpp uncrossed are "
+        "laid by this project too.\n",
+        f"Study {computed:.1f} s, figures {perf_counter() - begun - computed:.1f} s.\n",
+        "## Claims\n",
+        claim_table(checks),
+        f"## Plates\n\n{plate_table(study)}",
+        *(f"## {name}\n\n{result_table(plate)}" for name, plate in study.items()),
+        f"## Radius of the turns\n\n{variant_table(tried)}",
+        f"## Table 2: speeds\n\n{speed_table()}",
+        "## Figures\n",
+        *(f"![{name}]({name})\n" for name in drawn),
+    ]
+    (folder / "report.md").write_text("\n".join(parts))
+    print(claim_table(checks))
+    print(f"{folder / 'report.md'}: {perf_counter() - begun:.1f} s")
