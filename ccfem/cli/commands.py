@@ -3,6 +3,7 @@
 Everything heavy is imported by the command that needs it, so that ``ccfem --help`` answers at once.
 """
 
+import logging
 from importlib import metadata
 from pathlib import Path
 from typing import Annotated, Any
@@ -14,6 +15,7 @@ from ccfem.cli.options import (
     Backend,
     Calibration,
     CasePath,
+    Drawings,
     Fibre,
     FibreInAll,
     Force,
@@ -21,6 +23,7 @@ from ccfem.cli.options import (
     Layers,
     LoadCase,
     Out,
+    Pictures,
     Refine,
     SetCase,
     Slicing,
@@ -29,7 +32,15 @@ from ccfem.cli.options import (
     StressUnit,
     VirtualTest,
 )
-from ccfem.cli.run import foreign_stress, layers_of, load, options_of, run, slicings_of
+from ccfem.cli.run import (
+    drawings_of,
+    foreign_stress,
+    layers_of,
+    load,
+    options_of,
+    run,
+    slicings_of,
+)
 
 __all__ = ["app"]
 
@@ -37,7 +48,6 @@ app = typer.Typer(
     name="ccfem",
     help="Finite elements and stress-driven toolpaths for printing continuous fibre. "
     "Units: mm, N, MPa.",
-    add_completion=False,
     context_settings={"help_option_names": ["-h", "--help"]},
     pretty_exceptions_enable=False,
     rich_markup_mode=None,
@@ -48,7 +58,12 @@ app = typer.Typer(
 def _top(
     context: typer.Context,
     version: Annotated[bool, typer.Option("--version", help="Print the version.")] = False,
+    verbose: Annotated[
+        bool, typer.Option("--verbose", help="Log every step with its time, before the command.")
+    ] = False,
 ) -> None:
+    if verbose:
+        logging.basicConfig(level=logging.INFO, format="%(asctime)s %(name)s: %(message)s")
     if version:
         print(f"ccfem {metadata.version('ccfem')}")
         raise typer.Exit
@@ -222,10 +237,12 @@ def compare(
     backend: Backend = "auto",
     stress: StressFile = None,
     stress_unit: StressUnit = None,
+    pictures: Pictures = False,
+    drawings: Drawings = None,
     out: Out = None,
     force: Force = False,
 ) -> None:
-    """Plan a part by several strategies and show which is best, with numbers and pictures."""
+    """Plan a part by several strategies and show which is best, in numbers and a report."""
     from ccfem.comparison.compare import STRATEGIES
 
     names = STRATEGIES if strategies is None else names_of(strategies)
@@ -248,6 +265,8 @@ def compare(
         frame=paths_frame,
         force=force,
         refine=refine,
+        pictures=pictures,
+        drawings=drawings_of(drawings),
     )
 
 
@@ -275,6 +294,8 @@ def plan(
     ] = False,
     stress: StressFile = None,
     stress_unit: StressUnit = None,
+    pictures: Pictures = False,
+    drawings: Drawings = None,
     out: Out = None,
     force: Force = False,
 ) -> None:
@@ -297,6 +318,8 @@ def plan(
         suffix,
         force=force,
         refine=refine,
+        pictures=pictures,
+        drawings=drawings_of(drawings),
     )
 
 

@@ -1,5 +1,6 @@
 """What ``ccfem faces`` does: the smooth faces of a body listed, and drawn with their numbers."""
 
+from collections.abc import Sequence
 from pathlib import Path
 
 import numpy as np
@@ -11,12 +12,12 @@ from ccfem.cases.reading import read
 from ccfem.errors import InputError
 from ccfem.io.mesh_file import read_mesh
 from ccfem.io.surface import is_surface, read_surface
-from ccfem.mesh.smooth_faces import Face, given_faces, smooth_faces
+from ccfem.mesh.smooth_faces import FEATURE_ANGLE, Face, given_faces, smooth_faces
 from ccfem.meshing.cad import is_cad, read_cad
 from ccfem.plot.canvas import check_picture
 from ccfem.plot.part_views import Label, draw_part
 
-__all__ = ["list_faces"]
+__all__ = ["faces_of", "list_faces"]
 
 _COLOURS = ("#9ec1e3", "#f3c98b", "#a8d5a2", "#e3a9c0", "#c9b8e0", "#e8e08a", "#9fd6d2", "#d9b89c")
 _NAMED = 60
@@ -38,15 +39,7 @@ def list_faces(body: Path, angle: float, scale: float, picture: Path) -> None:
         File of the picture.
     """
     check_picture(picture)
-    names: tuple[str, ...] = ()
-    if is_cad(body):
-        cad = read_cad(body, scale)
-        points, triangles, names = cad.surface.points, cad.surface.triangles, cad.names
-        rows = [np.flatnonzero(cad.face == k) for k in range(1, len(names) + 1)]
-        faces = given_faces(points, triangles, [each for each in rows if len(each)])
-    else:
-        points, triangles = _boundary(body, scale)
-        faces = smooth_faces(points, triangles, angle)
+    points, triangles, faces, names = faces_of(body, angle, scale)
     columns = ("face", "area, mm^2", "what", "name")[: 4 if any(names) else 3]
     table = Table(box=None, padding=(0, 2, 0, 0))
     for column in columns:
@@ -67,6 +60,20 @@ def list_faces(body: Path, angle: float, scale: float, picture: Path) -> None:
         f"{len(faces)} faces{about}; picture: {picture}\n"
         'in a part file: [patches.NAME] with rule = "face", number = [1, 2]; lengths are mm'
     )
+
+
+def faces_of(
+    body: Path, angle: float = FEATURE_ANGLE, scale: float = 1.0
+) -> tuple[FloatArray, IntArray, Sequence[Face], tuple[str, ...]]:
+    """Points (n, 3) and outward triangles of a body, its faces, and their names in a CAD file."""
+    if is_cad(body):
+        cad = read_cad(body, scale)
+        points, triangles = cad.surface.points, cad.surface.triangles
+        rows = [np.flatnonzero(cad.face == k) for k in range(1, len(cad.names) + 1)]
+        faces = given_faces(points, triangles, [each for each in rows if len(each)])
+        return points, triangles, faces, cad.names
+    points, triangles = _boundary(body, scale)
+    return points, triangles, smooth_faces(points, triangles, angle), ()
 
 
 def _boundary(body: Path, scale: float) -> tuple[FloatArray, IntArray]:

@@ -9,6 +9,7 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
+from ccfem.checks import member_name
 from ccfem.comparison.headline import TEST_COLUMNS, headline_values
 from ccfem.comparison.result import Comparison
 from ccfem.comparison.runs import Run
@@ -121,6 +122,7 @@ def _load(stress: StressField) -> list[float] | None:
 def _run_record(run: Run) -> dict[str, Any]:
     return {
         "name": run.name,
+        "methods": _methods(run),
         "parameters": run.parameters,
         "length_per_layer": run.length_per_layer,
         "note": run.note,
@@ -133,6 +135,12 @@ def _run_record(run: Run) -> dict[str, Any]:
         "first_failure": vars(run.tested.failure) if run.tested and run.tested.failure else None,
         "first_failure_alternative": _alternative_failure(run),
     }
+
+
+def _methods(run: Run) -> list[str]:
+    """Name the strategy of a run, and those that stand among its parameters."""
+    inner = [value for value in run.parameters.values() if dataclasses.is_dataclass(value)]
+    return [member_name(each) for each in (run.strategy, *inner)]
 
 
 def _alternative_failure(run: Run) -> dict[str, Any] | None:

@@ -1,0 +1,67 @@
+"""Commands that begin a part and end a paper: ``ccfem new``, ``ccfem example``, ``ccfem cite``."""
+
+from pathlib import Path
+from typing import Annotated
+
+import typer
+
+from ccfem.cli.arguments import path_of
+
+__all__ = ["add_part_commands"]
+
+_Out = Annotated[
+    Path | None,
+    typer.Option("--out", metavar="PART.toml", parser=path_of, help="File that is written."),
+]
+_Force = Annotated[bool, typer.Option("--force", help="Replace a file that is there.")]
+
+
+def _new(
+    body: Annotated[
+        Path, typer.Argument(metavar="BODY", help="Surface (.stl), CAD file (.step) or mesh.")
+    ],
+    out: _Out = None,
+    force: _Force = False,
+) -> None:
+    """Write a part file for a body: its faces listed, a support and a load to be changed."""
+    from ccfem.cli.beginning import new_part
+
+    written = new_part(body, out, force)
+    print(f"{written}: change what is marked, then: ccfem check {written}")
+
+
+def _example(
+    name: Annotated[
+        str | None, typer.Argument(metavar="NAME", help="Write this one; without it, list them.")
+    ] = None,
+    out: _Out = None,
+    force: _Force = False,
+) -> None:
+    """List the part files that come with ccfem, or write one of them here."""
+    from ccfem.cli.beginning import print_examples, write_example
+
+    if name is None:
+        print_examples()
+    else:
+        written = write_example(name, out, force)
+        print(f"{written}: try: ccfem check {written}")
+
+
+def _cite(
+    whats: Annotated[
+        list[str] | None,
+        typer.Argument(
+            metavar="FOLDER_OR_METHOD", help="Folders of results, or strategies and slicers."
+        ),
+    ] = None,
+) -> None:
+    """Print BibTeX of ccfem, and of the papers whose methods a result used."""
+    from ccfem.cli.citing import cite
+
+    cite(whats or ())
+
+
+def add_part_commands(app: typer.Typer) -> None:
+    """Add the commands of this module to the command line."""
+    for name, command in (("new", _new), ("example", _example), ("cite", _cite)):
+        app.command(name)(command)
