@@ -1,4 +1,4 @@
-"""docs/your_part.md is true: its part files read, and wrong guesses are named with their cure."""
+"""The page on parts of your own is true: its part files read, wrong guesses get their cure."""
 
 import re
 from pathlib import Path
@@ -11,7 +11,7 @@ from ccfem.isolated.process import ChildError, in_own_process
 from ccfem.meshing import mesh_body, read_cad
 
 ROOT = Path(__file__).parents[1]
-PAGE = (ROOT / "docs" / "your_part.md").read_text()
+PAGE = (ROOT / "docs" / "how_to" / "your_part.md").read_text()
 READ = re.findall(r"```toml\n(.*?)```", PAGE, flags=re.S)
 BRACKET, HOOK, LEVER = (re.sub(r"edge_length = \S+", "edge_length = 4.0", text) for text in READ)
 

@@ -1,6 +1,6 @@
 """Make three parts as a user brings them: crane hook and brake lever (STL), bracket (STEP).
 
-Run ``python benchmarks/studies/own_parts.py FOLDER``; docs/your_part.md goes on from there.
+Run ``python benchmarks/studies/own_parts.py FOLDER``; docs/how_to/your_part.md goes on from there.
 """
 
 import sys

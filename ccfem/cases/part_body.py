@@ -26,7 +26,29 @@ _SMALLEST, _LARGEST = 0.1, 1e5
 
 @dataclass(frozen=True, kw_only=True)
 class Body:
-    """The keys of a part file that say what its body is (see `ccfem.cases.part_file`)."""
+    """The keys of a part file that say what its body is (see `ccfem.cases.part_file`).
+
+    Exactly one of `mesh`, `surface` and `planform` is given.
+
+    Attributes
+    ----------
+    mesh : str
+        File of tetrahedra: .tet .msh .vtu .inp .npz.
+    surface : str
+        Closed surface (.stl .obj .ply) or CAD file (.step .iges .brep), filled with tetrahedra.
+    planform : table
+        A flat part that stands on z = 0: its outline, holes, height and edge length.
+    edge_length : float, mm
+        Edge length of the tetrahedra that fill a surface.
+    scale : float
+        Factor on the coordinates of a file; 1000 for metres.
+    merge_nodes : bool
+        Whether to join pieces of a mesh where their nodes coincide.
+    order : int or str
+        Linear (1) or quadratic cells (2), or what the estimated error of linear ones calls for.
+    mesher : str
+        What fills a surface; "auto" is Gmsh where it is installed and works.
+    """
 
     mesh: str | None = None
     surface: str | None = None

@@ -205,14 +205,14 @@ them with a minus ("-z"), or three numbers.
 import os
 import tomllib
 from collections.abc import Mapping
-from dataclasses import dataclass, field
+from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
 from ccfem.arrays import FloatArray
 from ccfem.cases.before_meshing import check_before_meshing
 from ccfem.cases.case import Case, check_name
-from ccfem.cases.part_body import Body
+from ccfem.cases.part_keys import Part
 from ccfem.cases.part_loads import (
     alternative_supports_of,
     combinations_of,
@@ -234,31 +234,9 @@ from ccfem.machine.machine import Machine
 from ccfem.materials import Material
 from ccfem.mesh.face_rules import without_faces
 from ccfem.mesh.patch_findings import about_patches
-from ccfem.mesh.patches import Vector, patches_from_rules, unit_vector
+from ccfem.mesh.patches import patches_from_rules, unit_vector
 
 __all__ = ["read_part"]
-
-
-@dataclass(frozen=True, kw_only=True)
-class _Part(Body):
-    """The keys of a part file."""
-
-    material: str | dict[str, Any] | None = None
-    supports: tuple[dict[str, Any], ...] = ()
-    loads: dict[str, Any] = field(default_factory=dict)
-    alternative_supports: tuple[dict[str, Any], ...] = ()
-    combinations: dict[str, Any] = field(default_factory=dict)
-    regions: dict[str, Any] = field(default_factory=dict)
-    name: str = ""
-    title: str = ""
-    source: str = ""
-    build: str | Vector = "z"
-    layers: int | None = None
-    heights: tuple[float, ...] | None = None
-    slicing: dict[str, Any] | None = None
-    patches: dict[str, Any] = field(default_factory=dict)
-    machine: dict[str, Any] = field(default_factory=dict)
-    strategies: dict[str, Any] = field(default_factory=dict)
 
 
 def read_part(path: str | os.PathLike[str]) -> Case:
@@ -370,17 +348,17 @@ class _Values:
         return found  # type: ignore[return-value]
 
 
-def _readable(content: Mapping[str, Any], found: Mistakes) -> tuple[_Part, set[str]]:
+def _readable(content: Mapping[str, Any], found: Mistakes) -> tuple[Part, set[str]]:
     """Take of a part file what reads; the rest is noted, and named."""
     good = {}
     for key, value in content.items():
         with found.noted():
-            from_table(_Part, {key: value}, "the part file")
+            from_table(Part, {key: value}, "the part file")
             good[key] = value
-    return from_table(_Part, good, "the part file"), set(content) - set(good)
+    return from_table(Part, good, "the part file"), set(content) - set(good)
 
 
-def _slicing(part: _Part) -> Slicer:
+def _slicing(part: Part) -> Slicer:
     """Slicer of a part file: of its number of layers, their heights, or the table slicing."""
     given = [key for key in ("layers", "heights", "slicing") if getattr(part, key) is not None]
     if len(given) > 1:

@@ -32,6 +32,7 @@ from ccfem.cli.options import (
     StressUnit,
     VirtualTest,
 )
+from ccfem.cli.part_commands import add_part_commands
 from ccfem.cli.run import (
     drawings_of,
     foreign_stress,
@@ -52,6 +53,7 @@ app = typer.Typer(
     pretty_exceptions_enable=False,
     rich_markup_mode=None,
 )
+add_part_commands(app)
 
 
 @app.callback(invoke_without_command=True)

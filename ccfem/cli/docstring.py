@@ -2,7 +2,8 @@
 
 import inspect
 import re
-from typing import NamedTuple
+from collections.abc import Callable
+from typing import Any, NamedTuple
 
 __all__ = ["Attribute", "about", "attributes"]
 
@@ -16,14 +17,14 @@ class Attribute(NamedTuple):
     meaning: str
 
 
-def about(what: type) -> tuple[str, ...]:
+def about(what: Callable[..., Any]) -> tuple[str, ...]:
     """Paragraphs of the docstring before its first section."""
     text = _SECTION.split(inspect.getdoc(what) or "", maxsplit=1)[0]
     return tuple(" ".join(part.split()) for part in text.split("\n\n") if part.strip())
 
 
-def attributes(what: type) -> dict[str, Attribute]:
-    """Entries of the section Attributes by name, without the defaults.
+def attributes(what: Callable[..., Any]) -> dict[str, Attribute]:
+    """Entries of the section Attributes, or Parameters, by name, without the defaults.
 
     An entry of several names (``angle, turn : float, degrees``) stands for each of them.
 
@@ -37,7 +38,7 @@ def attributes(what: type) -> dict[str, Attribute]:
     sections = dict(zip(parts[1::2], parts[2::2], strict=True))
     found = {}
     # An entry begins at the left margin; the lines below it are indented.
-    for text in re.split(r"\n(?=\S)", sections.get("Attributes", "")):
+    for text in re.split(r"\n(?=\S)", sections.get("Attributes") or sections.get("Parameters", "")):
         head, _, body = text.partition("\n")
         names, _, kind = head.partition(" : ")
         entry = Attribute(re.sub(r",? *(default .*|optional)$", "", kind), " ".join(body.split()))

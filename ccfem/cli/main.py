@@ -10,12 +10,9 @@ from typing import Any
 import typer
 
 from ccfem.cli.commands import app
-from ccfem.cli.part_commands import add_part_commands
 from ccfem.errors import InputError, SolveError
 
 __all__ = ["main"]
-
-add_part_commands(app)
 
 
 def main() -> None:

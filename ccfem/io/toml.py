@@ -11,7 +11,7 @@ from typing import Any, Literal, TypeVar, Union, get_args, get_origin
 
 from ccfem.errors import InputError, Mistakes, known_names, shown
 
-__all__ = ["assignment", "from_table"]
+__all__ = ["assignment", "described", "from_table"]
 
 T = TypeVar("T")
 
@@ -81,7 +81,7 @@ def _converted(value: object, hint: Any, where: str, infinite: bool) -> Any:
             return from_table(option, value, where, infinite)
     found = _fitted(value, hint, infinite)
     if found is _UNFIT:
-        raise InputError(f"{where} must be {_described(hint)}; got {shown(value)}: correct it")
+        raise InputError(f"{where} must be {described(hint)}; got {shown(value)}: correct it")
     return found
 
 
@@ -131,18 +131,18 @@ def _plain(value: Any, hint: Any, infinite: bool) -> Any:
     return number if infinite or math.isfinite(number) else _UNFIT
 
 
-def _described(hint: Any) -> str:
-    """Words for an annotation."""
+def described(hint: Any) -> str:
+    """Words for what an annotation takes, as "a list of 3, each a number"."""
     origin, arguments = get_origin(hint), get_args(hint)
     if origin in (Union, types.UnionType):
         wanted = [option for option in arguments if option is not type(None)]
-        return " or ".join(_described(option) for option in wanted)
+        return " or ".join(described(option) for option in wanted)
     if origin is Literal:
         return "one of " + ", ".join(repr(option) for option in arguments)
     if origin is tuple and arguments[-1] is Ellipsis:
-        return f"a list, each item {_described(arguments[0])}"
+        return f"a list, each item {described(arguments[0])}"
     if origin is tuple:
-        return f"a list of {len(arguments)}, each {_described(arguments[0])}"
+        return f"a list of {len(arguments)}, each {described(arguments[0])}"
     if origin is dict or _is_dataclass(hint):
         return "a table"
     return _WORDS.get(hint, str(hint))

@@ -78,7 +78,7 @@ def test_the_documentation_lists_every_key():
     lines = [line[4:] for line in described.splitlines()]
     keys = {line.split("=")[0].strip() for line in lines if "=" in line.split("#")[0]}
     keys |= {line.strip("[]# ").split("]")[0].split(".")[0] for line in lines if line[:1] == "["}
-    for field in ccfem.cases.part_file._Part.__dataclass_fields__:
+    for field in ccfem.cases.part_keys.Part.__dataclass_fields__:
         assert field in keys, field
     for kind in (*ccfem.cases.part_tables.RULES, *ccfem.cases.part_loads.LOADS):
         assert f'"{kind}"' in described

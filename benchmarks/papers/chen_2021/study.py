@@ -1,0 +1,172 @@
+"""What the figures and the claims of the paper are computed from.
+
+On the authors' Loop where ``CCFEM_CHEN2021`` names their folder, else on the case `loop`, which
+has its size and loads. The paper's Shell, Wrench and Piston are not published. Their places are
+taken by parts of ours that show the same thing: a bar with a hole (`open_hole`), and `lifting_eye`,
+whose section changes from layer to layer as the Piston's does.
+"""
+
+import os
+from collections.abc import Mapping
+from dataclasses import dataclass, replace
+
+import numpy as np
+
+from benchmarks.papers.chen_2021.large_displacement import Turned, turns_at
+from benchmarks.papers.chen_2021.loop import FOLDER, authors_loop
+from benchmarks.papers.chen_2021.pipeline import LayerStages, VectorField, planned, vector_field
+from ccfem.arrays import FloatArray
+from ccfem.cases import create_case
+from ccfem.cases.case import Case
+from ccfem.elasticity import Force, solve
+from ccfem.elasticity.stress_field import StressField
+from ccfem.evaluation import Evaluation, evaluate
+from ccfem.layers.layer import Layer
+from ccfem.layers.slicing.planar import Planar
+from ccfem.planning import plan
+from ccfem.planning.equal_fibre import plan_to_length
+from ccfem.strategies import create
+from ccfem.toolpaths import Toolpaths
+from ccfem.virtual_testing.specimen import Specimen
+from ccfem.virtual_testing.virtual_test import virtual_test
+
+__all__ = ["POWERS", "Model", "Study", "joined", "model", "run_study"]
+
+POWERS = (0.0, 0.5, 1.0, 2.0)
+"""p of Eq. 5 that figure 9 is drawn for."""
+PISTON_LAYERS = 66
+"""Layers of the paper's Piston."""
+DISPLACEMENTS = (4.0, 16.0)
+"""Of figure 14, mm."""
+
+
+@dataclass(frozen=True)
+class Model:
+    """A part, its stress, and every stage of the paper's algorithm on its layers."""
+
+    name: str
+    case: Case
+    stress: StressField
+    layers: tuple[Layer, ...]
+    vectors: VectorField
+    stages: list[LayerStages]
+
+    @property
+    def paths(self) -> Toolpaths:
+        """Paths of all layers."""
+        return joined(self.stages)
+
+    @property
+    def evaluation(self) -> Evaluation:
+        """Indices of the paths."""
+        return evaluate(self.paths, self.layers, self.stress, self.case.machine)
+
+
+@dataclass(frozen=True)
+class Study:
+    """All that figures, tables and claims are made of.
+
+    Attributes
+    ----------
+    models : mapping of name to Model
+        "Loop", "Loop, pushed", "open_hole", "lifting_eye".
+    powers : mapping of p to Toolpaths
+        Figure 9, on the Loop.
+    unprocessed : Toolpaths
+        Figure 10 (a): without orientation and filter.
+    compared : mapping of name to (Toolpaths, stiffness ratio)
+        Table 2: the paper's algorithm and contour and zigzag of its length.
+    turns : mapping of displacement to Turned
+        Figure 14.
+    """
+
+    models: Mapping[str, Model]
+    powers: Mapping[float, Toolpaths]
+    unprocessed: Toolpaths
+    compared: Mapping[str, tuple[Toolpaths, float]]
+    turns: Mapping[float, Turned]
+
+    @property
+    def loop(self) -> Model:
+        """The part that most figures show."""
+        return self.models["Loop"]
+
+
+def joined(stages: list[LayerStages]) -> Toolpaths:
+    """Paths of several layers as one."""
+    return Toolpaths.concatenate([each.paths for each in stages])
+
+
+def model(name: str, case: Case, layers: int = 12) -> Model:
+    """Solve a case and run the paper's algorithm on flat layers of it."""
+    stress = next(iter(solve(case.problem).values()))
+    cut = Planar(count=layers).cut(stress.mesh, case.build)
+    vectors = vector_field(stress)
+    stages = planned(cut, vectors.tension, stress.held_or_loaded, case.machine)
+    return Model(name, case, stress, cut, vectors, stages)
+
+
+def pushed(case: Case) -> Case:
+    """Turn the force of a part round."""
+    ((name, (load,)),) = case.problem.loads.items()
+    assert isinstance(load, Force)
+    back = replace(load, vector=tuple(-v for v in load.vector))
+    return replace(case, problem=replace(case.problem, loads={name: (back,)}))
+
+
+def run_study(element_size: float | None = None, layers: int = 12) -> Study:
+    """Run everything; a minute and a half with the defaults.
+
+    Parameters
+    ----------
+    element_size : float, mm, optional
+        Of all parts, which then are ccfem's own.
+    layers : int, default 12
+    """
+    sized = {} if element_size is None else {"element_size": element_size}
+    authors = element_size is None and bool(os.environ.get(FOLDER))
+    loop_case = authors_loop(layers) if authors else create_case("loop", **sized)
+    many = PISTON_LAYERS if element_size is None else layers
+    models = {
+        "Loop": model("Loop", loop_case, layers),
+        "Loop, pushed": model("Loop, pushed", pushed(loop_case), layers),
+        "open_hole": model("open_hole", create_case("open_hole", **sized), layers),
+        "lifting_eye": model("lifting_eye", create_case("lifting_eye"), many),
+    }
+    loop = models["Loop"]
+    patches, machine = loop.stress.held_or_loaded, loop.case.machine
+
+    def with_power(power: float) -> Toolpaths:
+        return joined(planned(loop.layers, loop.vectors.tension, patches, machine, power))
+
+    return Study(
+        models,
+        {power: with_power(power) for power in POWERS},
+        joined(planned(loop.layers, loop.vectors.unfiltered, patches, machine)),
+        _compared(loop),
+        turns_at(loop.case.problem, _pull(loop.case), DISPLACEMENTS),
+    )
+
+
+def _compared(loop: Model) -> dict[str, tuple[Toolpaths, float]]:
+    """Paths of equal length and what they make of the part, with fibres that carry tension only."""
+    paths, machine = loop.paths, loop.case.machine
+    wanted = float(paths.lengths.sum()) / len(loop.layers)
+    found = {
+        "the paper's algorithm": paths,
+        "contour_zigzag": plan_to_length(
+            create("contour_zigzag"), loop.layers, loop.stress, machine, wanted
+        ).toolpaths,
+        "isocurve": plan(create("isocurve"), loop.layers, loop.stress, machine),
+    }
+    specimen = Specimen.of(loop.stress)
+    return {
+        name: (each, virtual_test(each, specimen, span=()).ratio) for name, each in found.items()
+    }
+
+
+def _pull(case: Case) -> FloatArray:
+    """Direction of the one force of a case."""
+    ((load,),) = case.problem.loads.values()
+    vector = np.array(load.vector)
+    return vector / np.linalg.norm(vector)

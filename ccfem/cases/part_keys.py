@@ -1,0 +1,69 @@
+"""The keys at the top of a part file."""
+
+from dataclasses import dataclass, field
+from typing import Any
+
+from ccfem.cases.part_body import Body
+from ccfem.mesh.patches import Vector
+
+__all__ = ["Part"]
+
+
+@dataclass(frozen=True, kw_only=True)
+class Part(Body):
+    """The keys of a part file.
+
+    Attributes
+    ----------
+    material : str or table
+        A name of the table of materials, or moduli.
+    supports : tuple of tables
+        What holds the part; at least one.
+    loads : dict
+        The load cases by name, each a list of loads; at least one.
+    alternative_supports : tuple of tables
+        Another model of how the part is held: strategies are tested under both, and no order is
+        told that the two do not agree on.
+    combinations : dict
+        Load cases that are sums of others times factors.
+    regions : dict
+        Cells of another material.
+    name : str
+        Name of the part; that of the file where there is none.
+    title : str
+        One line for tables and reports; the name where there is none.
+    source : str
+        Where the part comes from.
+    build : str or tuple of 3 floats
+        Build direction.
+    layers : int
+        Number of flat layers of fibre, spread evenly over the height.
+    heights : tuple of floats, mm
+        Heights of flat layers along the build direction, in place of their number.
+    slicing : table
+        A slicer with its parameters, in place of layers and heights; without any of the three,
+        12 flat layers.
+    patches : dict
+        Patches of the boundary, each by a rule. Groups of a mesh file are patches already.
+    machine : table
+        What differs from the default printer.
+    strategies : dict
+        Parameters of strategies on this part.
+    """
+
+    material: str | dict[str, Any] | None = None
+    supports: tuple[dict[str, Any], ...] = ()
+    loads: dict[str, Any] = field(default_factory=dict)
+    alternative_supports: tuple[dict[str, Any], ...] = ()
+    combinations: dict[str, Any] = field(default_factory=dict)
+    regions: dict[str, Any] = field(default_factory=dict)
+    name: str = ""
+    title: str = ""
+    source: str = ""
+    build: str | Vector = "z"
+    layers: int | None = None
+    heights: tuple[float, ...] | None = None
+    slicing: dict[str, Any] | None = None
+    patches: dict[str, Any] = field(default_factory=dict)
+    machine: dict[str, Any] = field(default_factory=dict)
+    strategies: dict[str, Any] = field(default_factory=dict)

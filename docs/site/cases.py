@@ -1,0 +1,42 @@
+"""Page of the cases: a picture of each, what it is, and its parameters."""
+
+import inspect
+import re
+from collections.abc import Callable
+
+from keys import keys
+
+from ccfem.cases import named_cases
+from ccfem.cases.case import Case
+from ccfem.cli.docstring import Attribute, attributes
+
+__all__ = ["cases_page"]
+
+_HEAD = """# Cases
+
+Parts that come with ccfem: `ccfem compare NAME`, or `ccfem.read("NAME")` in Python. A parameter is
+set by `--set-case NAME=VALUE`. The coloured facets are the patches that hold or load the part;
+arrows are the resultants of the loads, triangles mark what is held.
+
+"""
+
+
+def cases_page() -> str:
+    """Write a section for each case; the pictures are drawn by `python -m benchmarks.gallery`."""
+    return _HEAD + "".join(_section(name, make) for name, make in sorted(named_cases().items()))
+
+
+def _section(name: str, make: Callable[..., Case]) -> str:
+    first, _, rest = (inspect.getdoc(make) or "").partition("\n")
+    said = re.split(r"^Parameters( as in|$)", rest, maxsplit=1, flags=re.M)[0].strip()
+    return (
+        f"## {name}\n\n{first}\n\n![The part, its patches and loads](pictures/cases/{name}.png)"
+        f"{{ loading=lazy }}\n\n{said}\n\n{keys(make, _meanings(make))}"
+    )
+
+
+def _meanings(make: Callable[..., Case]) -> dict[str, Attribute]:
+    """Say what the parameters of a case mean, in its words or those of the case that it names."""
+    other = re.search(r"Parameters as in `ccfem\.cases\.(\w+)`", inspect.getdoc(make) or "")
+    inherited = _meanings(named_cases()[other[1]]) if other else {}
+    return inherited | attributes(make)

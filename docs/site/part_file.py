@@ -1,0 +1,41 @@
+"""Page of the part file: its keys, from the code that reads them."""
+
+import textwrap
+
+from keys import keys, kinds
+
+from ccfem.cases import part_file as reader
+from ccfem.cases.part_keys import Part
+from ccfem.cases.part_loads import LOADS, SUPPORTS
+from ccfem.cases.part_regions import REGIONS
+from ccfem.cases.part_tables import RULES
+from ccfem.machine import GcodeProfile, Limits, Machine, SpeedTable
+from ccfem.materials import isotropic, material_names, transversely_isotropic
+
+__all__ = ["part_file_page"]
+
+
+def part_file_page() -> str:
+    """Write the page: the example of the reader's documentation, then every table."""
+    about, _, example = (reader.__doc__ or "").partition("::\n")
+    names = ", ".join(f"`{name}`" for name in material_names())
+    parts = (
+        f"# Part file\n\n{about}\n\n",
+        f"## Keys at the top\n\n{keys(Part)}",
+        f"## Material\n\n`material` is one of {names}, or a table.\n\n",
+        f"### Isotropic\n\n{keys(isotropic)}",
+        f"### Transversely isotropic\n\n{keys(transversely_isotropic)}",
+        f"## Patches `[patches.NAME]`\n\n{kinds('rule', RULES)}",
+        f"## Supports `[[supports]]`\n\n{kinds('kind', SUPPORTS)}",
+        f"## Loads `[[loads.CASE]]`\n\n{kinds('kind', LOADS)}",
+        f"## Regions `[regions.NAME]`\n\n{kinds('rule', REGIONS)}",
+        f"## Machine `[machine]`\n\n{keys(Machine)}",
+        f"### Limits `[machine.limits]`\n\n{keys(Limits)}",
+        f"### Speeds `[machine.speeds]`\n\n{keys(SpeedTable)}",
+        f"### G-code `[machine.gcode]`\n\n{keys(GcodeProfile)}",
+        "## Strategies `[strategies.NAME]`\n\nThe parameters of a [strategy](strategies.md) on "
+        "this part.\n\n## Slicing `[slicing]`\n\n`method`, the name of a [slicer](slicers.md), and "
+        "its parameters.\n\n",
+        f"## All of it in one example\n\n```toml\n{textwrap.dedent(example).strip()}\n```\n",
+    )
+    return "".join(parts)

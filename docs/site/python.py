@@ -1,0 +1,56 @@
+"""Page of the Python interface: what `import ccfem` offers, and the packages behind it."""
+
+import importlib
+
+import ccfem
+
+__all__ = ["python_page"]
+
+_HEAD = """# Python
+
+`import ccfem` offers the functions of the flow; what they take and give lives in packages by name,
+which need no import of their own: `ccfem.elasticity.Force`, `ccfem.strategies.Isocurve`. Units are
+mm, N and MPa; angles are degrees.
+
+"""
+
+_PACKAGES = {
+    "elasticity": "Problems, supports, loads and stress",
+    "mesh": "Meshes and patches",
+    "materials": "Materials",
+    "layers": "Layers",
+    "machine": "Machine",
+    "toolpaths": "Paths",
+    "topopt": "Topology optimisation",
+    "export.gcode": "G-code",
+    "export.waypoints": "Waypoints",
+    "export.vtk": "Files for ParaView",
+}
+
+
+def python_page() -> str:
+    """Write a section for the public face and one for each package that users meet."""
+    face = "".join(_entry(ccfem, name, 3) for name in ccfem.__all__)
+    rooms = "".join(_room(name, title) for name, title in _PACKAGES.items())
+    return f"{_HEAD}## The flow\n\n{face}{rooms}"
+
+
+def _room(name: str, title: str) -> str:
+    module = importlib.import_module(f"ccfem.{name}")
+    entries = [_entry(module, each, 3) for each in module.__all__ if _documented(module, each)]
+    return f"## {title}: `ccfem.{name}` {{ #{name.replace('.', '-')} }}\n\n" + "".join(entries)
+
+
+def _documented(module: object, name: str) -> bool:
+    """Whether a name is a function or class of this project, and not on the page already."""
+    home = getattr(getattr(module, name), "__module__", "")
+    return home.startswith("ccfem") and not hasattr(ccfem, name)
+
+
+def _entry(module: object, name: str, level: int) -> str:
+    found = getattr(module, name)
+    shown = f"{module.__name__}.{name}"  # type: ignore[attr-defined]
+    return (
+        f"::: {found.__module__}.{found.__qualname__}\n    options:\n"
+        f"      heading: {shown}\n      toc_label: {name}\n      heading_level: {level}\n\n"
+    )
