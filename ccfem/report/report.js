@@ -300,11 +300,12 @@ function layersView(layers) {
         rim[p === layer.rim_offsets[k] ? "moveTo" : "lineTo"](layer.rims[0][p], layer.rims[1][p]);
     pen.save();
     pen.clip(rim, "evenodd");
-    pen.fillStyle = "#ececea";
+    pen.fillStyle = colour.value === "strand" ? "#ececea" : "#fafaf9";
     pen.fill(rim, "evenodd");
     if (below.value !== "none") {
       const side = Math.max(layer.box[2] - layer.box[0], layer.box[3] - layer.box[1]) / Math.max(...layer.shape);
       pen.save();
+      if (colour.value !== "strand") pen.globalAlpha = 0.35; // so that the colours of the strands are seen
       pen.scale(1, -1);
       pen.drawImage(mapOf(layer, below.value === "error" ? "error" : "tension"), layer.box[0], -layer.box[3],
         side * layer.shape[0], side * layer.shape[1]);
