@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from ccfem.comparison.record import record, results_frame
+from ccfem.comparison.record import record, results_rows, write_table
 from ccfem.comparison.result import Comparison
 from ccfem.comparison.shown import file_stem
 from ccfem.progress import Progress, silent
@@ -64,7 +64,7 @@ def write_results(
         spent["pictures"] = time.perf_counter() - start
     progress("writing results", 0.6)
     start = time.perf_counter()
-    results_frame(comparison).to_csv(folder / "results.csv", index=False)
+    write_table(results_rows(comparison), folder / "results.csv")
     if comparison.curve is not None:
         comparison.curve.frame.to_csv(folder / "curve.csv", index=False)
     _write_paths(comparison, folder)

@@ -9,7 +9,7 @@ from collections.abc import Mapping
 from pathlib import Path
 from typing import Any
 
-from ccfem.comparison.record import record, results_frame
+from ccfem.comparison.record import record, results_rows, write_table
 from ccfem.comparison.result import Comparison
 from ccfem.comparison.runs import Run
 from ccfem.comparison.shown import file_stem
@@ -50,8 +50,6 @@ def write_slicings(
     part_file : str
         Text of the part file, for the report.
     """
-    import pandas as pd
-
     from ccfem.comparison.report import report_html
 
     start = time.perf_counter()
@@ -66,10 +64,12 @@ def write_slicings(
     for name, one in comparison.slicings.items():
         for run in one.succeeded:
             _write_waypoints(name, one, run, folder)
-    tables = [results_frame(one).assign(slicing=name) for name, one in comparison.slicings.items()]
-    table = pd.concat(tables, ignore_index=True)
-    table.insert(0, "slicing", table.pop("slicing"))
-    table.to_csv(folder / "results.csv", index=False)
+    rows = [
+        {"slicing": name, **row}
+        for name, one in comparison.slicings.items()
+        for row in results_rows(one)
+    ]
+    write_table(rows, folder / "results.csv", first=("slicing",))
     spent["files"] = time.perf_counter() - start
     progress("writing the report", 0.8)
     about = _record(comparison, command, spent)
