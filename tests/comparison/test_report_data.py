@@ -1,6 +1,7 @@
 """What the report draws: paths, angles, forces, fronts, citations."""
 
 import re
+from dataclasses import replace
 
 import numpy as np
 import pytest
@@ -8,7 +9,7 @@ import pytest
 from ccfem.comparison import charts
 from ccfem.comparison.citations import METHODS, bibtex, cited, methods_of, sentence
 from ccfem.comparison.part_view import _coarser
-from ccfem.comparison.path_view import _nearest, angle_on_layer, drawn_paths
+from ccfem.comparison.path_view import _nearest, angle_on_layer, drawn_paths, in_layer
 from ccfem.comparison.runs import Run
 from ccfem.layers.layer_stress import LayerStress
 from ccfem.layers.slicing import Planar
@@ -109,3 +110,16 @@ def test_the_record_names_the_methods():
     ]
     assert methods_of({"slicings": {"z": stack}}) == ["pruned", "isocurve", "spatial"]
     assert cited(methods_of(stack)) == ["ccfem", "chen_2021", "fang_2024"]
+
+
+def test_a_curved_layer_is_drawn_as_rolled_off():
+    """An arc of radius 25 round a cylinder becomes a straight line of its length."""
+    radius = 25.0
+    angle = (LAYER.points[:, 0] - 40.0) / radius
+    bent = np.column_stack([radius * np.sin(angle), LAYER.points[:, 1], radius * np.cos(angle)])
+    turn = np.linspace(-1.2, 1.2, 40)
+    line = np.column_stack([radius * np.sin(turn), np.full(40, 30.0), radius * np.cos(turn)])
+    plane = in_layer(line, replace(LAYER, points=bent, flat=None))
+    steps = np.linalg.norm(np.diff(plane, axis=0), axis=1)
+    assert steps.sum() == pytest.approx(2.4 * radius, rel=0.02)
+    assert np.linalg.norm(plane[-1] - plane[0]) == pytest.approx(steps.sum(), rel=1e-3)
