@@ -23,48 +23,66 @@ import importlib
 from importlib.metadata import version
 from typing import TYPE_CHECKING, Any
 
+from ccfem import display
+
 if TYPE_CHECKING:
     from ccfem.cases.case import Case
     from ccfem.cases.reading import read
     from ccfem.comparison.compare import compare
     from ccfem.comparison.result import Comparison
+    from ccfem.comparison.saving import save
     from ccfem.elasticity import Problem, solve
     from ccfem.evaluation import evaluate
+    from ccfem.inspection.body_faces import faces
     from ccfem.inspection.part_check import check
     from ccfem.layers.slicing import slice
     from ccfem.machine import Machine
     from ccfem.planning import plan
+    from ccfem.studies import Study, study
     from ccfem.virtual_testing import virtual_test
+    from ccfem.virtual_testing.calibration import calibrate
 
 __all__ = [
     "Case",
     "Comparison",
     "Machine",
     "Problem",
+    "Study",
+    "calibrate",
     "check",
     "compare",
     "evaluate",
+    "faces",
     "plan",
     "read",
+    "save",
     "slice",
     "solve",
+    "study",
     "virtual_test",
 ]
 
 __version__ = version("ccfem")
+
+display.drawn_by("ccfem.plot.values")
 
 _HOMES = {
     "Case": "cases",
     "Comparison": "comparison",
     "Machine": "machine",
     "Problem": "elasticity",
+    "Study": "studies",
+    "calibrate": "virtual_testing.calibration",
     "check": "inspection",
     "compare": "comparison",
     "evaluate": "evaluation",
+    "faces": "inspection",
     "plan": "planning",
     "read": "cases",
+    "save": "comparison",
     "slice": "layers.slicing",
     "solve": "elasticity",
+    "study": "studies",
     "virtual_test": "virtual_testing",
 }
 """Package that each name comes from, imported when the name is first used."""
@@ -74,7 +92,7 @@ _PACKAGES = frozenset(
         *("cases", "comparison", "elasticity", "errors", "evaluation", "export", "fields"),
         *("geometry", "inspection", "io", "layers", "linking", "machine", "materials"),
         *("mesh", "meshing", "planning", "plates", "plot", "progress", "raster", "strategies"),
-        *("tensor", "toolpaths", "topopt", "virtual_testing"),
+        *("studies", "tensor", "toolpaths", "topopt", "virtual_testing"),
     }
 )
 """Packages and modules that need no import of their own."""

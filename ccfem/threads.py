@@ -1,4 +1,4 @@
-"""Work on many things side by side, in threads."""
+"""Work on many things side by side, in threads; at most CCFEM_NUM_THREADS where that is set."""
 
 import os
 from collections.abc import Callable, Sequence
@@ -32,7 +32,7 @@ def in_threads(
     Exception
         The first that `work` raises, in the order of the items.
     """
-    processors = os.cpu_count() or 1
+    processors = int(os.environ.get("CCFEM_NUM_THREADS", 0)) or os.cpu_count() or 1
     count = min(processors, processors if most is None else most, max(len(items[0]), 1))
     if count == 1:
         return [work(*each) for each in zip(*items, strict=True)]

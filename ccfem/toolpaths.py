@@ -6,6 +6,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from ccfem.arrays import BoolArray, FloatArray, IntArray, freeze
+from ccfem.display import Shown
 from ccfem.layers.layer import Layer
 
 __all__ = ["FIBRE", "KINDS", "MATRIX", "SUPPORT", "TRAVEL", "Toolpaths"]
@@ -15,7 +16,7 @@ FIBRE, MATRIX, SUPPORT, TRAVEL = range(4)
 
 
 @dataclass(frozen=True)
-class Toolpaths:
+class Toolpaths(Shown):
     """Polylines of a whole part, stored as one array of points with offsets (as in CSR).
 
     Attributes

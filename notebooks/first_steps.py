@@ -19,13 +19,7 @@
 # %%
 import numpy as np
 
-from ccfem.cases import create_case
-from ccfem.comparison.compare import compare
-from ccfem.elasticity import solve
-from ccfem.evaluation import evaluate
-from ccfem.layers.slicing.planar import Planar
-from ccfem.planning import plan
-from ccfem.strategies import create
+import ccfem
 
 # %% [markdown]
 # ## A part with its load
@@ -34,7 +28,7 @@ from ccfem.strategies import create
 # elements keep this short.
 
 # %%
-case = create_case("loop", element_size=4.0)
+case = ccfem.read("loop", element_size=4.0)
 print(case.title)
 print(len(case.problem.mesh.cells), "tetrahedra, patches", ", ".join(case.problem.mesh.patches))
 
@@ -44,7 +38,7 @@ print(len(case.problem.mesh.cells), "tetrahedra, patches", ", ".join(case.proble
 # One stress field a load case. Every solve says how it went, and the supports must hold what pulls.
 
 # %%
-stress = solve(case.problem)["pull"]
+stress = ccfem.solve(case.problem)["pull"]
 print(stress.record)
 pull = np.array([0.0, 1000.0, 0.0])
 assert np.allclose(stress.reactions.sum(axis=0), -pull, atol=1e-3)
@@ -55,8 +49,8 @@ assert np.allclose(stress.reactions.sum(axis=0), -pull, atol=1e-3)
 # A strategy is a small value whose fields are its parameters.
 
 # %%
-layers = Planar(count=3).cut(case.problem.mesh, case.build)
-paths = plan(create("isocurve", {"cap": 90.0}), layers, stress, case.machine)
+layers = ccfem.slice(stress, 3, case.build)
+paths = ccfem.plan(ccfem.strategies.Isocurve(cap=90.0), layers, stress, case.machine)
 print(len(paths), "paths,", round(paths.lengths.sum() / 1000.0, 2), "m of fibre")
 assert paths.lengths.min() >= case.machine.minimum_length
 
@@ -66,7 +60,7 @@ assert paths.lengths.min() >= case.machine.minimum_length
 # Every index for each layer and in total; `to_frame` gives a table.
 
 # %%
-evaluation = evaluate(paths, layers, stress, case.machine)
+evaluation = ccfem.evaluate(paths, layers, stress, case.machine)
 print(evaluation.to_frame()[["fibre_length", "paths", "efficiency", "curvature_95"]])
 assert evaluation.total["outside_length"] == 0.0
 
@@ -77,8 +71,9 @@ assert evaluation.total["outside_length"] == 0.0
 # part is solved again with the fibres in it.
 
 # %%
-comparison = compare(case, layers=3)
+comparison = ccfem.compare(case, layers=3)
 print(comparison)
+comparison.plot()  # the middle layer; comparison.pareto() draws stiffness over fibre
 
 # %% [markdown]
 # The headline: fibre along the tension makes the stiffest part, by a wide margin.

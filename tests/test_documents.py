@@ -1,5 +1,6 @@
 """README and CONTRIBUTING are true: their examples run, their lists are complete."""
 
+import dataclasses
 import json
 import re
 import shutil
@@ -17,6 +18,8 @@ from ccfem.io import read_mesh
 from ccfem.io.toml import from_table
 from ccfem.machine import Machine, SpeedTable
 from ccfem.strategies import named
+from ccfem.studies.definition import read_study
+from ccfem.studies.jobs import jobs_of
 
 ROOT = Path(__file__).parents[1]
 README = (ROOT / "README.md").read_text()
@@ -46,12 +49,21 @@ def test_python_of_the_readme_runs(capsys, monkeypatch, tmp_path):
 
 
 def test_part_file_of_the_readme_lacks_nothing_but_its_mesh(tmp_path):
-    block, printer = blocks(README, "toml")
+    block, printer, _ = blocks(README, "toml")
     (tmp_path / "hook.toml").write_text(block)
     with pytest.raises(InputError, match=r"hook.msh does not exist"):
         read_part(tmp_path / "hook.toml")
     machine = from_table(Machine, tomllib.loads(printer)["machine"], "machine")
     assert (machine.matrix_height, machine.speeds) == (0.4, SpeedTable())
+
+
+def test_the_study_of_the_readme_is_one(tmp_path):
+    *_, block = blocks(README, "toml")
+    (tmp_path / "densities.toml").write_text(block)
+    study = read_study(tmp_path / "densities.toml")
+    with pytest.raises(InputError, match=r"hook.toml does not exist"):
+        jobs_of(study)
+    assert len(jobs_of(dataclasses.replace(study, parts=("bar",))).jobs) == 3 + 2
 
 
 def test_every_strategy_is_in_the_readme():

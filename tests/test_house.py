@@ -75,7 +75,7 @@ def test_a_room_stands_above_all_that_it_imports():
 
 
 def test_the_core_does_not_draw():
-    drawing = {"plot", "comparison", "cli"}
+    drawing = {"plot", "comparison", "studies", "cli"}
     wanted = {name for name, those in imports().items() for one in those if room(one) == "plot"}
     assert {room(name) for name in wanted} <= drawing
 

@@ -6,6 +6,7 @@ from dataclasses import dataclass, field
 from typing import Any
 
 from ccfem.arrays import freeze
+from ccfem.display import Shown
 from ccfem.elasticity.problem import Force, Order, Problem, Support
 from ccfem.elasticity.support_kinds import AnySupport
 from ccfem.errors import Mistakes, shown
@@ -25,7 +26,7 @@ def pulled(mesh: TetMesh, force: tuple[float, float, float], order: Order) -> Pr
 
 
 @dataclass(frozen=True)
-class Case:
+class Case(Shown):
     """A part with its loads, how it is layered, and the machine that prints it.
 
     Attributes

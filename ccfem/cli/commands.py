@@ -10,7 +10,8 @@ from typing import Annotated, Any
 
 import typer
 
-from ccfem.cli.arguments import names_of, parameters_by_strategy, path_of
+from ccfem.cli.arguments import drawings_of, names_of, parameters_by_strategy, path_of
+from ccfem.cli.in_python import say_in_python
 from ccfem.cli.options import (
     Backend,
     Calibration,
@@ -33,15 +34,8 @@ from ccfem.cli.options import (
     VirtualTest,
 )
 from ccfem.cli.part_commands import add_part_commands
-from ccfem.cli.run import (
-    drawings_of,
-    foreign_stress,
-    layers_of,
-    load,
-    options_of,
-    run,
-    slicings_of,
-)
+from ccfem.cli.run import foreign_stress, layers_of, load, options_of, run, slicings_of
+from ccfem.cli.study_file import study
 
 __all__ = ["app"]
 
@@ -396,3 +390,7 @@ def calibrate(
         return load(case, set_case)
 
     fit_material(read, unreinforced, reinforced, strategy, parameters, options, out)
+
+
+app.command()(study)
+say_in_python(app)

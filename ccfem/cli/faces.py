@@ -1,6 +1,5 @@
 """What ``ccfem faces`` does: the smooth faces of a body listed, and drawn with their numbers."""
 
-from collections.abc import Sequence
 from pathlib import Path
 
 import numpy as np
@@ -8,16 +7,13 @@ from rich.console import Console
 from rich.table import Table
 
 from ccfem.arrays import FloatArray, IntArray
-from ccfem.cases.reading import read
-from ccfem.errors import InputError
-from ccfem.io.mesh_file import read_mesh
-from ccfem.io.surface import is_surface, read_surface
-from ccfem.mesh.smooth_faces import FEATURE_ANGLE, Face, given_faces, smooth_faces
-from ccfem.meshing.cad import is_cad, read_cad
+from ccfem.inspection.body_faces import faces as faces_of
+from ccfem.mesh.smooth_faces import Face
+from ccfem.meshing.cad import is_cad
 from ccfem.plot.canvas import check_picture
 from ccfem.plot.part_views import Label, draw_part
 
-__all__ = ["faces_of", "list_faces"]
+__all__ = ["list_faces"]
 
 _COLOURS = ("#9ec1e3", "#f3c98b", "#a8d5a2", "#e3a9c0", "#c9b8e0", "#e8e08a", "#9fd6d2", "#d9b89c")
 _NAMED = 60
@@ -39,7 +35,8 @@ def list_faces(body: Path, angle: float, scale: float, picture: Path) -> None:
         File of the picture.
     """
     check_picture(picture)
-    points, triangles, faces, names = faces_of(body, angle, scale)
+    found = faces_of(body, angle, scale)
+    points, triangles, faces, names = found.points, found.triangles, found.faces, found.names
     columns = ("face", "area, mm^2", "what", "name")[: 4 if any(names) else 3]
     table = Table(box=None, padding=(0, 2, 0, 0))
     for column in columns:
@@ -60,35 +57,6 @@ def list_faces(body: Path, angle: float, scale: float, picture: Path) -> None:
         f"{len(faces)} faces{about}; picture: {picture}\n"
         'in a part file: [patches.NAME] with rule = "face", number = [1, 2]; lengths are mm'
     )
-
-
-def faces_of(
-    body: Path, angle: float = FEATURE_ANGLE, scale: float = 1.0
-) -> tuple[FloatArray, IntArray, Sequence[Face], tuple[str, ...]]:
-    """Points (n, 3) and outward triangles of a body, its faces, and their names in a CAD file."""
-    if is_cad(body):
-        cad = read_cad(body, scale)
-        points, triangles = cad.surface.points, cad.surface.triangles
-        rows = [np.flatnonzero(cad.face == k) for k in range(1, len(cad.names) + 1)]
-        faces = given_faces(points, triangles, [each for each in rows if len(each)])
-        return points, triangles, faces, cad.names
-    points, triangles = _boundary(body, scale)
-    return points, triangles, smooth_faces(points, triangles, angle), ()
-
-
-def _boundary(body: Path, scale: float) -> tuple[FloatArray, IntArray]:
-    """Points and outward triangles of a body's boundary."""
-    if is_surface(body):
-        surface = read_surface(body, scale)
-        return surface.points, surface.triangles
-    is_part = body.suffix in ("", ".toml")
-    if is_part and scale != 1.0:
-        raise InputError(
-            f"--scale is for surface and mesh files; got {scale:g} for the part '{body}': leave it "
-            "out, or scale in the part file"
-        )
-    mesh = read(str(body)).problem.mesh if is_part else read_mesh(body, scale)
-    return mesh.points, mesh.boundary
 
 
 def _label(points: FloatArray, triangles: IntArray, face: Face, number: int) -> Label:

@@ -24,7 +24,7 @@ def _new(
     force: _Force = False,
 ) -> None:
     """Write a part file for a body: its faces listed, a support and a load to be changed."""
-    from ccfem.cli.beginning import new_part
+    from ccfem.inspection.beginning import new_part
 
     written = new_part(body, out, force)
     print(f"{written}: change what is marked, then: ccfem check {written}")
@@ -38,10 +38,14 @@ def _example(
     force: _Force = False,
 ) -> None:
     """List the part files that come with ccfem, or write one of them here."""
-    from ccfem.cli.beginning import print_examples, write_example
+    import tomllib
+
+    from ccfem.inspection.beginning import examples, write_example
 
     if name is None:
-        print_examples()
+        for known, text in examples().items():
+            print(f"{known}  {tomllib.loads(text)['title']}")
+        print("ccfem example NAME writes NAME.toml here")
     else:
         written = write_example(name, out, force)
         print(f"{written}: try: ccfem check {written}")

@@ -11,8 +11,8 @@ from dataclasses import replace
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
-from ccfem.checks import check_known, member_name
-from ccfem.cli.arguments import names_of, numbers_of
+from ccfem.checks import member_name
+from ccfem.cli.arguments import numbers_of
 from ccfem.errors import InputError
 from ccfem.io.toml import assignment
 from ccfem.progress import Progress, progress_bar
@@ -23,7 +23,6 @@ if TYPE_CHECKING:
     from ccfem.comparison.slicings import SlicingComparison
 
 __all__ = [
-    "drawings_of",
     "foreign_stress",
     "layers_of",
     "load",
@@ -100,14 +99,6 @@ def slicings_of(text: str) -> tuple[str, ...]:
     from ccfem.layers.slicing import split
 
     return split(text)
-
-
-def drawings_of(text: str | None) -> tuple[str, ...]:
-    """Read the formats of drawings that are asked for."""
-    names = tuple(name.lower() for name in names_of(text or ""))
-    for name in names:
-        check_known("format of drawings", name, ("svg", "dxf"))
-    return names
 
 
 def foreign_stress(path: Path | None, unit: str | None) -> Any:

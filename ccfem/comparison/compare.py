@@ -43,6 +43,7 @@ __all__ = [
     "ForeignStress",
     "compare",
     "create_all",
+    "otherwise_held",
     "solve_and_slice",
 ]
 
@@ -355,13 +356,13 @@ def _solved(
     alternative = None
     if case.alternative_supports:
         with timed(seconds, "solve, alternative supports"):
-            alternative = _otherwise_held(case, field, backend)
+            alternative = otherwise_held(case, field, backend)
     with timed(seconds, "specimens"):
         tests = Tests.of(field, alternative, strand, backend)
     return Solved(case, field, given, tests), seconds
 
 
-def _otherwise_held(case: Case, field: StressField, backend: str) -> StressField:
+def otherwise_held(case: Case, field: StressField, backend: str) -> StressField:
     """Solution of the same load case under the alternative supports."""
     loads = {field.case: field.problem.loads[field.case]}
     supports = case.alternative_supports

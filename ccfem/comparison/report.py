@@ -23,7 +23,7 @@ from ccfem.elasticity.stress_field import about_cells
 from ccfem.evaluation import COLUMNS
 from ccfem.inspection import check
 from ccfem.plot.colours import palette
-from ccfem.report.page import page
+from ccfem.report.filling import filled_page
 from ccfem.virtual_testing.stiffer import HONEST_PROMISE
 
 __all__ = ["report_html"]
@@ -104,7 +104,7 @@ def report_html(
         "versions": {"ccfem": record["ccfem"], **record["versions"]},
         "made": record["made"],
     }
-    return page(context, data)
+    return filled_page(context, data)
 
 
 def _facts(comparison: Comparison | SlicingComparison, record: Mapping[str, Any]) -> list[str]:

@@ -2,10 +2,12 @@
 
 from collections.abc import Mapping
 from dataclasses import dataclass
+from pathlib import Path
 from typing import TYPE_CHECKING
 
 from ccfem.arrays import freeze
 from ccfem.cases.case import Case
+from ccfem.checks import check_known
 from ccfem.comparison.curve import Curve
 from ccfem.comparison.ranking import ranking
 from ccfem.comparison.remarks import remarks
@@ -13,13 +15,17 @@ from ccfem.comparison.runs import Run
 from ccfem.comparison.summary import summary_html, summary_text
 from ccfem.comparison.table import frame
 from ccfem.comparison.verdict import verdict
+from ccfem.comparison.views import front_picture, layer_view, shown_layer, told
 from ccfem.elasticity.part_stress import GivenStress, PartStress
 from ccfem.elasticity.stress_field import StressField
 from ccfem.fibre_aware.upper_bound import UpperBound
 from ccfem.layers import Layer
+from ccfem.plot.scenes import View, show
+from ccfem.plot.values import image
 
 if TYPE_CHECKING:
     import pandas as pd
+    from matplotlib.figure import Figure
 
 __all__ = ["Comparison"]
 
@@ -79,7 +85,47 @@ class Comparison:
         return summary_text(self.ranking, " ".join(self.verdicts))
 
     def _repr_html_(self) -> str:
-        return summary_html(self.ranking, " ".join(self.verdicts))
+        page = summary_html(self.ranking, " ".join(self.verdicts)) + told(self.remarks)
+        return page + image(self.plot()) if self.succeeded else page
+
+    def plot(self) -> "Figure":
+        """Draw the paths of all strategies on the middle one of the layers with fibre."""
+        return self.plot_layer(shown_layer(self.succeeded, self.layers))
+
+    def plot_layer(self, index: int) -> "Figure":
+        """Draw the paths of all strategies on one layer, on the tension there.
+
+        Parameters
+        ----------
+        index : int
+            Of the layer (`Layer.index`): the first one is 0.
+        """
+        machine = self.case.machine
+        return layer_view(self.succeeded, self.layers, self.planned_on, machine, index)
+
+    def pareto(self, over: str = "fibre_length") -> "Figure":
+        """Draw stiffness over another index, and the runs that no other printable one dominates.
+
+        Parameters
+        ----------
+        over : {"fibre_length", "print_time_nearest", "first_failure_load"}
+        """
+        return front_picture(self.succeeded, over)
+
+    def show(self, strategy: str | None = None, picture: str | Path | None = None) -> View | None:
+        """Show the paths of one strategy in the part, in a window, a notebook, or as a picture.
+
+        Parameters
+        ----------
+        strategy : str, optional
+            By default the best one.
+        picture : path, optional
+            Write the view to a file (.png) instead.
+        """
+        runs = {run.name: run for run in self.ranking if len(run.toolpaths)}
+        name = next(iter(runs), "") if strategy is None else strategy
+        check_known("strategy with paths", name, runs)
+        return show((runs[name].toolpaths, *self.layers[:1]), picture)
 
     @property
     def succeeded(self) -> tuple[Run, ...]:

@@ -3,9 +3,10 @@
 import dataclasses
 from collections.abc import Mapping
 from dataclasses import dataclass, field
+from html import escape
 from typing import Any
 
-from ccfem.arrays import freeze
+from ccfem.arrays import freeze, in_brief
 from ccfem.evaluation import Evaluation
 from ccfem.export.print_plan import PrintPlan
 from ccfem.planning.strategy import Strategy
@@ -55,6 +56,8 @@ class Tested:
     note: str = ""
     matrix_before: float = float("nan")
     alternative: "Tested | None" = None
+
+    __repr__ = in_brief
 
 
 @dataclass(frozen=True)
@@ -116,6 +119,15 @@ class Run:
         if self.tested is None:
             return f"Run {self.name!r}: {laid}"
         return f"Run {self.name!r}: {laid}, {self.tested.bracket.tension.ratio:.2f} times as stiff"
+
+    def _repr_html_(self) -> str:
+        remarks = (self.note, self.why_not, self.untested)
+        lines = [f"<p>{escape(line)}</p>" for line in (repr(self), *remarks) if line]
+        return "".join(lines) + (self.toolpaths._repr_html_() if len(self.toolpaths) else "")
+
+    def plot(self, layer: int | None = None) -> Any:
+        """Draw the paths of one layer, by default of the one with most fibre."""
+        return self.toolpaths.plot(layer=layer)
 
     @property
     def length(self) -> float:

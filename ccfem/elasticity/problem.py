@@ -7,6 +7,7 @@ from typing import Literal
 import numpy as np
 
 from ccfem.arrays import FloatArray, IntArray, freeze
+from ccfem.display import Shown
 from ccfem.elasticity.load_kinds import (
     Bearing,
     Force,
@@ -63,7 +64,7 @@ class Region:
 
 
 @dataclass(frozen=True)
-class Problem:
+class Problem(Shown):
     """A linear elastic part with its supports and loads; one that exists can be solved on.
 
     Attributes

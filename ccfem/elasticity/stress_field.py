@@ -8,6 +8,7 @@ import numpy as np
 
 from ccfem.arrays import FloatArray, freeze, read_only
 from ccfem.checks import check_number
+from ccfem.display import Shown
 from ccfem.elasticity.error_estimate import ErrorEstimate, estimate_error
 from ccfem.elasticity.nodes import patch_nodes
 from ccfem.elasticity.order import about_error
@@ -66,7 +67,7 @@ class SolveRecord:
 
 
 @dataclass(frozen=True)
-class StressField:
+class StressField(Shown):
     """Displacement and stress of one load case.
 
     Attributes

@@ -7,6 +7,7 @@ from typing import TYPE_CHECKING, NamedTuple
 import numpy as np
 
 from ccfem.arrays import FloatArray, IntArray, freeze
+from ccfem.display import Shown
 from ccfem.elasticity.part_stress import PartStress
 from ccfem.errors import InputError
 from ccfem.evaluation import (
@@ -92,7 +93,7 @@ class FibreSamples:
 
 
 @dataclass(frozen=True)
-class Evaluation:
+class Evaluation(Shown):
     """Every index of a set of paths.
 
     Totals are computed from the samples of all layers together: they are no means of the layers.

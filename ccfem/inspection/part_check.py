@@ -9,6 +9,7 @@ import numpy as np
 
 from ccfem.cases.case import Case
 from ccfem.cases.reading import read
+from ccfem.display import Shown
 from ccfem.elasticity.held import Held
 from ccfem.elasticity.load_kinds import patches_of
 from ccfem.elasticity.loads import load_case
@@ -31,7 +32,7 @@ _ALL, _SOME = 1.0 - 1e-9, 0.02
 
 
 @dataclass(frozen=True)
-class Check:
+class Check(Shown):
     """A part before it is solved.
 
     Attributes
@@ -63,6 +64,12 @@ class Check:
         if not self.mistakes:
             lines.append("nothing keeps this part from being solved")
         return "\n".join(line.rstrip() for line in lines)
+
+    def __repr__(self) -> str:
+        return (
+            f"Check of {self.case.name!r}: {len(self.patches)} patches, {len(self.loads)} loads, "
+            f"{len(self.warnings)} warnings, {len(self.mistakes)} mistakes"
+        )
 
     def _repr_html_(self) -> str:
         from html import escape

@@ -8,6 +8,7 @@ import numpy as np
 import shapely
 
 from ccfem.arrays import FloatArray, IntArray, freeze, read_only
+from ccfem.display import Shown
 from ccfem.errors import InputError
 from ccfem.geometry.shapes import Region
 from ccfem.layers.plane import Plane
@@ -17,7 +18,7 @@ __all__ = ["FlatLayer", "Layer"]
 
 
 @dataclass(frozen=True)
-class Layer:
+class Layer(Shown):
     """A layer of the part, flat or curved.
 
     Attributes

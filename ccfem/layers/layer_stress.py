@@ -3,6 +3,7 @@
 from dataclasses import dataclass
 
 from ccfem.arrays import FloatArray, freeze
+from ccfem.display import Shown
 from ccfem.elasticity.part_stress import PartStress
 from ccfem.layers.layer import Layer
 from ccfem.tensor import in_axes
@@ -11,7 +12,7 @@ __all__ = ["LayerStress", "stress_on"]
 
 
 @dataclass(frozen=True)
-class LayerStress:
+class LayerStress(Shown):
     """Stress on a layer.
 
     Attributes

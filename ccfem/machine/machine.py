@@ -2,6 +2,7 @@
 
 from dataclasses import dataclass, field, fields
 
+from ccfem.arrays import in_brief
 from ccfem.checks import check_fields
 from ccfem.machine.gcode_profile import GcodeProfile
 from ccfem.machine.limits import Limits
@@ -90,6 +91,8 @@ class Machine:
     head_length: float = 40.0
     gcode: GcodeProfile = field(default_factory=GcodeProfile)
     limits: Limits = field(default_factory=Limits)
+
+    __repr__ = in_brief
 
     def __post_init__(self) -> None:
         check_fields(self, "fibre_width", "matrix_width", "matrix_diameter", above=0.0, unit="mm")

@@ -6,6 +6,7 @@ from functools import cached_property
 import numpy as np
 
 from ccfem.arrays import FloatArray, IntArray, read_only
+from ccfem.display import Shown
 from ccfem.errors import InputError
 from ccfem.mesh.cell_mesh import CellMesh
 from ccfem.mesh.facets import positions, unique_edges
@@ -23,7 +24,7 @@ _EDGES = np.array([[0, 1], [1, 2], [0, 2], [0, 3], [1, 3], [2, 3]])
 
 
 @dataclass(frozen=True, repr=False)
-class TetMesh(CellMesh):
+class TetMesh(CellMesh, Shown):
     """A tetrahedral mesh, linear (P1) or quadratic (P2), with named boundary patches.
 
     Attributes

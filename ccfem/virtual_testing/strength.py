@@ -10,7 +10,7 @@ from dataclasses import dataclass, field, replace
 
 import numpy as np
 
-from ccfem.arrays import FloatArray, freeze
+from ccfem.arrays import FloatArray, freeze, in_brief
 from ccfem.elasticity.stress_field import StressField
 from ccfem.errors import InputError
 from ccfem.layers import Layer
@@ -76,6 +76,8 @@ class FirstFailure:
     sliding: float = np.nan
     interlayer_zones: tuple[float, ...] = ()
     note: str = ""
+
+    __repr__ = in_brief
 
     def __post_init__(self) -> None:
         freeze(self, where=float, interlayer_where=float)

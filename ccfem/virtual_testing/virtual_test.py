@@ -7,6 +7,7 @@ from time import perf_counter
 import numpy as np
 
 from ccfem.arrays import FloatArray, freeze, in_brief
+from ccfem.display import Shown
 from ccfem.elasticity.stress_field import SolveRecord, StressField
 from ccfem.machine.machine import Machine
 from ccfem.toolpaths import Toolpaths
@@ -22,7 +23,7 @@ _SPAN_TOLERANCE = 1e-3
 
 
 @dataclass(frozen=True)
-class VirtualTest:
+class VirtualTest(Shown):
     """What a set of fibre paths does to a part under one load case.
 
     Attributes
@@ -93,6 +94,8 @@ class Bracket:
 
     tension: VirtualTest
     bonded: VirtualTest
+
+    __repr__ = in_brief
 
 
 def virtual_test(

@@ -30,6 +30,7 @@ def _section(name: str, command: Any) -> str:
     shown = [w if a.required else f"[{w}]" for w, a in zip(words, arguments, strict=True)]
     usage = " ".join(["ccfem", name, *shown])
     text = f"## {name}\n\n    {usage}{' [options]' if options else ''}\n\n{command.help}\n\n"
+    text += f"{command.epilog}\n\n" if command.epilog else ""
     rows = [(f"`{word}`", "", each.help or "") for word, each in zip(words, arguments, strict=True)]
     rows += [(_flags(each), _default(each), each.help or "") for each in options]
     return text + (table(("argument or option", "default", "meaning"), rows) if rows else "")

@@ -7,10 +7,10 @@ from typing import Any
 
 from ccfem.report.packing import compressed, pack
 
-__all__ = ["page"]
+__all__ = ["filled_page"]
 
 
-def page(context: Mapping[str, Any], data: Mapping[str, Any]) -> str:
+def filled_page(context: Mapping[str, Any], data: Mapping[str, Any]) -> str:
     """Fill the template of the report.
 
     Parameters

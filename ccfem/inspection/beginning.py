@@ -1,5 +1,6 @@
-"""What ``ccfem new`` and ``ccfem example`` do: part files to start from."""
+"""Part files to start from: one for a body, and examples."""
 
+import os
 from collections.abc import Sequence
 from importlib.resources import files
 from pathlib import Path
@@ -7,20 +8,22 @@ from pathlib import Path
 import numpy as np
 
 from ccfem.checks import check_known
-from ccfem.cli.faces import faces_of
 from ccfem.errors import InputError
+from ccfem.inspection.body_faces import faces as faces_of
 from ccfem.io.surface import is_surface
 from ccfem.io.whole import existing_file, whole_file
 from ccfem.mesh.smooth_faces import Face
 from ccfem.meshing.cad import is_cad
 
-__all__ = ["new_part", "print_examples", "write_example"]
+__all__ = ["examples", "new_part", "write_example"]
 
 _LISTED = 40
 """Faces that are listed in a new part file."""
 
 
-def new_part(body: Path, out: Path | None, force: bool) -> Path:
+def new_part(
+    body: str | os.PathLike[str], out: str | os.PathLike[str] | None = None, force: bool = False
+) -> Path:
     """Write a part file for a body: its faces listed, a support and a load to be changed.
 
     The largest plane that faces down is held, and the face farthest from it is pulled away from it
@@ -28,9 +31,9 @@ def new_part(body: Path, out: Path | None, force: bool) -> Path:
 
     Parameters
     ----------
-    body : Path
+    body : path
         Surface, CAD file or mesh.
-    out : Path, optional
+    out : path, optional
         Default the name of the body with ``.toml``, in the current folder.
     force : bool
         Replace a file that is there.
@@ -45,14 +48,16 @@ def new_part(body: Path, out: Path | None, force: bool) -> Path:
     InputError
         Where the body cannot be read, or the file is there.
     """
+    body = Path(body)
     if body.suffix in ("", ".toml"):
         raise InputError(
             f"ccfem new takes a body, such as lever.stl or lever.step; got '{body}': name its file"
         )
     existing_file(body, "the body")
-    out = Path(f"{body.stem}.toml") if out is None else out
+    out = Path(f"{body.stem}.toml" if out is None else out)
     _refuse_present(out, force)
-    points, _, faces, names = faces_of(body)
+    found = faces_of(body)
+    points, faces, names = found.points, found.faces, found.names
     edge = float(np.linalg.norm(np.ptp(points, axis=0))) / 25.0
     held = max(
         range(len(faces)),
@@ -138,27 +143,20 @@ def _text(
     )
 
 
-def _examples() -> dict[str, str]:
-    """Text of each example by its name."""
+def examples() -> dict[str, str]:
+    """Return the text of each example by its name."""
     found = files("ccfem.cases").joinpath("examples").iterdir()
     texts = {each.name: each.read_text(encoding="utf-8") for each in found}
     return {k.removesuffix(".toml"): texts[k] for k in sorted(texts) if k.endswith(".toml")}
 
 
-def print_examples() -> None:
-    """Print the names of the examples, with the title of each."""
-    import tomllib
-
-    for name, text in _examples().items():
-        print(f"{name}  {tomllib.loads(text)['title']}")
-    print("ccfem example NAME writes NAME.toml here")
-
-
-def write_example(name: str, out: Path | None, force: bool) -> Path:
+def write_example(
+    name: str, out: str | os.PathLike[str] | None = None, force: bool = False
+) -> Path:
     """Write an example to a file, by default NAME.toml; returns its path."""
-    texts = _examples()
+    texts = examples()
     check_known("example", name, texts)
-    out = Path(f"{name}.toml") if out is None else out
+    out = Path(f"{name}.toml" if out is None else out)
     _refuse_present(out, force)
     with whole_file(out) as temporary:
         temporary.write_text(texts[name], encoding="utf-8")

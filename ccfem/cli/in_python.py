@@ -1,0 +1,31 @@
+"""The call in Python that does what a command does, said by the help of each."""
+
+import typer
+
+__all__ = ["CALLS", "say_in_python"]
+
+CALLS = {
+    "cases": "ccfem.cases.named_cases()",
+    "strategies": "ccfem.strategies.named()",
+    "slicers": "ccfem.layers.slicing.named()",
+    "faces": "ccfem.faces(BODY)",
+    "check": "ccfem.check(CASE)",
+    "mesh": "ccfem.meshing.mesh_body(BODY, SIZE)",
+    "compare": "ccfem.compare(CASE, [A, B]), and ccfem.save(comparison, DIR)",
+    "plan": "ccfem.compare(CASE, [S], natural=True), or ccfem.plan(STRATEGY, LAYERS, STRESS)",
+    "solve": "ccfem.solve(CASE.problem)",
+    "calibrate": "ccfem.calibrate(PROBLEM, CURVE)",
+    "new": "ccfem.inspection.new_part(BODY)",
+    "example": "ccfem.inspection.write_example(NAME)",
+    "cite": "ccfem.comparison.bibtex(ccfem.comparison.cited([METHOD]))",
+    "study": "ccfem.study(FILE, workers=N)",
+}
+"""Call of each command, as its help prints it."""
+
+
+def say_in_python(app: typer.Typer) -> None:
+    """Let the help of each command end with its call."""
+    for command in app.registered_commands:
+        name = command.name or (command.callback.__name__ if command.callback else "")
+        if name in CALLS:
+            command.epilog = f"In Python: {CALLS[name]}"

@@ -1,0 +1,31 @@
+"""Fronts: runs of which none is better in one thing without being worse in another."""
+
+import numpy as np
+
+from ccfem.arrays import BoolArray, FloatArray
+
+__all__ = ["on_front"]
+
+
+def on_front(across: FloatArray, up: FloatArray, better: str = "low") -> BoolArray:
+    """Points that no other one dominates: none is as good in both and better in one.
+
+    Parameters
+    ----------
+    across, up : (n,) arrays
+        The second is better where it is high. Points with NaN are on no front.
+    better : {"low", "high"}
+        Which end of the first is better.
+
+    Examples
+    --------
+    >>> on_front(np.array([1.0, 2.0, 3.0, 2.0]), np.array([1.0, 3.0, 2.0, 2.0])).tolist()
+    [True, True, False, False]
+    """
+    cost = np.asarray(across, dtype=float) * (1.0 if better == "low" else -1.0)
+    gain = np.asarray(up, dtype=float)
+    known = np.isfinite(cost) & np.isfinite(gain)
+    as_good = (cost[:, None] <= cost) & (gain[:, None] >= gain)
+    better_in_one = (cost[:, None] < cost) | (gain[:, None] > gain)
+    dominated = (as_good & better_in_one & known[:, None]).any(axis=0)
+    return known & ~dominated

@@ -1,0 +1,108 @@
+"""What a comparison shows of itself: the paths of a layer, fronts, and a page for notebooks."""
+
+from collections.abc import Mapping, Sequence
+from dataclasses import replace
+from html import escape
+from typing import TYPE_CHECKING
+
+import numpy as np
+
+from ccfem.comparison.front import on_front
+from ccfem.comparison.headline import headline_values
+from ccfem.comparison.runs import Run
+from ccfem.elasticity.part_stress import PartStress
+from ccfem.errors import InputError
+from ccfem.fields.chart import flat_view, in_charts
+from ccfem.layers import Layer
+from ccfem.layers.layer_stress import stress_on
+from ccfem.machine.machine import Machine
+
+if TYPE_CHECKING:
+    from matplotlib.figure import Figure
+
+__all__ = ["FRONTS", "front_picture", "layer_view", "shown_layer", "told"]
+
+FRONTS: Mapping[str, tuple[str, str]] = {
+    "fibre_length": ("fibre, mm", "low"),
+    "print_time_nearest": ("print time, s", "low"),
+    "first_failure_load": ("first failure, N", "high"),
+}
+"""What stiffness is drawn over: its title, and which end of it is better."""
+
+
+def shown_layer(runs: Sequence[Run], layers: Sequence[Layer]) -> int:
+    """Index of the layer that shows most: the middle one of those with fibre of any run."""
+    laid = sorted({int(k) for run in runs for k in np.unique(run.toolpaths.layer)})
+    if laid:
+        return laid[len(laid) // 2]
+    if not layers:
+        raise InputError("there is no layer to draw: slice the part into at least one")
+    return layers[len(layers) // 2].index
+
+
+def layer_view(
+    runs: Sequence[Run],
+    layers: Sequence[Layer],
+    stress: PartStress,
+    machine: Machine,
+    index: int,
+) -> "Figure":
+    """Draw the paths of all runs on one layer, side by side, on the tension there.
+
+    Raises
+    ------
+    InputError
+        Where there is no such layer, and where no run has paths.
+    """
+    from ccfem.plot.paths import compare_layer
+
+    by_index = {layer.index: layer for layer in layers}
+    if index not in by_index:
+        raise InputError(
+            f"there is no layer {index}; layers are {min(by_index)} to {max(by_index)}: choose one"
+        )
+    if not runs:
+        raise InputError("no strategy could plan this part: see why in .frame['failure']")
+    flat = flat_view(by_index[index])
+    runs = [replace(run, toolpaths=in_charts(run.toolpaths, layers)) for run in runs]
+    captions = {}
+    for run in runs:
+        there = run.toolpaths.on_layer(index)
+        captions[run.name] = f"{there.lengths.sum():.0f} mm in {len(there)} paths"
+    paths = {run.name: run.toolpaths for run in runs}
+    return compare_layer(flat, stress_on(flat, stress), paths, machine.fibre_width, captions)
+
+
+def front_picture(runs: Sequence[Run], over: str) -> "Figure":
+    """Draw stiffness over another index, a point a run; the front of what is printable joined.
+
+    Raises
+    ------
+    InputError
+        For an unknown index, and runs without a virtual test.
+    """
+    from ccfem.plot.fronts import FrontPoint, front_figure
+
+    if over not in FRONTS:
+        raise InputError(f"fronts are drawn over {', '.join(FRONTS)}; got {over!r}: choose one")
+    values = [headline_values(run) for run in runs]
+    known = [
+        (run, found)
+        for run, found in zip(runs, values, strict=True)
+        if "stiffness" in found and over in found
+    ]
+    if not known:
+        raise InputError(f"no run has stiffness and {over}: compare with the virtual test")
+    title, better = FRONTS[over]
+    across = np.array([found[over] if run.printable else np.nan for run, found in known])
+    best = on_front(across, np.array([found["stiffness"] for _, found in known]), better)
+    points = [
+        FrontPoint(run.name, found[over], found["stiffness"], bool(chosen), run.printable, run.name)
+        for (run, found), chosen in zip(known, best, strict=True)
+    ]
+    return front_figure({"": points}, title, "stiffness, N/mm")
+
+
+def told(remarks: Sequence[str]) -> str:
+    """Remarks as HTML, a paragraph each."""
+    return "".join(f"<p>{escape(line)}</p>" for line in remarks)

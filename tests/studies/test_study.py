@@ -1,0 +1,189 @@
+"""A study run by processes, killed and resumed, and by Dask: always the same table."""
+
+import multiprocessing
+import os
+import signal
+import time
+from dataclasses import dataclass
+from typing import ClassVar
+
+import pandas as pd
+import pytest
+
+import ccfem
+from ccfem.errors import InputError
+from ccfem.planning import Amount
+from ccfem.studies.store import opened
+
+CELL = """
+from dataclasses import dataclass
+from typing import ClassVar
+import ccfem
+from ccfem.planning import Amount
+
+@dataclass(frozen=True)
+class Rows:
+    spacing: float = 5.0
+    amount: ClassVar[Amount] = Amount("spacing", 1.0, 20.0)
+
+    def __call__(self, layer, stress, machine):
+        return lines(self.spacing)(layer, stress, machine)
+
+def lines(spacing):
+    return ccfem.strategies.Zigzag(spacing, angle=0.0)
+
+@dataclass(frozen=True)
+class Middle:
+    def __call__(self, stress, build, machine):
+        return ccfem.layers.slicing.Planar(count=1)(stress, build, machine)
+"""
+NOTEBOOK = {"__name__": "__main__"}
+exec(CELL, NOTEBOOK)
+
+STUDY = ccfem.Study(
+    name="tiny",
+    parts=({"name": "bar", "element_size": 12.5},),
+    slicings=(NOTEBOOK["Middle"](),),
+    strategies=(
+        NOTEBOOK["Rows"](),
+        {"name": "zigzag", "sweep": {"spacing": [3.0, 4.0, 5.0, 6.0], "angle": [0.0, 45.0]}},
+    ),
+)
+
+
+@dataclass(frozen=True)
+class Raising:
+    """Raises what no strategy should."""
+
+    spacing: float = 1.0
+    amount: ClassVar[Amount] = Amount("spacing", 1.0, 20.0)
+
+    def __call__(self, layer, stress, machine):
+        raise RuntimeError("no paths <today>")
+
+
+def count(folder):
+    return len(list(folder.glob("runs/[!.]*.json")))
+
+
+@pytest.fixture(scope="module")
+def disturbed(tmp_path_factory):
+    """The study, killed after its first run was stored, and resumed; with what was told."""
+    folder, told = tmp_path_factory.mktemp("study") / "out", []
+    started = multiprocessing.get_context("fork").Process(
+        target=ccfem.study, args=(STUDY, folder), kwargs={"workers": 1}
+    )
+    started.start()
+    until = time.monotonic() + 120.0
+    while not count(folder) and started.is_alive() and time.monotonic() < until:
+        time.sleep(0.002)
+    os.kill(started.pid, signal.SIGKILL)
+    started.join()
+    before = count(folder)
+    result = ccfem.study(STUDY, folder, workers=0, progress=lambda *said: told.append(said))
+    return result, before, told
+
+
+@pytest.fixture(scope="module")
+def cluster():
+    distributed = pytest.importorskip("distributed")
+    options = {"processes": False, "threads_per_worker": 2, "dashboard_address": None}
+    with distributed.LocalCluster(n_workers=1, **options) as found:
+        yield found.scheduler_address
+
+
+def test_a_killed_study_goes_on_where_it_was(disturbed):
+    result, before, told = disturbed
+    assert before >= 1
+    assert result.computed == 9 - before
+    assert count(result.folder) == 9
+    assert not list(result.folder.glob("**/.*.json"))
+    assert not (result.folder / ".stress").exists()
+    if before < 9:
+        assert told[-1][0].startswith("9 of 9 runs, about 0 s left: ")
+    assert told[-1][1] == 1.0
+
+
+def test_dask_gives_the_same_table_to_the_last_digit(disturbed, cluster, tmp_path):
+    result, *_ = disturbed
+    other = ccfem.study(STUDY, tmp_path / "out", scheduler=cluster)
+    pd.testing.assert_frame_equal(result.frame, other.frame, check_exact=True)
+    assert other.computed == 9
+    for name in ("results.csv", "results.parquet"):
+        assert (tmp_path / "out" / name).read_bytes() == (result.folder / name).read_bytes()
+
+
+def test_a_strategy_and_a_slicer_of_a_notebook_run_in_other_processes(disturbed):
+    result, *_ = disturbed
+    assert not result.frame["failure"].any()
+    assert result.frame["slicing"].unique().tolist() == ["middle"]
+    row = result.frame.iloc[0]
+    assert row["strategy"] == "rows"
+    case = ccfem.read("bar", element_size=12.5)
+    zigzag = ccfem.strategies.Zigzag(5.0, angle=0.0)
+    own = ccfem.compare(case, [zigzag], layers=1, natural=True, strand=None).runs[0]
+    assert row["fibre_length"] == pytest.approx(own.evaluation.total["fibre_length"], rel=1e-12)
+
+
+def test_the_numbers_are_those_of_a_comparison(disturbed):
+    result, *_ = disturbed
+    case = ccfem.read("bar", element_size=12.5)
+    zigzag = ccfem.strategies.Zigzag(spacing=4.0)
+    own = ccfem.compare(case, [zigzag], layers=1, natural=True, curve=False).frame.iloc[0]
+    row = result.frame[result.frame["strategy"] == "zigzag"].iloc[3]  # 4 mm, 45 degrees
+    for name in ("stiffness", "first_failure_load", "fibre_length", "efficiency"):
+        assert row[name] == pytest.approx(own[name], rel=1e-9)
+
+
+def test_tables_fronts_and_the_page(disturbed):
+    result, *_ = disturbed
+    for name, read in (("results.csv", pd.read_csv), ("results.parquet", pd.read_parquet)):
+        table = read(result.folder / name)
+        assert table["stiffness"].tolist() == pytest.approx(result.frame["stiffness"].tolist())
+    front = result.front()
+    assert 1 <= len(front) < 9
+    best = result.frame.loc[result.frame["stiffness"].idxmax()]
+    assert best["run"] in set(front["run"])
+    page = (result.folder / "study.html").read_text()
+    assert page.count("<tr>") == 10
+    assert page.count("data:image/png;base64,") == 3
+    assert "http" not in page
+    assert "<table" in result._repr_html_()
+    assert len(repr(result)) < 200
+    with pytest.raises(InputError, match="choose one"):
+        result.front("colour")
+
+
+def test_failures_stay_and_what_changed_is_run_alone(disturbed, cluster):
+    result, *_ = disturbed
+    strategies = (
+        *STUDY.strategies,
+        Raising(),
+        {"name": "zigzag", "sweep": {"spacing": [3.0, 19.0]}},
+    )
+    more = ccfem.Study(
+        **{
+            **{name: getattr(STUDY, name) for name in ("name", "parts", "slicings")},
+            "strategies": strategies,
+        }
+    )
+    again = ccfem.study(more, result.folder, scheduler=cluster)
+    assert len(again.frame) == 11
+    assert again.repeated == 1  # spacing 3 at the default angle
+    assert again.computed == 2
+    failed = again.frame[again.frame["failure"] != ""]
+    assert failed["failure"].iloc[0] == "RuntimeError: no paths <today>"
+    assert "no paths &lt;today&gt;" in (result.folder / "study.html").read_text()
+    assert any("raising on bar" in line for line in again.remarks)
+    # A crash is tried again, a refusal is not.
+    assert ccfem.study(more, result.folder, scheduler=cluster).computed == 1
+
+
+def test_one_program_at_a_time_and_no_folder_of_others(tmp_path):
+    with opened(tmp_path / "a"), pytest.raises(InputError, match="another program runs a study"):
+        ccfem.study(STUDY, tmp_path / "a")
+    (tmp_path / "b").mkdir()
+    (tmp_path / "b" / "thesis.tex").write_text("mine")
+    with pytest.raises(InputError, match=r"holds files of something else, such as thesis.tex"):
+        ccfem.study(STUDY, tmp_path / "b")
+    assert [path.name for path in (tmp_path / "b").iterdir()] == ["thesis.tex"]
