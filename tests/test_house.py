@@ -102,3 +102,36 @@ def test_no_name_twice_for_two_ideas():
         if path.stem != "__init__":
             named[path.stem].append(name)
     assert {stem for stem, those in named.items() if len(those) > 1} == set(TWICE)
+
+
+REDUCTIONS = ("sum", "min", "max", "any", "all", "argmin", "argmax", "mean")
+
+
+def slow_to_compile(function):
+    """What a compiled function does that takes long to compile."""
+    for node in ast.walk(function):
+        targets = getattr(node, "targets", [getattr(node, "target", None)])
+        if isinstance(node, ast.Assign | ast.AugAssign) and any(
+            isinstance(part, ast.Slice) for target in targets for part in ast.walk(target)
+        ):
+            yield f"assigns to a slice: {ast.unparse(node)}"
+        called = node.func if isinstance(node, ast.Call) else None
+        if isinstance(called, ast.Attribute) and called.attr in REDUCTIONS:
+            yield f"reduces an array: {ast.unparse(node)}"
+
+
+def test_slow_to_compile_is_found():
+    text = "def f(a):\n    a[:] = 0.0\n    return a.max() + np.argmin(a)"
+    assert len(list(slow_to_compile(ast.parse(text)))) == 3
+
+
+def test_compiled_functions_work_number_by_number():
+    """Error messages for shapes that do not fit, say, are compiled too: that takes seconds."""
+    found = []
+    for name, path in modules().items():
+        for node in ast.walk(ast.parse(path.read_text(encoding="utf-8"))):
+            if isinstance(node, ast.FunctionDef) and any(
+                "njit" in ast.unparse(decorator) for decorator in node.decorator_list
+            ):
+                found += [f"{name}.{node.name} {what}" for what in slow_to_compile(node)]
+    assert not found

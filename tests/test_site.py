@@ -17,8 +17,7 @@ from ccfem.cases.part_loads import LOADS, SUPPORTS
 from ccfem.cases.part_tables import RULES
 from ccfem.cli.commands import app
 from ccfem.evaluation import COLUMNS
-from ccfem.io.toml import from_table
-from ccfem.machine import Machine
+from ccfem.machine import Machine, machine_from
 from ccfem.virtual_testing.force_displacement import read_curve
 
 ROOT = Path(__file__).parents[1]
@@ -61,7 +60,7 @@ def test_the_curve_of_the_calibration_page_reads(tmp_path):
 
 def test_the_machine_of_the_printing_page_reads():
     (text,) = fenced(ROOT / "docs/how_to/printing.md", "toml")
-    machine = from_table(Machine, tomllib.loads(text)["machine"], "machine")
+    machine = machine_from(tomllib.loads(text)["machine"])
     assert machine.matrix_height == 0.4
 
 
@@ -72,7 +71,10 @@ def test_groups_of_gmsh_are_patches(tmp_path):
     (geometry,), (part,) = fenced(page, "text"), fenced(page, "toml")
     (tmp_path / "beam.geo").write_text(geometry)
     (tmp_path / "beam.toml").write_text(part)
-    gmsh.initialize(["gmsh", "-v", "1"], readConfigFiles=False, interruptible=False)
+    try:
+        gmsh.initialize(["gmsh", "-v", "1"], readConfigFiles=False, interruptible=False)
+    except (AttributeError, OSError):
+        pytest.skip("the library of Gmsh is missing")
     try:
         gmsh.open(str(tmp_path / "beam.geo"))
         gmsh.model.mesh.generate(3)

@@ -1,15 +1,16 @@
-"""Solids that two extrusions at right angles have in common: what bolts from two sides hold."""
+"""Solids that extrusions at right angles have in common: what bolts from several sides hold."""
 
 import json
 from collections.abc import Mapping
 from contextlib import chdir
 from pathlib import Path
 from tempfile import TemporaryDirectory
+from typing import Any
 
 import numpy as np
 import shapely
 
-from ccfem.arrays import FloatArray
+from ccfem.arrays import FloatArray, IntArray
 from ccfem.mesh.check import check_mesh
 from ccfem.mesh.patches import PatchRule, patches_from_rules
 from ccfem.mesh.tet_mesh import TetMesh
@@ -30,19 +31,16 @@ def arc(x: float, y: float, radius: float, first: float, last: float) -> FloatAr
 
 
 def crossed_mesh(
-    front: shapely.Polygon,
-    top: shapely.Polygon,
+    outlines: Mapping[str, shapely.Polygon],
     element_size: float,
     rules: Mapping[str, PatchRule],
 ) -> TetMesh:
-    """Mesh of what two extrusions have in common; takes minutes.
+    """Mesh of what extrusions have in common; takes minutes.
 
     Parameters
     ----------
-    front : shapely Polygon, mm
-        Outline seen along z, in x and y.
-    top : shapely Polygon, mm
-        Outline seen along y, in x and z.
+    outlines : mapping of "x", "y" or "z" to shapely Polygon, mm
+        Two or three outlines, seen along these axes, each in the other two in alphabetical order.
     element_size : float, mm
         Target edge length.
     rules : mapping of patch name to PatchRule
@@ -54,20 +52,23 @@ def crossed_mesh(
     """
     import pytetwild
 
-    (_, low, _, high), (_, near, _, far) = front.bounds, top.bounds
-    deep, tall = far - near + 2.0 * _BEYOND, high - low + 2.0 * _BEYOND
-    one = extrude(front, deep, 2.0 * element_size)
-    other = extrude(top, tall, 2.0 * element_size)
-    # The planform of `top` lies in x and z, and is extruded along y.
-    upright = other.points @ np.array([[1.0, 0.0, 0.0], [0.0, 0.0, 1.0], [0.0, -1.0, 0.0]])
-    upright = upright + np.array([0.0, high + _BEYOND, 0.0])
+    low, high = _bounds(outlines)
     with TemporaryDirectory() as folder, chdir(folder):
-        _write_surface("front.stl", one.points + np.array([0.0, 0.0, near - _BEYOND]), one)
-        _write_surface("top.stl", upright, other)
-        tree = {"operation": "intersection", "left": "front.stl", "right": "top.stl"}
+        for axis, outline in outlines.items():
+            along = "xyz".index(axis)
+            tall = high[along] - low[along] + 2.0 * _BEYOND
+            body = extrude(outline, tall, 2.0 * element_size)
+            placed = np.empty_like(body.points)
+            placed[:, [k for k in range(3) if k != along]] = body.points[:, :2]
+            placed[:, along] = body.points[:, 2] + low[along] - _BEYOND
+            # Seen along y the first two axes change their sense, and so do the triangles.
+            _write_surface(f"{axis}.stl", placed, body.boundary[:, :: -1 if axis == "y" else 1])
+        first, *others = (f"{axis}.stl" for axis in outlines)
+        tree: Any = first
+        for other in others:
+            tree = {"operation": "intersection", "left": tree, "right": other}
         Path("tree.json").write_text(json.dumps(tree), encoding="utf-8")
-        width = max(front.bounds[2], top.bounds[2]) - min(front.bounds[0], top.bounds[0])
-        diagonal = float(np.linalg.norm([width, tall, deep]))
+        diagonal = float(np.linalg.norm(high - low + 2.0 * _BEYOND))
         grid = pytetwild.tetrahedralize_csg(
             "tree.json",
             epsilon=_TOLERANCE,
@@ -79,9 +80,20 @@ def crossed_mesh(
     return patches_from_rules(mesh, rules)
 
 
-def _write_surface(name: str, points: FloatArray, mesh: TetMesh) -> None:
-    """Write the boundary of a mesh, moved to other points, as STL."""
+def _bounds(outlines: Mapping[str, shapely.Polygon]) -> tuple[FloatArray, FloatArray]:
+    """Least and largest coordinates (3,) of what the extrusions have in common."""
+    low, high = np.full(3, -np.inf), np.full(3, np.inf)
+    for axis, outline in outlines.items():
+        across = [k for k in range(3) if k != "xyz".index(axis)]
+        ends = np.reshape(outline.bounds, (2, 2))
+        low[across] = np.maximum(low[across], ends[0])
+        high[across] = np.minimum(high[across], ends[1])
+    return low, high
+
+
+def _write_surface(name: str, points: FloatArray, triangles: IntArray) -> None:
+    """Write a closed surface as STL."""
     import pyvista
 
-    faces = np.column_stack([np.full(len(mesh.boundary), 3), mesh.boundary])
+    faces = np.column_stack([np.full(len(triangles), 3), triangles])
     pyvista.PolyData(points, faces.ravel()).save(name)

@@ -56,7 +56,7 @@ def lifting_eye_top() -> shapely.Polygon:
 
 def lifting_eye_mesh(element_size: float) -> TetMesh:
     """Mesh of what two extrusions have in common; takes minutes."""
-    return crossed_mesh(lifting_eye_front(), lifting_eye_top(), element_size, HOLES)
+    return crossed_mesh({"z": lifting_eye_front(), "y": lifting_eye_top()}, element_size, HOLES)
 
 
 def lifting_eye(

@@ -183,7 +183,8 @@ them with a minus ("-z"), or three numbers.
     pull = 1.5
     heat = 1.0
 
-    [machine]                         # what differs from ccfem.machine.machine.Machine
+    [machine]                         # what differs from ccfem.machine.machine.Machine, or from a
+    profile = "klipper"               # machine of ccfem machines
     minimum_length = 45.0
 
     [machine.speeds]                  # fibre speed by curvature, length and angle of a path's
@@ -194,6 +195,8 @@ them with a minus ("-z"), or three numbers.
 
     [machine.limits]                  # what differs from ccfem.machine.limits.Limits
     on_fibre = 0.05
+    [machine.process]                 # what differs from ccfem.machine.print_process.Process
+    start_speed = 3.0                 # mm/s
     [machine.gcode]                   # what differs from ccfem.machine.gcode_profile.GcodeProfile
     cut = ["M42 P4 S255", "G4 P{wait}", "M42 P4 S0"]
     bed = [250, 210, 200]             # mm
@@ -231,6 +234,7 @@ from ccfem.layers import slicing as slicers
 from ccfem.layers.slicer import Slicer
 from ccfem.layers.slicing.planar import Planar
 from ccfem.machine.machine import Machine
+from ccfem.machine.named_machines import machine_from
 from ccfem.materials import Material
 from ccfem.mesh.face_rules import without_faces
 from ccfem.mesh.patch_findings import about_patches
@@ -283,7 +287,7 @@ def _case(content: Mapping[str, Any], path: Path) -> Case:
     with found.noted():
         given.slicing = _slicing(part)
     with found.noted():
-        given.machine = from_table(Machine, part.machine, "machine")
+        given.machine = machine_from(part.machine)
     if "material" not in unread:
         with found.noted():
             given.material = material_of(part.material)

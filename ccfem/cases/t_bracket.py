@@ -88,7 +88,7 @@ def t_bracket_mesh(element_size: float) -> TetMesh:
 
     Patches are the walls of the holes, and `pull`: half of the wall of the head's.
     """
-    return crossed_mesh(t_bracket_front(), t_bracket_top(), element_size, HOLES)
+    return crossed_mesh({"z": t_bracket_front(), "y": t_bracket_top()}, element_size, HOLES)
 
 
 def t_bracket(

@@ -55,7 +55,7 @@ def twist_bar_top() -> shapely.Polygon:
 
 def twist_bar_mesh(element_size: float) -> TetMesh:
     """Mesh of what two extrusions have in common; takes minutes."""
-    return crossed_mesh(twist_bar_front(), twist_bar_top(), element_size, HOLES)
+    return crossed_mesh({"z": twist_bar_front(), "y": twist_bar_top()}, element_size, HOLES)
 
 
 def twist_bar(element_size: float = ELEMENT_SIZE, order: Order = 2, force: float = 1000.0) -> Case:

@@ -1,18 +1,25 @@
 """What ``ccfem check`` does: print what is known of a part before it is solved, and draw it."""
 
+from collections.abc import Callable
 from pathlib import Path
 
 from ccfem.cli.run import load
 from ccfem.errors import InputError
 from ccfem.inspection import check
 from ccfem.io.whole import check_writable, whole_file
+from ccfem.machine.machine import Machine
 from ccfem.plot.canvas import check_picture, save
 from ccfem.plot.part_picture import part_page, part_picture
 
 __all__ = ["check_part"]
 
 
-def check_part(part: str, set_case: list[str] | None, picture: Path | None) -> int:
+def check_part(
+    part: str,
+    set_case: list[str] | None,
+    picture: Path | None,
+    machine: Callable[[Machine], Machine] | None = None,
+) -> int:
     """Print a check; write its picture, and beside it the page that turns.
 
     Parameters
@@ -23,6 +30,8 @@ def check_part(part: str, set_case: list[str] | None, picture: Path | None) -> i
         Parameters of a case.
     picture : Path, optional
         .png, .pdf or .svg; default the part's name and ``-check.png``.
+    machine : callable, optional
+        What it makes of the part's machine (`ccfem.cli.machines.machine_choice`).
 
     Returns
     -------
@@ -32,7 +41,7 @@ def check_part(part: str, set_case: list[str] | None, picture: Path | None) -> i
     if picture is not None:
         check_picture(picture)
     try:
-        checked = check(load(part, set_case))
+        checked = check(load(part, set_case, machine=machine))
     except InputError as error:
         if len(error.mistakes) < 2:
             raise

@@ -12,6 +12,7 @@ import typer
 
 from ccfem.cli.arguments import drawings_of, names_of, parameters_by_strategy, path_of
 from ccfem.cli.in_python import say_in_python
+from ccfem.cli.machines import MachineName, SetMachine, machine_choice, machines
 from ccfem.cli.options import (
     Backend,
     Calibration,
@@ -102,6 +103,9 @@ def _list(kind: str, name: str | None) -> None:
         print_member(kind, name)
 
 
+app.command()(machines)
+
+
 @app.command()
 def faces(
     body: Annotated[
@@ -134,6 +138,8 @@ def faces(
 def check(
     case: CasePath,
     set_case: SetCase = None,
+    machine: MachineName = None,
+    set_machine: SetMachine = None,
     out: Annotated[
         Path | None,
         typer.Option(
@@ -147,35 +153,9 @@ def check(
     """Say and draw all that is known of a part before it is solved; all mistakes at once."""
     from ccfem.cli.check_part import check_part
 
-    code = check_part(case, set_case, out)
+    code = check_part(case, set_case, out, machine_choice(machine, set_machine))
     if code:
         raise typer.Exit(code)
-
-
-@app.command()
-def mesh(
-    body: Annotated[
-        Path,
-        typer.Argument(metavar="BODY", help="Surface (.stl, .obj, .ply) or CAD file (.step ...)."),
-    ],
-    size: Annotated[float, typer.Option("--size", metavar="MM", help="Edge length of the cells.")],
-    out: Annotated[
-        Path,
-        typer.Option(
-            "-o", "--out", metavar="MESH", parser=path_of, help="Mesh (.vtu, .npz, .tet)."
-        ),
-    ],
-    scale: Annotated[
-        float, typer.Option(metavar="S", help="Factor that makes a file's coordinates mm.")
-    ] = 1.0,
-    mesher: Annotated[
-        str, typer.Option(metavar="auto|gmsh|ftetwild", help="What meshes a surface.")
-    ] = "auto",
-) -> None:
-    """Mesh a surface or a CAD file, its faces as patches: face_1, face_2, or their names."""
-    from ccfem.cli.mesh_body import mesh_file
-
-    mesh_file(body, size, out, scale, mesher)
 
 
 @app.command()
@@ -230,6 +210,8 @@ def compare(
     load_case: LoadCase = None,
     refine: Refine = False,
     calibration: Calibration = None,
+    machine: MachineName = None,
+    set_machine: SetMachine = None,
     backend: Backend = "auto",
     stress: StressFile = None,
     stress_unit: StressUnit = None,
@@ -263,6 +245,7 @@ def compare(
         refine=refine,
         pictures=pictures,
         drawings=drawings_of(drawings),
+        machine=machine_choice(machine, set_machine),
     )
 
 
@@ -283,6 +266,8 @@ def plan(
     load_case: LoadCase = None,
     refine: Refine = False,
     calibration: Calibration = None,
+    machine: MachineName = None,
+    set_machine: SetMachine = None,
     backend: Backend = "auto",
     gcode: Annotated[
         bool,
@@ -316,6 +301,7 @@ def plan(
         refine=refine,
         pictures=pictures,
         drawings=drawings_of(drawings),
+        machine=machine_choice(machine, set_machine),
     )
 
 
@@ -368,6 +354,8 @@ def calibrate(
     layers: Layers = None,
     fibre_per_layer: Fibre = None,
     load_case: LoadCase = None,
+    machine: MachineName = None,
+    set_machine: SetMachine = None,
     out: Annotated[
         Path,
         typer.Option(
@@ -386,8 +374,10 @@ def calibrate(
     options = options_of(layers, fibre_per_layer, False, load_case, "auto")
     options["natural"] = fibre_per_layer is None
 
+    chosen = machine_choice(machine, set_machine)
+
     def read() -> Any:
-        return load(case, set_case)
+        return load(case, set_case, machine=chosen)
 
     fit_material(read, unreinforced, reinforced, strategy, parameters, options, out)
 

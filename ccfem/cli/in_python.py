@@ -8,6 +8,7 @@ CALLS = {
     "cases": "ccfem.cases.named_cases()",
     "strategies": "ccfem.strategies.named()",
     "slicers": "ccfem.layers.slicing.named()",
+    "machines": "ccfem.machine.machine_names()",
     "faces": "ccfem.faces(BODY)",
     "check": "ccfem.check(CASE)",
     "mesh": "ccfem.meshing.mesh_body(BODY, SIZE)",

@@ -1,4 +1,4 @@
-"""Commands that begin a part and end a paper: ``ccfem new``, ``ccfem example``, ``ccfem cite``."""
+"""Commands that begin a part and end a paper: ``mesh``, ``new``, ``example``, ``cite``."""
 
 from pathlib import Path
 from typing import Annotated
@@ -65,7 +65,35 @@ def _cite(
     cite(whats or ())
 
 
+def _mesh(
+    body: Annotated[
+        Path,
+        typer.Argument(metavar="BODY", help="Surface (.stl, .obj, .ply) or CAD file (.step ...)."),
+    ],
+    size: Annotated[float, typer.Option("--size", metavar="MM", help="Edge length of the cells.")],
+    out: Annotated[
+        Path,
+        typer.Option(
+            "-o", "--out", metavar="MESH", parser=path_of, help="Mesh (.vtu, .npz, .tet)."
+        ),
+    ],
+    scale: Annotated[
+        float, typer.Option(metavar="S", help="Factor that makes a file's coordinates mm.")
+    ] = 1.0,
+    mesher: Annotated[
+        str, typer.Option(metavar="auto|gmsh|ftetwild", help="What meshes a surface.")
+    ] = "auto",
+) -> None:
+    """Mesh a surface or a CAD file, its faces as patches: face_1, face_2, or their names."""
+    from ccfem.cli.mesh_body import mesh_file
+
+    mesh_file(body, size, out, scale, mesher)
+
+
+_COMMANDS = {"mesh": _mesh, "new": _new, "example": _example, "cite": _cite}
+
+
 def add_part_commands(app: typer.Typer) -> None:
     """Add the commands of this module to the command line."""
-    for name, command in (("new", _new), ("example", _example), ("cite", _cite)):
+    for name, command in _COMMANDS.items():
         app.command(name)(command)

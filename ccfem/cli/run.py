@@ -6,7 +6,7 @@ Everything heavy is imported where it is needed, so that ``ccfem --help`` answer
 import shlex
 import sys
 import time
-from collections.abc import Mapping, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import replace
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
@@ -21,6 +21,7 @@ if TYPE_CHECKING:
     from ccfem.cases.case import Case
     from ccfem.comparison.result import Comparison
     from ccfem.comparison.slicings import SlicingComparison
+    from ccfem.machine.machine import Machine
 
 __all__ = [
     "foreign_stress",
@@ -40,8 +41,16 @@ _SOLVED = 0.75
 """Share of the progress bar at which the comparison is made and the pictures begin."""
 
 
-def load(name: str, set_case: Sequence[str] | None, refine: bool = False) -> "Case":
-    """Read a part file, or make a case from its name and parameters; refine its cells if wanted."""
+def load(
+    name: str,
+    set_case: Sequence[str] | None,
+    refine: bool = False,
+    machine: "Callable[[Machine], Machine] | None" = None,
+) -> "Case":
+    """Read a part file, or make a case from its name and parameters.
+
+    Its cells are refined if wanted; `machine` changes its machine.
+    """
     from ccfem.cases.reading import read
 
     _refuse_body(name)
@@ -51,6 +60,8 @@ def load(name: str, set_case: Sequence[str] | None, refine: bool = False) -> "Ca
             f"--set-case is for cases by name; '{name}' is a part file: change the file"
         )
     case = read(name, **parameters)
+    if machine is not None:
+        case = replace(case, machine=machine(case.machine))
     return _refined(case) if refine else case
 
 
@@ -146,6 +157,7 @@ def run(
     refine: bool = False,
     pictures: bool = False,
     drawings: Sequence[str] = (),
+    machine: "Callable[[Machine], Machine] | None" = None,
 ) -> None:
     """Compare strategies, write the results and print the table; a failure leaves nothing behind.
 
@@ -176,6 +188,8 @@ def run(
         Also draw PNG files of what the report shows.
     drawings : sequence of {"svg", "dxf"}
         Also draw every flat layer of every strategy to scale.
+    machine : callable, optional
+        What it makes of the part's machine (`ccfem.cli.machines.machine_choice`).
     """
     if refine and options.get("stress") is not None:
         raise InputError("--refine changes the mesh that the file of --stress is on: drop one")
@@ -189,7 +203,7 @@ def run(
     imported = time.perf_counter()
     if drawings and options.get("slicings") is not None:
         raise InputError("--drawings are of one slicing; got --slicings: drop one")
-    case = load(name, set_case, refine)
+    case = load(name, set_case, refine, machine)
     seconds = {"start": imported - _STARTED, "mesh": time.perf_counter() - imported}
     if calibration is not None:
         case, options = _calibrated(case, options, calibration)

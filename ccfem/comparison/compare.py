@@ -23,7 +23,6 @@ from ccfem.elasticity.part_stress import GivenStress
 from ccfem.elasticity.solve import solve
 from ccfem.elasticity.stress_field import StressField
 from ccfem.errors import InputError, known_names
-from ccfem.export.print_plan import check_machine
 from ccfem.io.stress_file import read_stress
 from ccfem.layers import Layer
 from ccfem.layers.plane import plane_frame
@@ -32,6 +31,7 @@ from ccfem.layers.slicing import as_slicer
 from ccfem.planning.equal_fibre import check_wanted
 from ccfem.planning.given_paths import GivenPaths
 from ccfem.planning.strategy import Strategy
+from ccfem.printing.print_plan import check_machine
 from ccfem.progress import Progress, silent
 from ccfem.strategies import create
 from ccfem.toolpaths import Toolpaths

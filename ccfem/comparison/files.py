@@ -11,6 +11,7 @@ import numpy as np
 from ccfem.comparison.record import record, results_rows, write_table
 from ccfem.comparison.result import Comparison
 from ccfem.comparison.shown import file_stem
+from ccfem.printing.print_plan import PrintPlan
 from ccfem.progress import Progress, silent
 from ccfem.toolpaths import Toolpaths
 
@@ -33,8 +34,10 @@ def write_results(
     """Write ``results.csv``, ``results.json``, ``report.html`` and paths; pictures where wanted.
 
     With a curve, also ``curve.csv``; where layers are curved, ``matrix_waypoints.csv``, rings that
-    fill the layers. Runs with a print plan get ``STRATEGY.gcode`` too. In ``paths.vtp`` the cell
-    array "strategy" numbers the strategies that did not fail, in the order of ``results.json``.
+    fill the layers. Runs with a print plan get ``STRATEGY.gcode`` too, ``STRATEGY_cell.csv`` with
+    the same moves for a cell of robots, and ``STRATEGY_trim.csv`` where strands leave the part. In
+    ``paths.vtp`` the cell array "strategy" numbers the strategies that did not fail, in the order
+    of ``results.json``.
 
     Parameters
     ----------
@@ -142,8 +145,8 @@ def _write_in_space(comparison: Comparison, folder: Path) -> None:
 
 def _write_matrix(comparison: Comparison, folder: Path) -> None:
     """Write the matrix of curved layers for robots, once for all strategies."""
-    from ccfem.export.layer_matrix import layer_matrix
     from ccfem.export.robot_waypoints import write_robot_waypoints
+    from ccfem.printing.layer_matrix import layer_matrix
     from ccfem.toolpaths import MATRIX
 
     file = folder / "matrix_waypoints.csv"
@@ -152,9 +155,24 @@ def _write_matrix(comparison: Comparison, folder: Path) -> None:
         write_robot_waypoints(file, layer_matrix(layers, machine), layers, machine, MATRIX)
 
 
+def _write_print(folder: Path, name: str, plan: PrintPlan, comparison: Comparison) -> None:
+    """Write what a printer and a cell of robots do to print a part: one chain of moves."""
+    from ccfem.export.gcode import gcode_of_moves
+    from ccfem.export.robot_cell import write_robot_cell
+    from ccfem.export.trim_table import write_trims
+    from ccfem.printing.part_moves import part_moves
+
+    case = comparison.case
+    moves = part_moves(plan, case.machine)
+    text = gcode_of_moves(moves, plan, case.machine, f"{case.name}, {name}")
+    (folder / f"{name}.gcode").write_text(text, encoding="utf-8", newline="\n")
+    write_robot_cell(folder / f"{name}_cell.csv", moves)
+    if len(plan.trims):
+        write_trims(folder / f"{name}_trim.csv", plan)
+
+
 def _write_paths(comparison: Comparison, folder: Path) -> None:
     """Write the paths of every strategy in the formats of other programs."""
-    from ccfem.export.gcode import write_gcode
     from ccfem.export.robot_waypoints import write_robot_waypoints
     from ccfem.export.vtk import write_paths
     from ccfem.export.waypoints import write_waypoints
@@ -169,9 +187,7 @@ def _write_paths(comparison: Comparison, folder: Path) -> None:
             write_robot_waypoints(file, paths, layers, comparison.case.machine)
             _write_matrix(comparison, folder)
         if run.print_plan is not None:
-            write_gcode(
-                folder / f"{file_stem(run.name)}.gcode", run.print_plan, comparison.case.machine
-            )
+            _write_print(folder, file_stem(run.name), run.print_plan, comparison)
     every = Toolpaths.concatenate(run.toolpaths for run in runs)
     number = np.repeat(np.arange(float(len(runs))), [len(run.toolpaths) for run in runs])
     write_paths(every, folder / "paths.vtp", path_data={"strategy": number})

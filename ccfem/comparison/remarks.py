@@ -51,6 +51,8 @@ def _about(run: Run, wanted: Wanted, bounded: bool) -> list[str]:
             lines += _about_crossings(run.evaluation, bounded)
     if run.why_not:
         lines.append(f"not printable as planned: {run.why_not}")
+    if run.print_plan is not None:
+        lines += run.print_plan.warnings
     if run.empty_layers and run.evaluation is not None:
         lines.append(f"no fibre on {run.empty_layers} of {len(run.evaluation.layers)} layers")
     if run.note:

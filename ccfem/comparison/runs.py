@@ -8,8 +8,8 @@ from typing import Any
 
 from ccfem.arrays import freeze, in_brief
 from ccfem.evaluation import Evaluation
-from ccfem.export.print_plan import PrintPlan
 from ccfem.planning.strategy import Strategy
+from ccfem.printing.print_plan import PrintPlan
 from ccfem.toolpaths import Toolpaths
 from ccfem.virtual_testing.strength import FirstFailure
 from ccfem.virtual_testing.virtual_test import Bracket
@@ -80,6 +80,8 @@ class Run:
     printed_volume : float
         Volume of matrix and fibre of the print plan over that of the part; NaN without a plan.
     length_per_layer : float, mm
+    sampled : float, mm, optional
+        The same by a few layers, where no others were planned.
     note : str
         Why the length is not the wanted one, or that it sets it; else empty.
     failure : str
@@ -102,6 +104,7 @@ class Run:
     print_plan: PrintPlan | None = None
     printed_volume: float = float("nan")
     length_per_layer: float = 0.0
+    sampled: float | None = None
     note: str = ""
     failure: str = ""
     untested: str = ""

@@ -13,13 +13,20 @@ from ccfem.elasticity.stress_field import StressField
 from ccfem.errors import InputError, SolveError
 from ccfem.evaluation import evaluate
 from ccfem.evaluation.printable import why_not
-from ccfem.export.print_plan import plan_print
 from ccfem.layers import Layer
 from ccfem.machine.machine import Machine
-from ccfem.planning.equal_fibre import TOLERANCE, Planned, length_per_layer, plan_to_length
+from ccfem.planning.equal_fibre import (
+    TOLERANCE,
+    Planned,
+    length_per_layer,
+    plan_to_length,
+    sampled_length,
+)
 from ccfem.planning.given_paths import GivenPaths
 from ccfem.planning.plan import plan
 from ccfem.planning.strategy import LengthStrategy
+from ccfem.printing.curved_plan import curved_plan
+from ccfem.printing.print_plan import plan_print
 from ccfem.progress import Progress
 from ccfem.toolpaths import Toolpaths
 from ccfem.virtual_testing.equilibrium import BONDED, TENSION
@@ -48,6 +55,10 @@ __all__ = [
 
 Tell = Callable[[str], None]
 """Told what is done next."""
+
+_UNLIKE = 1.3
+"""How much more a few layers may lay than the whole stack: a strategy that lays more than so many
+times the least of all is not planned to its own amount."""
 
 _TOLERANCE = 1e-6
 """Relative residual of the virtual tests: the error of the stiffness is of its square."""
@@ -92,7 +103,9 @@ def planned(
             paths = plan(run.strategy, layers, stress, machine)
             found = Planned(run.strategy, paths, length_per_layer(paths, layers))
         else:
-            found = plan_to_length(run.strategy, layers, stress, machine, wanted, start=start)
+            found = plan_to_length(
+                run.strategy, layers, stress, machine, wanted, start, sampled=run.sampled
+            )
         return with_plan(run, found)
 
     bare = replace(run, toolpaths=Toolpaths.empty(), length_per_layer=0.0)
@@ -141,16 +154,35 @@ def levelled(runs: Sequence[Run], part: Part, tell: Tell) -> tuple[list[Run], fl
 def natural(runs: Sequence[Run], part: Part, tell: Tell) -> tuple[dict[str, Run], str | None]:
     """Plan runs to their natural amounts: by name, and the name of the one that lays least.
 
-    Strategies that take the length itself are planned only where they lay least; the name is None
-    where nobody lays fibre.
+    Strategies that take the length itself, and those that lay much more than others on a few
+    layers, are planned only where they lay least; the name is None where nobody lays fibre.
     """
-    own = {
-        run.name: run
-        if isinstance(run.strategy, LengthStrategy)
-        else planned(run, part, None, tell)
-        for run in runs
-    }
+    own: dict[str, Run] = {}
+    for run in runs:
+        some = any(len(one.toolpaths) for one in own.values())
+        own[run.name] = _sampled(run, part, tell) if some else _by_itself(run, part, tell)
     return own, _setter(own, part, tell)
+
+
+def _by_itself(run: Run, part: Part, tell: Tell) -> Run:
+    """Run planned to its natural amount, but for a strategy that takes the length itself."""
+    told = isinstance(run.strategy, LengthStrategy)
+    return run if told else planned(run, part, None, tell)
+
+
+def _sampled(run: Run, part: Part, tell: Tell) -> Run:
+    """Run with what it lays on a few layers; planned where these are all."""
+    if isinstance(run.strategy, LengthStrategy | GivenPaths) or run.failure:
+        return _by_itself(run, part, tell)
+    tell(f"planning {run.name} on a few layers")
+
+    def work() -> Run:
+        length = sampled_length(run.strategy, part.layers, part.stress, part.machine)
+        return replace(run, sampled=length)
+
+    found = _stage(run, "plan", work)
+    # Layers that stay empty say nothing of others.
+    return found if found.failure or found.sampled else _by_itself(found, part, tell)
 
 
 def to_length(
@@ -184,17 +216,21 @@ def to_length(
 def _setter(own: dict[str, Run], part: Part, tell: Tell) -> str | None:
     """Name of the run whose natural length is that of all: it is planned after this."""
     while True:
-        natural = {}
+        natural, least = {}, {}  # least: what the run may turn out to lay
         for name, run in own.items():
             if len(run.toolpaths):
-                natural[name] = run.length_per_layer
+                natural[name] = least[name] = run.length_per_layer
             elif isinstance(run.strategy, LengthStrategy) and not run.failure:
                 natural[name] = run.strategy.natural_length(part.layers, part.machine)
+                least[name] = natural[name]
+            elif run.sampled and not run.failure:
+                natural[name], least[name] = run.sampled, run.sampled / _UNLIKE
         given = [name for name in natural if isinstance(own[name].strategy, GivenPaths)]
-        setter = min(given or natural, key=natural.__getitem__, default=None)
+        setter = min(given or natural, key=least.__getitem__, default=None)
         if setter is None or len(own[setter].toolpaths):
             return setter
-        run = planned(own[setter], part, natural[setter], tell)
+        told = isinstance(own[setter].strategy, LengthStrategy)
+        run = planned(own[setter], part, natural[setter] if told else None, tell)
         nothing = not run.failure and not len(run.toolpaths)
         own[setter] = replace(run, failure=_no_fibre(part.machine)) if nothing else run
 
@@ -231,7 +267,9 @@ def with_print(run: Run, part: Part, tell: Tell) -> Run:
     if run.evaluation is None:
         return run
     try:
-        found = plan_print(run.toolpaths, part.layers, part.stress.mesh, part.machine)
+        what = (run.toolpaths, part.layers, part.stress.mesh, part.machine)
+        flat = all(layer.flat is not None for layer in part.layers)
+        found = plan_print(*what) if flat else curved_plan(*what, part.build or (0.0, 0.0, 1.0))
     except InputError as error:
         return replace(run, unprinted=str(error))
     share = found.volume(part.machine) / float(part.stress.mesh.volumes.sum())

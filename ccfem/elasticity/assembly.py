@@ -103,7 +103,8 @@ def _neighbours(cells, start, touching, indptr):  # type: ignore[no-untyped-def]
         last = first
         if first + q * (start[i + 1] - start[i]) > result.size:
             more = np.empty(2 * result.size + q * (start[i + 1] - start[i]), np.int32)
-            more[:first] = result[:first]
+            for k in range(first):
+                more[k] = result[k]
             result = more
         for e in range(start[i], start[i + 1]):
             cell = touching[e] // q

@@ -102,7 +102,8 @@ def _stress(cells, gradients, u, stiffness, free, edges, at, result):  # type: i
         c = stiffness[cell if len(stiffness) > 1 else 0]
         ease = free[cell if len(free) > 1 else 0]
         for q in range(len(at)):
-            slope[:] = 0.0
+            for p in range(3):
+                slope[p, 0], slope[p, 1], slope[p, 2] = 0.0, 0.0, 0.0
             for a in range(cells.shape[1]):
                 node = cells[cell, a]
                 if cells.shape[1] == 4:

@@ -25,6 +25,7 @@ from ccfem.evaluation import (
     space,
     spacing,
     stiffness_alignment,
+    tension_across,
 )
 from ccfem.evaluation.alignment import AlignmentSamples
 from ccfem.evaluation.column import Column
@@ -41,6 +42,7 @@ from ccfem.evaluation.sensitivity import strand_lamina
 from ccfem.evaluation.sinuosity import SinuositySamples
 from ccfem.evaluation.space import SpaceSamples
 from ccfem.evaluation.spacing import SpacingSamples
+from ccfem.evaluation.tension_across import TensionSamples
 from ccfem.fields.chart import chart_of
 from ccfem.geometry.nearest_on_triangles import nearest_on_triangles
 from ccfem.layers.layer import Layer
@@ -70,6 +72,7 @@ COLUMNS: tuple[Column, ...] = (
     *links.COLUMNS,
     *crossings.COLUMNS,
     *space.COLUMNS,
+    *tension_across.COLUMNS,
     *head.COLUMNS,
 )
 """Every index in the order of the tables."""
@@ -183,7 +186,7 @@ def evaluate(
         test. It counts where `stress` knows the material of the part.
     build : sequence of 3 floats, optional
         Build direction, which the head's tilt on curved layers is measured from; by default the
-        mean normal of the layers.
+        mean normal of the layers. Flat layers along it are compared with (`across_flat`).
 
     Returns
     -------
@@ -201,11 +204,13 @@ def evaluate(
     fibre = toolpaths.of_kind(FIBRE).layer
     late = fibre[fibre < np.maximum.accumulate(fibre)]
     stack = head.printed(layers, build)
+    upright = _upright(layers, build)
 
     def sampled(layer: Layer) -> _Samples:
         behind = int(np.count_nonzero(late == layer.index))
         on_layer = toolpaths.on_layer(layer.index)
-        return _sample(on_layer, layer, stress, machine, _below(layer, layers), behind, stack)
+        below = _below(layer, layers)
+        return _sample(on_layer, layer, stress, machine, below, behind, stack, upright)
 
     samples = in_threads(sampled, layers)
     material = _material(layers, stress, machine, strand or Strand())
@@ -239,6 +244,13 @@ def _check_layers(toolpaths: Toolpaths, layers: Sequence[Layer]) -> None:
             )
 
 
+def _upright(layers: Sequence[Layer], build: Sequence[float] | None) -> FloatArray:
+    """Return the unit vector of the build direction, by default the mean normal of the layers."""
+    total = np.sum([layer.areas @ layer.normals for layer in layers], axis=0)
+    up = total if build is None else np.asarray(build, dtype=np.float64)
+    return np.asarray(up / max(float(np.linalg.norm(up)), 1e-300))
+
+
 def _below(layer: Layer, layers: Sequence[Layer]) -> Layer | None:
     """Find the flat layer under a flat one; None where it is the lowest, and for curved layers."""
     if layer.flat is None:
@@ -262,6 +274,7 @@ class _Samples(NamedTuple):
     links: LinkSamples
     crossings: CrossingSamples
     space: SpaceSamples
+    tension: TensionSamples
     head: HeadSamples
 
 
@@ -273,6 +286,7 @@ def _sample(
     below: Layer | None,
     late: int,
     stack: head.Printed | None,
+    build: FloatArray,
 ) -> _Samples:
     """Take the samples of one layer."""
     width = machine.fibre_width
@@ -301,6 +315,7 @@ def _sample(
         links.sample_links(paths),
         crossings.sample_crossings(paths),
         in_space,
+        tension_across.sample_tension(layer, stress, build),
         head.sample_head(fibre, layer, stack, machine),
     )
 
@@ -342,5 +357,6 @@ def _indices(samples: _Samples, machine: Machine, material: Material) -> dict[st
         **links.link_indices(samples.links),
         **crossings.crossing_indices(samples.crossings),
         **space.space_indices(samples.space),
+        **tension_across.tension_indices(samples.tension),
         **head.head_indices(samples.head),
     }

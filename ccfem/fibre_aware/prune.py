@@ -141,26 +141,29 @@ class Profile:
         least = int(np.ceil(minimum / self.step - 1e-9))
         least = min(max(least, 1), len(self.value))
         keep = np.empty(len(self.value), dtype=np.bool_)
-        gain = _best_stretches((self.value - price) * self.step, least, cut_cost * price, keep)
+        each = (self.value - price) * self.step
+        equal = _EQUAL * float(np.abs(each).max())
+        gain = _best_stretches(each, least, cut_cost * price, equal, keep)
         return keep, float(gain)
 
 
 @njit(cache=True)
-def _best_stretches(gain, least, cost, keep):  # type: ignore[no-untyped-def]  # pragma: no cover
+def _best_stretches(gain, least, cost, equal, keep):  # type: ignore[no-untyped-def]  # pragma: no cover
     """Mark the pieces to keep and return their gain: dynamic programming over the pieces.
 
     `free[i]` is the most that the first i pieces can gain, `held[i]` the most where piece i is
     kept. Stretches are at least `least` pieces long; each but the first costs `cost`.
     """
     n = len(gain)
-    equal = _EQUAL * np.abs(gain).max()
     total = np.zeros(n + 1)
     for i in range(n):
         total[i + 1] = total[i] + gain[i]
     free = np.zeros(n + 1)
-    held = np.full(n + 1, -np.inf)
+    held = np.empty(n + 1)
     start = np.zeros(n + 1, np.int64)  # of the stretch that ends with piece i
     alone = np.zeros(n + 1, np.bool_)  # whether nothing is kept before that stretch
+    for i in range(least):
+        held[i] = -np.inf
     for i in range(least, n + 1):
         held[i] = held[i - 1] + gain[i - 1]
         start[i], alone[i] = start[i - 1], alone[i - 1]
@@ -169,13 +172,15 @@ def _best_stretches(gain, least, cost, keep):  # type: ignore[no-untyped-def]  #
         if opened >= held[i] - equal:
             held[i], start[i], alone[i] = opened, i - least, before == 0.0
         free[i] = held[i] if held[i] > free[i - 1] + equal else free[i - 1]
-    keep[:] = False
+    for i in range(n):
+        keep[i] = False
     i = n
     while i > 0 and free[i] > 0.0:
         if free[i] == free[i - 1]:
             i -= 1
             continue
-        keep[start[i] : i] = True
+        for k in range(start[i], i):
+            keep[k] = True
         i = 0 if alone[i] else start[i]
     return free[n]
 

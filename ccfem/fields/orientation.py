@@ -60,7 +60,7 @@ def _signs(count, pairs, opposite):  # type: ignore[no-untyped-def]
                 element = parent[element]
             root_of_pair[side] = element
             odd[side] = turned
-        a, b = root_of_pair
+        a, b = root_of_pair[0], root_of_pair[1]
         if a != b:
             # The smaller index stays the root: the first element keeps its sign.
             if b < a:

@@ -59,22 +59,23 @@ def share_room(
     (s, 4) array
         alone, every, fill and stack of `ccfem.geometry.beads.Beads`.
     """
+    half = 0.5 * width
+    # The furthest that a middle may lie whose rectangle meets the line across a part.
+    reach = float(half + np.sqrt(half * half + 0.25 * ahead.max(initial=0.0) ** 2)) * (1.0 + 1e-9)
     return np.asarray(
         _shared(grid.origin, grid.cell, grid.shape, grid.starts, grid.items, middle, direction,
                 normal, np.cross(normal, direction), ahead, often, fold, layer, line, apart, ring,
-                width, height, same_cosine)
+                width, height, same_cosine, reach)
     )  # fmt: skip
 
 
 @njit(cache=True, nogil=True)
 def _shared(  # type: ignore[no-untyped-def]
     origin, cell, shape, starts, items, middle, direction, normal, across, ahead, often, fold,
-    layer, line, apart, ring, width, height, same_cosine
+    layer, line, apart, ring, width, height, same_cosine, reach
 ):  # fmt: skip  # pragma: no cover
     half = 0.5 * width
-    # The furthest that a middle may lie whose rectangle meets the line across a part.
-    reach = (half + np.sqrt(half * half + 0.25 * ahead.max() ** 2)) * (1.0 + 1e-9)
-    found = np.ones((len(middle), 4))
+    found = np.empty((len(middle), 4))
     room = 64
     at, change, order = np.empty(room), np.empty((room, 4)), np.empty(room, np.int64)
     low, high = np.empty(3, np.int64), np.empty(3, np.int64)
@@ -132,9 +133,10 @@ def _shared(  # type: ignore[no-untyped-def]
                             order[events] = events
                             events += 1
         if events == 0:
-            found[k, 0], found[k, 1], found[k, 2] = 1.0 / often[k], 1.0 / often[k], fold[k]
+            found[k, 0], found[k, 1] = 1.0 / often[k], 1.0 / often[k]
+            found[k, 2], found[k, 3] = fold[k], 1.0
             continue
-        _sort(order, at, events)
+        _sort(order[:events], at)
         current[0], current[1], current[2], current[3] = often[k], often[k], fold[k], 1.0
         alone, every, fill, most, here = 0.0, 0.0, 0.0, 1.0, -half
         for e in range(events + 1):
@@ -165,9 +167,9 @@ def _clipped(low, high, value, slope, limit):  # type: ignore[no-untyped-def]  #
 
 
 @njit(cache=True, nogil=True)
-def _sort(order, at, count):  # type: ignore[no-untyped-def]  # pragma: no cover
-    """Sort the first indices by what they point at, by insertion: there are few, nearly sorted."""
-    for e in range(1, count):
+def _sort(order, at):  # type: ignore[no-untyped-def]  # pragma: no cover
+    """Sort indices by what they point at, by insertion: there are few, nearly sorted."""
+    for e in range(1, len(order)):
         index = order[e]
         place = e
         while place > 0 and at[order[place - 1]] > at[index]:

@@ -73,8 +73,8 @@ def shortest_curve(start: FloatArray, end: FloatArray, radius: float, step: floa
 
 @njit(cache=True, nogil=True)
 def _sample(pose, turns, sizes, parts, radius):  # type: ignore[no-untyped-def]
-    line = np.empty((parts.sum() + 1, 2))
-    x, y, heading = pose
+    line = np.empty((parts[0] + parts[1] + parts[2] + 1, 2))
+    x, y, heading = pose[0], pose[1], pose[2]
     line[0, 0], line[0, 1] = x, y
     count = 1
     for piece in range(3):
@@ -114,12 +114,14 @@ def word_sizes(start, end, radius, sizes):  # type: ignore[no-untyped-def]
     An arc that would turn almost all the way round is a tiny negative one instead.
     """
     for word in range(6):
-        first, middle, last = WORDS[word]
+        first, middle, last = WORDS[word, 0], WORDS[word, 1], WORDS[word, 2]
         # Centres of the circles at both ends in units of the radius, from one to the other.
         dx = (end[0] - start[0]) / radius - last * np.sin(end[2]) + first * np.sin(start[2])
         dy = (end[1] - start[1]) / radius + last * np.cos(end[2]) - first * np.cos(start[2])
         apart, way = np.hypot(dx, dy), np.arctan2(dy, dx)
-        sizes[word] = np.inf
+        # One by one: compiled code that assigns to a slice takes seconds to compile.
+        for piece in range(3):
+            sizes[word, piece] = np.inf
         if middle == 0 and first == last:
             if apart < _TOUCHING:
                 way = start[2]
@@ -144,4 +146,5 @@ def word_sizes(start, end, radius, sizes):  # type: ignore[no-untyped-def]
             sizes[word, 0] = _round(first * (one - start[2]))
             sizes[word, 1] = _round(middle * (other - one))
             sizes[word, 2] = _round(last * (end[2] - other))
-        sizes[word] *= radius
+        for piece in range(3):
+            sizes[word, piece] *= radius

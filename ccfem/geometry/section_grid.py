@@ -97,7 +97,8 @@ def _fill_places(grid):  # type: ignore[no-untyped-def]
     about, around = np.empty(nx + 1, np.int64), np.empty(nx + 1, np.int64)
     for j in range(ny):
         y = grid.origin[1] + (j + 0.5) * grid.cell
-        about[:], around[:] = 0, 0
+        for i in range(nx + 1):
+            about[i], around[i] = 0, 0
         for k in range(grid.starts[j], grid.starts[j + 1]):
             x0, y0, x1, y1 = grid.edges[k]
             if (y0 > y) != (y1 > y):

@@ -1,18 +1,21 @@
 """A scalar field whose gradient is as near to given directions as it can be.
 
 Kipping and Schueppstuhl 2023 (Materials 16, 998), section 2.4: a Poisson equation. The blend with
-one direction is ours: the least that leaves no cell upside down.
+one direction is ours, the least that leaves no cell upside down, and so are the bounds that keep
+the distance of layers within a range.
 """
 
 from collections.abc import Callable
 from dataclasses import dataclass
 
 import numpy as np
+import scipy.sparse as sp
 from scipy.sparse.csgraph import connected_components
 
 from ccfem.arrays import FloatArray, freeze
 from ccfem.elasticity.assembly import cell_gradients
 from ccfem.elasticity.direct import superlu
+from ccfem.guidance.bounded_gradient import Bounds, bounded
 from ccfem.guidance.energies import gradient_energy
 from ccfem.mesh.tet_mesh import TetMesh
 
@@ -22,6 +25,10 @@ _LARGEST = 64.0
 """Blend above which the field is as good as flat."""
 _CLOSE = 0.02
 """Accuracy of the least blend."""
+_BLENDS = (0.0, 0.1, 0.25, 0.5, 1.0, 2.0, 4.0, 64.0)
+"""Blends that are tried where the gradient is kept within bounds."""
+_LEFT = 5e-4
+"""Share of the volume that may be left outside them."""
 
 
 @dataclass(frozen=True)
@@ -49,7 +56,12 @@ class HeightField:
         freeze(self, values=float, gradient=float, up=float)
 
 
-def height_field(mesh: TetMesh, direction: FloatArray, blend: float | None = None) -> HeightField:
+def height_field(
+    mesh: TetMesh,
+    direction: FloatArray,
+    blend: float | None = None,
+    lengths: tuple[float, float] | None = None,
+) -> HeightField:
     """Find the field.
 
     Parameters
@@ -59,15 +71,32 @@ def height_field(mesh: TetMesh, direction: FloatArray, blend: float | None = Non
         Unit vectors that the gradient is to follow.
     blend : float, optional
         Weight of the mean gradient of the field without a blend, added to each direction. By
-        default the least with which every cell rises along it, to 0.02.
+        default the least with which every cell rises along it, to 0.02; with `lengths` the least
+        of eight with which the bounds can be kept.
+    lengths : tuple of 2 floats, optional
+        Range in which the length of the gradient is kept in every cell, which may not fall along
+        the mean gradient either, at the least cost in direction; 0.05 % of the volume may be left
+        outside.
     """
     solve = _poisson(mesh)
     plain = solve(direction)
-    if blend is None:
-        if not inverted_share(mesh, plain.gradient, plain.up) > 0.0:
+    up = plain.up
+
+    if lengths is None:
+        if blend is not None:
+            return _blended(direction, up, blend, solve)
+        if not inverted_share(mesh, plain.gradient, up) > 0.0:
             return plain
-        return _least(mesh, direction, plain.up, solve)
-    return plain if blend == 0.0 else _blended(direction, plain.up, blend, solve)
+        return _least(mesh, direction, up, solve)
+    bounds = Bounds(*lengths, up)
+    found = plain
+    for tried in _BLENDS if blend is None else (blend,):
+        kept = bounded(_mixed(direction, up, tried), bounds, solve)
+        found = HeightField(kept.values, kept.gradient, up, tried)
+        rising = not inverted_share(mesh, found.gradient, up) > 0.0
+        if rising and mesh.volumes @ bounds.outside(found.gradient) <= _LEFT * mesh.volumes.sum():
+            break
+    return found
 
 
 def inverted_share(mesh: TetMesh, gradient: FloatArray, up: FloatArray) -> float:
@@ -104,32 +133,39 @@ def _blended(
     blend: float,
     solve: Callable[[FloatArray], HeightField],
 ) -> HeightField:
-    mixed = direction + blend * up
-    mixed = mixed / np.maximum(np.linalg.norm(mixed, axis=1), 1e-12)[:, None]
-    found = solve(mixed)
+    found = solve(_mixed(direction, up, blend))
     return HeightField(found.values, found.gradient, up, blend)
+
+
+def _mixed(direction: FloatArray, up: FloatArray, blend: float) -> FloatArray:
+    if blend == 0.0:
+        return direction
+    mixed = direction + blend * up
+    return np.asarray(mixed / np.maximum(np.linalg.norm(mixed, axis=1), 1e-12)[:, None])
 
 
 def _poisson(mesh: TetMesh) -> Callable[[FloatArray], HeightField]:
     """Return what solves ``min sum_e V_e |grad g - v_e|^2`` for directions v: one factorisation."""
     gradients, cells, n = cell_gradients(mesh), mesh.corners, len(mesh.points)
-    volume = mesh.volumes
+    volume, m = mesh.volumes, len(mesh.corners)
+    rows = np.repeat(np.arange(3 * m).reshape(m, 1, 3), 4, axis=1)
+    places = (rows.ravel(), np.repeat(cells.ravel(), 3))
+    slope = sp.csr_array((gradients.ravel(), places), shape=(3 * m, n))
+    fall = sp.csr_array(slope.T * np.repeat(volume, 3))
     matrix = gradient_energy(gradients, cells, volume, n)
     used = np.unique(cells)
     piece = connected_components(matrix, directed=False)[1]
     pinned = used[np.unique(piece[used], return_index=True)[1]]
     free = np.setdiff1d(used, pinned)
     solve_free = superlu(matrix[free][:, free])
+    pieces = [used[piece[used] == each] for each in np.unique(piece[used]).tolist()]
 
     def solve(direction: FloatArray) -> HeightField:
-        share = volume[:, None] * np.einsum("eid,ed->ei", gradients, direction)
-        source = np.bincount(cells.ravel(), share.ravel(), minlength=n).astype(np.float64)
         values = np.zeros(n)
-        values[free] = solve_free(source[free])
-        for each in np.unique(piece[used]).tolist():
-            own = used[piece[used] == each]
+        values[free] = solve_free((fall @ direction.ravel())[free])
+        for own in pieces:
             values[own] -= values[own].min()
-        gradient = np.einsum("eid,ei->ed", gradients, values[cells])
+        gradient = (slope @ values).reshape(m, 3)
         mean = volume @ gradient
         up = mean / max(float(np.linalg.norm(mean)), 1e-300)
         return HeightField(values, gradient, up, 0.0)

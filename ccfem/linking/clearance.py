@@ -39,7 +39,12 @@ def trim_to_clearance(
     order = np.lexsort((-length, np.arange(len(lines)) >= first))
     ordered = [lines[k] for k in order]
     points, offsets = pack(ordered)
-    masks = np.split(_lay(points, offsets, clearance, least_length), offsets[1:-1])
+    low = points.min(axis=0)
+    shape = ((points.max(axis=0) - low) / clearance).astype(np.int64) + 1
+    keep = np.ones(len(points), dtype=bool)
+    head = np.full(int(shape.prod()), -1)
+    _lay(points, offsets, clearance, least_length, low, shape, head, keep)
+    masks = np.split(keep, offsets[1:-1])
     kept: list[FloatArray] = []
     for line, mask in zip(ordered, masks, strict=True):
         if mask.all():
@@ -53,14 +58,11 @@ def trim_to_clearance(
 
 
 @njit(cache=True, nogil=True)
-def _lay(points, offsets, clearance, least_length):  # type: ignore[no-untyped-def]
+def _lay(points, offsets, clearance, least_length, low, shape, head, keep):  # type: ignore[no-untyped-def]
+    """Strike from `keep` what is too near; `head` is the last point in each cell of a grid."""
     count = len(points)
-    keep = np.ones(count, np.bool_)
-    x0, y0 = points[:, 0].min(), points[:, 1].min()
-    nx = int((points[:, 0].max() - x0) / clearance) + 1
-    ny = int((points[:, 1].max() - y0) / clearance) + 1
-    head = np.full(nx * ny, -1)
-    following = np.full(count, -1)
+    x0, y0, nx, ny = low[0], low[1], shape[0], shape[1]
+    following = np.empty(count, np.int64)
     along = np.zeros(count)
     line = np.zeros(count, np.int64)
     for k in range(len(offsets) - 1):
@@ -99,7 +101,6 @@ def _lay(points, offsets, clearance, least_length):  # type: ignore[no-untyped-d
         _drop_short(keep, along, first, last, least_length, closed)
         for q in range(waiting, last):
             _add(points, keep, q, head, following, x0, y0, clearance, ny)
-    return keep
 
 
 @njit(cache=True, nogil=True)

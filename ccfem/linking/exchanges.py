@@ -171,19 +171,19 @@ def _rearranged(window, variant, out):  # type: ignore[no-untyped-def]
     """
     size = len(window)
     if variant == 0:
-        out[:] = window[::-1]
+        for k in range(size):
+            out[k] = window[size - 1 - k]
         return True
     block, way = (variant - 1) // 4 + 1, (variant - 1) % 4
     if block >= size or (block == 1 and way > 1):
         return False
-    if way % 2 == 0:
-        out[: size - block] = window[block:]
-        moved = window[:block]
-        out[size - block :] = moved if way < 2 else moved[::-1]
-    else:
-        out[block:] = window[: size - block]
-        moved = window[size - block :]
-        out[:block] = moved if way < 2 else moved[::-1]
+    # Where the block and the rest come from, and where they go.
+    block_from, block_to = (0, size - block) if way % 2 == 0 else (size - block, 0)
+    rest_from, rest_to = (block, 0) if way % 2 == 0 else (0, block)
+    for k in range(size - block):
+        out[rest_to + k] = window[rest_from + k]
+    for k in range(block):
+        out[block_to + k] = window[block_from + (k if way < 2 else block - 1 - k)]
     return True
 
 
@@ -208,7 +208,8 @@ def _exchange(order, clusters):  # type: ignore[no-untyped-def]
                     limit = least * (1.0 - 1e-9)
                     cost = _cost_with(part, i, order, clusters, ahead, behind, value, entry, limit)
                     if cost < limit:
-                        order[i:j] = part
+                        for k in range(j - i):
+                            order[i + k] = part[k]
                         least = _table(order, clusters, ahead, behind)
                         helped = True
     return least
@@ -221,7 +222,9 @@ def _cost_with(part, i, order, clusters, ahead, behind, value, entry, limit):  #
     j = i + len(part)
     rest = 0.0
     if j < len(order):
-        rest = behind[offsets[order[j]] : offsets[order[j] + 1]].min()
+        rest = np.inf
+        for a in range(offsets[order[j]], offsets[order[j] + 1]):
+            rest = min(rest, behind[a])
     if i == 0:
         cost = _begin(part[0], clusters, value)
     else:

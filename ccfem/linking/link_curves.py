@@ -109,8 +109,8 @@ def _reversed(pose):  # type: ignore[no-untyped-def]
 @njit(cache=True, nogil=True)
 def curve_cost(start, turns, sizes, radius, grid, weights, limit):  # type: ignore[no-untyped-def]
     """Length of a curve and `weights` times what of it lies in each place; inf above the limit."""
-    cost = np.abs(sizes).sum()
-    x, y, heading = start
+    cost = abs(sizes[0]) + abs(sizes[1]) + abs(sizes[2])
+    x, y, heading = start[0], start[1], start[2]
     for piece in range(3):
         turn, size = turns[piece], sizes[piece]
         total, done = abs(size), 0.0
@@ -160,7 +160,8 @@ def _link_curves(ends, reach, radius, grid, weights, bound):  # type: ignore[no-
                 word_sizes(start, end, radius, sizes)
                 stubs = stub[a, v] + stub[b, w]
                 for k in range(6):
-                    if stubs + np.abs(sizes[k]).sum() >= best:
+                    length = abs(sizes[k, 0]) + abs(sizes[k, 1]) + abs(sizes[k, 2])
+                    if stubs + length >= best:
                         continue
                     found = stubs + curve_cost(
                         start, WORDS[k], sizes[k], radius, grid, weights, best - stubs

@@ -98,20 +98,25 @@ def _poses(line: FloatArray, side: int, cuts: FloatArray, width: float) -> Float
 @njit(cache=True, nogil=True)
 def _best(poses, pairs, cuts, room, radius, limit):  # type: ignore[no-untyped-def]
     """Cost, turn and cuts of the cheapest link of each pair; an infinite cost for none."""
-    result = np.full((len(pairs), 4), np.inf)
+    result = np.empty((len(pairs), 4))
     sizes = np.empty((6, 3))
     end = np.empty(3)
     for p in range(len(pairs)):
-        a, b = pairs[p]
+        a, b = pairs[p, 0], pairs[p, 1]
+        for column in range(4):
+            result[p, column] = np.inf
         for one in range(len(cuts)):
             for other in range(len(cuts)):
                 if cuts[one] > 0.4 * room[a] or cuts[other] > 0.4 * room[b]:
                     continue
-                end[:] = poses[b, other]
-                end[2] += np.pi
+                end[0], end[1] = poses[b, other, 0], poses[b, other, 1]
+                end[2] = poses[b, other, 2] + np.pi
                 word_sizes(poses[a, one], end, radius, sizes)
-                word = np.argmin(np.array([np.abs(sizes[w]).sum() for w in range(6)]))
-                length = np.abs(sizes[word]).sum()
+                word, length = 0, np.inf
+                for w in range(6):
+                    size = abs(sizes[w, 0]) + abs(sizes[w, 1]) + abs(sizes[w, 2])
+                    if size < length:
+                        word, length = w, size
                 cost = length + cuts[one] + cuts[other]
                 if not cost < result[p, 0] or length > limit + np.pi * radius:
                     continue

@@ -2,23 +2,72 @@
 
 import re
 from collections.abc import Mapping
-from dataclasses import dataclass
+from dataclasses import dataclass, field
+from typing import Literal
 
-from ccfem.checks import check_fields, check_number
+from ccfem.checks import check_choices, check_fields, check_number
 from ccfem.errors import InputError
 
-__all__ = ["GcodeProfile"]
+__all__ = ["FeedAxes", "GcodeProfile"]
 
-_FIELDS = ("bed_temperature", "matrix_temperature", "fibre_temperature", "tool", "wait")
+_ALWAYS = (
+    *("bed_temperature", "matrix_temperature", "fibre_temperature"),
+    *("matrix_standby", "fibre_standby", "tool", "wait"),
+)
+_FIELDS = {
+    "start": (),
+    "end": (),
+    "tool": (),
+    "cut": (),
+    "standby": ("temperature",),
+    "preheat": ("temperature",),
+    "heat": ("temperature",),
+    "work": ("temperature",),
+    "heat_bed": ("temperature",),
+    "fan": ("fan",),
+    "path_start": ("length",),
+    "path_end": ("length",),
+    "layer": ("layer",),
+}
+"""Kinds of lines, and the fields that each knows beside those that all know."""
 _FIELD = re.compile(r"\{(\w*)\}")
+
+
+@dataclass(frozen=True)
+class FeedAxes:
+    """Letters of the axes that feed what the fibre's head lays; T0 feeds matrix by E.
+
+    Attributes
+    ----------
+    fibre : str
+        Fibre.
+    matrix : str
+        Matrix that the same head lays round it.
+    """
+
+    fibre: str = "E"
+    matrix: str = "V"
+
+    def __post_init__(self) -> None:
+        for name, letter in vars(self).items():
+            if len(letter) != 1 or letter not in "ABCDEHIJKLNOPQRSUVW":
+                raise InputError(
+                    f"gcode.axes.{name} must be one capital letter that is no X, Y, Z, F, G, M or "
+                    f"T; got {letter!r}: correct it"
+                )
+        if self.fibre == self.matrix:
+            raise InputError(
+                f"gcode.axes need two letters; both are {self.fibre!r}: change one of them"
+            )
 
 
 @dataclass(frozen=True)
 class GcodeProfile:
     """Commands and small moves of a printer with two tools: T0 lays matrix, T1 fibre.
 
-    The defaults are for Marlin, with a cutter on its first servo. All of them are our choice. The
-    firmware applies the offset between the nozzles (M218).
+    The defaults are for Marlin, with a cutter on its first servo. All of them are our choice. Lines
+    may hold {bed_temperature}, {matrix_temperature}, {fibre_temperature}, {matrix_standby},
+    {fibre_standby}, {tool} and {wait}, and what is said below.
 
     Attributes
     ----------
@@ -29,6 +78,29 @@ class GcodeProfile:
         Lines that select a tool; {tool} is its number.
     cut : tuple of str
         Lines that cut the fibre and wait; {wait} is `Machine.cut_wait` in milliseconds.
+    standby, preheat : tuple of str
+        Lines that let {tool} cool to {temperature} while the other one prints, and that heat it
+        again ahead of its turn, without waiting.
+    heat, work : tuple of str
+        Lines that set {tool}, while it prints, to {temperature}, and that wait for it after a
+        change.
+    heat_bed : tuple of str
+        Lines that set the bed to {temperature} without waiting.
+    fan : tuple of str
+        Lines that set the fan of {tool} to {fan}, 0 to 255.
+    path_start, path_end : tuple of str
+        Lines before and after a strand of {length} mm.
+    layer : tuple of str
+        Lines at the start of {layer}, counted from 0.
+    offset : tuple of 3 floats, mm
+        Of the fibre nozzle from the matrix nozzle.
+    offset_by : {"firmware", "gcode"}
+        What takes it into account: the firmware (M218, G10, macros), or the coordinates of the
+        file.
+    axes : FeedAxes
+        Letters of what the fibre's head feeds.
+    comments : {"prusa", "cura"}
+        Words by which comments name what is laid.
     bed : tuple of 3 floats, mm
         Width, depth and height of the space to print in; its corner is the origin. The default is
         the working space of Chen et al. 2021, section 5.2.
@@ -51,11 +123,10 @@ class GcodeProfile:
         "M83 ; relative extrusion",
         "M140 S{bed_temperature}",
         "M104 T0 S{matrix_temperature}",
-        "M104 T1 S{fibre_temperature}",
+        "M104 T1 S{fibre_standby}",
         "M190 S{bed_temperature}",
-        "M109 T0 S{matrix_temperature}",
-        "M109 T1 S{fibre_temperature}",
         "G28 ; home",
+        "M109 T0 S{matrix_temperature}",
     )
     tool: tuple[str, ...] = ("T{tool}",)
     cut: tuple[str, ...] = (
@@ -71,6 +142,19 @@ class GcodeProfile:
         "G28 X Y ; out of the way",
         "M84 ; motors off",
     )
+    standby: tuple[str, ...] = ("M104 T{tool} S{temperature}",)
+    preheat: tuple[str, ...] = ("M104 T{tool} S{temperature}",)
+    heat: tuple[str, ...] = ("M104 T{tool} S{temperature}",)
+    work: tuple[str, ...] = ("M109 T{tool} S{temperature}",)
+    heat_bed: tuple[str, ...] = ("M140 S{temperature}",)
+    fan: tuple[str, ...] = ("M106 P{tool} S{fan}",)
+    path_start: tuple[str, ...] = ()
+    path_end: tuple[str, ...] = ()
+    layer: tuple[str, ...] = ()
+    offset: tuple[float, float, float] = (0.0, 0.0, 0.0)
+    offset_by: Literal["firmware", "gcode"] = "firmware"
+    axes: FeedAxes = field(default_factory=FeedAxes)
+    comments: Literal["prusa", "cura"] = "prusa"
     bed: tuple[float, float, float] = (300.0, 300.0, 300.0)
     lift: float = 1.0
     lift_speed: float = 10.0
@@ -82,13 +166,16 @@ class GcodeProfile:
     longest_feed: float = 190.0
 
     def __post_init__(self) -> None:
-        for name in ("start", "tool", "cut", "end"):
+        check_choices(self)
+        for name in _FIELDS:
             for line in getattr(self, name):
                 self._check(name, line)
         check_fields(self, "lift", "retract", at_least=0.0, unit="mm")
         check_fields(self, "lift_speed", "retract_speed", "feed_speed", above=0.0, unit="mm/s")
         check_fields(self, "longest_feed", above=0.0, unit="mm")
         check_fields(self, "matrix_angle", "matrix_turn", unit="degrees")
+        for value in self.offset:
+            check_number("each number of gcode_profile.offset", value, unit="mm")
         for size in self.bed:
             check_number("each size of gcode_profile.bed", size, above=0.0, unit="mm")
 
@@ -96,10 +183,11 @@ class GcodeProfile:
     def _check(name: str, line: str) -> None:
         if not line.isprintable():
             raise InputError(f"{name} must be a list of single lines; got {line!r}: split it")
-        for field in _FIELD.findall(line):
-            if field not in _FIELDS:
+        known = _ALWAYS + _FIELDS[name]
+        for word in _FIELD.findall(line):
+            if word not in known:
                 raise InputError(
-                    f"{name} has no field '{{{field}}}' to fill in; there are: {', '.join(_FIELDS)}"
+                    f"{name} has no field '{{{word}}}' to fill in; there are: {', '.join(known)}"
                 )
 
     @staticmethod

@@ -5,7 +5,9 @@ from dataclasses import dataclass, field, fields
 from ccfem.arrays import in_brief
 from ccfem.checks import check_fields
 from ccfem.machine.gcode_profile import GcodeProfile
+from ccfem.machine.kinematics import Kinematics
 from ccfem.machine.limits import Limits
+from ccfem.machine.print_process import Process
 from ccfem.machine.speed_table import SpeedTable
 
 __all__ = ["Machine"]
@@ -14,7 +16,7 @@ _CUTTER_DISTANCE = 42.0
 """Chen et al. 2021, section 5.2, mm."""
 
 
-_PARTS = ("speeds", "gcode", "limits")
+_PARTS = ("speeds", "gcode", "limits", "process", "kinematics", "pressed")
 """Fields that are no numbers."""
 
 
@@ -34,6 +36,9 @@ class Machine:
         fibre, it is that: see `strand_height`.
     matrix_height : float, mm
         Height of a matrix layer between two fibre layers.
+    pressed : bool
+        Strands are pressed into the layer below: `fibre_height` holds though their section needs
+        more.
     filament_area : float, mm^2
         Cross-section of one strand.
     minimum_length : float, mm
@@ -57,13 +62,26 @@ class Machine:
         Of the matrix filament.
     fibre_density, matrix_density : float, g/cm^3
         Our choice: a data sheet's value for carbon tow in thermoplastic, and that of PLA.
+    fibre_tex : float, g/km, optional
+        Mass of the fibre filament, in place of its density and section.
+    coextrusion : float
+        Share of the room in a strand's cell, `fibre_width` times the height of its layer, that the
+        fibre's head fills with matrix of its own: 0 for one that lays fibre alone.
     bed_temperature : float, degrees Celsius
         Our choice, usual for PLA.
+    matrix_standby, fibre_standby : float, degrees Celsius
+        Of a tool while the other one prints (Aura: 100 and 180).
+    matrix_heating, fibre_heating : float, K/s
+        How fast a nozzle gets hot again (Aura: 0.97 and 1.38).
     head_angle, head_length : float, degrees and mm
         Half of the angle at the tip of the cone that the head is taken for, and the cone's length:
         what it would run into on curved layers. Our choice.
     gcode : GcodeProfile
         What its firmware wants to be told.
+    process : Process
+        How it prints.
+    kinematics : Kinematics
+        How it turns head and part to each other on curved layers.
     limits : Limits
         What it tolerates: paths beyond are not printable as they are.
     """
@@ -71,6 +89,7 @@ class Machine:
     fibre_width: float = 1.0
     fibre_height: float = 0.05
     matrix_height: float = 0.8
+    pressed: bool = False
     filament_area: float = 0.1075
     minimum_length: float = 42.0
     minimum_radius: float = 3.85
@@ -86,10 +105,18 @@ class Machine:
     matrix_diameter: float = 1.75
     fibre_density: float = 1.4
     matrix_density: float = 1.24
+    fibre_tex: float | None = None
+    coextrusion: float = 0.0
     bed_temperature: float = 60.0
+    matrix_standby: float = 100.0
+    fibre_standby: float = 180.0
+    matrix_heating: float = 0.97
+    fibre_heating: float = 1.38
     head_angle: float = 35.0
     head_length: float = 40.0
     gcode: GcodeProfile = field(default_factory=GcodeProfile)
+    process: Process = field(default_factory=Process)
+    kinematics: Kinematics = field(default_factory=Kinematics)
     limits: Limits = field(default_factory=Limits)
 
     __repr__ = in_brief
@@ -98,12 +125,22 @@ class Machine:
         check_fields(self, "fibre_width", "matrix_width", "matrix_diameter", above=0.0, unit="mm")
         numbers = [one.name for one in fields(self) if one.name not in _PARTS]
         check_fields(self, *numbers, at_least=0.0)
+        check_fields(self, "matrix_heating", "fibre_heating", above=0.0, unit="K/s")
+        check_fields(self, "coextrusion", at_most=1.0)
         check_fields(self, "head_angle", below=90.0, unit="degrees")
 
     @property
     def strand_height(self) -> float:
         """Least height of a layer of strands a fibre width apart, mm: what their volume needs."""
+        if self.pressed:
+            return self.fibre_height
         return max(self.fibre_height, self.filament_area / self.fibre_width)
+
+    @property
+    def strand_area(self) -> float:
+        """Section of what a strand lays, mm^2: the filament, and the matrix round it."""
+        room = self.fibre_width * self.strand_height - self.filament_area
+        return self.filament_area + self.coextrusion * max(room, 0.0)
 
     @property
     def tail(self) -> float:

@@ -14,7 +14,7 @@ from ccfem.geometry.polylines import (
 )
 from ccfem.machine.speed_table import SpeedTable
 
-__all__ = ["table_speeds"]
+__all__ = ["step_curvatures", "table_speeds"]
 
 _DIGITS = 9
 """Decimals that curvature and length are rounded to."""
@@ -63,7 +63,7 @@ def table_speeds(
     start = np.flatnonzero(starts_segment(offsets))
     if not len(start):
         return np.full(count, table.speed[0])
-    curvature = _step_curvatures(points, offsets, corner, shortest)
+    curvature = step_curvatures(points, offsets, corner, shortest)
     row = table.row_of(curvature)
     new = corner[start]
     new[0] = True
@@ -78,7 +78,7 @@ def table_speeds(
     return np.repeat(speeds, np.diff(np.append(kept, count)))
 
 
-def _step_curvatures(
+def step_curvatures(
     points: FloatArray, offsets: IntArray, corner: BoolArray, shortest: float
 ) -> FloatArray:
     """Curvature of each step, in the order of the points they start from."""

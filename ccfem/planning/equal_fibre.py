@@ -11,7 +11,6 @@ from functools import cached_property
 
 import numpy as np
 
-from ccfem.arrays import in_brief
 from ccfem.checks import check_number
 from ccfem.elasticity.part_stress import PartStress
 from ccfem.layers.layer import Layer
@@ -19,6 +18,7 @@ from ccfem.machine.machine import Machine
 from ccfem.planning.dial import Dial, around
 from ccfem.planning.mixing import layer_lengths, mixed
 from ccfem.planning.plan import check_layers, plan, plan_layers
+from ccfem.planning.planned import Planned
 from ccfem.planning.strategy import LengthStrategy, Strategy
 from ccfem.toolpaths import FIBRE, Toolpaths
 
@@ -30,6 +30,7 @@ __all__ = [
     "length_per_layer",
     "plan_to_length",
     "plan_to_lengths",
+    "sampled_length",
 ]
 
 TOLERANCE = 0.01
@@ -53,32 +54,6 @@ _FEW = 4
 """Stacks of at most this many layers are searched as they are."""
 
 
-@dataclass(frozen=True)
-class Planned:
-    """Toolpaths of a part, and the strategy that made them.
-
-    Attributes
-    ----------
-    strategy : Strategy
-        With the values that were found (of most layers, see `note`).
-    toolpaths : Toolpaths
-    length_per_layer : float, mm
-        Fibre length divided by the number of layers.
-    note : str
-        Empty, or one line: which layers have another value, or why the wanted length was missed.
-    reached : bool
-        Whether it lays the wanted length within `TOLERANCE`.
-    """
-
-    strategy: Strategy
-    toolpaths: Toolpaths
-    length_per_layer: float
-    note: str = ""
-    reached: bool = True
-
-    __repr__ = in_brief
-
-
 def length_per_layer(toolpaths: Toolpaths, layers: Sequence[Layer]) -> float:
     """Fibre length divided by the number of layers, mm."""
     return float(toolpaths.of_kind(FIBRE).lengths.sum()) / max(len(layers), 1)
@@ -97,6 +72,7 @@ def plan_to_length(
     wanted: float,
     start: Planned | None = None,
     tolerance: float = TOLERANCE,
+    sampled: float | None = None,
 ) -> Planned:
     """Plan to a wanted length of fibre.
 
@@ -120,6 +96,8 @@ def plan_to_length(
         The strategy's plan with its own value, where there is one already.
     tolerance : float, default 0.01
         Share by which it may lay less.
+    sampled : float, mm, optional
+        What it lays with its own value on a few layers (`sampled_length`), where that is known.
 
     Returns
     -------
@@ -131,7 +109,19 @@ def plan_to_length(
         When `wanted` is not a positive number, or whatever the strategy raises.
     """
     known = () if start is None else (start,)
-    return plan_to_lengths(strategy, layers, stress, machine, (wanted,), known, tolerance)[0]
+    lengths = (wanted,)
+    return plan_to_lengths(strategy, layers, stress, machine, lengths, known, tolerance, sampled)[0]
+
+
+def sampled_length(
+    strategy: Strategy, layers: Sequence[Layer], stress: PartStress, machine: Machine
+) -> float | None:
+    """Length per layer that a strategy lays with its own value, mm, judged by a few layers.
+
+    None where the stack is small and they are all there are. Parameters as in `plan_to_length`.
+    """
+    search = _Search(Dial(strategy), layers, stress, machine)
+    return None if search.few is layers else search.sample(search.dial.own)
 
 
 def plan_to_lengths(
@@ -142,6 +132,7 @@ def plan_to_lengths(
     lengths: Sequence[float],
     known: Sequence[Planned] = (),
     tolerance: float = TOLERANCE,
+    sampled: float | None = None,
 ) -> list[Planned]:
     """Plan to several lengths of fibre, mm per layer: what is planned for one serves the others.
 
@@ -154,6 +145,8 @@ def plan_to_lengths(
         Plans of the strategy with its own value or at its extremes, where there are any.
     tolerance : float, default 0.01
         Share by which less may be laid.
+    sampled : float, mm, optional
+        As in `plan_to_length`.
     """
     for wanted in lengths:
         check_wanted(wanted)
@@ -166,6 +159,8 @@ def plan_to_lengths(
         ]
     search = _Search(Dial(strategy), layers, stress, machine, tolerance)
     search.learn(known)
+    if sampled is not None:
+        search.sampled[search.dial.own] = sampled
     return [search.to(wanted) for wanted in lengths]
 
 

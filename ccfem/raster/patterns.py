@@ -30,6 +30,12 @@ __all__ = [
 
 SHELL, GUIDE, INFILL = range(3)
 
+_DASH = 12
+"""Pieces of rings with fewer pixels than this are dashes."""
+_LADDER = 12
+"""Number of dashes side by side that give way to rings along the strip: in corners there are fewer.
+"""
+
 _LEAST_AXIS = 4
 """Minimum number of pixels of a medial axis: a part with fewer is filled by concentric rings."""
 
@@ -171,7 +177,9 @@ def medial_regions(mask: BoolArray, shells: int = 3, metric: Metric = "euclid") 
 def stress_regions(mask: BoolArray, guides: IntArray, shells: int = 3) -> Regions:
     """Shells, and rings round the nearest of some guides, an image, -1 where there is none.
 
-    Pieces inside the shells that no guide runs through are filled by concentric rings.
+    Pieces inside the shells that no guide runs through are filled by concentric rings, and so is
+    what rings round the end of a guide would fill with dashes from one side of a strip to the
+    other.
     """
     shell, inside = _shells(mask, shells)
     pieces, _ = ndimage.label(inside, np.ones((3, 3)))
@@ -181,4 +189,31 @@ def stress_regions(mask: BoolArray, guides: IntArray, shells: int = 3) -> Region
     if guided.any():
         ring, guide = rings_round(guides, guided)
         grown = np.where(ring >= 0, guide * (ring.max() + 1) + ring, -1)
-    return _stack(shell, (grown, GUIDE), (bands(inside & ~guided), INFILL))
+        grown[_ladders(grown, ring > 0)] = -1
+    return _stack(shell, (grown, GUIDE), (bands(inside & (grown < 0)), INFILL))
+
+
+def _ladders(number: IntArray, counts: BoolArray) -> BoolArray:
+    """Pixels (H, W) of dashes that lie side by side, of regions where these count."""
+    pieces = _pieces(number, counts)
+    size = np.bincount(pieces.ravel())
+    dashes = counts & (number >= 0) & (size < _DASH)[pieces]
+    together, count = ndimage.label(dashes, np.ones((3, 3)))
+    pairs = np.unique(np.stack([together[dashes], pieces[dashes]], axis=1), axis=0)
+    many = np.bincount(pairs[:, 0], minlength=count + 1) >= _LADDER
+    return dashes & many[together]
+
+
+def _pieces(number: IntArray, counts: BoolArray) -> IntArray:
+    """Give each piece (H, W) of a region that counts a number from 1; 0 where none counts."""
+    found = np.zeros(number.shape, dtype=np.int64)
+    total = 0
+    boxes = ndimage.find_objects(np.where(counts, number + 1, 0))
+    for region, box in enumerate(boxes):
+        if box is None:
+            continue
+        inside = counts[box] & (number[box] == region)
+        labels, count = ndimage.label(inside, np.ones((3, 3)))
+        found[box][inside] = labels[inside] + total
+        total += count
+    return found

@@ -41,11 +41,12 @@ def _corners(pixels, offsets, stairs):  # type: ignore[no-untyped-def]
             while k < last:
                 m = k
                 while m + 1 < last and _stair(pixels, m):
-                    if m > k and (pixels[m + 2] - pixels[m + 1] != pixels[m] - pixels[m - 1]).any():
+                    if m > k and not _parallel(pixels, m):
                         break
                     m += 1
                 if m + 1 - k >= stairs:
-                    keep[k + 1 : m + 1] = False
+                    for p in range(k + 1, m + 1):
+                        keep[p] = False
                 k = m + 1
         # Straight runs of what is left.
         before, here = first, -1
@@ -53,9 +54,9 @@ def _corners(pixels, offsets, stairs):  # type: ignore[no-untyped-def]
             if not keep[k]:
                 continue
             if here >= 0:
-                one, other = pixels[here] - pixels[before], pixels[k] - pixels[here]
-                along = one[0] * other[0] + one[1] * other[1]
-                if one[0] * other[1] == one[1] * other[0] and along > 0:
+                ax, ay = pixels[here, 0] - pixels[before, 0], pixels[here, 1] - pixels[before, 1]
+                bx, by = pixels[k, 0] - pixels[here, 0], pixels[k, 1] - pixels[here, 1]
+                if ax * by == ay * bx and ax * bx + ay * by > 0:
                     keep[here] = False
                 else:
                     before = here
@@ -66,6 +67,16 @@ def _corners(pixels, offsets, stairs):  # type: ignore[no-untyped-def]
 @njit(cache=True)
 def _stair(pixels, m):  # type: ignore[no-untyped-def]
     """Whether the steps from point m and m + 1 go along sides, at a right angle."""
-    one, other = pixels[m + 1] - pixels[m], pixels[m + 2] - pixels[m + 1]
-    along_sides = abs(one[0]) + abs(one[1]) == 1 and abs(other[0]) + abs(other[1]) == 1
-    return along_sides and one[0] * other[0] + one[1] * other[1] == 0
+    ax, ay = pixels[m + 1, 0] - pixels[m, 0], pixels[m + 1, 1] - pixels[m, 1]
+    bx, by = pixels[m + 2, 0] - pixels[m + 1, 0], pixels[m + 2, 1] - pixels[m + 1, 1]
+    along_sides = abs(ax) + abs(ay) == 1 and abs(bx) + abs(by) == 1
+    return along_sides and ax * bx + ay * by == 0
+
+
+@njit(cache=True)
+def _parallel(pixels, m):  # type: ignore[no-untyped-def]
+    """Whether the step to point m and that from point m + 1 are the same."""
+    for i in range(2):
+        if pixels[m + 2, i] - pixels[m + 1, i] != pixels[m, i] - pixels[m - 1, i]:
+            return False
+    return True

@@ -275,7 +275,7 @@ def _join(following, before, here, there):  # type: ignore[no-untyped-def]
 def chains(regions, used, following, before):  # type: ignore[no-untyped-def]
     """Pixels path by path, with offsets and which are closed."""
     width = regions.shape[1]
-    pixels = np.empty((used.sum(), 2), dtype=np.int64)
+    pixels = np.empty((used.size, 2), dtype=np.int64)
     offsets = np.empty(len(pixels) + 1, dtype=np.int64)
     closed = np.empty(len(pixels), dtype=np.bool_)
     done = np.zeros(used.size, dtype=np.bool_)

@@ -123,7 +123,7 @@ def _own_way(line, seed, closed, width, own):  # type: ignore[no-untyped-def]
     count = len(line)
     along = np.zeros(count)
     for p in range(1, count):
-        along[p] = along[p - 1] + np.sqrt(((line[p] - line[p - 1]) ** 2).sum())
+        along[p] = along[p - 1] + np.sqrt(_squared(line, p, p - 1))
     first = last = seed
     for sense in (1, -1):
         p = seed + sense
@@ -132,7 +132,7 @@ def _own_way(line, seed, closed, width, own):  # type: ignore[no-untyped-def]
                 arc = abs(along[p] - along[q])
                 if closed:
                     arc = min(arc, along[-1] - arc)
-                if arc > own and ((line[p] - line[q]) ** 2).sum() < width * width:
+                if arc > own and _squared(line, p, q) < width * width:
                     break
             else:
                 first, last = min(first, p), max(last, p)
@@ -140,6 +140,13 @@ def _own_way(line, seed, closed, width, own):  # type: ignore[no-untyped-def]
                 continue
             break
     return first, last
+
+
+@njit(cache=True, nogil=True)
+def _squared(line, p, q):  # type: ignore[no-untyped-def]
+    """Square of the distance of two points."""
+    x, y = line[p, 0] - line[q, 0], line[p, 1] - line[q, 1]
+    return x * x + y * y
 
 
 def _iso_lines(seed: FloatArray, region: Region, pitch: float, off: float) -> list[FloatArray]:

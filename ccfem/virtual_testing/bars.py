@@ -83,7 +83,7 @@ class Bars:
     def strain(self, displacement: FloatArray) -> FloatArray:
         """Strain (s,) along the pieces, at their middles, of a displacement (n, 3), mm."""
         result = np.empty(len(self.length))
-        u = np.ascontiguousarray(displacement, dtype=np.float64)
+        u = _seen(displacement)
         _strain(self.nodes, self.slope, self.tangent, u, result)
         return result
 
@@ -96,10 +96,17 @@ class Bars:
             EA of each piece; those of zero stiffness cost nothing.
         displacement : (n, 3) array, mm
         """
-        u = np.ascontiguousarray(displacement, dtype=np.float64)
+        u = _seen(displacement)
         result = np.zeros(u.shape)
         _forces(self.nodes, self.slope, self.tangent, stiffness * self.length, u, result)
         return result
+
+
+def _seen(displacement: FloatArray) -> FloatArray:
+    """View that nobody writes through, so that loops are compiled for one kind of array."""
+    view = np.ascontiguousarray(displacement, dtype=np.float64).view()
+    view.flags.writeable = False
+    return view
 
 
 # One loop each, without slices: these would double the time.

@@ -38,24 +38,39 @@ def _sweep(points, start, end, edges, share, keep, sweeps):  # type: ignore[no-u
     for sweep in range(sweeps):
         for step in range(count):
             k = step if sweep % 2 == 0 else count - 1 - step
-            a, b = points[edges[k, 0]], points[edges[k, 1]]
-            if k > 0:
-                p = points[edges[k - 1, 0]] * (1.0 - share[k - 1]) + (
-                    points[edges[k - 1, 1]] * share[k - 1]
-                )
-            else:
-                p = points[start]
-            if k < count - 1:
-                q = points[edges[k + 1, 0]] * (1.0 - share[k + 1]) + (
-                    points[edges[k + 1, 1]] * share[k + 1]
-                )
-            else:
-                q = points[end]
-            along = b - a
-            square = (along * along).sum()
             # Where each neighbour stands along the edge, and how far off it.
-            s, t = ((p - a) * along).sum() / square, ((q - a) * along).sum() / square
-            u = np.sqrt(max(((p - a - s * along) ** 2).sum(), 0.0))
-            v = np.sqrt(max(((q - a - t * along) ** 2).sum(), 0.0))
+            square, s, t = 0.0, 0.0, 0.0
+            for i in range(points.shape[1]):
+                a = points[edges[k, 0], i]
+                along = points[edges[k, 1], i] - a
+                square += along * along
+                s += (_before(points, start, edges, share, k, i) - a) * along
+                t += (_behind(points, end, edges, share, k, i) - a) * along
+            s, t = s / square, t / square
+            u, v = 0.0, 0.0
+            for i in range(points.shape[1]):
+                a = points[edges[k, 0], i]
+                along = points[edges[k, 1], i] - a
+                u += (_before(points, start, edges, share, k, i) - a - s * along) ** 2
+                v += (_behind(points, end, edges, share, k, i) - a - t * along) ** 2
+            u, v = np.sqrt(u), np.sqrt(v)
             if u + v > 0.0:
                 share[k] = min(max((s * v + t * u) / (u + v), keep), 1.0 - keep)
+
+
+@njit(cache=True, nogil=True)
+def _before(points, start, edges, share, k, i):  # type: ignore[no-untyped-def]
+    """Coordinate i of what comes before crossing k: the crossing before it, or the start."""
+    return points[start, i] if k == 0 else _crossing(points, edges, share, k - 1, i)
+
+
+@njit(cache=True, nogil=True)
+def _behind(points, end, edges, share, k, i):  # type: ignore[no-untyped-def]
+    """Coordinate i of what follows crossing k: the next crossing, or the end."""
+    return points[end, i] if k == len(share) - 1 else _crossing(points, edges, share, k + 1, i)
+
+
+@njit(cache=True, nogil=True)
+def _crossing(points, edges, share, k, i):  # type: ignore[no-untyped-def]
+    """Coordinate i of a crossing."""
+    return points[edges[k, 0], i] * (1.0 - share[k]) + points[edges[k, 1], i] * share[k]

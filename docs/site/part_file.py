@@ -9,7 +9,7 @@ from ccfem.cases.part_keys import Part
 from ccfem.cases.part_loads import LOADS, SUPPORTS
 from ccfem.cases.part_regions import REGIONS
 from ccfem.cases.part_tables import RULES
-from ccfem.machine import GcodeProfile, Limits, Machine, SpeedTable
+from ccfem.machine import GcodeProfile, Kinematics, Limits, Machine, Process, SpeedTable
 from ccfem.materials import isotropic, material_names, transversely_isotropic
 
 __all__ = ["part_file_page"]
@@ -32,6 +32,8 @@ def part_file_page() -> str:
         f"## Machine `[machine]`\n\n{keys(Machine)}",
         f"### Limits `[machine.limits]`\n\n{keys(Limits)}",
         f"### Speeds `[machine.speeds]`\n\n{keys(SpeedTable)}",
+        f"### Process `[machine.process]`\n\n{keys(Process)}",
+        f"### Kinematics `[machine.kinematics]`\n\n{keys(Kinematics)}",
         f"### G-code `[machine.gcode]`\n\n{keys(GcodeProfile)}",
         "## Strategies `[strategies.NAME]`\n\nThe parameters of a [strategy](strategies.md) on "
         "this part.\n\n## Slicing `[slicing]`\n\n`method`, the name of a [slicer](slicers.md), and "

@@ -48,7 +48,9 @@ def smallest_angle(corners):
 def test_names():
     assert set(NAMES) <= set(named_cases())
     assert all(isinstance(make(), Case) for make in named_cases().values())
-    with pytest.raises(InputError, match="no case named 'lop'; there are: bar, bracket, bridge, "):
+    with pytest.raises(
+        InputError, match="no case named 'lop'; there are: arm_bracket, bar, bracket, "
+    ):
         create_case("lop")
     with pytest.raises(InputError, match="no parameter 'size'; it has: element_size, order, force"):
         create_case("loop", size=3.0)

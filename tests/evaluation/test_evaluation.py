@@ -150,6 +150,7 @@ def test_zero_stress(make_part, uniform):
         "stiffness_alignment_harmonic",
         *(f"matching_{name}_{k}" for name in ("path", "energy") for k in (10, 30)),
         *("space_angle_mean", "space_angle_stress", "across_tension"),
+        *("across_flat", "across_best"),
         *(f"space_aligned_{k}" for k in (10, 20, 30)),
     }
     assert total["no_tension"] == 1.0

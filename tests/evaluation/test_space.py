@@ -101,6 +101,24 @@ def test_tension_across_the_layers_is_what_acts_along_their_normal():
     assert total["across_tension"] == pytest.approx(s**2)
 
 
+def test_layers_are_compared_with_flat_ones_and_the_best():
+    """Tension of 4 along y and of 1 at 30 degrees to the layer's normal: known in closed form."""
+    c, s = np.cos(np.radians(30.0)), np.sin(np.radians(30.0))
+    one, other = np.array([s, 0.0, c]), np.array([c, 0.0, -s])
+    tensor = np.diag([0.0, 4.0, 0.0]) + np.outer(one, one) - 2.0 * np.outer(other, other)
+    layer = Planar(heights=(1.0,)).cut(MESH)[0]
+    paths = Toolpaths.from_plane([np.array([[5.0, 10.0], [55.0, 10.0]])], layer)
+    along = (0.0, 1.0, 0.0)
+    total = evaluate(paths, [layer], uniform(tensor), Machine(), build=along).total
+    assert total["across_tension"] == pytest.approx((c**2 - 2.0 * s**2) / 4.0)
+    assert total["across_flat"] == pytest.approx(1.0)
+    assert total["across_best"] == 0.0
+    pull = uniform(np.diag([3.0, 2.0, 1.0]))
+    total = evaluate(paths, [layer], pull, Machine()).total
+    assert total["across_flat"] == pytest.approx(1.0 / 3.0)
+    assert total["across_best"] == pytest.approx(1.0 / 3.0)
+
+
 def test_joints_linked_counts_the_patches_that_a_strand_comes_near():
     layer = Planar(heights=(1.0,)).cut(MESH)[0]
     whole = np.array([[5.0, 10.0], [55.0, 10.0]])

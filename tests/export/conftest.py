@@ -10,7 +10,7 @@ import numpy as np
 import pytest
 from gcodeparser import parse_gcode_lines
 
-SILENT = {("G", 21), ("M", 84), ("M", 400)}
+SILENT = {("G", 21), ("M", 84), ("M", 106), ("M", 400)}
 
 
 @dataclass

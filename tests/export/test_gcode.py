@@ -11,17 +11,44 @@ from ccfem.errors import InputError
 from ccfem.evaluation.manufacture import manufacture_indices, sample_manufacture
 from ccfem.evaluation.plane_paths import plane_paths
 from ccfem.export.gcode import gcode, write_gcode
-from ccfem.export.matrix_flow import with_flow
-from ccfem.export.print_plan import check_machine, plan_print
 from ccfem.io.toml import from_table
 from ccfem.layers.slicing.planar import Planar
-from ccfem.machine import Machine, SpeedTable
+from ccfem.machine import Machine, Process, SpeedTable
 from ccfem.machine.gcode_profile import GcodeProfile
 from ccfem.mesh.box import box_mesh
 from ccfem.meshing import extrude
+from ccfem.printing.matrix_flow import with_flow
+from ccfem.printing.print_plan import check_machine, plan_print
 from ccfem.toolpaths import MATRIX, Toolpaths
 
-MACHINE = Machine(speeds=SpeedTable(), matrix_height=0.7, fibre_height=0.1, filament_area=0.1)
+# Nothing but lines, feeds and cuts: what the process adds has tests of its own.
+PLAIN = Process(
+    restart_extra=0.0,
+    start_length=0.0,
+    ramp_length=0.0,
+    corner_angle=180.0,
+    finish_speed=1e3,
+    strand_lift=0.0,
+    tool_lift=0.0,
+    tool_retract=0.0,
+    short="error",
+    cover=0.0,
+    prime="none",
+    skirt_loops=0,
+    first_layer_height=0.0,
+    first_layer_speed=1.0,
+    warm_height=0.0,
+    acceleration=1e9,
+)
+MACHINE = Machine(
+    speeds=SpeedTable(),
+    matrix_height=0.7,
+    fibre_height=0.1,
+    filament_area=0.1,
+    matrix_heating=1e9,
+    fibre_heating=1e9,
+    process=PLAIN,
+)
 TAIL = 42.0
 HOLE = 8.0
 # A plate of 90 x 50 x 4 mm with a hole; its lower corner lies at (-20, 10, 3).
@@ -262,9 +289,10 @@ def test_flow_follows_the_section_within_a_tenth(wide, scale):
         closed=np.zeros(1, bool),
     )
     strip = shapely.box(0.0, -0.5 * wide, 50.0, 0.5 * wide)
-    found, laid = with_flow(paths, strip, 0.5, [], 0.0, MACHINE)
+    found, laid, warning = with_flow(paths, strip, 0.5, [], 0.0, MACHINE)
     assert found.lengths.sum() == pytest.approx(50.0)
     np.testing.assert_allclose(laid[:-1], 0.5 * scale)
+    assert not warning
 
 
 def test_strands_that_stand_higher_than_the_matrix_above_are_refused():
@@ -299,8 +327,11 @@ def test_both_nozzles_are_hot_before_they_extrude(printed):
     assert all(move.hot for move in run.moves if move.fed != 0.0)
     assert {move.tool for move in run.moves if move.fed != 0.0} == {0, 1}
     first = text.index("\nT0\n")
-    for line in ("M190 S60", "M109 T0 S200", "M109 T1 S250", "G28"):
+    for line in ("M190 S60", "M109 T0 S200", "G28"):
         assert 0 < text.index(line) < first
+    # Each tool is waited for behind each change to it.
+    for tool, degrees, changes in ((0, 200, 4), (1, 250, 3)):
+        assert text.count(f"\nT{tool}\nM109 T{tool} S{degrees}\n") == changes
     assert text.index("M104 T1 S0") > text.rindex("G1")
 
 
@@ -333,8 +364,8 @@ def test_the_time_is_that_of_the_evaluator(printed, plate):
     # The sum at the head of the file; the way to the first line starts from an unknown place.
     first = next(m for m in run.moves if m.rapid and np.any((m.end - m.start)[:2]))
     seconds = sum(move.seconds for move in run.moves) - first.seconds + run.waited
-    (said,) = [line for line in text.splitlines() if "without heating" in line]
-    assert float(said.split()[1]) == pytest.approx(seconds, abs=0.6)
+    (said,) = [line for line in text.splitlines() if line.startswith(";TIME:")]
+    assert float(said[6:]) == pytest.approx(seconds, abs=0.6)
 
 
 def test_paths_follow_each_other_by_their_nearest_ends(printed):
@@ -398,6 +429,7 @@ def test_the_printer_s_own_commands(plate):
             "bed": [200, 200, 50],
         },
         "cut_wait": 0.25,
+        "process": {"prime": "none", "warm_height": 0.0},
     }
     machine = from_table(Machine, table, "machine")
     text = gcode(plan_print(paths, layers, mesh, machine), machine)

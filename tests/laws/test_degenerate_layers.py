@@ -9,7 +9,6 @@ import shapely
 from ccfem.elasticity import GivenStress
 from ccfem.errors import InputError, SolveError
 from ccfem.evaluation import evaluate
-from ccfem.export.layer_matrix import layer_matrix
 from ccfem.layers.level_surfaces import level_surfaces
 from ccfem.layers.slicing import Spatial
 from ccfem.machine import Machine
@@ -17,6 +16,7 @@ from ccfem.mesh import TetMesh, box_mesh
 from ccfem.mesh.patches import Cylinder, patches_from_rules
 from ccfem.meshing import extrude
 from ccfem.planning import plan
+from ccfem.printing.layer_matrix import layer_matrix
 from ccfem.strategies import create
 
 MACHINE = Machine()

@@ -120,7 +120,7 @@ def test_every_pixel_has_a_region_and_shells_are_the_same(name):
     shells = regions.domain == SHELL
     np.testing.assert_array_equal(shells, (bands(PLATE) >= 0) & (bands(PLATE) < 3))
     assert not set(regions.number[shells]) & set(regions.number[PLATE & ~shells])
-    inner = {"mat": {GUIDE, INFILL}, "mps": {GUIDE}}.get(name, {INFILL})
+    inner = {"mat": {GUIDE, INFILL}, "mps": {GUIDE, INFILL}}.get(name, {INFILL})
     assert set(regions.domain[PLATE & ~shells].tolist()) == inner
 
 
@@ -151,6 +151,19 @@ def test_holes_that_touch_shells_share_their_rings():
         first = regions.number[1, 1]
         beside_hole = mask & ndimage.binary_dilation(~mask[:, :], CROSS)
         assert set(regions.number[beside_hole]) == {first}
+
+
+@pytest.mark.parametrize("height", [8, 9, 10, 11])
+def test_beyond_a_short_guide_a_strip_is_filled_along(height):
+    mask = plate(height, 150)
+    guides = np.full(mask.shape, -1)
+    guides[height // 2 + 1, 70:80] = 0
+    regions = stress_regions(mask, guides)
+    np.testing.assert_array_equal(regions.number >= 0, mask)
+    beyond = regions.number[4 : height - 2, 8:60]  # between the shells
+    # Along every row of the strip one region, and not the same on all of them.
+    assert all(len(np.unique(row)) == 1 for row in beyond)
+    assert (regions.domain[4 : height - 2, 8:60] == INFILL).all()
 
 
 def test_disc_by_mat_is_concentric():

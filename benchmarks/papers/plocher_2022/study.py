@@ -32,15 +32,15 @@ from ccfem.evaluation.plane_paths import PlanePaths, plane_paths
 from ccfem.evaluation.sinuosity import path_sinuosity, sample_sinuosity, sinuosity_indices
 from ccfem.evaluation.stiffness_alignment import READINGS
 from ccfem.export.gcode import gcode
-from ccfem.export.print_plan import PrintPlan
 from ccfem.geometry.polylines import lengths, pack
 from ccfem.layers.layer import Layer
 from ccfem.layers.layer_stress import stress_on
 from ccfem.linking.print_order import nearest_end_order
-from ccfem.machine import Machine
+from ccfem.machine import Machine, Process
 from ccfem.materials import named_material
 from ccfem.planning import plan
 from ccfem.plates import solve_plane
+from ccfem.printing.print_plan import PrintPlan
 from ccfem.raster.raster_plan import RasterPlan
 from ccfem.strategies import create
 from ccfem.toolpaths import FIBRE, Toolpaths
@@ -127,6 +127,7 @@ def machine_of(plate: Plate) -> Machine:
         cutter_distance=0.0,
         fibre_speed=PRINT_SPEED,
         travel_speed=TRAVEL_SPEED,
+        process=Process(prime="none", skirt_loops=0),
     )
 
 

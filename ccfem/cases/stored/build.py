@@ -13,7 +13,10 @@ from ccfem.mesh.tet_mesh import TetMesh
 
 __all__ = ["CASES", "DESIGNED", "build"]
 
-CASES = ("bar", "loop", "open_hole", "bracket", "t_bracket", "twist_bar", "lifting_eye")
+CASES = (
+    *("bar", "loop", "open_hole", "bracket", "t_bracket", "twist_bar", "lifting_eye"),
+    *("arm_bracket", "corner_bracket"),
+)
 DESIGNED = ("bridge", "suspension", "cantilever", "m_shape", "l_shape")
 """Cases of optimised plates: an outline and its mesh each."""
 

@@ -2,7 +2,8 @@
 
 H. Kipping, T. Schueppstuhl, Load-oriented nonplanar additive manufacturing method for optimized
 continuous carbon fiber parts, Materials 16 (2023) 998. The defaults differ from the paper where it
-leaves layers flat, upside down, or to chance; ``quantile=1, gap=0, blend=0`` is the paper's.
+leaves layers flat, upside down, or to chance; ``quantile=1, gap=0, blend=0, even=False`` is the
+paper's.
 """
 
 from dataclasses import dataclass
@@ -25,7 +26,7 @@ from ccfem.principal_lines.trace import mean_edge
 
 __all__ = ["LoadOriented", "LoadOrientedSlicing"]
 
-_SHORTEST = 0.3
+_SHORTEST = 0.15
 """Shortest edge of the layers' triangles, in mean edges of the mesh."""
 
 
@@ -86,11 +87,15 @@ class LoadOriented:
         So many regions are followed, the largest.
     smoothing : int, default 200
         Passes that smooth the directions in a region.
+    even : bool, default True
+        Whether the field is changed, as little as that takes, where layers would leave the range
+        of thickness; the paper only puts layers in and leaves layers out.
     blend : float, optional
         How much of the mean direction is added to all: layers become flatter. By default as little
-        as leaves no layer upside down; the paper has none, 0.
+        as leaves no layer upside down, and with `even` nearly none outside the range of thickness;
+        the paper has none, 0.
     shortest_edge : float, mm, optional
-        Of the triangles of the layers, by default 0.3 mean edges of the mesh.
+        Of the triangles of the layers, by default 0.15 mean edges of the mesh.
     least_area : float, mm^2, default 3.3
         Smaller pieces of layers are left out.
     """
@@ -104,6 +109,7 @@ class LoadOriented:
     alignment: float = 0.75
     regions: int = 10
     smoothing: int = 200
+    even: bool = True
     blend: float | None = None
     shortest_edge: float | None = None
     least_area: float = 3.3
@@ -128,6 +134,13 @@ class LoadOriented:
                 f"load_oriented.thickness must lie from {self.thinnest:g} to {self.thickest:g} mm; "
                 f"got {self.thickness:g}: change it, or the range"
             )
+
+    @property
+    def _lengths(self) -> tuple[float, float] | None:
+        """Range of the gradient's length with which layers are neither too thick nor too thin."""
+        if not self.even:
+            return None
+        return self.thickness / self.thickest, self.thickness / self.thinnest
 
     def __call__(self, stress: PartStress, build: Vector, machine: Machine) -> tuple[Layer, ...]:
         """Cut a part into curved layers, none of which lies upside down."""
@@ -168,7 +181,7 @@ class LoadOriented:
             self.smoothing,
         )
         normals = normal_field(mesh, regions, up)
-        field = height_field(mesh, normals.direction, self.blend)
+        field = height_field(mesh, normals.direction, self.blend, self._lengths)
         steep = np.linalg.norm(field.gradient, axis=1)
         step = self.thickness * float(mesh.volumes @ steep / mesh.volumes.sum())
         if not float(np.ptp(field.values[mesh.corners])) > step:

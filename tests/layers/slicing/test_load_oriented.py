@@ -209,6 +209,52 @@ def test_what_cannot_be_is_said(block):
 
     stress = part_stress(block, turning)
     with pytest.raises(InputError, match=r"upside down in .* raise load_oriented.blend"):
-        create("load_oriented", {"blend": 0.0})(stress, (0.0, 0.0, 1.0), Machine())
+        create("load_oriented", {"blend": 0.0, "even": False})(stress, (0.0, 0.0, 1.0), Machine())
     layers = create("load_oriented")(stress, (0.0, 0.0, 1.0), Machine())
     assert len(layers) > 10
+
+
+@pytest.mark.parametrize(
+    ("values", "options", "said"),
+    [
+        ((0.0, 0.0, 0.0), {}, "give a load that pulls"),
+        ((-1.0, -4.0, -9.0), {}, "give a load that pulls"),
+        ((10.0, 0.0, 0.0), {}, "lower share or gap"),
+        ((10.0, 4.0, -3.0), {"thickness": 40.0, "thickest": 80.0}, "give a smaller thickness"),
+    ],
+)
+def test_degenerate_stress_is_refused_in_one_line(block, values, options, said):
+    """Nothing, compression alone, a pull along one axis, a part thinner than its layers."""
+    stress = part_stress(
+        block,
+        lambda points: np.broadcast_to(stress_of(tilted(20.0), values), (len(points), 3, 3)),
+    )
+    with pytest.raises(InputError, match=said) as refused:
+        LoadOriented(**options).slice(stress)
+    assert "\n" not in str(refused.value)
+
+
+def test_specks_of_stress_are_no_region(block):
+    centres = block.points[block.corners].mean(axis=1)
+    near = np.argsort(np.linalg.norm(centres - centres[0], axis=1))[:6]
+    given = np.zeros((len(centres), 3, 3))
+    given[near] = stress_of(tilted(20.0))
+    with pytest.raises(InputError, match="no region of critical stress has 10 cells"):
+        stress_regions(block, given, UP, quantile=1.0)
+
+
+def test_a_part_in_two_pieces_is_layered_in_both(block):
+    """One piece is loaded, the other is not: its layers are flat."""
+    count = len(block.points)
+    points = np.concatenate([block.points, block.points + np.array([0.0, 20.0, 0.0])])
+    mesh = replace(block, points=points, cells=np.concatenate([block.cells, block.cells + count]))
+
+    def of(points):
+        return np.where((points[:, 1] < 10.0)[:, None, None], stress_of(tilted(20.0)), 0.0)
+
+    found = LoadOriented(thickness=0.4).slice(part_stress(mesh, of))
+    other = mesh.points[mesh.corners].mean(axis=1)[:, 1] > 10.0
+    np.testing.assert_allclose(
+        found.field.gradient[other], UP + np.zeros((other.sum(), 3)), atol=1e-9
+    )
+    np.testing.assert_allclose(found.field.gradient[~other] @ tilted(20.0)[2], 1.0, atol=1e-9)

@@ -24,7 +24,7 @@ from ccfem.geometry.shapes import Region, strings
 from ccfem.machine.machine import Machine
 from ccfem.toolpaths import Toolpaths
 
-__all__ = ["with_flow"]
+__all__ = ["pad_flow", "with_flow"]
 
 _PIECE = 2.0
 """Longest piece, mm, over which the height is taken as one."""
@@ -39,8 +39,9 @@ _LEAST = 0.05
 _SCALE = 1.1
 """Most by which a layer is scaled: where lines do not reach a tenth of a section, as between walls
 nearer than a line is wide, more flow would not reach it either. Our choice."""
-_TOO_THIN = 0.1
-"""Share of a layer's lines that may be thinner, since fibre below stands too high. Our choice."""
+_THIN, _TOO_THIN = 0.01, 0.1
+"""Shares of a layer's lines that may be thinner, since fibre below stands too high, without a word
+and with a warning. Our choice."""
 
 
 def with_flow(
@@ -50,7 +51,8 @@ def with_flow(
     strands: Sequence[FloatArray],
     below: float,
     machine: Machine,
-) -> tuple[Toolpaths, FloatArray]:
+    sections: Sequence[float] | None = None,
+) -> tuple[Toolpaths, FloatArray, str]:
     """Lines of a matrix layer with the height that each of their steps lays.
 
     Parameters
@@ -66,6 +68,8 @@ def with_flow(
     below : float, mm
         Height of the fibre layers that they lie in.
     machine : Machine
+    sections : sequence of float, mm^2, optional
+        Section of each strand; by default `Machine.strand_area`.
 
     Returns
     -------
@@ -73,6 +77,8 @@ def with_flow(
         With a point wherever the height changes by a twentieth.
     laid : (P,) array, mm
         Height of matrix, a line wide, on the step from each point; 0 at the end of a line.
+    warning : str
+        Where strands stand higher on more than a hundredth; else empty.
 
     Raises
     ------
@@ -83,9 +89,11 @@ def with_flow(
     start = np.flatnonzero(starts_segment(offsets))
     length = np.linalg.norm(points[start + 1] - points[start], axis=1)
     middle = 0.5 * (points[start] + points[start + 1])[:, :2]
-    volume = height + below - machine.filament_area * _density(strands, middle, machine)
+    if sections is None:
+        sections = [machine.strand_area] * len(strands)
+    volume = height + below - _density(strands, sections, middle, machine)
     least = min(_LEAST, height)
-    _check(volume, length, height, below, least)
+    warning = _check(volume, length, height, below, least)
     wanted = np.maximum(volume, least)
     # Of neighbouring pieces in one step of the height only the first keeps its point.
     level = np.full(len(points), -1)
@@ -96,8 +104,8 @@ def with_flow(
     run = (np.cumsum(keep) - 1)[start]
     long = np.bincount(run, length, len(kept))
     laid = np.bincount(run, wanted * length, len(kept)) / np.maximum(long, 1e-300)
-    inside = shapely.length(shapely.intersection(strings(strands), section)).sum()
-    room = section.area * (height + below) - machine.filament_area * inside
+    inside = shapely.length(shapely.intersection(strings(strands), section))
+    room = section.area * (height + below) - float(inside @ np.asarray(sections))
     scale = room / (machine.matrix_width * (laid * long).sum())
     laid *= np.clip(scale, 1.0 / _SCALE, _SCALE)
     fewer = replace(
@@ -107,23 +115,55 @@ def with_flow(
         offsets=np.searchsorted(kept, offsets),
         link=np.zeros(len(kept), dtype=bool),
     )
-    return fewer, laid
+    return fewer, laid, warning
 
 
-def _density(strands: Sequence[FloatArray], places: FloatArray, machine: Machine) -> FloatArray:
-    """Length of strand per area, 1/mm, round places (k, 2)."""
+def pad_flow(
+    paths: Toolpaths,
+    height: float,
+    strands: Sequence[FloatArray],
+    below: float,
+    machine: Machine,
+    sections: Sequence[float],
+) -> tuple[Toolpaths, FloatArray]:
+    """Lines of pads, with the height that strands on the pads below leave to each step.
+
+    Parameters and results are those of `with_flow`; nothing is scaled, and nothing refused.
+    """
+    points, offsets, _ = subdivide(paths.points, paths.offsets, _PIECE)
+    after = np.minimum(np.arange(len(points)) + 1, len(points) - 1)
+    middle = 0.5 * (points + points[after])[:, :2]
+    volume = height + below - _density(strands, sections, middle, machine)
+    finer = replace(
+        paths,
+        points=points,
+        normals=np.broadcast_to(paths.normals[0], (len(points), 3)),
+        offsets=offsets,
+        link=np.zeros(len(points), dtype=bool),
+    )
+    return finer, np.maximum(volume, min(_LEAST, height))
+
+
+def _density(
+    strands: Sequence[FloatArray],
+    sections: Sequence[float],
+    places: FloatArray,
+    machine: Machine,
+) -> FloatArray:
+    """Volume of strands per area, mm, round places (k, 2)."""
     if not len(strands):
         return np.zeros(len(places))
     width = machine.fibre_width
     cell = _CELL * width
     lines, offsets = pack(strands)
-    samples, _, length, _ = sample_midpoints(lines, offsets, 0.5 * cell)
+    samples, _, length, line = sample_midpoints(lines, offsets, 0.5 * cell)
     low = places.min(axis=0) - 4.0 * width
     shape = tuple(np.ceil((places.max(axis=0) + 4.0 * width - low) / cell).astype(int) + 1)
     index = np.floor((samples - low) / cell).astype(int)
     inside = ((index >= 0) & (index < shape)).all(axis=1)
     flat = np.ravel_multi_index(tuple(index[inside].T), shape)
-    count = np.bincount(flat, length[inside], int(np.prod(shape))).reshape(shape)
+    weight = (length * np.asarray(sections)[line])[inside]
+    count = np.bincount(flat, weight, int(np.prod(shape))).reshape(shape)
     spread = gaussian_filter(count / cell**2, _SPREAD / _CELL, mode="constant")
     at = (places - low) / cell - 0.5
     return np.asarray(map_coordinates(spread, at.T, order=1, mode="nearest"))
@@ -131,16 +171,19 @@ def _density(strands: Sequence[FloatArray], places: FloatArray, machine: Machine
 
 def _check(
     volume: FloatArray, length: FloatArray, height: float, below: float, least: float
-) -> None:
+) -> str:
     """Raise where strands stand higher than the matrix above them on too much of the layer."""
     thin = length[volume < least].sum() / length.sum()
-    if thin <= _TOO_THIN:
-        return
+    if thin <= _THIN:
+        return ""
     order = np.argsort(volume)
     share = np.cumsum(length[order]) / length.sum()
     missing = least - float(volume[order[np.searchsorted(share, 0.01)]])
-    raise InputError(
+    said = (
         f"strands stand higher than the {height:.3g} mm of matrix above them on {thin:.0%} of the "
         f"layer; {height + missing:.3g} mm would do: lay fibre layers at least "
         f"{height + below + missing:.3g} mm apart"
     )
+    if thin > _TOO_THIN:
+        raise InputError(said)
+    return said

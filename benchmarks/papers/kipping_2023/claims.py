@@ -1,0 +1,65 @@
+"""The claims of the paper beside ours: every quantity is computed from a run."""
+
+from collections.abc import Mapping
+from pathlib import Path
+
+import numpy as np
+
+from benchmarks.papers.kipping_2023.chain import PAPER_SECONDS, Chain
+from benchmarks.papers.kipping_2023.fiso_shapes import Strand
+from benchmarks.papers.verdicts import Check, judged
+from ccfem.support import support_columns
+
+__all__ = ["quantities", "support_table", "verdicts"]
+
+EXPECTED = Path(__file__).with_name("expected.toml")
+
+
+def quantities(
+    chains: Mapping[str, Chain],
+    trades: Mapping[str, Mapping[str, Mapping[str, float]]],
+    loads: Mapping[str, Mapping[str, tuple[float, ...]]],
+    strands: Mapping[tuple[str, bool], Strand],
+) -> dict[str, float]:
+    """Every quantity that `expected.toml` may name."""
+    found: dict[str, float] = {}
+    for part, run in chains.items():
+        found |= {f"{part}: seconds, {name}": value for name, value in run.seconds.items()}
+        found[f"{part}: time over the paper's"] = run.seconds["all"] / PAPER_SECONDS[part]
+        found[f"{part}: inverted"] = run.sliced.inverted
+        found[f"{part}: thickness"] = run.distances.mean
+        found[f"{part}: with a layer below"] = run.distances.covered
+        found[f"{part}: paths"] = float(len(run.paths))
+        layers = len(np.unique(run.paths.layer))
+        found[f"{part}: layers with paths"] = float(layers)
+        found[f"{part}: support mm^3"] = run.support.volume
+        for name, figures in trades[part].items():
+            found |= {f"{part}, {name}: {key}": value for key, value in figures.items()}
+        flat, ours = loads[part]["flat, z"], loads[part]["load-oriented"]
+        found[f"{part}: failure load over flat"] = ours[0] / flat[0]
+        found[f"{part}: failure load over flat, bond strong in shear"] = ours[3] / flat[3]
+    found["strands: most paths"] = float(max(s.paths for s in strands.values()))
+    found["strands: least coverage"] = min(s.coverage for s in strands.values())
+    found["strands: least coverage, opened"] = min(s.coverage_opened for s in strands.values())
+    found["strands: crossings"] = float(sum(s.crossings for s in strands.values()))
+    found["strands: longest step"] = max(s.longest_step for s in strands.values())
+    return found
+
+
+def support_table(chains: Mapping[str, Chain]) -> str:
+    """Table of the space below each part: layers along the stress, and flat ones that carry 45."""
+    lines = ["| part | layers | mm^3 | contact mm^2 | part mm^3 |", "|---" * 5 + "|"]
+    for part, run in chains.items():
+        mesh = run.stress.mesh
+        flat = support_columns(mesh, angle=45.0)
+        for name, support in (("load-oriented", run.support), ("flat, over 45 degrees", flat)):
+            lines.append(
+                f"| {part} | {name} | {support.volume:.0f} | {support.contact:.0f} | "
+                f"{mesh.volumes.sum():.0f} |"
+            )
+    return "\n".join(lines) + "\n"
+
+
+def verdicts(found: Mapping[str, float]) -> list[Check]:
+    """Judge the claims by the quantities found."""
+    return judged(found, EXPECTED)

@@ -1,0 +1,149 @@
+"""Machines on the command line: the options that choose one, and what lists and prints them."""
+
+import dataclasses
+import textwrap
+from collections.abc import Callable, Sequence
+from typing import TYPE_CHECKING, Annotated, Any
+
+import typer
+
+from ccfem.cli.docstring import attributes
+from ccfem.errors import InputError
+from ccfem.io.toml import assignment
+
+if TYPE_CHECKING:
+    from ccfem.machine.machine import Machine
+
+__all__ = ["MachineName", "SetMachine", "machine_choice", "machine_file", "machines"]
+
+MachineName = Annotated[
+    str | None,
+    typer.Option(
+        "--machine",
+        metavar="NAME_OR_FILE",
+        help="Printer: one of ccfem machines, or a TOML file with [machine]; what it does not set "
+        "stays as the part has it.",
+    ),
+]
+SetMachine = Annotated[
+    list[str] | None,
+    typer.Option(
+        "--set-machine",
+        metavar="KEY=VALUE",
+        help="Set a value of the machine, as process.start_speed=3; repeatable.",
+    ),
+]
+
+_WIDTH = 100
+
+
+def machine_choice(
+    name: str | None, texts: Sequence[str] | None
+) -> "Callable[[Machine], Machine] | None":
+    """Turn the two options into what they make of a case's machine; None where neither is given.
+
+    Raises
+    ------
+    InputError
+        For an unknown machine, a file that is none, and a text that is no assignment; what comes
+        back raises it for unknown keys and values of a wrong type.
+    """
+    if name is None and not texts:
+        return None
+    from ccfem.machine.named_machines import machine_table, updated
+
+    tables = [] if name is None else [machine_table(name)]
+    tables += [_table(text) for text in texts or ()]
+    return lambda machine: updated(machine, *tables)
+
+
+def _table(text: str) -> dict[str, Any]:
+    """Table of one assignment, ``process.start_speed=3``."""
+    path, value = assignment(text)
+    *outer, last = path.split(".")
+    if not all((*outer, last)):
+        raise InputError(
+            f"--set-machine expects KEY=VALUE; got '{text}': write for example process.lift=2"
+        )
+    found: dict[str, Any] = {last: value}
+    for key in reversed(outer):
+        found = {key: found}
+    return found
+
+
+def machines(
+    name: Annotated[
+        str | None,
+        typer.Argument(metavar="NAME_OR_FILE", help="Print all values of this one, to edit."),
+    ] = None,
+) -> None:
+    """List the printers that come with ccfem, or print one as a file to edit."""
+    if name is None:
+        _list()
+    else:
+        print(machine_file(name), end="")
+
+
+def _list() -> None:
+    """List the machines that come with ccfem, with the first sentence of their files."""
+    from ccfem.machine.machine import Machine
+    from ccfem.machine.named_machines import machine_about, machine_names, machine_table, updated
+
+    print("--machine NAME, or profile = NAME under [machine] of a part file; a printout to edit:")
+    print("ccfem machines NAME > mine.toml\n")
+    for name in machine_names():
+        machine = updated(Machine(), machine_table(name))
+        about = machine_about(name).split(". ")[0].rstrip(".")
+        print(f"{name}\n    {about}.")
+        print(
+            f"    strands {machine.fibre_width:g} x {machine.strand_height:g} mm, cutter "
+            f"{machine.tail:g} mm before the nozzle"
+        )
+
+
+def machine_file(name: str) -> str:
+    """All values of a machine as a TOML file, with what they mean.
+
+    Parameters
+    ----------
+    name : str
+        Of a machine, or of its file.
+    """
+    from ccfem.machine.machine import Machine
+    from ccfem.machine.named_machines import machine_about, machine_table, updated
+
+    machine = updated(Machine(), machine_table(name))
+    head = textwrap.fill(machine_about(name), _WIDTH, initial_indent="# ", subsequent_indent="# ")
+    return "\n".join([head] * bool(machine_about(name)) + _lines(machine, "machine")) + "\n"
+
+
+def _lines(value: Any, where: str) -> list[str]:
+    """Lines of a table and of those inside it."""
+    about, inner, lines = attributes(type(value)), [], [f"[{where}]"]
+    for one in dataclasses.fields(value):
+        entry = getattr(value, one.name)
+        if dataclasses.is_dataclass(entry):
+            inner += ["", *_lines(entry, f"{where}.{one.name}")]
+            continue
+        kind, meaning = about.get(one.name, ("", ""))
+        words = ", ".join(
+            word for word in kind.split(", ") if word.startswith(("mm", "deg", "g/", "s", "K/"))
+        )
+        said = f"{words}: {meaning}" if words else meaning
+        if said and said != (lines[-1] if lines else ""):
+            lines += textwrap.wrap(said, _WIDTH - 2, initial_indent="# ", subsequent_indent="# ")
+        lines.append(
+            f"# {one.name} is not set" if entry is None else f"{one.name} = {_text(entry)}"
+        )
+    return lines + inner
+
+
+def _text(value: Any) -> str:
+    """Value as TOML writes it."""
+    if isinstance(value, bool):
+        return "true" if value else "false"
+    if isinstance(value, str):
+        return '"' + value.replace("\\", "\\\\").replace('"', '\\"') + '"'
+    if isinstance(value, tuple):
+        return "[" + ", ".join(_text(entry) for entry in value) + "]"
+    return repr(value)

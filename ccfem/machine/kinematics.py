@@ -1,0 +1,123 @@
+"""Where five axes stand for a place and a direction of the head, and back."""
+
+from dataclasses import dataclass
+from typing import Literal
+
+import numpy as np
+
+from ccfem.arrays import FloatArray
+from ccfem.checks import check_choices, check_fields, check_number
+
+__all__ = ["Kinematics", "axis_values", "head_pose"]
+
+_UPRIGHT = 1e-6
+"""Sine of the tilt below which the second rotation has no meaning, and stays as it is."""
+
+
+@dataclass(frozen=True)
+class Kinematics:
+    """How a machine turns head and part to each other, in a part file ``[machine.kinematics]``.
+
+    Attributes
+    ----------
+    kind : {"three_axes", "table_table", "head_head"}
+        Upright head; a table that turns about Z by C on one that turns about X by A (trunnion), the
+        head upright; or a head that turns about Y by B under one that turns about Z by C.
+    centre : tuple of 3 floats, mm
+        Of a table-table machine: where both axes meet.
+    pivot : float, mm
+        Of a head-head machine: from the place where both axes meet to the tip of the nozzle.
+    tilt_limit : float, degrees
+        Most that head and part tilt to each other.
+    """
+
+    kind: Literal["three_axes", "table_table", "head_head"] = "three_axes"
+    centre: tuple[float, float, float] = (150.0, 150.0, 0.0)
+    pivot: float = 100.0
+    tilt_limit: float = 60.0
+
+    def __post_init__(self) -> None:
+        check_choices(self)
+        check_fields(self, "pivot", at_least=0.0, unit="mm")
+        check_fields(self, "tilt_limit", at_least=0.0, below=180.0, unit="degrees")
+        for value in self.centre:
+            check_number("each number of kinematics.centre", value, unit="mm")
+
+    @property
+    def letters(self) -> tuple[str, ...]:
+        """Letters of the axes that turn."""
+        return {"table_table": ("A", "C"), "head_head": ("B", "C")}.get(self.kind, ())
+
+
+def axis_values(
+    kinematics: Kinematics, place: FloatArray, normal: FloatArray
+) -> tuple[FloatArray, FloatArray]:
+    """Values of the axes for tips and directions, one after the other (inverse kinematics).
+
+    Parameters
+    ----------
+    kinematics : Kinematics
+    place : (n, 3) array, mm
+        Tip of the nozzle, in the frame of the part as it lies on the bed.
+    normal : (n, 3) array
+        Unit vector from the tip along the head, in that frame.
+
+    Returns
+    -------
+    linear : (n, 3) array, mm
+        X, Y, Z; those of the tip where the head is upright and the table is at zero.
+    turning : (n, 2) array, degrees
+        A and C, or B and C: tilts from -180 to 180, C without jumps of more than a quarter of a
+        turn, and kept where the head is upright. Both 0 with three axes.
+    """
+    if kinematics.kind == "three_axes":
+        return place, np.zeros((len(place), 2))
+    x, y, z = normal.T
+    tilt = np.arctan2(np.hypot(x, y), z)
+    spin = np.arctan2(x, y) if kinematics.kind == "table_table" else np.arctan2(y, x)
+    turned = np.hypot(x, y) > _UPRIGHT
+    index = np.maximum.accumulate(np.where(turned, np.arange(len(spin)), 0))
+    first = int(np.argmax(turned)) if turned.any() else 0
+    spin = np.where(turned.any(), spin[np.maximum(index, first)], 0.0)
+    # Half a turn more of C with the tilt the other way round is the same pose: no turn at the pole.
+    even = np.unwrap(spin, period=np.pi)
+    tilt = np.where(np.round((even - spin) / np.pi) % 2.0 == 1.0, -tilt, tilt)
+    spin = even
+    if kinematics.kind == "table_table":
+        centre = np.array(kinematics.centre)
+        linear = _about_x(_about_z(place - centre, spin), tilt) + centre
+    else:
+        linear = place + kinematics.pivot * (normal - [0.0, 0.0, 1.0])
+    return linear, np.degrees(np.column_stack([tilt, spin]))
+
+
+def head_pose(
+    kinematics: Kinematics, linear: FloatArray, turning: FloatArray
+) -> tuple[FloatArray, FloatArray]:
+    """Tips and directions in the frame of the part for values of the axes (forward kinematics).
+
+    Parameters and results are those of `axis_values`, the other way round.
+    """
+    tilt, spin = np.radians(turning).T
+    up = np.tile([0.0, 0.0, 1.0], (len(linear), 1))
+    if kinematics.kind == "table_table":
+        centre = np.array(kinematics.centre)
+        place = _about_z(_about_x(linear - centre, -tilt), -spin) + centre
+        return place, _about_z(_about_x(up, -tilt), -spin)
+    if kinematics.kind == "head_head":
+        sine = np.sin(tilt)
+        normal = np.column_stack([sine * np.cos(spin), sine * np.sin(spin), np.cos(tilt)])
+        return linear - kinematics.pivot * (normal - up), normal
+    return linear, up
+
+
+def _about_x(points: FloatArray, angle: FloatArray) -> FloatArray:
+    x, y, z = points.T
+    cosine, sine = np.cos(angle), np.sin(angle)
+    return np.column_stack([x, cosine * y - sine * z, sine * y + cosine * z])
+
+
+def _about_z(points: FloatArray, angle: FloatArray) -> FloatArray:
+    x, y, z = points.T
+    cosine, sine = np.cos(angle), np.sin(angle)
+    return np.column_stack([cosine * x - sine * y, sine * x + cosine * y, z])

@@ -1,0 +1,147 @@
+"""Machines by name or from a file: tables of what differs, laid over each other.
+
+The later one wins: the defaults of `Machine`, a built-in machine that a table names as its
+``profile``, that table, the machine of a case, one named for it, single values.
+"""
+
+import dataclasses
+import tomllib
+from collections.abc import Mapping
+from functools import cache
+from importlib import resources
+from pathlib import Path
+from typing import Any
+
+from ccfem.checks import check_known
+from ccfem.errors import InputError, shown
+from ccfem.io.toml import from_table
+from ccfem.io.whole import existing_file
+from ccfem.machine.machine import Machine
+
+__all__ = ["machine_about", "machine_from", "machine_names", "machine_table", "updated"]
+
+_FOLDER = resources.files("ccfem.machine") / "built_in"
+
+
+@cache
+def machine_names() -> tuple[str, ...]:
+    """Names of the machines that come with ccfem."""
+    files = (entry.name for entry in _FOLDER.iterdir())
+    return tuple(sorted(name.removesuffix(".toml") for name in files if name.endswith(".toml")))
+
+
+def machine_about(name: str | Path) -> str:
+    """Comment at the head of a built-in machine's file; nothing for other files."""
+    if str(name) not in machine_names():
+        return ""
+    lines = (_FOLDER / f"{name}.toml").read_text(encoding="utf-8").splitlines()
+    return " ".join(line.removeprefix("#").strip() for line in lines[: lines.index("[machine]")])
+
+
+def machine_table(name: str | Path) -> dict[str, Any]:
+    """Find what a machine sets, those that it builds on included.
+
+    Parameters
+    ----------
+    name : str or Path
+        Of a machine that comes with ccfem, or of a TOML file with a table ``[machine]``, as in part
+        files.
+
+    Raises
+    ------
+    InputError
+        For an unknown name, and a file that is none of a machine.
+    """
+    text = str(name)
+    if not text.endswith(".toml") and not {"/", "\\"} & set(text):
+        check_known("machine", text, machine_names(), "or name a file, .toml")
+        content = tomllib.loads((_FOLDER / f"{text}.toml").read_text(encoding="utf-8"))
+        return _whole_table(content["machine"])
+    file = existing_file(text, "machine file")
+    try:
+        with file.open("rb") as stream:
+            content = tomllib.load(stream)
+    except (ValueError, RecursionError) as error:
+        raise InputError(f"{file} is not a TOML file: {error}: correct it") from None
+    if not isinstance(content.get("machine"), Mapping):
+        raise InputError(f"{file} is no machine file: it has no table [machine]: write one")
+    try:
+        return _whole_table(content["machine"])
+    except InputError as error:
+        raise InputError(*(f"{file}: {line}" for line in error.mistakes)) from None
+
+
+def _whole_table(table: Mapping[str, Any]) -> dict[str, Any]:
+    """Lay a table over the built-in machine that it names as its profile."""
+    rest = {key: value for key, value in table.items() if key != "profile"}
+    if "profile" not in table:
+        return rest
+    name = table["profile"]
+    if not isinstance(name, str) or name not in machine_names():
+        raise InputError(
+            f"machine.profile must be one of {', '.join(machine_names())}; got {shown(name)}: "
+            "name one of them"
+        )
+    return _laid_over(machine_table(name), rest)
+
+
+def machine_from(table: object, where: str = "machine") -> Machine:
+    """Make a machine of a table as in part files, with a ``profile`` or none.
+
+    Raises
+    ------
+    InputError
+        For an unknown key or a value of a wrong type, as `ccfem.io.toml.from_table`.
+    """
+    whole = _whole_table(table) if isinstance(table, Mapping) else table
+    return from_table(Machine, whole, where)
+
+
+def updated(machine: Machine, *tables: Mapping[str, Any], where: str = "machine") -> Machine:
+    """Lay tables over a machine, one after the other.
+
+    Parameters
+    ----------
+    machine : Machine
+    *tables : mapping
+        As `machine_table` gives them; what they do not name stays.
+    where : str
+        What the values came from, for messages.
+
+    Raises
+    ------
+    InputError
+
+    Examples
+    --------
+    >>> updated(Machine(), machine_table("aura_like"), {"process": {"start_speed": 3.0}}).tail
+    46.0
+    """
+    found = _as_table(machine)
+    for table in tables:
+        found = _laid_over(found, _whole_table(table))
+    return from_table(Machine, found, where)
+
+
+def _laid_over(under: Mapping[str, Any], over: Mapping[str, Any]) -> dict[str, Any]:
+    """Join two tables; the second one wins, tables in both are joined in turn."""
+    found = dict(under)
+    for key, value in over.items():
+        both = isinstance(value, Mapping) and isinstance(found.get(key), Mapping)
+        found[key] = _laid_over(found[key], value) if both else value
+    return found
+
+
+def _as_table(value: object) -> dict[str, Any]:
+    """Fields of a machine as a TOML file would hold them; those that are None are left out."""
+    return {
+        key: _entry(entry)
+        for key, entry in dataclasses.asdict(value).items()  # type: ignore[call-overload]
+        if entry is not None
+    }
+
+
+def _entry(value: Any) -> Any:
+    if isinstance(value, Mapping):
+        return {key: _entry(entry) for key, entry in value.items() if entry is not None}
+    return list(value) if isinstance(value, tuple) else value

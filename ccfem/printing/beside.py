@@ -1,0 +1,128 @@
+"""What is laid beside a part: a skirt, a brim, a block to prime matrix on, a bar for a strand."""
+
+from dataclasses import dataclass
+
+import numpy as np
+import shapely
+
+from ccfem.arrays import FloatArray
+from ccfem.geometry.shapes import Region
+from ccfem.machine.machine import Machine
+from ccfem.printing.print_plan import COORDINATE_DIGITS, PrintPlan
+from ccfem.toolpaths import FIBRE
+
+__all__ = ["Beside", "beside"]
+
+_GAP = 4.0
+"""From the part to the block and the bar, mm. Our choice."""
+_BAR_LINES = 3
+"""Lines of matrix under the first strand."""
+_BAR_MORE = 20.0
+"""Length of the bar beyond the distance from cutter to nozzle, mm."""
+
+
+@dataclass(frozen=True)
+class Beside:
+    """Lines beside the part, each (n, 2), mm.
+
+    Attributes
+    ----------
+    skirt : tuple of arrays
+        Loops round the first layer, the outermost first; those of the brim come last.
+    block : tuple of arrays
+        Loops of the block from its contour inwards, or lines to and fro; on each matrix layer as
+        many as its volume wants, at least two.
+    bar : tuple of arrays
+        Lines of the bar, on each matrix layer below the first strand.
+    strand : (2, 2) array or None
+        The first strand, on the bar.
+    """
+
+    skirt: tuple[FloatArray, ...] = ()
+    block: tuple[FloatArray, ...] = ()
+    bar: tuple[FloatArray, ...] = ()
+    strand: FloatArray | None = None
+
+
+def beside(plan: PrintPlan, machine: Machine) -> Beside:
+    """Choose the places of what is laid beside a part.
+
+    Parameters
+    ----------
+    plan : PrintPlan
+    machine : Machine
+
+    Returns
+    -------
+    Beside
+        The block left of the part and of fibre that leaves it, the bar in front of it, the skirt
+        round all.
+    """
+    process, width = machine.process, machine.matrix_width
+    low, high = plan.paths.points[:, :2].min(axis=0), plan.paths.points[:, :2].max(axis=0)
+    half = 0.5 * width
+    low, high = low - half, high + half
+    block: list[FloatArray] = []
+    bar: list[FloatArray] = []
+    strand = None
+    if process.prime != "none":
+        right, middle = low[0] - _GAP, 0.5 * (low[1] + high[1])
+        block = _block(right, middle, machine)
+    if process.prime != "none" and bool((plan.paths.kind == FIBRE).any()):
+        long = machine.tail + _BAR_MORE
+        left = 0.5 * (low[0] + high[0] - long)
+        front = low[1] - _GAP - (_BAR_LINES - 0.5) * width
+        for k in range(_BAR_LINES):
+            ends = np.array([[left, front + k * width], [left + long, front + k * width]])
+            bar.append(ends[:: -1 if k % 2 else 1].round(COORDINATE_DIGITS))
+        strand = np.array([[left, 0.0], [left + long, 0.0]])
+        strand[:, 1] = front + 0.5 * (_BAR_LINES - 1) * width
+        strand = strand.round(COORDINATE_DIGITS)
+    skirt = _skirt(plan, (*block, *bar), machine)
+    return Beside(tuple(skirt), tuple(block), tuple(bar), strand)
+
+
+def _block(right: float, middle: float, machine: Machine) -> list[FloatArray]:
+    """Lines of the block, whose right side lies here."""
+    process, width = machine.process, machine.matrix_width
+    size = process.prime_size
+    if process.prime == "block":
+        insets = (np.arange(max(int(0.5 * size / width), 1)) + 0.5) * width
+        half = 0.5 * size - insets[insets < 0.5 * size]
+        corners = np.array([[1, -1], [1, 1], [-1, 1], [-1, -1], [1, -1]])
+        centre = np.array([right - 0.5 * size, middle])
+        return [(centre + reach * corners).round(COORDINATE_DIGITS) for reach in half.tolist()]
+    lines = []
+    for k in range(int(max(size // width, 2.0))):
+        x = right - (k + 0.5) * width
+        ends = np.array([[x, middle - 2.0 * size], [x, middle + 2.0 * size]])
+        lines.append(ends[:: -1 if k % 2 else 1].round(COORDINATE_DIGITS))
+    return lines
+
+
+def _skirt(plan: PrintPlan, others: tuple[FloatArray, ...], machine: Machine) -> list[FloatArray]:
+    """Loops round the first layer and what is laid beside it, and those that touch it."""
+    process, width = machine.process, machine.matrix_width
+    first = plan.paths.on_layer(int(plan.paths.layer.min()))
+    lines = [line[:, :2] for line in first]
+    found: list[FloatArray] = []
+    if process.skirt_loops:
+        points = np.concatenate([*lines, *others])
+        hull = shapely.convex_hull(shapely.MultiPoint(points))
+        for k in range(process.skirt_loops)[::-1]:
+            far = process.skirt_gap + process.brim_loops * width + (k + 0.5) * width
+            found += _ring(shapely.buffer(hull, far + 0.5 * width))
+    closed = [line for line in lines if len(line) > 3 and (line[0] == line[-1]).all()]
+    if process.brim_loops and closed:
+        section = shapely.union_all([shapely.Polygon(line) for line in closed])
+        for k in range(process.brim_loops)[::-1]:
+            found += _ring(shapely.buffer(section, (k + 1) * width))
+    return found
+
+
+def _ring(region: Region) -> list[FloatArray]:
+    """Outer borders of a region, rounded."""
+    return [
+        shapely.get_coordinates(part.exterior).round(COORDINATE_DIGITS)
+        for part in shapely.get_parts(region)
+    ]

@@ -1,0 +1,91 @@
+"""How long moves take: trapezoids of speed that the corners between them allow."""
+
+from itertools import pairwise
+
+import numpy as np
+
+from ccfem.arrays import FloatArray, IntArray
+from ccfem.machine.machine import Machine
+from ccfem.printing.moves import CUT, FEED, LAY, PREHEAT, STANDBY, TRAVEL, WAIT, WORK, Moves
+
+__all__ = ["durations"]
+
+
+def durations(moves: Moves, machine: Machine, heating: bool = True) -> FloatArray:
+    """Seconds that each row takes.
+
+    Moves speed up and slow down at `Process.acceleration`. At a corner the nozzle is as fast as on
+    the arc that leaves it by `Process.junction` (junction deviation); it stands still where
+    filament alone is fed, at cuts and at changes of tools. Waiting tools cool and heat at their
+    rates of heating. The first heating of bed and nozzles is not counted.
+
+    Parameters
+    ----------
+    moves : Moves
+    machine : Machine
+    heating : bool, default True
+        Whether the waits for tools count.
+
+    Returns
+    -------
+    (n,) array, s
+    """
+    seconds = np.zeros(len(moves))
+    fed = moves.event == FEED
+    seconds[fed] = np.abs(moves.feed[fed]) / moves.speed[fed]
+    still = np.isin(moves.event, [CUT, WAIT])
+    seconds[still] = moves.amount[still]
+    moving = np.flatnonzero(np.isin(moves.event, [TRAVEL, LAY]) & (moves.length > 0.0))
+    # The way to the first place begins at an unknown one.
+    moving = moving[1:]
+    halt = np.cumsum(np.isin(moves.event, [FEED, CUT, WAIT, WORK]).astype(np.int64))
+    seconds[moving] = _motion(moves, moving, halt[moving], machine)
+    if heating:
+        _add_heating(seconds, moves, machine)
+    return seconds
+
+
+def _motion(moves: Moves, moving: IntArray, stops: IntArray, machine: Machine) -> FloatArray:
+    """Seconds of moves (k,), which stop where the number of halts before them changes."""
+    if not len(moving):
+        return np.zeros(0)
+    most, process = machine.process.acceleration, machine.process
+    length, speed = moves.length[moving], moves.speed[moving]
+    way = (moves.place - moves.start)[moving] / length[:, None]
+    cosine = -np.einsum("ij,ij->i", way[1:], way[:-1])
+    half = np.sqrt(np.clip(0.5 * (1.0 - cosine), 0.0, 1.0 - 1e-12))
+    corner = most * process.junction * half / (1.0 - half)
+    corner = np.minimum(corner, np.minimum(speed[1:], speed[:-1]) ** 2)
+    corner[stops[1:] != stops[:-1]] = 0.0
+    # Squares of the speeds between the moves: what can be reached, and stopped from.
+    square = np.concatenate([[0.0], corner, [0.0]]).tolist()
+    gain = (2.0 * most * length).tolist()
+    for k, more in enumerate(gain):
+        square[k + 1] = min(square[k + 1], square[k] + more)
+    for k in range(len(gain) - 1, -1, -1):
+        square[k] = min(square[k], square[k + 1] + gain[k])
+    first, last = np.sqrt(square[:-1]), np.sqrt(square[1:])
+    peak = np.minimum(speed, np.sqrt(0.5 * (first**2 + last**2) + most * length))
+    ramps = (peak - first) / most + (peak - last) / most
+    way_of_ramps = 0.5 * ((peak**2 - first**2) + (peak**2 - last**2)) / most
+    return np.asarray(ramps + np.maximum(length - way_of_ramps, 0.0) / peak)
+
+
+def _add_heating(seconds: FloatArray, moves: Moves, machine: Machine) -> None:
+    """Add the waits for tools that are not hot yet to rows WORK, in place."""
+    rate = (machine.matrix_heating, machine.fibre_heating)
+    work = np.flatnonzero(np.isin(moves.event, [STANDBY, PREHEAT, WORK]))
+    heat = [machine.matrix_temperature + machine.process.warm_matrix, machine.fibre_standby]
+    wanted, since = list(heat), [0.0, 0.0]
+    now = 0.0
+    for last, k in pairwise([0, *work.tolist()]):
+        now += float(seconds[last:k].sum())
+        tool = int(moves.tool[k])
+        step = rate[tool] * (now - since[tool])
+        gap = wanted[tool] - heat[tool]
+        heat[tool] += float(np.clip(gap, -step, step))
+        wanted[tool], since[tool] = float(moves.amount[k]), now
+        if moves.event[k] == WORK:
+            seconds[k] += max(wanted[tool] - heat[tool], 0.0) / rate[tool]
+            heat[tool] = max(heat[tool], wanted[tool])
+            # The time of the wait passes with the rows behind it.

@@ -1,0 +1,102 @@
+"""What a machine does from the first line to the last: a table, one row a move or an event."""
+
+from dataclasses import dataclass
+
+import numpy as np
+
+from ccfem.arrays import BoolArray, FloatArray, IntArray, freeze, in_brief
+
+__all__ = [
+    *("CUT", "EVENTS", "FAN", "FEED", "HEAT", "HEAT_BED", "LAY", "LAYER", "PATH_END"),
+    *("PATH_START", "PREHEAT", "ROLES", "STANDBY", "TOOL", "TRAVEL", "WAIT", "WORK"),
+    *("Moves", "role"),
+]
+
+EVENTS = (
+    *("travel", "lay", "feed", "cut", "tool", "standby", "preheat", "heat", "work"),
+    *("heat bed", "fan", "wait", "layer", "start", "end"),
+)
+"""What a row is: moves first, then what happens where the nozzle stands."""
+TRAVEL, LAY, FEED, CUT, TOOL, STANDBY, PREHEAT, HEAT, WORK = range(9)
+HEAT_BED, FAN, WAIT, LAYER, PATH_START, PATH_END = range(9, 15)
+
+ROLES = ("travel", "contour", "infill", "fibre", "tail", "block", "skirt", "pad", "short")
+"""What is laid: the tail is fibre behind its cut, short what is too short for the cutter."""
+
+
+def role(name: str) -> int:
+    """Find the index of a role by its name."""
+    return ROLES.index(name)
+
+
+@dataclass(frozen=True)
+class Moves:
+    """Moves and events of a print, in their order.
+
+    Attributes
+    ----------
+    event : (n,) int array
+        Index into `EVENTS`.
+    place, normal : (n, 3) arrays, mm
+        Where the nozzle is at the end of a row, rounded to 0.001 mm, and the direction that its
+        head stands in.
+    tool : (n,) int array
+        0 for matrix, 1 for fibre; of a tool's event the tool meant.
+    feed, beside : (n,) arrays, mm
+        Filament that the row feeds: matrix by tool 0, fibre by tool 1; and matrix that the fibre's
+        head feeds with it.
+    speed : (n,) array, mm/s
+        Of moves, and of feeds without a move.
+    width, height : (n,) arrays, mm
+        Of the line that a move lays.
+    amount : (n,) array
+        Of an event: degrees Celsius, share of a fan, seconds, number of a layer or a path's length.
+    role : (n,) int array
+        Index into `ROLES`.
+    layer : (n,) int array
+    strand : (n,) int array
+        Number of the strand that is laid; -1 for all else, and for strands beside the part.
+    """
+
+    event: IntArray
+    place: FloatArray
+    normal: FloatArray
+    tool: IntArray
+    feed: FloatArray
+    beside: FloatArray
+    speed: FloatArray
+    width: FloatArray
+    height: FloatArray
+    amount: FloatArray
+    role: IntArray
+    layer: IntArray
+    strand: IntArray
+
+    __repr__ = in_brief
+
+    def __post_init__(self) -> None:
+        whole = dict.fromkeys(("event", "tool", "role", "layer", "strand"), int)
+        rest = dict.fromkeys(
+            ("place", "normal", "feed", "beside", "speed", "width", "height", "amount"), float
+        )
+        freeze(self, **whole, **rest)
+
+    def __len__(self) -> int:
+        return len(self.event)
+
+    @property
+    def start(self) -> FloatArray:
+        """Where the nozzle is before each row, (n, 3)."""
+        return np.concatenate([self.place[:1], self.place[:-1]])
+
+    @property
+    def length(self) -> FloatArray:
+        """Way of the nozzle in each row, (n,), mm."""
+        return np.asarray(np.linalg.norm(self.place - self.start, axis=1))
+
+    @property
+    def in_part(self) -> BoolArray:
+        """Rows that lay something of the part itself, (n,): no block, skirt or pad."""
+        own = [role(name) for name in ("contour", "infill", "fibre", "tail", "short")]
+        beside = np.isin(self.role, [role("fibre"), role("tail")]) & (self.strand < 0)
+        return (self.event == LAY) & np.isin(self.role, own) & ~beside

@@ -1,0 +1,138 @@
+"""Notes down what a machine does, knowing where its nozzle stands."""
+
+import numpy as np
+
+from ccfem.arrays import FloatArray
+from ccfem.geometry.polylines import subdivide
+from ccfem.machine.machine import Machine
+from ccfem.printing.moves import FEED, LAY, TRAVEL, Moves, role
+from ccfem.printing.print_plan import COORDINATE_DIGITS
+
+__all__ = ["Recorder"]
+
+_FEED_DIGITS = 5
+"""Decimals of what is fed, mm."""
+_SAME = 1e-9
+
+
+class Recorder:
+    """Rows of `Moves` so far, and the state of the machine after them."""
+
+    def __init__(self, machine: Machine) -> None:
+        self.machine = machine
+        self.rows: list[tuple[float, ...]] = []
+        self.place: FloatArray | None = None
+        self.normal = np.array([0.0, 0.0, 1.0])
+        self.tool = -1
+        self.top = 0.0
+        self.layer = 0
+        self.strand = -1
+        self.drawn_back = 0.0
+
+    def note(self, event: int, value: float = 0.0, tool: int | None = None) -> None:
+        """Note what happens where the nozzle stands."""
+        self._row(event, tool=self.tool if tool is None else tool, value=value)
+
+    def feed(self, length: float, speed: float, beside: float = 0.0) -> None:
+        """Feed filament without moving, in steps that the firmware takes."""
+        count = int(np.ceil(abs(length) / self.machine.gcode.longest_feed - 1e-9))
+        each = np.diff(np.linspace(0.0, length, count + 1).round(_FEED_DIGITS))
+        for part in each.tolist():
+            self._row(FEED, feed=part, beside=beside * part / length, speed=speed)
+
+    def travel(self, place: FloatArray, normal: FloatArray) -> None:
+        """Go above all that is printed to a place, and down to it along its normal."""
+        lift = self.machine.gcode.lift
+        if self.place is not None:
+            level = max(self.top + lift, float(place[2]) + lift, float(self.place[2]))
+            self._to(np.append(self.place[:2], level), self.normal)
+        else:
+            level = max(self.top, float(place[2])) + lift
+        above = place + lift * normal
+        self._to(np.append(above[:2], level), normal, across=True)
+        if normal[2] < 1.0 - _SAME:
+            self._to(above, normal)
+        self._to(place, normal)
+
+    def retreat(self, more: float = 0.0) -> None:
+        """Leave what was laid, along the normal."""
+        assert self.place is not None
+        self._to(self.place + (self.machine.gcode.lift + more) * self.normal, self.normal)
+
+    def rise(self, height: float) -> None:
+        """Go straight up to a height, if the nozzle is below it."""
+        if self.place is not None and self.place[2] < height:
+            self._to(np.append(self.place[:2], height), self.normal)
+
+    def lay(
+        self,
+        line: FloatArray,
+        normals: FloatArray,
+        speeds: FloatArray,
+        feed: FloatArray,
+        width: float,
+        heights: FloatArray,
+        what: str,
+        beside: FloatArray | None = None,
+    ) -> None:
+        """Move along a line (n, 3) from its start, feeding so much per mm of each step (n - 1,)."""
+        index = np.arange(len(line) - 1)
+        if len(feed) and feed.max() > 0.0:
+            ends, longest = np.array([0, len(line)]), self.machine.gcode.longest_feed
+            line, _, step = subdivide(line, ends, longest / float(feed.max()))
+            line = line.round(COORDINATE_DIGITS)
+            normals, index = normals[step], step[:-1]
+        steps = np.linalg.norm(np.diff(line, axis=0), axis=1)
+        # Rounded in sum, so that no feed is lost however short the steps are.
+        fed = np.diff(np.append(0.0, np.cumsum(feed[index] * steps)).round(_FEED_DIGITS))
+        with_it = np.zeros(len(fed)) if beside is None else beside[index] * steps
+        with_it = np.diff(np.append(0.0, np.cumsum(with_it)).round(_FEED_DIGITS))
+        number = role(what)
+        for k, at in enumerate(index.tolist()):
+            if steps[k] > 0.0:
+                self.place, self.normal = line[k + 1], normals[k + 1]
+                self._row(
+                    LAY,
+                    feed=fed[k],
+                    beside=with_it[k],
+                    speed=speeds[at],
+                    width=width,
+                    height=heights[at],
+                    what=number,
+                )
+        self.top = max(self.top, float(line[:, 2].max()))
+
+    def _to(self, place: FloatArray, normal: FloatArray, across: bool = False) -> None:
+        """Travel straight to a place."""
+        place = place.round(COORDINATE_DIGITS) + 0.0
+        if self.place is not None and np.abs(place - self.place).max() < _SAME:
+            self.normal = normal
+            return
+        self.place, self.normal = place, normal
+        machine = self.machine
+        self._row(TRAVEL, speed=machine.travel_speed if across else machine.gcode.lift_speed)
+
+    def _row(
+        self,
+        event: int,
+        tool: int | None = None,
+        feed: float = 0.0,
+        beside: float = 0.0,
+        speed: float = 0.0,
+        width: float = 0.0,
+        height: float = 0.0,
+        value: float = 0.0,
+        what: int = 0,
+    ) -> None:
+        place = np.zeros(3) if self.place is None else self.place
+        number = self.tool if tool is None else tool
+        state = (self.layer, self.strand)
+        lines = (number, feed, beside, speed, width, height, value, what)
+        self.rows.append((event, *place, *self.normal, *lines, *state))
+
+    def moves(self) -> Moves:
+        """All that was noted."""
+        table = np.array(self.rows).reshape(-1, 17)
+        names = ["tool", "feed", "beside", "speed", "width", "height", "amount", "role", "layer"]
+        columns = dict(zip([*names, "strand"], table[:, 7:].T, strict=True))
+        return Moves(event=table[:, 0], place=table[:, 1:4], normal=table[:, 4:7], **columns)

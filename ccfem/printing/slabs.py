@@ -1,0 +1,91 @@
+"""The layers that a part is printed in: fibre where it was planned, matrix in all that is left."""
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+from itertools import pairwise
+
+import numpy as np
+
+from ccfem.errors import InputError
+from ccfem.layers import Layer
+from ccfem.machine.machine import Machine
+
+__all__ = ["LOW", "Slab", "check_cover", "slabs_of"]
+
+LOW = 0.1
+"""Least height of a line of matrix, mm. Our choice."""
+_SAME = 1e-6
+"""Heights closer than this, mm, are the same."""
+
+
+@dataclass(frozen=True)
+class Slab:
+    """A layer to print: its extent along the build direction, and its fibre layer if it is one."""
+
+    lower: float
+    upper: float
+    fibre: int | None = None
+
+
+def slabs_of(layers: Sequence[Layer], bottom: float, top: float, machine: Machine) -> list[Slab]:
+    """All layers to print, from the bottom to the top."""
+    slabs: list[Slab] = []
+    level = bottom
+    for layer in sorted(layers, key=lambda one: one.plane.height):
+        lower = layer.plane.height - 0.5 * machine.strand_height
+        upper = layer.plane.height + 0.5 * machine.strand_height
+        if lower < level - _SAME or upper > top + _SAME:
+            raise InputError(
+                f"fibre layer {layer.index} at {layer.plane.height:g} mm does not fit with a fibre "
+                f"height of {machine.strand_height:g} mm between {level:g} and {top:g} mm: move it "
+                "with --heights, or take fewer layers"
+            )
+        slabs += _matrix_slabs(level, lower, machine, first=not slabs)
+        slabs.append(Slab(lower, upper, layer.index))
+        level = upper
+    return slabs + _matrix_slabs(level, top, machine, first=not slabs)
+
+
+def _matrix_slabs(lower: float, upper: float, machine: Machine, first: bool) -> list[Slab]:
+    """Matrix layers of equal height that fill a gap, the first of all lower; none without a gap."""
+    if upper - lower <= _SAME:
+        return []
+    low = min(machine.process.first_layer_height, machine.matrix_height)
+    if first and low > 0.0 and upper - lower > low + LOW:
+        start = Slab(lower, lower + low)
+        return [start, *_matrix_slabs(lower + low, upper, machine, first=False)]
+    count = int(np.ceil((upper - lower) / machine.matrix_height - _SAME))
+    edges = np.linspace(lower, upper, count + 1).tolist()
+    return [Slab(a, b) for a, b in pairwise(edges)]
+
+
+def check_cover(slabs: Sequence[Slab], machine: Machine) -> list[str]:
+    """Check the matrix below the first and over the last layer of fibre.
+
+    Returns
+    -------
+    list of str
+        A warning for each side where it is one layer alone.
+
+    Raises
+    ------
+    InputError
+        Where it is less than `Process.cover`.
+    """
+    fibre = [k for k, slab in enumerate(slabs) if slab.fibre is not None]
+    if not fibre:
+        return []
+    found, least = [], machine.process.cover
+    sides = {"below the first": slabs[: fibre[0]], "over the last": slabs[fibre[-1] + 1 :]}
+    for side, those in sides.items():
+        height = those[-1].upper - those[0].lower if those else 0.0
+        if height < least - _SAME:
+            raise InputError(
+                f"{height:.3g} mm of matrix {side} fibre layer do not hold it; at least "
+                f"{least:g} mm do: move the layer with --heights, or set process.cover"
+            )
+        if len(those) == 1:
+            found.append(
+                f"one layer of matrix {side} fibre layer, {height:.3g} mm; two hold better"
+            )
+    return found

@@ -1,0 +1,110 @@
+"""Machines by name and from files: what wins over what, and that a printout is the machine."""
+
+import tomllib
+from dataclasses import replace
+
+import pytest
+
+from ccfem.cases.reading import read
+from ccfem.cli.machines import machine_choice, machine_file, machines
+from ccfem.errors import InputError
+from ccfem.io.toml import from_table
+from ccfem.machine import (
+    Machine,
+    SpeedTable,
+    machine_from,
+    machine_names,
+    machine_table,
+    updated,
+)
+
+NAMES = ("aura_like", "chen2021", "klipper", "marlin_two_tools", "reprap_duet")
+
+
+def test_the_five_machines_hold_what_is_published():
+    assert machine_names() == NAMES
+    aura, chen = (machine_from({"profile": name}) for name in ("aura_like", "chen2021"))
+    # Session of Aura 2.4.8: sizes; 1 mm of the cell's matrix is .95 of what the fibre leaves.
+    assert (aura.filament_area, aura.fibre_width, aura.tail) == (0.0616, 0.78, 46.0)
+    matrix = (aura.strand_area - aura.filament_area) / (0.25 * 3.14159 * 1.75**2)
+    assert matrix == pytest.approx(0.0373, abs=1e-4)
+    # Chen et al. 2021, table 3: strands pressed into .05 mm at a width of 1.2 mm.
+    assert (chen.strand_height, chen.fibre_width, chen.tail) == (0.05, 1.2, 42.0)
+    assert replace(chen, pressed=False).strand_height == pytest.approx(0.1075 / 1.2)
+    assert "M280" not in " ".join(machine_from({"profile": "klipper"}).gcode.cut)
+
+
+@pytest.mark.parametrize("name", NAMES)
+def test_a_printout_is_the_machine(name, tmp_path):
+    text = machine_file(name)
+    again = from_table(Machine, tomllib.loads(text)["machine"], "machine")
+    assert again == updated(Machine(), machine_table(name))
+    assert max(map(len, (line for line in text.splitlines() if line.startswith("#")))) <= 100
+    # With one value changed, it is a machine of the user's own.
+    (tmp_path / "mine.toml").write_text(text.replace("start_speed = 2.0", "start_speed = 3.5"))
+    mine = updated(Machine(), machine_table(tmp_path / "mine.toml"))
+    assert mine.process.start_speed == 3.5
+    assert machine_file(str(tmp_path / "mine.toml")).startswith("[machine]")
+
+
+def test_the_later_one_wins(tmp_path):
+    case = Machine(fibre_width=0.9, minimum_length=10.0, speeds=SpeedTable())
+    # A machine leaves of the case what it does not set ...
+    found = machine_choice("klipper", None)(case)
+    assert (found.fibre_width, found.speeds, found.gcode.longest_feed) == (0.9, SpeedTable(), 45.0)
+    # ... sets what it does, and single values win over all.
+    texts = ["fibre_width=0.8", "process.start_speed=3", "gcode.cut=['M42 P4 S255']"]
+    found = machine_choice("aura_like", texts)(case)
+    assert (found.fibre_width, found.minimum_length) == (0.8, 46.0)
+    assert (found.process.start_speed, found.process.finish_speed) == (3.0, 8.0)
+    assert found.gcode.cut == ("M42 P4 S255",)
+    # A file builds on a profile, and a part file's table is one, too.
+    (tmp_path / "own.toml").write_text('[machine]\nprofile = "klipper"\nfibre_width = 1.4\n')
+    found = machine_choice(str(tmp_path / "own.toml"), None)(case)
+    assert (found.fibre_width, found.minimum_length, found.gcode.longest_feed) == (1.4, 10.0, 45.0)
+    assert machine_choice(None, None) is machine_choice(None, []) is None
+
+
+@pytest.mark.parametrize(
+    ("name", "texts", "message"),
+    [
+        ("kliper", [], "no machine named 'kliper'; there are: aura_like, .*did you mean 'klipper'"),
+        ("none.toml", [], "machine file none.toml does not exist"),
+        (None, ["lift"], "expected NAME=VALUE; got 'lift'"),
+        (None, [".lift=2"], "--set-machine expects KEY=VALUE; got '.lift=2'"),
+        (None, ["lift=2"], "machine has no key 'lift'"),
+        (None, ["process.start_sped=2"], "machine.process has no key .*did you mean 'start_speed'"),
+        (None, ["process.short=melt"], "machine.process.short must be one of 'matrix', 'drop'"),
+        (None, ["process.start_speed=0"], "process.start_speed must be above 0 mm/s; got 0"),
+        (None, ["process=3"], "machine.process must be a table; got 3"),
+        (None, ["gcode.axes.fibre=X"], "axes.fibre must be one capital letter .* got 'X'"),
+        (None, ["gcode.axes.fibre=V"], "axes need two letters; both are 'V'"),
+        (None, ["gcode.fan=['M106 S{temperature}']"], r"fan has no field '\{temperature\}'"),
+        (None, ["coextrusion=1.2"], "machine.coextrusion must be .*at most 1"),
+        (None, ["profile=prusa"], "machine.profile must be one of aura_like"),
+    ],
+)
+def test_wrong_machines_are_one_line(name, texts, message):
+    with pytest.raises(InputError, match=message):
+        machine_choice(name, texts)(Machine())
+
+
+def test_files_that_hold_no_machine(tmp_path):
+    (tmp_path / "text.toml").write_text("= 3")
+    with pytest.raises(InputError, match="is not a TOML file"):
+        machine_table(tmp_path / "text.toml")
+    (tmp_path / "part.toml").write_text("layers = 3")
+    with pytest.raises(InputError, match=r"has no table \[machine\]: write one"):
+        machine_table(tmp_path / "part.toml")
+
+
+def test_the_list_names_all(capsys):
+    machines()
+    said = capsys.readouterr().out
+    assert [line for line in said.splitlines() if line in NAMES] == list(NAMES)
+    assert "cutter 46 mm before the nozzle" in said
+
+
+def test_a_case_is_printed_by_another_machine():
+    case = read("bar", element_size=12.0)
+    assert machine_choice("chen2021", ["fibre_speed=4"])(case.machine).fibre_speed == 4.0
