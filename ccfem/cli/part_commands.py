@@ -1,5 +1,6 @@
 """Commands that begin a part and end a paper: ``mesh``, ``new``, ``example``, ``cite``."""
 
+from collections.abc import Callable
 from pathlib import Path
 from typing import Annotated
 
@@ -90,7 +91,12 @@ def _mesh(
     mesh_file(body, size, out, scale, mesher)
 
 
-_COMMANDS = {"mesh": _mesh, "new": _new, "example": _example, "cite": _cite}
+_COMMANDS: dict[str, Callable[..., None]] = {
+    "mesh": _mesh,
+    "new": _new,
+    "example": _example,
+    "cite": _cite,
+}
 
 
 def add_part_commands(app: typer.Typer) -> None:
