@@ -10,11 +10,12 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 import scipy.sparse as sp
-from scipy.sparse.linalg import splu
+from numba import njit
 
 from ccfem.arrays import BoolArray, FloatArray, IntArray, freeze
 from ccfem.errors import InputError
 from ccfem.fields.layer_elements import Surface, positive_definite
+from ccfem.geometry.locate import locate
 from ccfem.geometry.nearest_on_triangles import nearest_on_triangles
 from ccfem.geometry.polylines import subdivide
 from ccfem.layers.layer import Layer
@@ -99,10 +100,14 @@ class Chart:
         if not len(paths):
             return paths
         flat, offsets, segment = subdivide(paths.points, paths.offsets, _STEP)
-        found = nearest_on_triangles(self.flat.points, self.layer.triangles, flat)
-        corners = self.layer.triangles[found.triangle]
-        points = np.einsum("qk,qkd->qd", found.weights, self.layer.points[corners])
-        normals = np.einsum("qk,qkd->qd", found.weights, self.layer.point_normals[corners])
+        triangle, weights = locate(self.flat.points[:, :2], self.layer.triangles, flat[:, :2])
+        left = np.flatnonzero(triangle < 0)
+        if len(left):
+            found = nearest_on_triangles(self.flat.points, self.layer.triangles, flat[left])
+            triangle[left], weights[left] = found.triangle, found.weights
+        corners = self.layer.triangles[triangle]
+        points = np.einsum("qk,qkd->qd", weights, self.layer.points[corners])
+        normals = np.einsum("qk,qkd->qd", weights, self.layer.point_normals[corners])
         size = np.linalg.norm(normals, axis=1, keepdims=True)
         return replace(
             paths,
@@ -200,7 +205,7 @@ def _conformal(surface: Surface) -> FloatArray:
     held = np.array([first, last, n + first, n + last])
     free = np.setdiff1d(np.arange(2 * n), held)
     rows = sp.csr_array(matrix)[free]
-    values[free] = splu(sp.csc_array(rows[:, free])).solve(-(rows @ values))
+    values[free] = positive_definite(rows[:, free]).solve(-(rows @ values))
     return values.reshape(2, n).T
 
 
@@ -221,10 +226,27 @@ def _rigid(surface: Surface, image: FloatArray) -> tuple[FloatArray, FloatArray]
 
 def _rotations(surface: Surface, image: FloatArray) -> FloatArray:
     """Rotation (t, 2, 2) nearest to the map on each triangle."""
-    j = np.einsum("tid,tik->tdk", image[surface.triangles], surface.gradients)
-    angle = np.arctan2(j[:, 1, 0] - j[:, 0, 1], j[:, 0, 0] + j[:, 1, 1])
-    c, s = np.cos(angle), np.sin(angle)
-    return np.stack([np.stack([c, -s], axis=1), np.stack([s, c], axis=1)], axis=1)
+    found: FloatArray = _nearest_rotations(surface.gradients, surface.triangles, image)
+    return found
+
+
+@njit(cache=True, nogil=True)
+def _nearest_rotations(gradients, triangles, image):  # type: ignore[no-untyped-def]
+    found = np.empty((len(triangles), 2, 2))
+    for t in range(len(triangles)):
+        cosine, sine = 0.0, 0.0
+        for i in range(3):
+            u, v = image[triangles[t, i], 0], image[triangles[t, i], 1]
+            cosine += u * gradients[t, i, 0] + v * gradients[t, i, 1]
+            sine += v * gradients[t, i, 0] - u * gradients[t, i, 1]
+        size = np.hypot(cosine, sine)
+        if size > 0.0:
+            cosine, sine = cosine / size, sine / size
+        else:
+            cosine, sine = 1.0, 0.0
+        found[t, 0, 0], found[t, 0, 1] = cosine, -sine
+        found[t, 1, 0], found[t, 1, 1] = sine, cosine
+    return found
 
 
 def _along_axes(surface: Surface, image: FloatArray) -> FloatArray:

@@ -139,16 +139,19 @@ top_.max=data.count;top_.value=data.count;
 let low=[1e9,1e9,1e9],high=[-1e9,-1e9,-1e9];
 for(const [k,line] of data.strands.concat(data.rims))for(const p of line)for(let i=0;i<3;i++){
 low[i]=Math.min(low[i],p[i]);high[i]=Math.max(high[i],p[i]);}
-const mid=low.map((v,i)=>(v+high[i])/2),size=Math.hypot(...low.map((v,i)=>high[i]-v));
+const mid=low.map((v,i)=>(v+high[i])/2),half=low.map((v,i)=>(high[i]-v)/2);
 let turn=-0.6,tilt=0.5,zoom=1;
+const wide=Math.cos(turn)*half[0]-Math.sin(turn)*half[1],
+deep=-Math.sin(turn)*half[0]+Math.cos(turn)*half[1],
+tall=Math.cos(tilt)*half[2]+Math.sin(tilt)*deep;
 function draw(){view.width=innerWidth;view.height=innerHeight;
-const s=zoom*Math.min(view.width,view.height*1.5)/size,ct=Math.cos(turn),st=Math.sin(turn),
-ce=Math.cos(tilt),se=Math.sin(tilt),limit=+top_.value;
+const s=zoom*0.46*Math.min(view.width/wide,(view.height-60)/tall),ct=Math.cos(turn),
+st=Math.sin(turn),ce=Math.cos(tilt),se=Math.sin(tilt),limit=+top_.value;
 function at(p){const x=p[0]-mid[0],y=p[1]-mid[1],z=p[2]-mid[2],u=ct*x-st*y,v=st*x+ct*y;
-return[view.width/2+s*u,view.height/2-s*(ce*z+se*v)];}
+return[view.width/2+s*u,view.height/2+25-s*(ce*z+se*v)];}
 function stroke(line,colour,width){pen.strokeStyle=colour;pen.lineWidth=width;pen.beginPath();
 line.forEach((p,i)=>{const q=at(p);i?pen.lineTo(q[0],q[1]):pen.moveTo(q[0],q[1]);});pen.stroke();}
-for(const [k,line] of data.rims)if(k<limit)stroke(line,"#ccc",0.6);
+for(const [k,line] of data.rims)if(k<limit)stroke(line,"#aaa",0.7);
 for(const [k,line] of data.strands)if(k<limit)
 stroke(line,"hsl("+(260-220*k/data.count)+",70%,42%)",1);
 said.textContent=limit+" of "+data.count;}

@@ -9,6 +9,7 @@ from ccfem.fields.chart import chart_of, flat_view
 from ccfem.geometry.offsets import offset_rings
 from ccfem.layers.layer import Layer
 from ccfem.machine.machine import Machine
+from ccfem.threads import in_threads
 from ccfem.toolpaths import MATRIX, Toolpaths
 
 __all__ = ["layer_matrix"]
@@ -34,13 +35,13 @@ def layer_matrix(layers: Sequence[Layer], machine: Machine) -> Toolpaths:
     Toolpaths
         Closed paths of matrix, from the border inwards, layer by layer.
     """
-    width = machine.matrix_width
-    found = []
-    for layer in layers:
-        view = flat_view(layer)
-        levels = offset_rings(view.plane.polygon, _HALF_WIDTHS * width, width, width)
-        rings = [ring for level in levels for ring in level]
-        paths = Toolpaths.from_plane(rings, view)
-        paths = replace(paths, kind=np.full(len(paths), MATRIX, dtype=paths.kind.dtype))
-        found.append(paths if view is layer else chart_of(layer).lifted(paths))
-    return Toolpaths.concatenate(found)
+    return Toolpaths.concatenate(in_threads(lambda layer: _rings(layer, machine), layers))
+
+
+def _rings(layer: Layer, machine: Machine) -> Toolpaths:
+    """Matrix of one layer."""
+    width, view = machine.matrix_width, flat_view(layer)
+    levels = offset_rings(view.plane.polygon, _HALF_WIDTHS * width, width, width)
+    paths = Toolpaths.from_plane([ring for level in levels for ring in level], view)
+    paths = replace(paths, kind=np.full(len(paths), MATRIX, dtype=paths.kind.dtype))
+    return paths if view is layer else chart_of(layer).lifted(paths)

@@ -34,8 +34,10 @@ from ccfem.toolpaths import Toolpaths
 from ccfem.winding.annulus import annulus_field
 from ccfem.winding.bends import limit_bends
 from ccfem.winding.even_levels import evened, steep
+from ccfem.winding.joining_curves import border_tree
 from ccfem.winding.paper_field import PaperWeights, paper_field
 from ccfem.winding.piece import Piece, pieces_with_joints
+from ccfem.winding.spaced import CLOSEST, kept_apart
 
 __all__ = ["Winding"]
 
@@ -45,6 +47,8 @@ _REACH = 4.0
 """How far along the curves the lift of the holes reaches, mm."""
 _KNOWN = "_wound"
 """Where a layer keeps the fields of its pieces."""
+_BETWEEN = (0.0, 0.125, 0.25, 0.375, 0.625, 0.75, 0.875)
+"""Levels at which strands may start, in steps."""
 _KEPT = 0.6
 """Share of the length of the strands that keeps the spacing asked for."""
 
@@ -74,6 +78,9 @@ class Winding:
         paper), cells of large stress, or all alike.
     lines : {"joining", "touching", "all"}
         Stress lines that count, as in the slicer `spatial`.
+    even : bool, default False
+        Strands end where they would lie nearer than 0.7 spacings, and more start where there is
+        room for them: what lies between 0.7 and 1.5 spacings grows, fewer strands are closed.
     cut : bool, default True
         Cut the layer along the curves that join its holes, so that strands wind round all of them.
     repulsion : float, mm^2, default 4
@@ -99,6 +106,7 @@ class Winding:
     smoothness: float = 0.3
     weight: Literal["lines", "stress", "even"] = "lines"
     lines: Keep = "joining"
+    even: bool = False
     cut: bool = True
     repulsion: float = 4.0
     lift: float = 0.1
@@ -112,6 +120,7 @@ class Winding:
         "stress": {"weight": "stress"},
         "even": {"weight": "even", "isotropy": 1.0, "smoothness": 0.0},
         "uncut": {"cut": False},
+        "spaced": {"even": True},
         "paper": {"energy": "paper", "weight": "stress"},
     }
 
@@ -189,7 +198,7 @@ class _Planner:
     def __call__(self, layer: Layer, stress: LayerStress, machine: Machine) -> Toolpaths:
         lines: list[FloatArray] = []
         for one in self.fields(layer):
-            lines += self.strands(one, self.strategy.spacing * machine.fibre_width)
+            lines += self.strands(one, machine)
         normals = []
         for k, line in enumerate(lines):
             found = nearest_on_triangles(layer.points, layer.triangles, line)
@@ -203,7 +212,7 @@ class _Planner:
 
     def fields(self, layer: Layer) -> "list[_Wound]":
         """Fields of the pieces of a layer; the layer keeps the last, for another spacing."""
-        same = replace(self.strategy, spacing=1.0, minimum_length=None)
+        same = replace(self.strategy, spacing=1.0, even=False, minimum_length=None)
         known: tuple[_Planner, list[_Wound]] | None = vars(layer).get(_KNOWN)
         if known is not None:
             last, found = known
@@ -234,26 +243,36 @@ class _Planner:
         field = evened(surface, field)
         return _Wound(piece, field, steep(surface, field, _KEPT))
 
-    def strands(self, one: "_Wound", spacing: float) -> list[FloatArray]:
+    def strands(self, one: "_Wound", machine: Machine) -> list[FloatArray]:
         """Level lines of the field on a piece of a layer, near its surface."""
-        mesh = one.piece.mesh
-        if self.strategy.energy == "paper":
-            step = spacing * one.steep
-            every = isocontours(mesh.points, mesh.triangles, one.field, 0.5 * step, step)
-            return [
-                limit_bends(line, self.strategy.sharpest)
-                if np.array_equal(line[0], line[-1])
-                else line
-                for line, level in zip(every.lines(), every.level, strict=True)
-                if level >= 0
-            ]
-        count = max(1, round(1.0 / (one.steep * spacing)))
-        found = isocontours(mesh.points, mesh.triangles, one.field, 0.5 / count, 1.0 / count)
-        return [
-            limit_bends(line, self.strategy.sharpest)
-            for line, level in zip(found.lines(), found.level, strict=True)
-            if 0 <= level < count and np.array_equal(line[0], line[-1])
+        s, spacing = self.strategy, self.strategy.spacing * machine.fibre_width
+        step = spacing * one.steep
+        if s.energy == "annulus":
+            step = 1.0 / max(1, round(1.0 / step))
+        lines = self.lines(one, 0.5 * step, step, 0.0)
+        if not s.even:
+            return lines
+        between = [
+            line for shift in _BETWEEN for line in self.lines(one, shift * step, step, -np.inf)
         ]
+        border = border_tree(one.piece.mesh.points, [*one.piece.outer, *one.piece.loops])
+        least = machine.minimum_length if s.minimum_length is None else s.minimum_length
+        apart = CLOSEST * spacing
+        lines = kept_apart(lines, apart, least)
+        return lines + kept_apart(between, apart, least, lines, border)
+
+    def lines(self, one: "_Wound", first: float, step: float, least: float) -> list[FloatArray]:
+        """Level lines of values from `least` on, where they are closed with their bends limited."""
+        s, mesh = self.strategy, one.piece.mesh
+        found = isocontours(mesh.points, mesh.triangles, one.field, first, step)
+        open_too = s.energy == "paper"
+        most = np.inf if open_too else 1.0 - 1e-9
+        lines = []
+        for line, level in zip(found.lines(), found.level.tolist(), strict=True):
+            closed = np.array_equal(line[0], line[-1])
+            if least <= first + level * step <= most and (closed or open_too):
+                lines.append(limit_bends(line, s.sharpest) if closed else line)
+        return lines
 
     def tension(self, layer: Layer) -> FloatArray:
         """``w t t^T`` on each triangle, (t, 3, 3), of mean trace 1: t is the stress along it."""

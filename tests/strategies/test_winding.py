@@ -81,6 +81,24 @@ def test_even_weight_and_no_stress_term_keep_the_spacing(link):
     assert np.quantile(away, 0.4) > 1.5
 
 
+def test_even_strands_keep_seven_tenths_of_the_spacing_and_leave_less_bare(link):
+    layers = Planar(count=1).cut(link.mesh)
+    found = {}
+    for even in (False, True):
+        paths = plan(
+            create("winding", {"even": even, "minimum_length": 15.0}), layers, link, MACHINE
+        )
+        lines = [shapely.LineString(path[:, :2]) for path in paths]
+        nearest = min(a.distance(b) for k, a in enumerate(lines) for b in lines[:k])
+        covered = shapely.union_all([line.buffer(0.75 * 2.2) for line in lines])
+        found[even] = nearest, covered.intersection(layers[0].plane.polygon).area, paths
+    assert found[False][0] < 1.4
+    assert found[True][0] > 0.7 * 2.2 * 0.98
+    assert found[True][1] > 1.02 * found[False][1]
+    assert found[False][2].closed.all()
+    assert not found[True][2].closed.all()
+
+
 def test_on_a_rolled_layer_strands_wind_as_on_the_flat_one(link):
     """The field lives on the surface: rolled up with its stress, it gets the same strands."""
     radius = 30.0

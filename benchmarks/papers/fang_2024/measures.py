@@ -16,11 +16,18 @@ from ccfem.layers.layer import Layer
 from ccfem.principal_lines import strongest_stress
 from ccfem.toolpaths import Toolpaths
 from ccfem.winding.joint_loops import joint_loops
+from ccfem.winding.spaced import CLOSEST
 
 __all__ = ["Strands", "measured"]
 
 _AWAY = 12.0
 """Arc length from which on a strand is its own neighbour, mm (as the published spacing)."""
+
+
+NOMINAL, WIDEST = 2.2, 1.5
+"""Spacing asked for, mm, as the authors' is; most that it may be, in itself (least: `CLOSEST`)."""
+_MEASURED = 0.99
+"""Allowance for the steps of the samples, which are cut afresh."""
 
 
 @dataclass(frozen=True)
@@ -39,6 +46,13 @@ class Strands:
         length and number of these lines.
     spacing_10, spacing_50, spacing_90 : float, mm
     curvature_50, curvature_80, curvature_95 : float, 1/mm
+    near, far : float
+        Shares of the strands' length with the next strand nearer than 0.7 nominal spacings, and
+        further than 1.5.
+    covered : float
+        Share of the area of the layers with fibre within half of 1.5 nominal spacings of a strand.
+    closed_length : float
+        Share of the strands' length in closed ones.
     """
 
     layers: float
@@ -54,6 +68,10 @@ class Strands:
     curvature_50: float
     curvature_80: float
     curvature_95: float
+    near: float
+    far: float
+    covered: float
+    closed_length: float
 
     def table(self) -> dict[str, float]:
         """Figures by name."""
@@ -76,15 +94,17 @@ def measured(
     laid = np.unique(paths.layer)
     angle, length, cell = _angles(paths, stress)
     critical = weight[cell] > 0.0
-    spacing, curvature, round_all = [], [], []
+    spacing, curvature, round_all, area = [], [], [], np.zeros(2)
     known = {layer.index: layer for layer in layers}
     for index in laid.tolist():
         mine = paths.on_layer(index)
         spacing.append(_spacing(mine))
         curvature.append(_curvature(mine))
         round_all.append(_round_all(mine, known[index], stress))
+        area += _covered(mine, known[index], 0.5 * WIDEST * NOMINAL)
     apart, bend = np.concatenate(spacing), np.concatenate(curvature)
-    low, middle, high = np.quantile(apart[np.isfinite(apart)], [0.1, 0.5, 0.9])
+    apart = apart[np.isfinite(apart)]
+    low, middle, high = np.quantile(apart, [0.1, 0.5, 0.9])
     bends = np.quantile(bend, [0.5, 0.8, 0.95])
     return Strands(
         float(len(laid)),
@@ -98,6 +118,10 @@ def measured(
         float(middle),
         float(high),
         *(float(value) for value in bends),
+        float((apart < _MEASURED * CLOSEST * NOMINAL).mean()),
+        float((apart > WIDEST * NOMINAL).mean()),
+        float(area[0] / area[1]),
+        float(paths.lengths[paths.closed].sum() / paths.lengths.sum()),
     )
 
 
@@ -132,6 +156,14 @@ def _spacing(paths: Toolpaths) -> FloatArray:
         away = np.linalg.norm(points[others] - points[row], axis=1)
         found.append(float(away.min()) if len(others) else np.nan)
     return np.array(found)
+
+
+def _covered(paths: Toolpaths, layer: Layer, reach: float) -> FloatArray:
+    """Area of a layer within a reach of its strands, and all of it."""
+    points, _ = resample(paths.points, paths.offsets, 0.4)
+    middle = layer.points[layer.triangles].mean(axis=1)
+    near = cKDTree(points).query(middle)[0] <= reach
+    return np.array([layer.areas[near].sum(), layer.areas.sum()])
 
 
 def _curvature(paths: Toolpaths) -> FloatArray:
