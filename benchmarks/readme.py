@@ -39,7 +39,7 @@ def draw_bridge() -> None:
 def main() -> None:
     """Run the comparison and write README.md, docs/loop.png and docs/bridge.png."""
     with tempfile.TemporaryDirectory() as folder:
-        command = [sys.executable, "-m", "ccfem", "compare", "loop", "--out", folder]
+        command = [sys.executable, "-m", "ccfem", "compare", "loop", "--pictures", "--out", folder]
         environment = {**os.environ, "COLUMNS": "100"}
         done = subprocess.run(
             command, cwd=ROOT, env=environment, capture_output=True, text=True, check=True

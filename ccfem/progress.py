@@ -1,21 +1,62 @@
 """How long tasks report their progress."""
 
+import logging
+import sys
+import time
 from collections.abc import Callable, Iterator
 from contextlib import contextmanager
 
-__all__ = ["Progress", "progress_bar", "silent"]
+__all__ = ["Progress", "progress_bar", "silent", "time_left"]
 
 Progress = Callable[[str, float], None]
 """Called with the name of the current step and the share of all work, in [0, 1], that is done."""
+
+_LEAST = 0.05
+"""Share of the work from which on the time that is left is worth a word."""
 
 
 def silent(what: str, share: float) -> None:
     """Report nothing."""
 
 
+def time_left(spent: float, share: float) -> str:
+    """Say how long work will still take, by the time that its share took so far.
+
+    Parameters
+    ----------
+    spent : float, s
+    share : float in [0, 1]
+        Of the work that is done.
+
+    Returns
+    -------
+    str
+        Empty where too little is done to tell.
+
+    Examples
+    --------
+    >>> time_left(30.0, 0.25)
+    'about 90 s left'
+    >>> time_left(300.0, 0.25)
+    'about 15 min left'
+    """
+    if not _LEAST <= share < 1.0:
+        return ""
+    left = spent * (1.0 - share) / share
+    return f"about {left:.0f} s left" if left < 120.0 else f"about {left / 60.0:.0f} min left"
+
+
 @contextmanager
-def progress_bar() -> Iterator[Progress]:
-    """Progress bar on the terminal's stderr or in a notebook; nothing anywhere else.
+def progress_bar(lines: bool = False) -> Iterator[Progress]:
+    """Progress bar on the terminal's stderr or in a notebook.
+
+    Every step is also logged (`logging`, "ccfem", level INFO).
+
+    Parameters
+    ----------
+    lines : bool, default False
+        Where there is neither a terminal nor a notebook, write a line for each step to stderr;
+        else nothing.
 
     Examples
     --------
@@ -26,15 +67,42 @@ def progress_bar() -> Iterator[Progress]:
     from rich.markup import escape
     from rich.progress import BarColumn, Progress, TextColumn, TimeElapsedColumn
 
-    console = Console(stderr=True)
+    console, start = Console(stderr=True), time.perf_counter()
     if not (console.is_terminal or console.is_jupyter):
-        yield silent
+        yield _each_step(_line if lines else None)
         return
     columns = (BarColumn(), TimeElapsedColumn(), TextColumn("{task.description}"))
     with Progress(*columns, console=console, transient=True) as bar:
         task = bar.add_task("", total=1.0)
+        log = _each_step(None)
 
         def tell(what: str, share: float) -> None:
-            bar.update(task, description=escape(what), completed=share)
+            log(what, share)
+            left = time_left(time.perf_counter() - start, share)
+            said = f"{what} ({left})" if left else what
+            bar.update(task, description=escape(said), completed=share)
 
         yield tell
+
+
+def _line(text: str) -> None:
+    print(f"ccfem: {text}", file=sys.stderr, flush=True)
+
+
+def _each_step(write: Callable[[str], None] | None) -> Progress:
+    """Progress that logs the name of each step once, and writes it."""
+    start, last = time.perf_counter(), ""
+    logger = logging.getLogger("ccfem")
+
+    def tell(what: str, share: float) -> None:
+        nonlocal last
+        if what == last:
+            return
+        last = what
+        spent = time.perf_counter() - start
+        left = time_left(spent, share)
+        logger.info("%.1f s, %.0f %%: %s", spent, 100.0 * share, what)
+        if write is not None:
+            write(f"{spent:.0f} s, {100.0 * share:.0f} %{', ' + left if left else ''}: {what}")
+
+    return tell

@@ -9,10 +9,12 @@ from typing import Any
 
 import typer
 
+from ccfem.checks import check_known
 from ccfem.errors import InputError
 from ccfem.io.toml import assignment
 
 __all__ = [
+    "drawings_of",
     "names_of",
     "numbers_of",
     "parameters_by_strategy",
@@ -30,6 +32,14 @@ def path_of(text: str | Path) -> Path:
 def names_of(text: str) -> tuple[str, ...]:
     """Split names separated by commas."""
     return tuple(name.strip() for name in text.split(",") if name.strip())
+
+
+def drawings_of(text: str | None) -> tuple[str, ...]:
+    """Read the formats of drawings that are asked for."""
+    names = tuple(name.lower() for name in names_of(text or ""))
+    for name in names:
+        check_known("format of drawings", name, ("svg", "dxf"))
+    return names
 
 
 def numbers_of(text: str) -> tuple[float, ...]:

@@ -3,19 +3,21 @@
 Everything heavy is imported by the command that needs it, so that ``ccfem --help`` answers at once.
 """
 
+import logging
 from importlib import metadata
 from pathlib import Path
 from typing import Annotated, Any
 
 import typer
 
-from ccfem.cli.arguments import names_of, parameters_by_strategy, path_of
+from ccfem.cli.arguments import drawings_of, names_of, parameters_by_strategy, path_of
 from ccfem.cli.in_python import say_in_python
 from ccfem.cli.machines import MachineName, SetMachine, machine_choice, machines
 from ccfem.cli.options import (
     Backend,
     Calibration,
     CasePath,
+    Drawings,
     Fibre,
     FibreInAll,
     Force,
@@ -23,6 +25,7 @@ from ccfem.cli.options import (
     Layers,
     LoadCase,
     Out,
+    Pictures,
     Refine,
     SetCase,
     Slicing,
@@ -32,6 +35,7 @@ from ccfem.cli.options import (
     VirtualTest,
 )
 from ccfem.cli.papers_again import reproduce
+from ccfem.cli.part_commands import add_part_commands
 from ccfem.cli.run import foreign_stress, layers_of, load, options_of, run, slicings_of
 from ccfem.cli.study_file import study
 
@@ -41,18 +45,23 @@ app = typer.Typer(
     name="ccfem",
     help="Finite elements and stress-driven toolpaths for printing continuous fibre. "
     "Units: mm, N, MPa.",
-    add_completion=False,
     context_settings={"help_option_names": ["-h", "--help"]},
     pretty_exceptions_enable=False,
     rich_markup_mode=None,
 )
+add_part_commands(app)
 
 
 @app.callback(invoke_without_command=True)
 def _top(
     context: typer.Context,
     version: Annotated[bool, typer.Option("--version", help="Print the version.")] = False,
+    verbose: Annotated[
+        bool, typer.Option("--verbose", help="Log every step with its time, before the command.")
+    ] = False,
 ) -> None:
+    if verbose:
+        logging.basicConfig(level=logging.INFO, format="%(asctime)s %(name)s: %(message)s")
     if version:
         print(f"ccfem {metadata.version('ccfem')}")
         raise typer.Exit
@@ -151,32 +160,6 @@ def check(
 
 
 @app.command()
-def mesh(
-    body: Annotated[
-        Path,
-        typer.Argument(metavar="BODY", help="Surface (.stl, .obj, .ply) or CAD file (.step ...)."),
-    ],
-    size: Annotated[float, typer.Option("--size", metavar="MM", help="Edge length of the cells.")],
-    out: Annotated[
-        Path,
-        typer.Option(
-            "-o", "--out", metavar="MESH", parser=path_of, help="Mesh (.vtu, .npz, .tet)."
-        ),
-    ],
-    scale: Annotated[
-        float, typer.Option(metavar="S", help="Factor that makes a file's coordinates mm.")
-    ] = 1.0,
-    mesher: Annotated[
-        str, typer.Option(metavar="auto|gmsh|ftetwild", help="What meshes a surface.")
-    ] = "auto",
-) -> None:
-    """Mesh a surface or a CAD file, its faces as patches: face_1, face_2, or their names."""
-    from ccfem.cli.mesh_body import mesh_file
-
-    mesh_file(body, size, out, scale, mesher)
-
-
-@app.command()
 def compare(
     case: CasePath,
     strategies: Annotated[
@@ -233,10 +216,12 @@ def compare(
     backend: Backend = "auto",
     stress: StressFile = None,
     stress_unit: StressUnit = None,
+    pictures: Pictures = False,
+    drawings: Drawings = None,
     out: Out = None,
     force: Force = False,
 ) -> None:
-    """Plan a part by several strategies and show which is best, with numbers and pictures."""
+    """Plan a part by several strategies and show which is best, in numbers and a report."""
     from ccfem.comparison.compare import STRATEGIES
 
     names = STRATEGIES if strategies is None else names_of(strategies)
@@ -259,6 +244,8 @@ def compare(
         frame=paths_frame,
         force=force,
         refine=refine,
+        pictures=pictures,
+        drawings=drawings_of(drawings),
         machine=machine_choice(machine, set_machine),
     )
 
@@ -289,6 +276,8 @@ def plan(
     ] = False,
     stress: StressFile = None,
     stress_unit: StressUnit = None,
+    pictures: Pictures = False,
+    drawings: Drawings = None,
     out: Out = None,
     force: Force = False,
 ) -> None:
@@ -311,6 +300,8 @@ def plan(
         suffix,
         force=force,
         refine=refine,
+        pictures=pictures,
+        drawings=drawings_of(drawings),
         machine=machine_choice(machine, set_machine),
     )
 

@@ -17,6 +17,9 @@ CALLS = {
     "solve": "ccfem.solve(CASE.problem)",
     "calibrate": "ccfem.calibrate(PROBLEM, CURVE)",
     "reproduce": "ccfem.papers.reproduce.reproduce(PAPER, PART)",
+    "new": "ccfem.inspection.new_part(BODY)",
+    "example": "ccfem.inspection.write_example(NAME)",
+    "cite": "ccfem.comparison.bibtex(ccfem.comparison.cited([METHOD]))",
     "study": "ccfem.study(FILE, workers=N)",
 }
 """Call of each command, as its help prints it."""

@@ -11,12 +11,14 @@ __all__ = [
     "Backend",
     "Calibration",
     "CasePath",
+    "Drawings",
     "Fibre",
     "FibreInAll",
     "Heights",
     "Layers",
     "LoadCase",
     "Out",
+    "Pictures",
     "SetCase",
     "Slicing",
     "Slicings",
@@ -90,6 +92,18 @@ Slicings = Annotated[
 Force = Annotated[
     bool,
     typer.Option("--force", help="Replace files in the folder that ccfem did not write, too."),
+]
+Pictures = Annotated[
+    bool,
+    typer.Option("--pictures", help="Also draw what the report shows as PNG files."),
+]
+Drawings = Annotated[
+    str | None,
+    typer.Option(
+        "--drawings",
+        metavar="svg,dxf",
+        help="Also draw every flat layer of every strategy to scale, in mm: border, fibre, links.",
+    ),
 ]
 VirtualTest = Annotated[
     bool,

@@ -11,6 +11,7 @@ from dataclasses import replace
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
+from ccfem.checks import member_name
 from ccfem.cli.arguments import numbers_of
 from ccfem.errors import InputError
 from ccfem.io.toml import assignment
@@ -22,9 +23,19 @@ if TYPE_CHECKING:
     from ccfem.comparison.slicings import SlicingComparison
     from ccfem.machine.machine import Machine
 
-__all__ = ["foreign_stress", "layers_of", "load", "options_of", "run", "slicings_of"]
+__all__ = [
+    "foreign_stress",
+    "layers_of",
+    "load",
+    "options_of",
+    "run",
+    "slicings_of",
+]
 
 _STARTED = time.perf_counter()
+
+_MESHES = (".msh", ".vtu", ".inp", ".tet", ".npz")
+"""Suffixes of files that hold a mesh."""
 
 _SOLVED = 0.75
 """Share of the progress bar at which the comparison is made and the pictures begin."""
@@ -42,6 +53,7 @@ def load(
     """
     from ccfem.cases.reading import read
 
+    _refuse_body(name)
     parameters = dict(assignment(text) for text in set_case or ())
     if parameters and name.endswith(".toml"):
         raise InputError(
@@ -51,6 +63,20 @@ def load(
     if machine is not None:
         case = replace(case, machine=machine(case.machine))
     return _refined(case) if refine else case
+
+
+def _refuse_body(name: str) -> None:
+    """Say what a part file is to who gives the body instead."""
+    from ccfem.io.surface import is_surface
+    from ccfem.meshing.cad import is_cad
+
+    body = Path(name)
+    if is_surface(body) or is_cad(body) or body.suffix.lower() in _MESHES:
+        raise InputError(
+            f"{name} is a body, without material, loads and supports; these stand in a part file, "
+            f"a text (TOML) that names the body: 'ccfem new {shlex.quote(name)}' writes one to "
+            "fill in"
+        )
 
 
 def _refined(case: "Case") -> "Case":
@@ -129,6 +155,8 @@ def run(
     frame: str | None = None,
     force: bool = False,
     refine: bool = False,
+    pictures: bool = False,
+    drawings: Sequence[str] = (),
     machine: "Callable[[Machine], Machine] | None" = None,
 ) -> None:
     """Compare strategies, write the results and print the table; a failure leaves nothing behind.
@@ -156,6 +184,10 @@ def run(
         Replace files in the folder that ccfem did not write, too.
     refine : bool
         Refine the cells by their estimated error first.
+    pictures : bool
+        Also draw PNG files of what the report shows.
+    drawings : sequence of {"svg", "dxf"}
+        Also draw every flat layer of every strategy to scale.
     machine : callable, optional
         What it makes of the part's machine (`ccfem.cli.machines.machine_choice`).
     """
@@ -163,12 +195,14 @@ def run(
         raise InputError("--refine changes the mesh that the file of --stress is on: drop one")
     from ccfem.cli.screen import print_comparison, print_slicings
     from ccfem.comparison.compare import compare, create_all
-    from ccfem.comparison.files import write_results
+    from ccfem.comparison.files import write_drawings, write_results
     from ccfem.comparison.slicings import SlicingComparison
     from ccfem.comparison.slicings_files import write_slicings
     from ccfem.io.result_folder import whole_folder
 
     imported = time.perf_counter()
+    if drawings and options.get("slicings") is not None:
+        raise InputError("--drawings are of one slicing; got --slicings: drop one")
     case = load(name, set_case, refine, machine)
     seconds = {"start": imported - _STARTED, "mesh": time.perf_counter() - imported}
     if calibration is not None:
@@ -176,19 +210,35 @@ def run(
     chosen = create_all(case, strategies, parameters) if strategies or not paths else {}
     chosen |= _given(case, paths, frame, chosen)
     where = out if out is not None else Path("results") / f"{case.name}{suffix}"
-    with whole_folder(where, force) as folder, progress_bar() as progress:
+    part_file = _text_of(name)
+    slicer = member_name(_slicer_of(case, options.get("layers")))
+    with whole_folder(where, force) as folder, progress_bar(lines=True) as progress:
         comparison = compare(case, chosen, progress=_part(progress, 0.0, _SOLVED), **options)
         _check(comparison)
         command, rest = shlex.join(["ccfem", *sys.argv[1:]]), _part(progress, _SOLVED, 1.0)
         if isinstance(comparison, SlicingComparison):
-            write_slicings(comparison, folder, command, seconds, rest)
+            write_slicings(comparison, folder, command, seconds, rest, pictures, part_file)
         else:
-            write_results(comparison, folder, command, seconds, rest)
+            if drawings:
+                write_drawings(comparison, folder, drawings)
+            write_results(comparison, folder, command, seconds, rest, pictures, part_file, slicer)
     spent = time.perf_counter() - _STARTED
     if isinstance(comparison, SlicingComparison):
         print_slicings(comparison, where, spent)
     else:
         print_comparison(comparison, where, spent)
+
+
+def _slicer_of(case: "Case", layers: Any) -> Any:
+    """Return what cuts the layers: the part's own slicer, or the one that was asked for."""
+    from ccfem.layers.slicing import as_slicer
+
+    return case.slicing if layers is None else as_slicer(layers)
+
+
+def _text_of(name: str) -> str:
+    """Text of a part file; empty for the name of a case."""
+    return Path(name).read_text(encoding="utf-8") if name.endswith(".toml") else ""
 
 
 def _given(

@@ -1,8 +1,9 @@
 """Comparison of strategies on one part: runs, ranking, pictures, report and files."""
 
+from ccfem.comparison.citations import bibtex, cited
 from ccfem.comparison.compare import compare
 from ccfem.comparison.result import Comparison
 from ccfem.comparison.runs import Run
 from ccfem.comparison.saving import save
 
-__all__ = ["Comparison", "Run", "compare", "save"]
+__all__ = ["Comparison", "Run", "bibtex", "cited", "compare", "save"]

@@ -2,14 +2,15 @@
 
 import json
 import time
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from pathlib import Path
 from typing import TYPE_CHECKING
 
 import numpy as np
 
-from ccfem.comparison.record import record, results_frame
+from ccfem.comparison.record import record, results_rows, write_table
 from ccfem.comparison.result import Comparison
+from ccfem.comparison.shown import file_stem
 from ccfem.printing.print_plan import PrintPlan
 from ccfem.progress import Progress, silent
 from ccfem.toolpaths import Toolpaths
@@ -17,7 +18,7 @@ from ccfem.toolpaths import Toolpaths
 if TYPE_CHECKING:
     from ccfem.comparison.pictures import Pictures
 
-__all__ = ["write_results"]
+__all__ = ["write_drawings", "write_results"]
 
 
 def write_results(
@@ -26,16 +27,15 @@ def write_results(
     command: str = "",
     seconds: Mapping[str, float] | None = None,
     progress: Progress = silent,
+    pictures: bool = False,
+    part_file: str = "",
+    slicer: str = "",
 ) -> None:
-    """Write ``results.csv``, ``results.json``, ``report.html``, pictures and paths.
+    """Write ``results.csv``, ``results.json``, ``report.html`` and paths; pictures where wanted.
 
-    ``part.png`` shows the part with its patches, loads and supports, ``part.html`` turns it.
-
-    Where layers are curved, also ``STRATEGY_space.png`` and a page that turns,
-    ``STRATEGY_space.html``, and ``matrix_waypoints.csv``, rings that fill the layers; with a curve,
-    ``curve.csv`` and ``curve.png``. Runs with a print plan get ``STRATEGY.gcode`` too,
-    ``STRATEGY_cell.csv`` with the same moves for a cell of robots, and ``STRATEGY_trim.csv`` where
-    strands leave the part. In
+    With a curve, also ``curve.csv``; where layers are curved, ``matrix_waypoints.csv``, rings that
+    fill the layers. Runs with a print plan get ``STRATEGY.gcode`` too, ``STRATEGY_cell.csv`` with
+    the same moves for a cell of robots, and ``STRATEGY_trim.csv`` where strands leave the part. In
     ``paths.vtp`` the cell array "strategy" numbers the strategies that did not fail, in the order
     of ``results.json``.
 
@@ -49,35 +49,78 @@ def write_results(
     seconds : mapping of stage to float, optional
         Stages outside the comparison.
     progress : callable, optional
+    pictures : bool, default False
+        Also draw what the report shows as PNG files: every layer of every strategy, forces,
+        tension, all side by side, the part and the curve; and ``part.html``, which turns the part.
+        Where layers are curved, also ``STRATEGY_space.png`` and ``STRATEGY_space.html``.
+    part_file : str
+        Text of the part file, for the report.
+    slicer : str
+        Name of what cut the layers, for the citations.
     """
-    from ccfem.comparison.pictures import draw_pictures
     from ccfem.comparison.report import report_html
 
     start = time.perf_counter()
-    pictures = draw_pictures(comparison, lambda what, share: progress(what, 0.9 * share))
-    spent = {**(seconds or {}), "pictures": time.perf_counter() - start}
-    progress("writing results", 0.9)
-    _write_pictures(pictures, folder)
-    results_frame(comparison).to_csv(folder / "results.csv", index=False)
+    spent = dict(seconds or {})
+    if pictures:
+        _draw(comparison, folder, lambda what, share: progress(what, 0.6 * share))
+        spent["pictures"] = time.perf_counter() - start
+    progress("writing results", 0.6)
+    start = time.perf_counter()
+    write_table(results_rows(comparison), folder / "results.csv")
     if comparison.curve is not None:
         comparison.curve.frame.to_csv(folder / "curve.csv", index=False)
     _write_paths(comparison, folder)
-    if any(layer.flat is None for layer in comparison.layers):
-        _write_in_space(comparison, folder)
-    about = record(comparison, command, spent)
-    page = report_html(comparison, about, pictures)
+    spent["files"] = time.perf_counter() - start
+    progress("writing the report", 0.8)
+    about = {**record(comparison, command, spent), "slicer": slicer}
+    page = report_html(comparison, about, part_file)
     (folder / "report.html").write_text(page, encoding="utf-8")
+    about["seconds"]["report"] = time.perf_counter() - start - spent["files"]
     about["files"] = sorted({path.name for path in folder.iterdir()} | {"results.json"})
     text = json.dumps(about, indent=1, ensure_ascii=False, allow_nan=False)
     (folder / "results.json").write_text(text + "\n", encoding="utf-8")
 
 
+def write_drawings(comparison: Comparison, folder: Path, formats: Sequence[str]) -> None:
+    """Draw every flat layer of every run to scale: ``STRATEGY_layer_NN.svg`` and ``.dxf``.
+
+    Parameters
+    ----------
+    comparison : Comparison
+    folder : Path
+    formats : sequence of {"svg", "dxf"}
+
+    Raises
+    ------
+    InputError
+        Where layers are curved.
+    """
+    from ccfem.export.layer_drawings import draw_layer
+
+    width = comparison.case.machine.fibre_width
+    for run in comparison.succeeded:
+        for layer in comparison.layers:
+            for suffix in formats:
+                file = folder / f"{file_stem(run.name)}_layer_{layer.index:02d}.{suffix}"
+                draw_layer(run.toolpaths, layer, width, file)
+
+
+def _draw(comparison: Comparison, folder: Path, progress: Progress) -> None:
+    """Draw and write all pictures."""
+    from ccfem.comparison.pictures import draw_pictures
+
+    _write_pictures(draw_pictures(comparison, progress), folder)
+    if any(layer.flat is None for layer in comparison.layers):
+        _write_in_space(comparison, folder)
+
+
 def _write_pictures(pictures: "Pictures", folder: Path) -> None:
     """Write the pictures that are files of their own."""
     for (name, index), image in pictures.paths.items():
-        (folder / f"{name}_layer_{index:02d}.png").write_bytes(image)
+        (folder / f"{file_stem(name)}_layer_{index:02d}.png").write_bytes(image)
     for name, image in pictures.forces.items():
-        (folder / f"{name}_force.png").write_bytes(image)
+        (folder / f"{file_stem(name)}_force.png").write_bytes(image)
     (folder / "tension.png").write_bytes(pictures.tension)
     (folder / "overview.png").write_bytes(pictures.overview)
     (folder / "part.png").write_bytes(pictures.part)
@@ -95,9 +138,9 @@ def _write_in_space(comparison: Comparison, folder: Path) -> None:
     for run in comparison.succeeded:
         title = f"{comparison.case.name}, {run.name}"
         picture = space_picture(layers, run.toolpaths, title, build)
-        (folder / f"{run.name}_space.png").write_bytes(png(picture))
+        (folder / f"{file_stem(run.name)}_space.png").write_bytes(png(picture))
         page = turning_page(layers, run.toolpaths, title, build)
-        (folder / f"{run.name}_space.html").write_text(page, encoding="utf-8")
+        (folder / f"{file_stem(run.name)}_space.html").write_text(page, encoding="utf-8")
 
 
 def _write_matrix(comparison: Comparison, folder: Path) -> None:
@@ -138,13 +181,13 @@ def _write_paths(comparison: Comparison, folder: Path) -> None:
     for run in runs:
         layers, paths = comparison.layers, run.toolpaths
         if all(layer.flat is not None for layer in layers):
-            write_waypoints(folder / f"{run.name}_waypoints.txt", paths, layers)
+            write_waypoints(folder / f"{file_stem(run.name)}_waypoints.txt", paths, layers)
         else:
-            file = folder / f"{run.name}_waypoints.csv"
+            file = folder / f"{file_stem(run.name)}_waypoints.csv"
             write_robot_waypoints(file, paths, layers, comparison.case.machine)
             _write_matrix(comparison, folder)
         if run.print_plan is not None:
-            _write_print(folder, run.name, run.print_plan, comparison)
+            _write_print(folder, file_stem(run.name), run.print_plan, comparison)
     every = Toolpaths.concatenate(run.toolpaths for run in runs)
     number = np.repeat(np.arange(float(len(runs))), [len(run.toolpaths) for run in runs])
     write_paths(every, folder / "paths.vtp", path_data={"strategy": number})

@@ -10,6 +10,7 @@ from ccfem.arrays import FloatArray
 from ccfem.comparison.ranking import stiffness_ratio
 from ccfem.comparison.result import Comparison
 from ccfem.comparison.runs import Run
+from ccfem.comparison.shown import caption, drawn_layers, middle_layer
 from ccfem.elasticity.stress_field import StressField
 from ccfem.evaluation.matching import THRESHOLDS, along_fibre, matching_curve
 from ccfem.evaluation.plane_paths import pool
@@ -37,7 +38,7 @@ from ccfem.progress import Progress, silent
 if TYPE_CHECKING:
     from matplotlib.figure import Figure
 
-__all__ = ["Pictures", "caption", "draw_pictures", "overview_picture"]
+__all__ = ["Pictures", "draw_pictures", "overview_picture"]
 
 
 @dataclass(frozen=True)
@@ -62,7 +63,7 @@ class Pictures:
     part_page : str
         Page on which it turns, HTML.
     middle : int
-        Index of the middle layer.
+        Index of the layer that stands for all: the middle one of those with fibre.
     curve : bytes
         Stiffness over the length of fibre; empty without a curve.
     """
@@ -87,12 +88,12 @@ def draw_pictures(comparison: Comparison, progress: Progress = silent) -> Pictur
         replace(run, toolpaths=in_charts(run.toolpaths, comparison.layers))
         for run in comparison.succeeded
     ]
-    layers = [flat_view(layer) for layer in _drawn(comparison)]
+    centre = middle_layer(comparison)
+    layers = [flat_view(layer) for layer in drawn_layers(comparison)]
     stresses = [stress_on(layer, comparison.planned_on) for layer in layers]
     limit = max(tension_limit(stress) for stress in stresses)
     colours = palette(run.name for run in comparison.runs)
-    middle = stresses[len(stresses) // 2]
-    centre = _drawn(comparison)[len(stresses) // 2]
+    middle = next(each for each in stresses if each.layer.index == centre.index)
     rates, bends = _curves(runs)
     heading = f"tension in layer {middle.layer.index}, load case {comparison.stress.case}"
     checked = check(comparison.case)
@@ -127,13 +128,6 @@ def _curve(comparison: Comparison, colours: Mapping[str, str]) -> bytes:
     return png(stiffness_curves(curves, comparison.curve.common, heading, colours))
 
 
-def _drawn(comparison: Comparison) -> list[Layer]:
-    """Layers that are drawn: all flat ones, and of curved ones those that have fibre."""
-    laid = {int(k) for run in comparison.succeeded for k in np.unique(run.toolpaths.layer)}
-    chosen = [k for k in comparison.layers if k.flat is not None or k.index in laid]
-    return chosen or list(comparison.layers)
-
-
 def _layers(
     runs: Sequence[Run],
     stresses: Sequence[LayerStress],
@@ -162,13 +156,12 @@ def _error(stress: StressField, layer: Layer) -> "Figure":
 
 
 def overview_picture(comparison: Comparison) -> "Figure":
-    """Draw all strategies side by side on the middle one of the layers that have fibre."""
+    """Draw all strategies side by side on the layer that stands for all."""
     runs = [
         replace(run, toolpaths=in_charts(run.toolpaths, comparison.layers))
         for run in comparison.succeeded
     ]
-    drawn = _drawn(comparison)
-    stress = stress_on(flat_view(drawn[len(drawn) // 2]), comparison.planned_on)
+    stress = stress_on(flat_view(middle_layer(comparison)), comparison.planned_on)
     return _overview(runs, stress, comparison.case.machine.fibre_width, tension_limit(stress))
 
 
@@ -177,19 +170,6 @@ def _overview(runs: Sequence[Run], stress: LayerStress, width: float, limit: flo
     paths = {run.name: run.toolpaths for run in runs}
     captions = {run.name: caption(run, stress.layer) for run in runs}
     return compare_layer(stress.layer, stress, paths, width, captions, limit)
-
-
-def caption(run: Run, layer: Layer) -> str:
-    """Key numbers of a run on one layer."""
-    if run.evaluation is None:
-        return ""
-    values = run.evaluation.of_layer(layer.index)
-    count = int(values["paths"])
-    if not count:
-        return "no fibre"
-    laid = f"{values['fibre_length']:.0f} mm in {count} path{'s' if count > 1 else ''}"
-    efficiency = values["efficiency"]
-    return laid if np.isnan(efficiency) else f"{laid}, efficiency {efficiency:.2f}"
 
 
 def _curves(runs: Sequence[Run]) -> tuple[dict[str, FloatArray], dict[str, FloatArray]]:

@@ -1,14 +1,17 @@
 """The record of a comparison: all its numbers as a table, and what it takes to repeat it."""
 
+import csv
 import dataclasses
 import platform
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from datetime import UTC, datetime
 from importlib.metadata import PackageNotFoundError, version
+from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
+from ccfem.checks import member_name
 from ccfem.comparison.headline import TEST_COLUMNS, headline_values
 from ccfem.comparison.result import Comparison
 from ccfem.comparison.runs import Run
@@ -17,39 +20,66 @@ from ccfem.elasticity.stress_field import StressField
 if TYPE_CHECKING:
     import pandas as pd
 
-__all__ = ["record", "results_frame"]
+__all__ = ["record", "results_frame", "results_rows", "write_table"]
+
+_FIRST = ("strategy", "layer", "failure")
 
 _PACKAGES = ("numpy", "scipy", "numba", "pyamg", "shapely", "pypardiso")
 
 
-def results_frame(comparison: Comparison) -> "pd.DataFrame":
+def results_rows(comparison: Comparison) -> list[dict[str, Any]]:
     """Every index of every run: one row per layer, and one in total.
 
-    Returns
-    -------
-    DataFrame
-        Columns strategy, layer ("total" or its index), failure, the evaluator's columns, and those
-        of the virtual test, which are of the whole part and stand in the total rows only.
-        A failed strategy has its total row, with the reason and no numbers.
+    Columns are strategy, layer ("total" or its index), failure, the evaluator's columns, and those
+    of the virtual test, which are of the whole part and stand in the total rows only. A failed
+    strategy has its total row, with the reason and no numbers. A row holds what it has a value for.
     """
+    rows: list[dict[str, Any]] = []
+    for run in comparison.runs:
+        own = {"strategy": run.name}
+        if run.evaluation is None:
+            rows.append({"strategy": run.name, "layer": "total", "failure": run.failure})
+            continue
+        values = run.evaluation.values
+        for k, layer in enumerate((*run.evaluation.layers, "total")):
+            found = {name: value[k].item() for name, value in values.items()}
+            rows.append({**own, "layer": layer, "failure": "", **found})
+        extra = headline_values(run)
+        tested = (column.name for column in TEST_COLUMNS)
+        rows[-1] |= {name: extra[name] for name in tested if name in extra}
+        rows[-1]["fails_in"] = run.fails_in
+    return rows
+
+
+def _columns(rows: Sequence[Mapping[str, Any]]) -> list[str]:
+    """Columns of rows: who, where and why not first, then in the order in which they occur."""
+    return list(dict.fromkeys([*_FIRST, *(name for row in rows for name in row)]))
+
+
+def results_frame(comparison: Comparison) -> "pd.DataFrame":
+    """Return `results_rows` as a table; what a row has no value for is NaN."""
     import pandas as pd
 
-    frames = []
-    for run in comparison.runs:
-        if run.evaluation is None:
-            frames.append(pd.DataFrame({"layer": ["total"], "failure": [run.failure]}))
-        else:
-            frame = run.evaluation.to_frame().reset_index().assign(failure="")
-            extra = headline_values(run)
-            for column in TEST_COLUMNS:
-                if column.name in extra:
-                    frame.loc[frame.index[-1], column.name] = extra[column.name]
-            frame.loc[frame.index[-1], "fails_in"] = run.fails_in
-            frames.append(frame)
-        frames[-1].insert(0, "strategy", run.name)
-    frame = pd.concat(frames, ignore_index=True)
-    first = ["strategy", "layer", "failure"]
-    return frame[first + [name for name in frame.columns if name not in first]]
+    rows = results_rows(comparison)
+    return pd.DataFrame(rows, columns=_columns(rows))
+
+
+def write_table(rows: Sequence[Mapping[str, Any]], file: Path, first: Sequence[str] = ()) -> None:
+    """Write rows as CSV, with some columns first; what is missing or not a number is empty.
+
+    Pandas, which takes a second to be imported, is not needed for this.
+    """
+    columns = list(dict.fromkeys([*first, *_columns(rows)]))
+    with file.open("w", encoding="utf-8", newline="") as stream:
+        writer = csv.writer(stream, lineterminator="\n")
+        writer.writerow(columns)
+        for row in rows:
+            cells = (row.get(name) for name in columns)
+            writer.writerow(["" if _missing(cell) else cell for cell in cells])
+
+
+def _missing(value: Any) -> bool:
+    return value is None or (isinstance(value, float) and np.isnan(value))
 
 
 def record(comparison: Comparison, command: str, seconds: Mapping[str, float]) -> dict[str, Any]:
@@ -121,6 +151,7 @@ def _load(stress: StressField) -> list[float] | None:
 def _run_record(run: Run) -> dict[str, Any]:
     return {
         "name": run.name,
+        "methods": _methods(run),
         "parameters": run.parameters,
         "length_per_layer": run.length_per_layer,
         "note": run.note,
@@ -133,6 +164,12 @@ def _run_record(run: Run) -> dict[str, Any]:
         "first_failure": vars(run.tested.failure) if run.tested and run.tested.failure else None,
         "first_failure_alternative": _alternative_failure(run),
     }
+
+
+def _methods(run: Run) -> list[str]:
+    """Name the strategy of a run, and those that stand among its parameters."""
+    inner = [value for value in run.parameters.values() if dataclasses.is_dataclass(value)]
+    return [member_name(each) for each in (run.strategy, *inner)]
 
 
 def _alternative_failure(run: Run) -> dict[str, Any] | None:

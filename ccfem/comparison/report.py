@@ -1,131 +1,201 @@
-"""The report of a comparison: one HTML file that holds everything, pictures included."""
+"""The report of a comparison: one HTML file that holds everything and draws itself."""
 
+import dataclasses
 from collections.abc import Mapping, Sequence
 from typing import Any
 
-from ccfem.comparison.curve_section import curve_section
-from ccfem.comparison.html import figure, grid
-from ccfem.comparison.pictures import Pictures
-from ccfem.comparison.report_sections import (
+from ccfem.comparison.charts import curve_charts, fronts, spreads
+from ccfem.comparison.citations import bibtex, cited, methods_of, sentence
+from ccfem.comparison.headline import HEADLINE, HEADLINE_OF_SLICINGS, TEST_COLUMNS
+from ccfem.comparison.layer_view import layer_views
+from ccfem.comparison.part_view import part_view
+from ccfem.comparison.report_tables import (
     against_each_other,
     all_indices,
-    computation,
-    glossary,
-    header,
-    headline_section,
-    page,
-    parameters_section,
-    reproduce,
+    curve_table,
+    headline_table,
+    stage_seconds,
 )
 from ccfem.comparison.result import Comparison
-from ccfem.comparison.runs import Run
-from ccfem.layers.layer import Layer
+from ccfem.comparison.runs import Wanted
+from ccfem.comparison.slicings import SlicingComparison
+from ccfem.elasticity.stress_field import about_cells
+from ccfem.evaluation import COLUMNS
+from ccfem.inspection import check
+from ccfem.plot.colours import palette
+from ccfem.report.filling import filled_page
+from ccfem.virtual_testing.stiffer import HONEST_PROMISE
 
 __all__ = ["report_html"]
 
 
 def report_html(
-    comparison: Comparison,
+    comparison: Comparison | SlicingComparison,
     record: Mapping[str, Any],
-    pictures: Pictures,
+    part_file: str = "",
 ) -> str:
-    """Return the report as one HTML text that needs no other file.
+    """Return the report as one HTML text that needs no other file and no network.
 
     Parameters
     ----------
-    comparison : Comparison
+    comparison : Comparison or SlicingComparison
     record : mapping
-        What `ccfem.comparison.record.record` returns.
-    pictures : Pictures
+        What ``results.json`` holds.
+    part_file : str
+        Text of the part file, where there is one.
 
     Returns
     -------
     str
     """
-    sections = [
-        _header(comparison, record),
-        headline_section(comparison, comparison.fibre_per_layer, comparison.verdicts),
-        curve_section(comparison.curve, pictures.curve),
-        against_each_other(comparison),
-        _pictures(comparison, pictures),
-        all_indices(comparison),
-        parameters_section(comparison),
-        computation(comparison, record),
-        glossary(),
-        reproduce(record),
+    several = isinstance(comparison, SlicingComparison)
+    stacks: Mapping[str, Comparison]
+    wanted: Wanted
+    if isinstance(comparison, SlicingComparison):
+        stacks, wanted, curve = comparison.slicings, comparison.wanted, None
+    else:
+        stacks, wanted, curve = {"": comparison}, comparison.fibre_per_layer, comparison.curve
+    strategies = palette(run.name for one in stacks.values() for run in one.runs)
+    colours = palette(run.name for run in comparison.runs) if several else strategies
+    ranked = [run for run in comparison.ranking if run.evaluation is not None]
+    checked = check(comparison.case)
+    radius = comparison.case.machine.minimum_radius
+    data = {
+        "part": part_view(checked, comparison.stress),
+        "layers": layer_views(stacks, strategies),
+        "charts": {
+            "curve": curve_charts(curve, colours),
+            "fronts": fronts(ranked, colours),
+            "spreads": list(spreads(ranked, colours, radius)) if ranked else [],
+        },
+    }
+    keys = cited(methods_of(record))
+    context = {
+        "title": comparison.case.title,
+        "facts": _facts(comparison, record),
+        "source": comparison.case.source,
+        "findings": (*comparison.case.findings, *comparison.stress.findings),
+        "load_text": _load_text(record),
+        "patches": checked.patches,
+        "loads": checked.loads,
+        "verdicts": _verdicts(comparison),
+        "headline": headline_table(
+            comparison, wanted, HEADLINE_OF_SLICINGS if several else HEADLINE
+        ),
+        "colours": colours,
+        "remarks": comparison.remarks,
+        "promise": HONEST_PROMISE if any(run.tested is not None for run in ranked) else "",
+        "has_curve": curve is not None,
+        "curve_said": _about_curve(comparison),
+        "curve_table": curve_table(curve),
+        "against": against_each_other(comparison),
+        "indices": all_indices(comparison),
+        "parameters": _parameters(comparison),
+        "machine": _machine(comparison),
+        "part_file": part_file,
+        "computation": _computation(comparison, record),
+        "solver": _rows(record["solver"]),
+        "stages": ", ".join(f"{what} {value:.2f}" for what, value in record["seconds"].items()),
+        "seconds": stage_seconds(comparison),
+        "glossary": (*TEST_COLUMNS, *COLUMNS),
+        "citations": [sentence(key) for key in keys],
+        "bibtex": bibtex(keys),
+        "command": record["command"],
+        "versions": {"ccfem": record["ccfem"], **record["versions"]},
+        "made": record["made"],
+    }
+    return filled_page(context, data)
+
+
+def _facts(comparison: Comparison | SlicingComparison, record: Mapping[str, Any]) -> list[str]:
+    """Say in few words what was compared."""
+    about = record["case"]
+    if isinstance(comparison, SlicingComparison):
+        stacks = [f"{name}: {len(one.layers)} layers" for name, one in comparison.slicings.items()]
+        amount = "each run lays its own amount of fibre"
+        if comparison.fibre is not None:
+            amount = f"{1e-3 * comparison.fibre:.2f} m of fibre in all"
+    else:
+        stacks = [f"{about['layers']} layers"]
+        amount = "each strategy lays its own amount of fibre"
+        if comparison.fibre_per_layer is not None:
+            amount = f"{comparison.fibre_per_layer:.0f} mm of fibre per layer"
+    return [
+        f"load case “{about['load_case']}”{_load_text(record)}",
+        f"{about['cells']:,} tetrahedra of order {about['order']}",
+        *stacks,
+        amount,
+        f"fibre width W {comparison.case.machine.fibre_width:g} mm",
     ]
-    return page(comparison.case.title, sections)
 
 
-def _header(comparison: Comparison, record: Mapping[str, Any]) -> str:
-    amount = (
-        "each strategy lays its own amount of fibre"
-        if comparison.fibre_per_layer is None
-        else f"{comparison.fibre_per_layer:.0f} mm of fibre per layer"
-    )
-    return header(comparison, record, [f"{record['case']['layers']} layers", amount])
+def _load_text(record: Mapping[str, Any]) -> str:
+    load = record["case"]["load"]
+    return "" if load is None else f", in all ({', '.join(f'{x:.4g}' for x in load)}) N"
 
 
-def _pictures(comparison: Comparison, pictures: Pictures) -> str:
-    runs = [run for run in comparison.ranking if run.evaluation is not None]
-    drawn = {index for _, index in pictures.paths}
-    places = {layer.index: _place(layer) for layer in comparison.layers if layer.index in drawn}
-    rows = [_layer(index, place, runs, pictures) for index, place in places.items()]
-    every = ""
-    if len(rows) > 1:
-        every = f"<details><summary>All {len(rows)} layers</summary>\n{''.join(rows)}</details>\n"
-    tension = figure(pictures.tension, "tension in the middle layer")
-    error = figure(pictures.error, "estimated error of the cells in the middle layer")
-    part = figure(pictures.part, "patches, resultants of the loads, supports (triangles)")
-    return (
-        f"<h2>Paths</h2>\n{_layer(pictures.middle, places[pictures.middle], runs, pictures)}"
-        f"{every}{_forces(runs, pictures)}{_curves(pictures)}"
-        f"<h2>Tension without fibres</h2>\n{grid([tension, error, '', ''])}\n"
-        f"<h2>The part</h2>\n{grid([part])}\n"
-    )
+def _verdicts(comparison: Comparison | SlicingComparison) -> Sequence[str]:
+    if isinstance(comparison, SlicingComparison):
+        return [comparison.verdict] if comparison.verdict else []
+    return comparison.verdicts
 
 
-def _place(layer: Layer) -> str:
-    """Where a layer is, in words."""
-    if layer.flat is None:
-        return "curved, laid flat"
-    return f"at {layer.flat.height:.2f} mm along the build direction"
-
-
-def _layer(index: int, place: str, runs: Sequence[Run], pictures: Pictures) -> str:
-    """One layer of every run side by side."""
-    figures = [
-        figure(pictures.paths[run.name, index], f"{run.name}, layer {index}") for run in runs
-    ]
-    title = f"<h3>Layer {index}, {place}</h3>"
-    return f"{title}{grid(figures)}\n"
-
-
-def _forces(runs: Sequence[Run], pictures: Pictures) -> str:
-    if not pictures.forces:
+def _about_curve(comparison: Comparison | SlicingComparison) -> str:
+    if isinstance(comparison, SlicingComparison) or comparison.curve is None:
         return ""
-    figures = [
-        figure(pictures.forces[run.name], f"{run.name}, force in the fibres")
-        for run in runs
-        if run.name in pictures.forces
-    ]
-    return (
-        "<h2>Force in the fibres</h2>\n"
-        '<p class="note">Predicted axial force, fibres carrying tension only, in layer '
-        f"{pictures.middle}; the mark is where the part first fails, on whatever layer.</p>\n"
-        f"{grid(figures)}\n"
-    )
+    common = ", ".join(f"{length:.0f}" for length in comparison.curve.common)
+    return f"All reach {common} mm a layer." if common else "There is no length that all reach."
 
 
-def _curves(pictures: Pictures) -> str:
-    curves = [
-        figure(pictures.matching, "share of the fibre within an angle of the stress"),
-        figure(pictures.curvature, "share of the fibre below a curvature"),
-        "",
+def _parameters(
+    comparison: Comparison | SlicingComparison,
+) -> list[tuple[str, list[tuple[str, str, bool]]]]:
+    """Return what every strategy was set to, and which parameter sets its amount of fibre."""
+    return [
+        (
+            run.name,
+            [
+                (key, _short(value), key == run.strategy.amount.parameter)
+                for key, value in run.parameters.items()
+            ],
+        )
+        for run in comparison.runs
     ]
-    return (
-        "<h2>Direction and curvature</h2>\n"
-        '<p class="note">Share of the fibre\'s length within an angle of the in-plane principal '
-        "stress of the larger size, and share of it that is straighter than a curvature; all "
-        f"layers.</p>\n{grid(curves)}\n"
-    )
+
+
+def _machine(comparison: Comparison | SlicingComparison) -> list[tuple[str, str]]:
+    values = vars(comparison.case.machine).items()
+    return [(k, _short(v)) for k, v in values if v is not None and k != "gcode"]
+
+
+def _short(value: Any) -> str:
+    if isinstance(value, float):
+        return f"{value:.5g}"
+    if dataclasses.is_dataclass(value) and not isinstance(value, type):
+        inner = (f"{f.name}={_short(getattr(value, f.name))}" for f in dataclasses.fields(value))
+        return f"{type(value).__name__}({', '.join(inner)})"
+    return str(value)
+
+
+def _computation(
+    comparison: Comparison | SlicingComparison, record: Mapping[str, Any]
+) -> list[str]:
+    """Say what was computed how."""
+    solver = record["solver"]
+    return [
+        f"Solve: {solver['backend']}, {solver['unknowns']:,} unknowns, "
+        + (f"{solver['iterations']} iterations, " if solver["iterations"] else "direct, ")
+        + f"relative residual {solver['residual']:.1e}, assembly "
+        f"{solver['assembly_seconds']:.2f} s, solve {solver['solve_seconds']:.2f} s.",
+        f"{about_cells(comparison.stress)}; backward error of the equations "
+        f"{solver['backward_error']:.1e}.",
+        f"Material: {record['case']['material']}. Strain energy "
+        f"{record['strain_energy']:.4g} N mm.",
+    ]
+
+
+def _rows(values: Mapping[str, Any]) -> list[tuple[str, str]]:
+    """Return the entries of a record that say something."""
+    shown = {k: v for k, v in values.items() if v not in (None, "")}
+    return [(k.replace("_", " "), f"{v:.4g}" if isinstance(v, float) else f"{v:,}" if
+             isinstance(v, int) else str(v)) for k, v in shown.items()]  # fmt: skip

@@ -19,7 +19,7 @@ def save(
     force: bool = False,
     progress: Progress = silent,
 ) -> Path:
-    """Write the report, tables, paths and pictures of a comparison, all of them or none.
+    """Write the report, tables and paths of a comparison, all of them or none.
 
     Parameters
     ----------

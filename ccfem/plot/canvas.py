@@ -43,16 +43,19 @@ _FORMATS = (".png", ".pdf", ".svg")
 _FONT: dict[str, Any] = {"family": ["DejaVu Sans"], "color": INK}
 
 
-def new_figure(extents: Sequence[float], columns: int = 1) -> tuple["Figure", list["Axes"]]:
-    """Figure with one picture of a section, or several side by side.
+def new_figure(
+    extents: Sequence[float], columns: int = 1, rows: int = 1
+) -> tuple["Figure", list["Axes"]]:
+    """Figure with one picture of a section, or several side by side and below each other.
 
     Parameters
     ----------
     extents : 4 floats, mm
         x and y of the lower left, then of the upper right corner of what is drawn.
-    columns : int, default 1
+    columns, rows : int, default 1
         Pictures; the height of each follows the section's shape, up to one and a half times its
-        width. Their axes have no frame and no ticks, and are in mm, both to one scale.
+        width. Their axes have no frame and no ticks, and are in mm, both to one scale. They come
+        row by row from the upper left.
     """
     from matplotlib.backends.backend_agg import FigureCanvasAgg
     from matplotlib.figure import Figure
@@ -62,11 +65,15 @@ def new_figure(extents: Sequence[float], columns: int = 1) -> tuple["Figure", li
     wide, high = right - left + 2.0 * margin, top - bottom + 2.0 * margin
     height = _WIDTH * min(max(high / wide, 0.2), 1.5)
     total = height + _HEAD + _FOOT
-    figure = Figure(figsize=(columns * _WIDTH, total), dpi=_DPI, facecolor="white")
+    figure = Figure(figsize=(columns * _WIDTH, rows * total), dpi=_DPI, facecolor="white")
     FigureCanvasAgg(figure)
     axes = []
-    for k in range(columns):
-        one = figure.add_axes((k / columns, _FOOT / total, 1.0 / columns, height / total))
+    for k in range(columns * rows):
+        row, column = divmod(k, columns)
+        bottom_edge = ((rows - 1 - row) * total + _FOOT) / (rows * total)
+        one = figure.add_axes(
+            (column / columns, bottom_edge, 1.0 / columns, height / (rows * total))
+        )
         one.set_axis_off()
         one.set_xlim(left - margin, right + margin)
         one.set_ylim(bottom - margin, top + margin)

@@ -24,7 +24,10 @@ _STRATEGIES = {
     "zigzag": "#009e73",
     "contour_zigzag": "#cc79a7",
 }
-_OTHERS = ("#d55e00", "#56b4e9", "#8c7a00", "#4d4d4d")
+_OTHERS = (
+    *("#d55e00", "#56b4e9", "#8c7a00", "#4d4d4d"),
+    *("#7b4fa6", "#9c2f2f", "#7ac36a", "#1f4e5f", "#b08968", "#ef8fb4"),
+)
 
 _SCALES = {
     "stress": (SECTION, "#f9e9cc", "#fbd9a5", "#f5b36b", "#e58646"),
@@ -40,7 +43,7 @@ def palette(names: Iterable[str]) -> dict[str, str]:
     ----------
     names : iterable of str
         Strategies in one picture. Unknown ones take the free colours in their order, which repeat
-        after four.
+        after ten.
     """
     colours: dict[str, str] = {}
     others = 0

@@ -16,7 +16,7 @@ from ccfem.plot.part_views import Arrow, Label, part_figure
 if TYPE_CHECKING:
     from matplotlib.figure import Figure
 
-__all__ = ["part_page", "part_picture"]
+__all__ = ["coloured", "load_arrows", "part_page", "part_picture", "support_marks"]
 
 _COLOURS = ("#56b4e9", "#e69f00", "#009e73", "#cc79a7", "#8c7a00", "#d9a58c", "#9ec1e3", "#b9dccb")
 _LOAD = "#b3261e"
@@ -31,14 +31,20 @@ def part_picture(checked: Check) -> "Figure":
     none. Triangles mark what is held.
     """
     mesh = checked.case.problem.mesh
-    colours, labels = _coloured(checked)
+    colours, labels = coloured(checked)
     title = checked.case.title
     return part_figure(
-        mesh.points, mesh.boundary, colours, labels, _arrows(checked), title, _marks(checked)
+        mesh.points,
+        mesh.boundary,
+        colours,
+        labels,
+        load_arrows(checked),
+        title,
+        support_marks(checked),
     )
 
 
-def _coloured(checked: Check) -> tuple[list[str], list[Label]]:
+def coloured(checked: Check) -> tuple[list[str], list[Label]]:
     """Colour of each boundary facet, and the labels of the patches."""
     mesh = checked.case.problem.mesh
     colours = np.full(len(mesh.boundary), SECTION, dtype=object)
@@ -58,16 +64,17 @@ def _coloured(checked: Check) -> tuple[list[str], list[Label]]:
     return colours.tolist(), labels
 
 
-def _arrows(checked: Check) -> list[Arrow]:
-    """Resultants of the loads."""
+def load_arrows(checked: Check, case: str | None = None) -> list[Arrow]:
+    """Resultants of the loads; of one load case alone where that has loads of its own."""
+    own = [row for row in checked.loads if row.case == case]
     return [
         Arrow(row.point, row.resultant, _LOAD, f"{row.case}: {row.size:.4g} N")
-        for row in checked.loads
+        for row in own or checked.loads
         if row.size > 0.0
     ]
 
 
-def _marks(checked: Check) -> FloatArray:
+def support_marks(checked: Check) -> FloatArray:
     """Places on what is held, spread evenly over its facets."""
     problem = checked.case.problem
     found: list[FloatArray] = []
@@ -94,18 +101,18 @@ def part_page(checked: Check) -> str:
     """Write a page, complete in itself, on which the part of `part_picture` turns."""
     mesh = checked.case.problem.mesh
     used, triangles = np.unique(mesh.boundary, return_inverse=True)
-    colours, labels = _coloured(checked)
+    colours, labels = coloured(checked)
     known = list(dict.fromkeys(colours))
     points = mesh.points[used]
     size = float(np.linalg.norm(np.ptp(points, axis=0)))
-    arrows = _arrows(checked)
+    arrows = load_arrows(checked)
     data = {
         "points": points.round(3).tolist(),
         "triangles": triangles.reshape(-1, 3).tolist(),
         "colours": [[int(name[k : k + 2], 16) for k in (1, 3, 5)] for name in known],
         "colour": [known.index(name) for name in colours],
         "labels": [[label.text, label.place.round(3).tolist()] for label in labels],
-        "marks": _marks(checked).round(3).tolist(),
+        "marks": support_marks(checked).round(3).tolist(),
         "arrows": [
             [
                 arrow.text,

@@ -45,6 +45,10 @@ _LINE = 0.45
 """Width of a drawn strand over the fibre width, so that neighbours stay apart in the picture."""
 
 
+_A_ROW = 4
+"""Pictures that stand in one row."""
+
+
 @dataclass(frozen=True)
 class Coloured:
     """Straight pieces of fibre with a value each, to colour the paths by.
@@ -312,7 +316,7 @@ def compare_layer(
     captions: Mapping[str, str] | None = None,
     limit: float | None = None,
 ) -> "Figure":
-    """Picture of one layer with the paths of several strategies side by side.
+    """Picture of one layer with the paths of several strategies, at most four in a row.
 
     Parameters
     ----------
@@ -322,9 +326,13 @@ def compare_layer(
     captions : mapping of strategy name to str, optional
         Lines with key numbers.
     """
-    figure, columns = new_figure(picture_extents(layer, paths.values()), columns=len(paths))
+    rows = max(1, -(-len(paths) // _A_ROW))
+    columns = max(1, -(-len(paths) // rows))
+    figure, places = new_figure(picture_extents(layer, paths.values()), columns, rows)
+    for left in places[max(len(paths), 1) :]:
+        left.remove()
     colours = palette(paths)
-    for axes, (name, lines) in zip(columns, paths.items(), strict=True):
+    for axes, (name, lines) in zip(places[: len(paths)], paths.items(), strict=True):
         _draw(axes, layer, stress, lines, width, limit)
         title(axes, name, (captions or {}).get(name, ""), colours[name])
     return figure

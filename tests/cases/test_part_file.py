@@ -16,7 +16,7 @@ from ccfem.layers.slicing.planar import Planar
 from ccfem.mesh import TetMesh
 from ccfem.meshing import extrude
 
-EXAMPLE = Path(__file__).parents[2] / "benchmarks" / "studies" / "part_example.toml"
+EXAMPLE = Path(ccfem.__file__).parent / "cases" / "examples" / "bracket_plate.toml"
 
 PART = """
 mesh = "body.npz"

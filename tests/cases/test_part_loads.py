@@ -39,7 +39,7 @@ from ccfem.io.surface import Surface
 from ccfem.mesh import box_mesh
 from ccfem.mesh.patches import Plane
 
-EXAMPLE = Path(__file__).parents[2] / "docs" / "loads_and_supports.toml"
+EXAMPLE = Path(ccfem.__file__).parent / "cases" / "examples" / "loads_and_supports.toml"
 
 PART = """
 mesh = "body.npz"

@@ -223,7 +223,7 @@ def test_where_a_length_is_not_one_for_all_the_curve_decides(along):
 
 
 def test_the_curve_is_a_table_and_a_picture(along, tmp_path):
-    write_results(along, tmp_path)
+    write_results(along, tmp_path, pictures=True)
     table = pd.read_csv(tmp_path / "curve.csv")
     assert list(table["strategy"].unique()) == ["rings", "zigzag"]
     at_all = table[table["reached_by_all"]]

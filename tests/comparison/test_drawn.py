@@ -22,7 +22,11 @@ from ccfem.mesh.box import box_mesh
 ROOT = Path(ccfem.__file__).parent
 DRAWN = [
     *sorted((ROOT / "plot").glob("*.py")),
-    *(ROOT / "comparison" / f"{name}.py" for name in ("pictures", "report", "record", "files")),
+    *(
+        ROOT / "comparison" / f"{name}.py"
+        for name in ("pictures", "report", "record", "files", "charts", "shown")
+    ),
+    *(ROOT / "comparison" / f"{name}_view.py" for name in ("layer", "part", "path")),
 ]
 COMPUTED = ("sample_", "evaluate", "plan_", "plan", "matching_rate", "virtual_test", "plane_paths")
 

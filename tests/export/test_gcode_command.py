@@ -1,6 +1,7 @@
 """``ccfem plan --gcode``: a part file in, a file to print out."""
 
 import json
+import re
 import sys
 
 import numpy as np
@@ -49,7 +50,9 @@ def ccfem(monkeypatch, capsys, tmp_path):
         with pytest.raises(SystemExit) as ended:
             main()
         folder = tmp_path / "results" / "part-zigzag"
-        return ended.value.code, capsys.readouterr().err, folder
+        # Without the lines of progress.
+        err = re.sub(r"(?m)^ccfem: \d+ s, \d+ %.*\n", "", capsys.readouterr().err)
+        return ended.value.code, err, folder
 
     return call
 

@@ -1,0 +1,105 @@
+"""Commands that begin a part and end a paper: ``mesh``, ``new``, ``example``, ``cite``."""
+
+from collections.abc import Callable
+from pathlib import Path
+from typing import Annotated
+
+import typer
+
+from ccfem.cli.arguments import path_of
+
+__all__ = ["add_part_commands"]
+
+_Out = Annotated[
+    Path | None,
+    typer.Option("--out", metavar="PART.toml", parser=path_of, help="File that is written."),
+]
+_Force = Annotated[bool, typer.Option("--force", help="Replace a file that is there.")]
+
+
+def _new(
+    body: Annotated[
+        Path, typer.Argument(metavar="BODY", help="Surface (.stl), CAD file (.step) or mesh.")
+    ],
+    out: _Out = None,
+    force: _Force = False,
+) -> None:
+    """Write a part file for a body: its faces listed, a support and a load to be changed."""
+    from ccfem.inspection.beginning import new_part
+
+    written = new_part(body, out, force)
+    print(f"{written}: change what is marked, then: ccfem check {written}")
+
+
+def _example(
+    name: Annotated[
+        str | None, typer.Argument(metavar="NAME", help="Write this one; without it, list them.")
+    ] = None,
+    out: _Out = None,
+    force: _Force = False,
+) -> None:
+    """List the part files that come with ccfem, or write one of them here."""
+    import tomllib
+
+    from ccfem.inspection.beginning import examples, write_example
+
+    if name is None:
+        for known, text in examples().items():
+            print(f"{known}  {tomllib.loads(text)['title']}")
+        print("ccfem example NAME writes NAME.toml here")
+    else:
+        written = write_example(name, out, force)
+        print(f"{written}: try: ccfem check {written}")
+
+
+def _cite(
+    whats: Annotated[
+        list[str] | None,
+        typer.Argument(
+            metavar="FOLDER_OR_METHOD", help="Folders of results, or strategies and slicers."
+        ),
+    ] = None,
+) -> None:
+    """Print BibTeX of ccfem, and of the papers whose methods a result used."""
+    from ccfem.cli.citing import cite
+
+    cite(whats or ())
+
+
+def _mesh(
+    body: Annotated[
+        Path,
+        typer.Argument(metavar="BODY", help="Surface (.stl, .obj, .ply) or CAD file (.step ...)."),
+    ],
+    size: Annotated[float, typer.Option("--size", metavar="MM", help="Edge length of the cells.")],
+    out: Annotated[
+        Path,
+        typer.Option(
+            "-o", "--out", metavar="MESH", parser=path_of, help="Mesh (.vtu, .npz, .tet)."
+        ),
+    ],
+    scale: Annotated[
+        float, typer.Option(metavar="S", help="Factor that makes a file's coordinates mm.")
+    ] = 1.0,
+    mesher: Annotated[
+        str, typer.Option(metavar="auto|gmsh|ftetwild", help="What meshes a surface.")
+    ] = "auto",
+) -> None:
+    """Mesh a surface or a CAD file, its faces as patches: face_1, face_2, or their names."""
+    from ccfem.cli.mesh_body import mesh_file
+
+    mesh_file(body, size, out, scale, mesher)
+
+
+_COMMANDS: dict[str, Callable[..., None]] = {
+    "mesh": _mesh,
+    "new": _new,
+    "example": _example,
+    "cite": _cite,
+}
+
+
+def add_part_commands(app: typer.Typer) -> None:
+    """Add the commands of this module to the command line."""
+    for name, command in _COMMANDS.items():
+        app.command(name)(command)

@@ -1,0 +1,85 @@
+"""What to cite: the papers whose methods a result used, as BibTeX."""
+
+import re
+from collections.abc import Iterable, Mapping
+from functools import cache
+from importlib.resources import files
+from typing import Any
+
+__all__ = ["METHODS", "bibtex", "cited", "methods_of", "sentence"]
+
+METHODS: dict[str, tuple[str, ...]] = {
+    "concentric": (),
+    "contour_zigzag": (),
+    "eqs": ("papapetrou_2020", "wang_2021"),
+    "fiso": ("kipping_2023",),
+    "grid": ("plocher_2022",),
+    "isocurve": ("chen_2021",),
+    "mat": ("plocher_2022",),
+    "mps": ("plocher_2022",),
+    "offset": ("papapetrou_2020", "wang_2021"),
+    "pruned": (),
+    "stream_function": (),
+    "streamline": ("jobard_1997", "papapetrou_2020", "wang_2021"),
+    "svt": ("wang_2021",),
+    "winding": ("fang_2024",),
+    "zigzag": (),
+    "load_oriented": ("kipping_2023",),
+    "planar": (),
+    "spatial": ("fang_2024",),
+    "surfaces": (),
+    "amg": ("vanek_1996",),
+    "two-level": ("vanek_1996",),
+    "error": ("zienkiewicz_1987", "zienkiewicz_1992"),
+}
+"""Papers of each strategy, slicer and solver by its name, and of the estimated error of the cells;
+none for what is common practice or ours."""
+
+
+def methods_of(record: Mapping[str, Any]) -> list[str]:
+    """Return the strategies, slicers, solver and error estimate that a comparison used.
+
+    Parameters
+    ----------
+    record : mapping
+        As in ``results.json``.
+    """
+    stacks = record.get("slicings") or {"": record}
+    runs = [run for one in stacks.values() for run in one["strategies"]]
+    found = [method for run in runs for method in run.get("methods", [run["name"]])]
+    found += [one["slicer"] for one in stacks.values() if one.get("slicer")]
+    solver = record.get("solver", {})
+    found += [str(solver.get("backend", "")), "error" if solver.get("error") is not None else ""]
+    return [method for method in dict.fromkeys(found) if method]
+
+
+def cited(methods: Iterable[str]) -> list[str]:
+    """Keys of ccfem and of the papers of some methods; a method of another package has none."""
+    keys = [key for method in methods for key in METHODS.get(method, ())]
+    return ["ccfem", *dict.fromkeys(keys)]
+
+
+def bibtex(keys: Iterable[str]) -> str:
+    """Entries of some keys, one after the other."""
+    return "\n\n".join(_entries()[key] for key in keys)
+
+
+def sentence(key: str) -> str:
+    """One entry as a line of a list of references."""
+    fields = dict(re.findall(r"^  (\w+) = \{(.*)\},$", _entries()[key], flags=re.MULTILINE))
+    names = re.sub(r" and ", "; ", fields["author"])
+    where = ", ".join(
+        fields[name] for name in ("journal", "booktitle", "publisher") if name in fields
+    )
+    place = " ".join(fields[name] for name in ("volume", "pages") if name in fields)
+    parts = [names, fields["title"], f"{where} {place}".strip(), fields.get("year", "")]
+    parts += [f"doi:{fields['doi']}"] if "doi" in fields else []
+    said = ". ".join(part.rstrip(".") for part in parts if part)
+    return re.sub(r"[{}]", "", said).replace("--", "–") + "."
+
+
+@cache
+def _entries() -> dict[str, str]:
+    text = files("ccfem.comparison").joinpath("references.bib").read_text(encoding="utf-8")
+    entries = [entry.strip() for entry in re.split(r"\n(?=@)", text)]
+    return {entry[entry.index("{") + 1 : entry.index(",")]: entry for entry in entries}

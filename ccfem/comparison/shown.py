@@ -1,0 +1,45 @@
+"""Which layers of a comparison are shown, and what is said of a run on one of them."""
+
+import re
+
+import numpy as np
+
+from ccfem.comparison.result import Comparison
+from ccfem.comparison.runs import Run
+from ccfem.layers.layer import Layer
+
+__all__ = ["caption", "drawn_layers", "file_stem", "middle_layer"]
+
+
+def drawn_layers(comparison: Comparison) -> list[Layer]:
+    """Layers that are drawn: all flat ones, and of curved ones those that have fibre."""
+    laid = {int(k) for run in comparison.succeeded for k in np.unique(run.toolpaths.layer)}
+    chosen = [k for k in comparison.layers if k.flat is not None or k.index in laid]
+    return chosen or list(comparison.layers)
+
+
+def middle_layer(comparison: Comparison) -> Layer:
+    """Middle one of the layers on which the most runs lay fibre: it stands for all."""
+    laid = [set(np.unique(run.toolpaths.layer).tolist()) for run in comparison.succeeded]
+    drawn = drawn_layers(comparison)
+    runs = [sum(layer.index in those for those in laid) for layer in drawn]
+    best = [layer for layer, count in zip(drawn, runs, strict=True) if count == max(runs)]
+    return best[len(best) // 2]
+
+
+def caption(run: Run, layer: Layer) -> str:
+    """Key numbers of a run on one layer."""
+    if run.evaluation is None:
+        return ""
+    values = run.evaluation.of_layer(layer.index)
+    count = int(values["paths"])
+    if not count:
+        return "no fibre"
+    laid = f"{values['fibre_length']:.0f} mm in {count} path{'s' if count > 1 else ''}"
+    efficiency = values["efficiency"]
+    return laid if np.isnan(efficiency) else f"{laid}, efficiency {efficiency:.2f}"
+
+
+def file_stem(*names: str) -> str:
+    """Name of a file made of some names, with dashes for characters that do not suit a file."""
+    return "_".join(re.sub(r"[^\w.+-]+", "-", name) for name in names)

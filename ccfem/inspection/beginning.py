@@ -1,0 +1,163 @@
+"""Part files to start from: one for a body, and examples."""
+
+import os
+from collections.abc import Sequence
+from importlib.resources import files
+from pathlib import Path
+
+import numpy as np
+
+from ccfem.checks import check_known
+from ccfem.errors import InputError
+from ccfem.inspection.body_faces import faces as faces_of
+from ccfem.io.surface import is_surface
+from ccfem.io.whole import existing_file, whole_file
+from ccfem.mesh.smooth_faces import Face
+from ccfem.meshing.cad import is_cad
+
+__all__ = ["examples", "new_part", "write_example"]
+
+_LISTED = 40
+"""Faces that are listed in a new part file."""
+
+
+def new_part(
+    body: str | os.PathLike[str], out: str | os.PathLike[str] | None = None, force: bool = False
+) -> Path:
+    """Write a part file for a body: its faces listed, a support and a load to be changed.
+
+    The largest plane that faces down is held, and the face farthest from it is pulled away from it
+    with 100 N. Cells are a twenty-fifth of the diagonal long.
+
+    Parameters
+    ----------
+    body : path
+        Surface, CAD file or mesh.
+    out : path, optional
+        Default the name of the body with ``.toml``, in the current folder.
+    force : bool
+        Replace a file that is there.
+
+    Returns
+    -------
+    Path
+        The file that was written.
+
+    Raises
+    ------
+    InputError
+        Where the body cannot be read, or the file is there.
+    """
+    body = Path(body)
+    if body.suffix in ("", ".toml"):
+        raise InputError(
+            f"ccfem new takes a body, such as lever.stl or lever.step; got '{body}': name its file"
+        )
+    existing_file(body, "the body")
+    out = Path(f"{body.stem}.toml" if out is None else out)
+    _refuse_present(out, force)
+    found = faces_of(body)
+    points, faces, names = found.points, found.faces, found.names
+    edge = float(np.linalg.norm(np.ptp(points, axis=0))) / 25.0
+    held = max(
+        range(len(faces)),
+        key=lambda k: (_faces_down(faces[k]), faces[k].area),
+    )
+    away = [float(np.linalg.norm(face.centre - faces[held].centre)) for face in faces]
+    pulled = int(np.argmax(away))
+    pull = faces[pulled].centre - faces[held].centre
+    pull = 100.0 * pull / max(float(np.linalg.norm(pull)), 1e-300)
+    meshed = is_surface(body) or is_cad(body)
+    with whole_file(out) as temporary:
+        text = _text(body, edge if meshed else None, faces, names, held, pulled, pull.tolist())
+        temporary.write_text(text, encoding="utf-8")
+    return out
+
+
+def _faces_down(face: Face) -> bool:
+    return face.kind == "plane" and bool(face.direction[2] < -0.9)
+
+
+def _refuse_present(out: Path, force: bool) -> None:
+    if out.exists() and not force:
+        raise InputError(f"{out} is there already: name another file (--out), or --force")
+
+
+def _text(
+    body: Path,
+    edge: float | None,
+    faces: Sequence[Face],
+    names: Sequence[str],
+    held: int,
+    pulled: int,
+    pull: Sequence[float],
+) -> str:
+    """Text of the part file."""
+    path = str(body).replace("\\", "/")
+    given = [f'mesh = "{path}"']
+    if edge is not None:
+        given = [f'surface = "{path}"', f"edge_length = {edge:.3g}           # mm; of the cells"]
+    listed = [
+        f"#   {k:>3}  {face.about}" + (f"  ({names[k - 1]})" if any(names) else "")
+        for k, face in enumerate(faces[:_LISTED], 1)
+    ]
+    more = len(faces) - len(listed)
+    if more > 0:
+        listed.append(f"#   and {more} smaller ones: ccfem faces {path}")
+    name = "".join(c if c.isalnum() or c in "-_" else "_" for c in body.stem)
+    return "\n".join(
+        [
+            f"# A part file for {path}: change what is marked, then",
+            "#",
+            "#     ccfem check FILE.toml      what is known before a solve",
+            "#     ccfem compare FILE.toml    plan by several strategies, say which is best",
+            "#",
+            "# All keys are described in ccfem/cases/part_file.py; `ccfem example` has more parts.",
+            "",
+            f'name = "{name}"',
+            *given,
+            'build = "z"                  # CHANGE: direction of printing',
+            "layers = 12                  # CHANGE: layers of fibre",
+            'material = "pla"             # CHANGE: or a table with modulus and poisson',
+            "",
+            "# Faces:",
+            *listed,
+            "",
+            "[patches.held]               # CHANGE: what is fixed",
+            'rule = "face"',
+            f"number = [{held + 1}]",
+            "",
+            "[patches.pulled]             # CHANGE: where the load acts",
+            'rule = "face"',
+            f"number = [{pulled + 1}]",
+            "",
+            "[[supports]]",
+            'patch = "held"',
+            "",
+            "[[loads.pull]]",
+            'kind = "force"',
+            'patch = "pulled"',
+            f"vector = [{', '.join(f'{x + 0.0:.1f}' for x in pull)}]   # CHANGE: N",
+            "",
+        ]
+    )
+
+
+def examples() -> dict[str, str]:
+    """Return the text of each example by its name."""
+    found = files("ccfem.cases").joinpath("examples").iterdir()
+    texts = {each.name: each.read_text(encoding="utf-8") for each in found}
+    return {k.removesuffix(".toml"): texts[k] for k in sorted(texts) if k.endswith(".toml")}
+
+
+def write_example(
+    name: str, out: str | os.PathLike[str] | None = None, force: bool = False
+) -> Path:
+    """Write an example to a file, by default NAME.toml; returns its path."""
+    texts = examples()
+    check_known("example", name, texts)
+    out = Path(f"{name}.toml" if out is None else out)
+    _refuse_present(out, force)
+    with whole_file(out) as temporary:
+        temporary.write_text(texts[name], encoding="utf-8")
+    return out

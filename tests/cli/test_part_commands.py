@@ -1,0 +1,78 @@
+"""Part files to start from, and what to cite."""
+
+import sys
+
+import numpy as np
+import pytest
+
+from ccfem.cases.part_file import read_part
+from ccfem.cli.main import main
+from ccfem.inspection import check
+from ccfem.io import write_mesh
+from ccfem.mesh.box import box_mesh
+
+
+@pytest.fixture
+def ccfem(monkeypatch, capsys, tmp_path):
+    def call(*arguments):
+        monkeypatch.chdir(tmp_path)
+        monkeypatch.setattr(sys, "argv", ["ccfem", *map(str, arguments)])
+        with pytest.raises(SystemExit) as ended:
+            main()
+        said = capsys.readouterr()
+        return ended.value.code, said.out, said.err
+
+    return call
+
+
+def test_a_body_is_no_part_and_a_new_part_file_is_one(ccfem, tmp_path):
+    write_mesh(box_mesh((60.0, 24.0, 4.0), (6, 3, 2)), tmp_path / "lever.npz")
+    code, _, err = ccfem("compare", "lever.npz")
+    assert (code, err.count("\n")) == (2, 1)
+    assert "'ccfem new lever.npz' writes one to fill in" in err
+    for body in ("lever.stl", "lever.STEP"):
+        assert f"ccfem new {body}" in ccfem("check", body)[2]
+    code, out, err = ccfem("new", "lever.npz")
+    assert (code, err) == (0, "")
+    assert "ccfem check lever.toml" in out
+    case = read_part(tmp_path / "lever.toml")
+    checked = check(case)
+    assert checked.mistakes == ()
+    (load,) = checked.loads
+    assert np.linalg.norm(load.resultant) == pytest.approx(100.0, rel=1e-3)
+    areas = {row.name: row.area for row in checked.patches}
+    assert areas["held"] == pytest.approx(60.0 * 24.0)
+    text = (tmp_path / "lever.toml").read_text()
+    assert text.count("CHANGE") == 6
+    assert "6  plane of" in text
+    code, _, err = ccfem("new", "lever.npz")
+    assert (code, "is there already" in err) == (2, True)
+    assert ccfem("new", "lever.npz", "--force")[0] == 0
+    assert "name its file" in ccfem("new", "loop")[2]
+    assert "does not exist" in ccfem("new", "none.stl")[2]
+
+
+def test_examples_are_listed_written_and_without_mistake(ccfem, tmp_path):
+    names = [line.split()[0] for line in ccfem("example")[1].splitlines()[:-1]]
+    assert set(names) >= {"bracket_plate", "loads_and_supports"}
+    for name in names:
+        code, _, err = ccfem("example", name)
+        assert (code, err) == (0, "")
+    assert check(read_part(tmp_path / "bracket_plate.toml")).mistakes == ()
+    assert "there already" in ccfem("example", names[0])[2]
+    assert "no example named 'hook'" in ccfem("example", "hook")[2]
+
+
+def test_cite_prints_bibtex(ccfem, tmp_path):
+    code, out, err = ccfem("cite", "isocurve", "winding")
+    assert (code, err) == (0, "")
+    assert out.count("\n@") + out.startswith("@") == 3
+    assert "doi = {10.1016/j.addma.2021.102470}" in out
+    (tmp_path / "results.json").write_text(
+        '{"strategies": [{"name": "svt", "methods": ["svt"]}], "solver": {"backend": "amg"}}'
+    )
+    assert "{wang_2021," in ccfem("cite", ".")[1]
+    (tmp_path / "results.json").write_text("[1]")
+    assert "is no record of ccfem compare" in ccfem("cite", ".")[2]
+    assert "holds no results.json" in ccfem("cite", "none.json")[2]
+    assert "no method or folder of results named 'isocurv'" in ccfem("cite", "isocurv")[2]

@@ -1,0 +1,125 @@
+"""What the report draws: paths, angles, forces, fronts, citations."""
+
+import re
+from dataclasses import replace
+
+import numpy as np
+import pytest
+
+from ccfem.comparison import charts
+from ccfem.comparison.citations import METHODS, bibtex, cited, methods_of, sentence
+from ccfem.comparison.part_view import _coarser
+from ccfem.comparison.path_view import _nearest, angle_on_layer, drawn_paths, in_layer
+from ccfem.comparison.runs import Run
+from ccfem.layers.layer_stress import LayerStress
+from ccfem.layers.slicing import Planar
+from ccfem.layers.slicing import named as slicers
+from ccfem.mesh.box import box_mesh
+from ccfem.strategies import Zigzag, named
+from ccfem.toolpaths import Toolpaths
+
+(LAYER,) = Planar(count=1).cut(box_mesh((80.0, 60.0, 4.0), (8, 6, 1)))
+
+
+def test_thinned_paths_keep_corners_shape_and_curvature():
+    """A square with sharp corners and a circle of radius 10 with 2000 points."""
+    turn = np.linspace(0.0, 2.0 * np.pi, 2001)
+    circle = np.stack([40.0 + 10.0 * np.cos(turn), 30.0 + 10.0 * np.sin(turn)], axis=1)
+    circle[-1] = circle[0]
+    square = np.array([[5.0, 5.0], [75.0, 5.0], [75.0, 55.0], [5.0, 55.0], [5.0, 5.0]])
+    run = Run("rings", Zigzag(), Toolpaths.from_plane([square, circle], LAYER), None)
+    found = drawn_paths(run, 1.5, 1.0)
+    assert len(found.points) < 250
+    plane = LAYER.plane.project(found.points)
+    first = slice(found.offsets[0], found.offsets[1])
+    for corner in square:
+        assert np.linalg.norm(plane[first] - corner, axis=1).min() < 1e-9
+    assert np.linalg.norm(np.diff(plane[first], axis=0), axis=1).max() <= 3.0 + 1e-9
+    ring = plane[found.offsets[1] : found.offsets[2]]
+    radius = np.linalg.norm(0.5 * (ring[1:] + ring[:-1]) - [40.0, 30.0], axis=1)
+    assert radius.min() > 10.0 * np.cos(0.5 * 1.6 / 10.0)
+    bend = found.curvature[found.offsets[1] : found.offsets[2] - 1]
+    np.testing.assert_allclose(bend, 0.1, rtol=0.02)
+    assert np.isnan(found.force).all()
+
+
+def test_angles_are_to_the_larger_stress():
+    """Tension along 30 degrees: a line along x is 30 degrees off, one along y 60."""
+    t = np.radians(30.0)
+    tensor = np.zeros((3, 3))
+    tensor[:2, :2] = 5.0 * np.outer([np.cos(t), np.sin(t)], [np.cos(t), np.sin(t)])
+    count = len(LAYER.points)
+    stress = LayerStress(
+        LAYER,
+        np.broadcast_to(tensor, (len(LAYER.triangles), 3, 3)),
+        np.broadcast_to(tensor, (count, 3, 3)),
+    )
+    line = np.array([[10.0, 10.0], [30.0, 10.0], [30.0, 40.0], [30.0, 200.0]])
+    found = angle_on_layer(line, stress)
+    np.testing.assert_allclose(found[:2], [30.0, 60.0])
+    assert np.isnan(found[2:]).all()  # outside, and the last point
+
+
+def test_values_go_to_the_nearest_piece_of_the_same_path():
+    line, arc = np.array([0, 0, 2]), np.array([1.0, 5.0, 1.0])
+    found = _nearest(
+        line, arc, np.array([10.0, 20.0, 30.0]), np.array([0, 0, 1, 2]), np.array([2.9, 3.1, 1, 9])
+    )
+    np.testing.assert_array_equal(found, [10.0, 20.0, np.nan, 30.0])
+
+
+def test_a_front_is_what_nothing_beats():
+    points = [tuple(p) for p in np.random.default_rng(3).integers(0, 20, (60, 2)).astype(float)]
+    for better, sign in (("low", 1.0), ("high", -1.0)):
+        beaten = {
+            p for p in points for q in points
+            if q != p and sign * q[0] <= sign * p[0] and q[1] >= p[1]
+        }  # fmt: skip
+        assert charts.front(points, better) == sorted(set(points) - beaten)
+
+
+def test_a_large_part_is_drawn_coarser():
+    side = np.linspace(0.0, 1.0, 130)
+    points = np.stack([*np.meshgrid(side, side), np.zeros((130, 130))], axis=-1).reshape(-1, 3)
+    k = np.arange(129 * 130).reshape(129, 130)[:, :-1].ravel()
+    triangles = np.concatenate(
+        [np.stack([k, k + 1, k + 130], 1), np.stack([k + 1, k + 131, k + 130], 1)]
+    )
+    kept, coarse, shade = _coarser(points, triangles, np.zeros(len(triangles), np.uint8), 2.0**0.5)
+    assert len(coarse) == len(shade) <= 16_000
+    a, b, c = np.moveaxis(points[kept][coarse], 1, 0)
+    area = 0.5 * np.cross(b - a, c - a)[:, 2].sum()
+    assert area == pytest.approx(1.0, rel=0.05)
+
+
+def test_every_method_says_what_to_cite():
+    assert set(named()) | set(slicers()) <= set(METHODS)
+    known = set(re.findall(r"^@\w+\{(\w+),", bibtex(cited(METHODS)), flags=re.MULTILINE))
+    assert known == {"ccfem", *(key for keys in METHODS.values() for key in keys)}
+    assert cited(["zigzag", "mine"]) == ["ccfem"]
+    assert sentence("chen_2021").endswith(
+        "Additive Manufacturing 49 102470. 2021. doi:10.1016/j.addma.2021.102470."
+    )
+
+
+def test_the_record_names_the_methods():
+    stack = {"strategies": [{"name": "a", "methods": ["pruned", "isocurve"]}], "slicer": "spatial"}
+    solver = {"backend": "amg", "error": 0.1}
+    assert methods_of({**stack, "solver": solver}) == [
+        *("pruned", "isocurve", "spatial", "amg", "error")
+    ]
+    assert methods_of({"slicings": {"z": stack}}) == ["pruned", "isocurve", "spatial"]
+    assert cited(methods_of(stack)) == ["ccfem", "chen_2021", "fang_2024"]
+
+
+def test_a_curved_layer_is_drawn_as_rolled_off():
+    """An arc of radius 25 round a cylinder becomes a straight line of its length."""
+    radius = 25.0
+    angle = (LAYER.points[:, 0] - 40.0) / radius
+    bent = np.column_stack([radius * np.sin(angle), LAYER.points[:, 1], radius * np.cos(angle)])
+    turn = np.linspace(-1.2, 1.2, 40)
+    line = np.column_stack([radius * np.sin(turn), np.full(40, 30.0), radius * np.cos(turn)])
+    plane = in_layer(line, replace(LAYER, points=bent, flat=None))
+    steps = np.linalg.norm(np.diff(plane, axis=0), axis=1)
+    assert steps.sum() == pytest.approx(2.4 * radius, rel=0.02)
+    assert np.linalg.norm(plane[-1] - plane[0]) == pytest.approx(steps.sum(), rel=1e-3)
