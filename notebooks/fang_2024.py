@@ -10,7 +10,7 @@
 # %% [markdown]
 # # Layers that curve with the stress, fibre that winds round the bolts
 #
-# Fang et al. (Additive Manufacturing 79 (2024) 103903) print with a robot: layers follow the
+# Fang et al. (arXiv:2311.17265) print with a robot: layers follow the
 # strongest stress and are square to the bolts, and strands of fibre wind round all bolts of a
 # layer. Here: a lifting eye, whose eye lies across the bolts of its flange, so that no flat layer
 # holds all three. The T-bracket with the authors' own layers, all tables and the claims beside ours

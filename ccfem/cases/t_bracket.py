@@ -138,7 +138,7 @@ def t_bracket(
         ),
         build=(0.0, 1.0, 0.0),
         slicing=Spatial(),
-        source="shape recovered from the layers published by Fang et al., Additive Manufacturing "
-        "79 (2024) 103903; load in the direction of theirs",
+        source="shape recovered from the layers published by Fang et al., "
+        "arXiv:2311.17265; load in the direction of theirs",
         alternative_supports=alternative,
     )

@@ -86,6 +86,6 @@ def twist_bar(element_size: float = ELEMENT_SIZE, order: Order = 2, force: float
         build=(0.0, 1.0, 0.0),
         slicing=Spatial(thickness=1.7),
         machine=Machine(fibre_width=1.8),
-        source="extent, holes and volume of the layers published by Fang et al., Additive "
-        "Manufacturing 79 (2024) 103903; bends and loads are ours",
+        source="extent, holes and volume of the layers published by Fang et al., "
+        "arXiv:2311.17265; bends and loads are ours",
     )

@@ -1,6 +1,6 @@
 """The guidance field: one linear solve for a scalar field whose level surfaces are the layers.
 
-Fang et al. 2024 (Additive Manufacturing 79, 103903), section 2.3, minimise an energy of the field
+Fang et al. 2024 (arXiv:2311.17265), section 2.3, minimise an energy of the field
 that has no scale of its own: the constant field is its minimum. Here the joints give the scale.
 """
 

@@ -1,7 +1,7 @@
 """The region that carries the load: the cells crossed by stress lines that join the joints.
 
 G. Fang, T. Zhang, Y. Huang, Z. Zhang, K. Masania, C. C. L. Wang, Exceptional mechanical performance
-by spatial printing with continuous fiber, Additive Manufacturing 79 (2024) 103903, section 2.2.
+by spatial printing with continuous fiber, arXiv:2311.17265, section 2.2.
 """
 
 from collections.abc import Sequence

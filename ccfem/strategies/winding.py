@@ -2,7 +2,7 @@
 
 G. Fang, T. Zhang, Y. Huang, Z. Zhang, K. Masania, C. C. L. Wang, Exceptional mechanical performance
 by spatial printing with continuous fiber: Curved slicing, toolpath generation and physical
-verification, Additive Manufacturing 79 (2024) 103903. The layer is cut along curves that join its
+verification, arXiv:2311.17265. The layer is cut along curves that join its
 holes, and strands are level lines of a field from there to the outer border. The values on both
 borders are ours: with the paper's gradients (``energy = "paper"``) the field rises and falls, and
 lines close on islands or end at the border.

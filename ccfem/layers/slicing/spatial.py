@@ -2,7 +2,7 @@
 
 G. Fang, T. Zhang, Y. Huang, Z. Zhang, K. Masania, C. C. L. Wang, Exceptional mechanical performance
 by spatial printing with continuous fiber: Curved slicing, toolpath generation and physical
-verification, Additive Manufacturing 79 (2024) 103903. ``form="literal"`` is the paper's term for
+verification, arXiv:2311.17265. ``form="literal"`` is the paper's term for
 the joints; the default makes layers like those that the authors published.
 """
 
