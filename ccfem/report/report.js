@@ -123,7 +123,7 @@ function tooltips() {
 
 // The layout of a scene; its words lie above everything, at places in space.
 function scene(view, words) {
-  const away = 1.05 * Math.max(1, (1.2 * view.clientHeight) / view.clientWidth);
+  const away = 1.05 * Math.max(1, (1.55 * view.clientHeight) / view.clientWidth);
   return {
     margin: { l: 0, r: 0, t: 0, b: 0 }, showlegend: false, uirevision: 1,
     scene: {
