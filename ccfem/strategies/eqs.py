@@ -11,12 +11,11 @@ from typing import Any, ClassVar
 
 import numpy as np
 import shapely
-from numba import njit
 
 from ccfem.arrays import FloatArray
 from ccfem.errors import InputError
 from ccfem.fields.streamlines import streamlines
-from ccfem.geometry.polylines import is_closed
+from ccfem.geometry.own_way import until_itself
 from ccfem.geometry.shapes import Region, open_lines
 from ccfem.layers.layer import Layer
 from ccfem.layers.layer_stress import LayerStress
@@ -32,8 +31,6 @@ _STEP = 0.25
 """Step along the seed line, in fibre widths."""
 _CANDIDATES = 20
 """Most stressed places whose streamlines are compared."""
-_OWN = 3.0
-"""Length along the seed line, in fibre widths, within which it is not in its own way."""
 _OFF = 0.005
 """Largest deviation from the distance, in fibre widths."""
 
@@ -98,55 +95,11 @@ class Eqs:
         lines = streamlines(layer.plane.points, layer.triangles, plane, starts, step)
         width = step / _STEP
         lines = [
-            _until_itself(line, start, width) for line, start in zip(lines, starts, strict=True)
+            until_itself(line, start, width) for line, start in zip(lines, starts, strict=True)
         ]
         if not lines:
             return np.zeros((0, 2))
         return lines[int(np.argmax([len(line) for line in lines]))]
-
-
-def _until_itself(line: FloatArray, start: FloatArray, width: float) -> FloatArray:
-    """Line (n, 2) from a point on it ahead, then back, to where it meets itself within a width.
-
-    A closed line stays closed where only its ends meet.
-    """
-    if len(line) < 2:
-        return line
-    seed = int(np.argmin(((line - start) ** 2).sum(axis=1)))
-    first, last = _own_way(line, seed, is_closed(line), width, _OWN * width)
-    return line[first : last + 1]
-
-
-@njit(cache=True, nogil=True)
-def _own_way(line, seed, closed, width, own):  # type: ignore[no-untyped-def]
-    """First and last point that keep a distance from all others, `own` mm of arc left aside."""
-    count = len(line)
-    along = np.zeros(count)
-    for p in range(1, count):
-        along[p] = along[p - 1] + np.sqrt(_squared(line, p, p - 1))
-    first = last = seed
-    for sense in (1, -1):
-        p = seed + sense
-        while 0 <= p < count:
-            for q in range(first, last + 1):
-                arc = abs(along[p] - along[q])
-                if closed:
-                    arc = min(arc, along[-1] - arc)
-                if arc > own and _squared(line, p, q) < width * width:
-                    break
-            else:
-                first, last = min(first, p), max(last, p)
-                p += sense
-                continue
-            break
-    return first, last
-
-
-@njit(cache=True, nogil=True)
-def _squared(line, p, q):  # type: ignore[no-untyped-def]
-    """Square of the distance of two points."""
-    x, y = line[p, 0] - line[q, 0], line[p, 1] - line[q, 1]
-    return x * x + y * y
 
 
 def _iso_lines(seed: FloatArray, region: Region, pitch: float, off: float) -> list[FloatArray]:

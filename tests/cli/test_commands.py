@@ -395,7 +395,7 @@ def test_bad_parts_end_in_one_line(ccfem, folder, text, message):
     ("arguments", "message"),
     [
         (["gone.toml"], "part file gone.toml does not exist: check its name and folder"),
-        (["lop"], "no case named 'lop'; there are: bar, bracket, bridge, cantilever, l_shape"),
+        (["lop"], "no case named 'lop'; there are: arm_bracket, bar, bracket, bridge, cantilever"),
         (["part.toml", "--strategies", "zigzag,spiral"], "no strategy named 'spiral'; there are:"),
         (["lop"], r"twist_bar: did you mean 'loop'\? \(or name a part file"),
         (["part.toml", "--strategies", "isocurv"], "zigzag: did you mean 'isocurve'"),

@@ -8,13 +8,13 @@ from ccfem.cases import create_case
 from ccfem.elasticity import Force, Problem, Support, solve
 from ccfem.errors import InputError
 from ccfem.evaluation import evaluate
+from ccfem.geometry.own_way import until_itself
 from ccfem.layers.slicing.planar import Planar
 from ccfem.machine import Machine
 from ccfem.materials import isotropic
 from ccfem.mesh.box import box_mesh
 from ccfem.planning import plan
 from ccfem.strategies import create
-from ccfem.strategies.eqs import _until_itself
 from ccfem.strategies.offset import _level_sets
 
 MACHINE = Machine(fibre_width=1.0, minimum_length=5.0)
@@ -121,13 +121,13 @@ def test_a_seed_line_stops_where_it_meets_itself() -> None:
     angle = np.linspace(0.0, 10.0 * np.pi, 4000)
     radius = np.where(angle < 4 * np.pi, 20.0 - angle / np.pi, 17.0 - 0.25 * angle / np.pi)
     line = radius[:, None] * np.column_stack([np.cos(angle), np.sin(angle)])
-    kept = _until_itself(line, line[0], 1.0)
+    kept = until_itself(line, line[0], 1.0)
     # At t half turns the third turn lies 5 - 0.75 t mm inside the second: 1 mm at t = 16 / 3.
     assert len(kept) == pytest.approx(4000 * 16.0 / 30.0, abs=3)
-    assert _until_itself(line[:1600], line[800], 1.0) == pytest.approx(line[:1600])
+    assert until_itself(line[:1600], line[800], 1.0) == pytest.approx(line[:1600])
     ring = np.concatenate([20.0 * line[:801] / radius[:801, None]])
     ring[-1] = ring[0]
-    assert len(_until_itself(ring, ring[100], 1.0)) == len(ring)
+    assert len(until_itself(ring, ring[100], 1.0)) == len(ring)
 
 
 @pytest.mark.parametrize("name", ["streamline", "eqs"])

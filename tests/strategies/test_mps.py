@@ -6,12 +6,18 @@ import pytest
 import shapely
 from shapely import affinity
 
+from ccfem.cases import create_case
+from ccfem.elasticity import solve
 from ccfem.errors import InputError
+from ccfem.evaluation import evaluate
 from ccfem.layers import LayerStress
 from ccfem.layers.layer import Layer
 from ccfem.layers.plane import Plane
+from ccfem.layers.slicing.planar import Planar
 from ccfem.machine import Machine
 from ccfem.meshing import triangulate
+from ccfem.planning import plan as plan_part
+from ccfem.strategies import create
 from ccfem.strategies.concentric import Concentric
 from ccfem.strategies.grid import Grid
 from ccfem.strategies.mat import Mat
@@ -361,3 +367,15 @@ def test_mps_under_mirrored_tension_is_mirrored():
     laid = covered(lines)
     mirrored = affinity.scale(laid, 1, -1, origin=(0, 0))
     assert laid.symmetric_difference(mirrored).area < 0.01 * section.area
+
+
+@pytest.mark.parametrize("shells", [0, 1])
+def test_guides_that_circle_a_hole_go_round_once(shells):
+    """Streamlines round the loop never quite close: of each turn but one no strand is laid."""
+    case = create_case("loop", element_size=6.0)
+    stress = solve(case.problem)["pull"]
+    layers = Planar(count=1).cut(case.problem.mesh, case.build)
+    paths = plan_part(create("mps", {"shells": shells}), layers, stress, case.machine)
+    total = evaluate(paths, layers, stress, case.machine).total
+    assert total["spacing_below"] < 0.1
+    assert total["on_fibre"] < 0.02

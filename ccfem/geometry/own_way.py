@@ -1,0 +1,64 @@
+"""Lines up to where they come near themselves."""
+
+import numpy as np
+from numba import njit
+
+from ccfem.arrays import FloatArray
+from ccfem.geometry.polylines import is_closed
+
+__all__ = ["until_itself"]
+
+_OWN = 3.0
+"""Length along the seed line, in fibre widths, within which it is not in its own way."""
+
+
+def until_itself(line: FloatArray, start: FloatArray, width: float) -> FloatArray:
+    """Line (n, 2) from a point on it ahead, then back, to where it meets itself within a width.
+
+    Streamlines go round a hole many times, a little aside each time. A closed line stays closed
+    where only its ends meet.
+
+    Parameters
+    ----------
+    line : (n, 2) array, mm
+    start : (2,) array, mm
+        The point of the line that is nearest to it is kept.
+    width : float, mm
+    """
+    if len(line) < 2:
+        return line
+    seed = int(np.argmin(((line - start) ** 2).sum(axis=1)))
+    first, last = _own_way(line, seed, is_closed(line), width, _OWN * width)
+    return line[first : last + 1]
+
+
+@njit(cache=True, nogil=True)
+def _own_way(line, seed, closed, width, own):  # type: ignore[no-untyped-def]
+    """First and last point that keep a distance from all others, `own` mm of arc left aside."""
+    count = len(line)
+    along = np.zeros(count)
+    for p in range(1, count):
+        along[p] = along[p - 1] + np.sqrt(_squared(line, p, p - 1))
+    first = last = seed
+    for sense in (1, -1):
+        p = seed + sense
+        while 0 <= p < count:
+            for q in range(first, last + 1):
+                arc = abs(along[p] - along[q])
+                if closed:
+                    arc = min(arc, along[-1] - arc)
+                if arc > own and _squared(line, p, q) < width * width:
+                    break
+            else:
+                first, last = min(first, p), max(last, p)
+                p += sense
+                continue
+            break
+    return first, last
+
+
+@njit(cache=True, nogil=True)
+def _squared(line, p, q):  # type: ignore[no-untyped-def]
+    """Square of the distance of two points."""
+    x, y = line[p, 0] - line[q, 0], line[p, 1] - line[q, 1]
+    return x * x + y * y
