@@ -13,10 +13,9 @@ from ccfem.virtual_testing.stiffer import RESOLUTION
 _NUMBER = r"(\d+\.\d\d)"
 
 
-def candidates(comparison):
+def candidates(comparison, frame):
     """Rows of the table that the verdict may speak of."""
-    table = comparison.frame
-    table = table[table["printable"]]
+    table = frame[frame["printable"]]
     wanted = comparison.fibre_per_layer
     if wanted is not None:
         table = table[abs(table["fibre_per_layer"] / wanted - 1.0) <= 0.01]
@@ -31,13 +30,14 @@ def gains(table, one, other):
 
 def check(comparison):
     """Hold every word of the verdict against the table; return which kind it was."""
-    said, table = comparison.verdict, candidates(comparison)
+    said, frame = comparison.verdict, comparison.frame
+    table = candidates(comparison, frame)
     left = re.search(r" Not printable as planned: (.*)\.$", said)
-    unprintable = list(comparison.frame[comparison.frame["why_not"] != ""]["strategy"])
+    unprintable = list(frame[frame["why_not"] != ""]["strategy"])
     assert (left[1].split(", ") if left else []) == unprintable
     sentence = said[: left.start()] if left else said
     off = re.search(r" Not at that length: (.*)\.$", sentence)
-    printable = comparison.frame[comparison.frame["printable"]]
+    printable = frame[frame["printable"]]
     elsewhere = [name for name in printable["strategy"] if name not in table.index]
     found = re.findall(r"(\w+) \(lays (\d+) mm\)", off[1]) if off else []
     assert [name for name, _ in found] == elsewhere
