@@ -12,7 +12,8 @@ import shapely
 
 from ccfem.arrays import BoolArray, FloatArray
 from ccfem.geometry.offsets import rings
-from ccfem.geometry.polylines import pack, sample_midpoints, straight_pieces
+from ccfem.geometry.own_way import until_itself
+from ccfem.geometry.polylines import line_length, pack, sample_midpoints, straight_pieces
 from ccfem.geometry.shapes import Region, open_lines
 
 __all__ = ["fitted_guides", "spaced_guides"]
@@ -35,7 +36,7 @@ def spaced_guides(
     distance: float,
     least_length: float,
 ) -> list[FloatArray]:
-    """Clip curves to a region and cut each where it comes near to one before it.
+    """Clip curves to a region and cut each where it comes near to itself or one before it.
 
     Of each curve at most one piece, a (m, 2) array in mm, is left.
 
@@ -62,10 +63,11 @@ def spaced_guides(
             continue
         strings = [shapely.LineString(piece) for piece in pieces]
         nearest = int(np.argmin(shapely.distance(strings, point)))
-        if strings[nearest].length < least_length:
+        guide = until_itself(pieces[nearest], seed, distance)
+        if line_length(guide) < least_length:
             continue
-        guides.append(pieces[nearest])
-        free = shapely.difference(free, shapely.buffer(strings[nearest], distance))
+        guides.append(guide)
+        free = shapely.difference(free, shapely.buffer(shapely.LineString(guide), distance))
     return guides
 
 

@@ -17,7 +17,6 @@ from ccfem.errors import InputError
 from ccfem.fields.streamlines import streamlines
 from ccfem.geometry.guide_fit import fitted_guides, spaced_guides
 from ccfem.geometry.medial_axis import medial_axis
-from ccfem.geometry.own_way import until_itself
 from ccfem.geometry.parallel_strands import grow, lengthened
 from ccfem.geometry.polylines import along_line, points_along
 from ccfem.geometry.shapes import Region
@@ -143,10 +142,6 @@ class Mps(Infill):
             seeds,
             _STEP * pitch,
         )
-        curves = [
-            until_itself(curve, seed, _APART * pitch)
-            for curve, seed in zip(curves, seeds, strict=True)
-        ]
         guides = spaced_guides(curves, seeds, interior, _APART * pitch, _SHORTEST * pitch)
         guides = fitted_guides(guides, interior, pitch)
         return [

@@ -379,3 +379,13 @@ def test_guides_that_circle_a_hole_go_round_once(shells):
     total = evaluate(paths, layers, stress, case.machine).total
     assert total["spacing_below"] < 0.1
     assert total["on_fibre"] < 0.02
+
+
+def test_halves_of_the_loop_get_the_same_fibre():
+    """Part and load are symmetric about x = 0; the mesh is not, nor is the place of a seed."""
+    case = create_case("loop", element_size=4.0)
+    stress = solve(case.problem)["pull"]
+    layers = Planar(count=1).cut(case.problem.mesh, case.build)
+    points = np.concatenate(list(plan_part(create("mps"), layers, stress, case.machine)))
+    lugs = points[np.abs(points[:, 1]) > 50.0]
+    assert (lugs[:, 0] > 0.0).mean() == pytest.approx(0.5, abs=0.05)
