@@ -1,0 +1,167 @@
+"""Checks of how nozzles move: speeds, travel, what lies below fibre, the bed."""
+
+import numpy as np
+
+from benchmarks.print_checks.height_map import HeightMap, sampled
+from benchmarks.print_checks.job import Job, Lines
+from benchmarks.print_checks.printer import Run, Step
+
+__all__ = ["arc", "bed", "free_fibre", "speeds", "support", "travel"]
+
+STRAIGHT, CURVED = 8.0, 3.0
+"""Longest span over nothing, mm, of a strand that turns by less than 10 degrees, and of others."""
+_TURN = 10.0
+
+
+def arc(steps: list[Step]) -> np.ndarray:
+    """Length of a strand at the ends of its steps."""
+    return np.cumsum([0.0, *(step.length for step in steps)])
+
+
+def _radii(points: np.ndarray, along: np.ndarray, reach: float) -> np.ndarray:
+    """Radius of the circle through the places a reach before and behind the middle of each step."""
+
+    def at(where: np.ndarray) -> np.ndarray:
+        return np.stack([np.interp(where, along, column) for column in points.T], axis=1)
+
+    middle = 0.5 * (along[1:] + along[:-1])
+    a, b, c = at(middle - reach), at(middle), at(middle + reach)
+    sides = [np.linalg.norm(x - y, axis=1) for x, y in ((a, b), (b, c), (c, a))]
+    twice = np.linalg.norm(np.cross(b - a, c - a), axis=1)
+    return sides[0] * sides[1] * sides[2] / np.maximum(2.0 * twice, 1e-12)
+
+
+def speeds(job: Job, run: Run) -> list[str]:
+    """Slow at the start, at corners, in turns and behind the cut."""
+    wrong, machine, process = [], job.machine, job.machine.process
+    top = min(process.speed_limit or np.inf, machine.fibre_speed)
+    if machine.speeds is not None:
+        top = min(process.speed_limit or np.inf, max(machine.speeds.speed))
+    for name, steps in run.strands().items():
+        steps = [step for step in steps if step.length]
+        along = arc(steps)
+        points = np.array([steps[0].start, *(step.end for step in steps)])
+        speed = np.array([step.speed for step in steps])
+        start, end = along[:-1], along[1:]
+        ways = np.diff(points, axis=0) / np.diff(along)[:, None]
+        turn = np.einsum("ij,ij->i", ways[1:], ways[:-1]) < np.cos(np.radians(process.corner_angle))
+        near = process.corner_length - 0.01
+        slow = start < process.start_length - 0.01
+        for at in along[1:-1][turn]:
+            slow |= (start < at + near) & (end > at - near)
+        limit = np.where(slow, min(process.start_speed, top), top)
+        reach = 2.0 * machine.fibre_width
+        inside = (start > reach) & (end < along[-1] - reach) & (end - start < 0.5 * reach)
+        for at in along[1:-1][turn]:
+            inside &= (start > at + reach) | (end < at - reach)
+        if machine.speeds is None and process.bend_radius > machine.minimum_radius:
+            radius = np.minimum(_radii(points, along, reach), process.bend_radius)
+            share = (radius - machine.minimum_radius) / (
+                process.bend_radius - machine.minimum_radius
+            )
+            slowest = min(process.start_speed, machine.fibre_speed)
+            bent = slowest + np.clip(share, 0.0, 1.0) * (machine.fibre_speed - slowest)
+            # Another way to take the curvature of a polyline: a hundredth is left for it.
+            limit = np.where(inside, np.minimum(limit, 1.01 * bent), limit)
+        cut = along[-1] - machine.tail
+        behind = 0.5 * (start + end) > cut
+        limit = np.where(behind, np.minimum(limit, process.finish_speed), limit)
+        for k in np.flatnonzero(speed > limit + 1e-6)[:3].tolist():
+            wrong.append(f"strand {name} at {end[k]:.1f} mm: {speed[k]:g} > {limit[k]:g} mm/s")
+    return wrong
+
+
+def travel(job: Job, run: Run) -> list[str]:
+    """Above all that is laid, this layer's lines included, and never with fibre that is not cut."""
+    wrong, lift = [], job.machine.gcode.lift
+    lines, area = Lines(run.steps), HeightMap(job.machine.gcode.bed)
+    across = np.abs(lines.end - lines.start)[:, :2].max(axis=1) > 0.0
+    moved = lines.rapid & across
+    moved[:2] = False
+    # Batches: each ends where a line lies higher than those of the batch.
+    tops = np.maximum.accumulate(np.where(lines.lays, lines.end[:, 2], 0.0))
+    edges = np.flatnonzero(np.diff(tops, prepend=-1.0) > 1e-9).tolist()
+    for first, last in zip(edges, [*edges[1:], len(tops)], strict=True):
+        here = np.arange(first, last)
+        laid = here[lines.lays[here]]
+        if len(laid):
+            area.lay(lines.start[laid], lines.end[laid], job.machine.matrix_width)
+        going = here[moved[here]]
+        if len(going):
+            place, move = sampled(lines.start[going], lines.end[going])
+            over = np.zeros(len(going))
+            np.maximum.at(over, move, area.highest(place))
+            low = np.minimum(lines.start[going, 2], lines.end[going, 2])
+            for k in np.flatnonzero(low < over + 0.95 * lift).tolist():
+                wrong.append(f"travel at {low[k]:g} over {over[k]:g}: step {going[k]}")
+    hanging = False
+    for step in run.steps:
+        hanging = (hanging or (step.tool == 1 and step.fed > 0.0)) and step.number not in run.cuts
+        if step.tool == 1 and step.cut:
+            hanging = False
+        if step.rapid and hanging:
+            wrong.append(f"fibre is dragged by step {step.number}")
+            hanging = False
+    return wrong
+
+
+def free_fibre(job: Job, run: Run) -> tuple[float, list[tuple[float, float]]]:
+    """Share of the fibre with nothing below it; length and turn, degrees, of each run of it."""
+    lines = Lines(run.steps)
+    layer, area = job.machine.strand_height, HeightMap(job.machine.gcode.bed)
+    fibre = lines.lays & (lines.tool == 1)
+    height = lines.end[:, 2].round(3)
+    free, spans, done = 0.0, [], 0
+    order = np.argsort(np.where(lines.lays, height, np.inf), kind="stable")
+    order = order[: int(lines.lays.sum())]
+    for z in np.unique(height[fibre]).tolist():
+        # All that lies lower; lines of the same layer carry nothing.
+        count = int(np.searchsorted(height[order], z))
+        new = order[done:count]
+        if len(new):
+            area.lay(lines.start[new], lines.end[new], job.machine.matrix_width)
+        done = max(done, count)
+        mine = np.flatnonzero(fibre & (height == z))
+        strand = np.cumsum(np.diff(mine, prepend=-2) > 1)
+        for number in np.unique(strand).tolist():
+            steps = mine[strand == number]
+            place, _ = sampled(lines.start[steps], lines.end[steps], 0.5)
+            held = area.highest(place, 0.2) >= z - 1.6 * layer - 1e-6
+            way = np.append(np.linalg.norm(np.diff(place, axis=0), axis=1), 0.0)
+            free += float(way[~held].sum())
+            spans += _runs(place, way, held)
+    return free / max(float(lines.length[fibre].sum()), 1e-9), spans
+
+
+def _runs(place: np.ndarray, way: np.ndarray, held: np.ndarray) -> list[tuple[float, float]]:
+    """Length and turn of each run of places that nothing holds."""
+    found = []
+    edges = np.flatnonzero(np.diff(np.concatenate([[True], held, [True]]).astype(int)))
+    for first, last in edges.reshape(-1, 2).tolist():
+        steps = np.diff(place[first : last + 1, :2], axis=0)
+        steps = steps[np.linalg.norm(steps, axis=1) > 1e-6]
+        angle = np.unwrap(np.arctan2(steps[:, 1], steps[:, 0]))
+        turn = float(np.degrees(np.ptp(angle))) if len(angle) else 0.0
+        found.append((float(way[first:last].sum()), turn))
+    return found
+
+
+def support(job: Job, run: Run) -> list[str]:
+    """Fibre has something below it, but for .5 % and short spans."""
+    share, spans = free_fibre(job, run)
+    wrong = [f"{share:.3%} of the fibre has nothing below"] if share > 0.005 else []
+    for length, turn in spans:
+        if length > (STRAIGHT if turn < _TURN else CURVED):
+            wrong.append(f"a span of {length:.1f} mm that turns by {turn:.0f} degrees")
+    return wrong
+
+
+def bed(job: Job, run: Run) -> list[str]:
+    """Both nozzles over the bed wherever either of them works."""
+    lines, profile = Lines(run.steps), job.machine.gcode
+    low, high = lines.end[2:].min(axis=0), lines.end[2:].max(axis=0)
+    fibre = lines.end[lines.tool == 1] - [*profile.offset[:2], 0.0]
+    if len(fibre):
+        low, high = np.minimum(low, fibre.min(axis=0)), np.maximum(high, fibre.max(axis=0))
+    inside = (low >= 0.0).all() and (high <= profile.bed).all()
+    return [] if inside else [f"nozzles reach {low} to {high}"]

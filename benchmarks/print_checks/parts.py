@@ -1,0 +1,95 @@
+"""Parts that are printed on paper: three cases and a plate from a part file."""
+
+import time
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass
+
+import numpy as np
+import shapely
+
+from benchmarks.print_checks.job import Job
+from benchmarks.print_checks.sections import section_of
+from ccfem.cases import Case, create_case
+from ccfem.cases.part_file import read_part
+from ccfem.elasticity import solve
+from ccfem.export.gcode import gcode
+from ccfem.inspection.beginning import examples
+from ccfem.layers.layer import Layer
+from ccfem.layers.plane import plane_frame
+from ccfem.machine import machine_table, updated
+from ccfem.mesh.tet_mesh import TetMesh
+from ccfem.planning import plan
+from ccfem.printing.print_plan import plan_print
+from ccfem.strategies import create
+from ccfem.toolpaths import Toolpaths
+
+__all__ = ["PARTS", "Part", "job_of", "section_on_bed"]
+
+PARTS = {"loop": "isocurve", "bridge": "svt", "bracket": "svt", "plate": "svt"}
+"""Strategy for each part."""
+
+
+@dataclass(frozen=True)
+class Part:
+    """A case that is solved and cut into layers."""
+
+    case: Case
+    strategy: str
+    stress: object
+    layers: Sequence[Layer]
+
+    @classmethod
+    def named(cls, name: str) -> "Part":
+        """Solve one of `PARTS`."""
+        case = _plate() if name == "plate" else create_case(name)
+        stress = solve(case.problem)
+        first = stress[case.problem.cases[0]]
+        return cls(case, PARTS[name], first, case.slicing(first, case.build, case.machine))
+
+
+def _plate() -> Case:
+    import tempfile
+    from pathlib import Path
+
+    with tempfile.TemporaryDirectory() as folder:
+        file = Path(folder) / "plate.toml"
+        file.write_text(examples()["bracket_plate"])
+        return read_part(file)
+
+
+def job_of(part: Part, machine_name: str) -> tuple[Job, dict[str, float]]:
+    """Plan a part for a machine, write its file and follow it; seconds of each."""
+    case = part.case
+    machine, mesh = updated(case.machine, machine_table(machine_name)), case.problem.mesh
+    began = time.process_time()
+    strategy = create(part.strategy, dict(case.parameters.get(part.strategy, {})))
+    paths = plan(strategy, part.layers, part.stress, machine)
+    planned = time.process_time()
+    printed = plan_print(paths, part.layers, mesh, machine)
+    text = gcode(printed, machine)
+    written = time.process_time()
+    strands, section = section_on_bed(paths, mesh, case.build, machine.gcode.bed)
+    job = Job(machine_name, machine, printed, text, strands, section, float(mesh.volumes.sum()))
+    followed = time.process_time()
+    spent = {"plan": planned - began, "write": written - planned, "follow": followed - written}
+    return job, spent
+
+
+def section_on_bed(
+    paths: Toolpaths, mesh: TetMesh, build: Sequence[float], bed: Sequence[float]
+) -> tuple[list[np.ndarray], Callable[[float], shapely.Geometry]]:
+    """Strands on the bed, the part in its middle; and sections of the part there by height."""
+    frame = plane_frame(tuple(build))
+    corners = mesh.points[np.unique(mesh.corners)] @ frame.T
+    low, high = corners.min(axis=0), corners.max(axis=0)
+    shift = np.append(0.5 * (low + high)[:2] - 0.5 * np.array(bed[:2]), low[2])
+    known: dict[float, shapely.Geometry] = {}
+
+    def section(height: float) -> shapely.Geometry:
+        at = round(height, 4)
+        if at not in known:
+            found = section_of(mesh, frame, at + low[2])
+            known[at] = shapely.transform(found, lambda points: points - shift[:2])
+        return known[at]
+
+    return [line @ frame.T - shift for line in paths], section

@@ -1,0 +1,32 @@
+"""Matrix that is too thin over strands or at the outside is said, or refused."""
+
+import numpy as np
+import pytest
+
+from ccfem.errors import InputError
+from ccfem.layers.slicing.planar import Planar
+from ccfem.machine import Machine, updated
+from ccfem.mesh.box import box_mesh
+from ccfem.printing.print_plan import plan_print
+from ccfem.toolpaths import Toolpaths
+
+
+def strip(height, values):
+    """A strip of 60 x 20 mm with strands a width apart on a tenth of it, in its middle."""
+    mesh, machine = box_mesh((60.0, 20.0, height), (6, 2, 1)), updated(Machine(), values)
+    layers = Planar(count=1).cut(mesh)
+    # Four strands on top of each other.
+    stack = [np.array([[4.0, 10.0], [56.0, 10.0 + 0.01 * k]]) for k in range(4)]
+    return plan_print(Toolpaths.from_plane(stack, layers[0]), layers, mesh, machine)
+
+
+def test_thin_matrix_and_thin_cover_are_said_or_refused():
+    # Stacks of .43 mm, spread over two widths: higher than the matrix above, on a few hundredths.
+    (said, *_) = strip(0.5, {}).warnings
+    assert "strands stand higher than the 0.196 mm of matrix above them on " in said
+    assert 0.01 < 0.01 * float(said.split("them on ")[1].split("%")[0]) < 0.1
+    below = strip(2.0, {}).warnings
+    assert below == ()
+    assert sum("one layer of matrix" in line for line in strip(0.5, {}).warnings) == 2
+    with pytest.raises(InputError, match=r"0\.146 mm of matrix below the first fibre layer do not"):
+        strip(0.4, {"process": {"short": "drop"}})
