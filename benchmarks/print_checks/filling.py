@@ -87,7 +87,7 @@ def amount(job: Job, run: Run) -> list[str]:
     """Fibre, matrix in its place and what is left out are what was planned."""
     fibre = sum(sum(s.length for s in steps) for steps in own(run).values())
     short = sum(s.length for s in run.steps if s.lays and s.tool == 0 and s.kind == PART[2])
-    found = fibre + short + job.plan.dropped
+    found = fibre + short + job.plan.dropped + job.plan.ended
     return [] if abs(found / job.planned - 1.0) < 1e-3 else [f"{found:g} of {job.planned:g} mm"]
 
 
@@ -98,7 +98,8 @@ def places(job: Job, run: Run) -> list[str]:
     lines = [shapely.LineString(line[:, :2]) for line in job.strands]
     middles = np.array([line[0, 2] for line in job.strands])
     half = 0.5 * job.machine.strand_height
-    wrong, whole = [], job.machine.process.turns != "cut"
+    wrong: list[str] = []
+    whole = job.machine.process.turns != "cut" and not job.plan.ended
     for name, steps in own(run).items():
         points = np.array([steps[0].start, *(step.end for step in steps)])
         drawn = shapely.LineString(points[:, :2])

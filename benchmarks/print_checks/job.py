@@ -38,6 +38,9 @@ class Job:
         Section of the part on the bed at a height over it, a shapely geometry.
     volume : float, mm^3
         Of the part.
+    bent : float
+        Factor by which a strand may be faster in a turn than by the radius that the check finds:
+        of a polyline it is a matter of how it is taken.
     """
 
     name: str
@@ -47,6 +50,7 @@ class Job:
     strands: list[np.ndarray]
     section: Callable[[float], Any]
     volume: float
+    bent: float = 1.01
     done: Run = field(init=False)
 
     def __post_init__(self) -> None:

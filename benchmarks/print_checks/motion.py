@@ -61,8 +61,7 @@ def speeds(job: Job, run: Run) -> list[str]:
             )
             slowest = min(process.start_speed, machine.fibre_speed)
             bent = slowest + np.clip(share, 0.0, 1.0) * (machine.fibre_speed - slowest)
-            # Another way to take the curvature of a polyline: a hundredth is left for it.
-            limit = np.where(inside, np.minimum(limit, 1.01 * bent), limit)
+            limit = np.where(inside, np.minimum(limit, job.bent * bent), limit)
         cut = along[-1] - machine.tail
         behind = 0.5 * (start + end) > cut
         limit = np.where(behind, np.minimum(limit, process.finish_speed), limit)

@@ -12,10 +12,12 @@ from benchmarks.print_checks.sections import section_of
 from ccfem.cases import Case, create_case
 from ccfem.cases.part_file import read_part
 from ccfem.elasticity import solve
+from ccfem.elasticity.part_stress import PartStress
 from ccfem.export.gcode import gcode
 from ccfem.inspection.beginning import examples
 from ccfem.layers.layer import Layer
 from ccfem.layers.plane import plane_frame
+from ccfem.layers.slicing.planar import Planar
 from ccfem.machine import machine_table, updated
 from ccfem.mesh.tet_mesh import TetMesh
 from ccfem.planning import plan
@@ -27,6 +29,8 @@ __all__ = ["PARTS", "Part", "job_of", "section_on_bed"]
 
 PARTS = {"loop": "isocurve", "bridge": "svt", "bracket": "svt", "plate": "svt"}
 """Strategy for each part."""
+LAYERS = {("bridge", "aura_like"): 1}
+"""Fewer layers than the case has: 1 mm has no room for two of strands .2 mm high that cross."""
 
 
 @dataclass(frozen=True)
@@ -34,17 +38,21 @@ class Part:
     """A case that is solved and cut into layers."""
 
     case: Case
-    strategy: str
-    stress: object
-    layers: Sequence[Layer]
+    name: str
+    stress: PartStress
 
     @classmethod
     def named(cls, name: str) -> "Part":
         """Solve one of `PARTS`."""
         case = _plate() if name == "plate" else create_case(name)
         stress = solve(case.problem)
-        first = stress[case.problem.cases[0]]
-        return cls(case, PARTS[name], first, case.slicing(first, case.build, case.machine))
+        return cls(case, name, stress[case.problem.cases[0]])
+
+    def layers(self, machine: str) -> Sequence[Layer]:
+        """Layers of the case, or as many as a machine has room for."""
+        count = LAYERS.get((self.name, machine))
+        slicer = self.case.slicing if count is None else Planar(count=count)
+        return slicer(self.stress, self.case.build, self.case.machine)
 
 
 def _plate() -> Case:
@@ -61,15 +69,18 @@ def job_of(part: Part, machine_name: str) -> tuple[Job, dict[str, float]]:
     """Plan a part for a machine, write its file and follow it; seconds of each."""
     case = part.case
     machine, mesh = updated(case.machine, machine_table(machine_name)), case.problem.mesh
+    chosen, layers = PARTS[part.name], part.layers(machine_name)
     began = time.process_time()
-    strategy = create(part.strategy, dict(case.parameters.get(part.strategy, {})))
-    paths = plan(strategy, part.layers, part.stress, machine)
+    strategy = create(chosen, dict(case.parameters.get(chosen, {})))
+    paths = plan(strategy, layers, part.stress, machine)
     planned = time.process_time()
-    printed = plan_print(paths, part.layers, mesh, machine)
+    printed = plan_print(paths, layers, mesh, machine)
     text = gcode(printed, machine)
     written = time.process_time()
     strands, section = section_on_bed(paths, mesh, case.build, machine.gcode.bed)
-    job = Job(machine_name, machine, printed, text, strands, section, float(mesh.volumes.sum()))
+    job = Job(
+        machine_name, machine, printed, text, strands, section, float(mesh.volumes.sum()), 1.05
+    )
     followed = time.process_time()
     spent = {"plan": planned - began, "write": written - planned, "follow": followed - written}
     return job, spent

@@ -25,6 +25,7 @@ def gcode_head(moves: Moves, plan: PrintPlan, machine: Machine, title: str) -> l
         Case, strategy and machine; left out where empty.
     """
     seconds = float(durations(moves, machine).sum())
+    heating = seconds - float(durations(moves, machine, heating=False).sum())
     fibre_fed = float(moves.feed[moves.tool == 1].sum())
     matrix_fed = float(moves.feed[moves.tool == 0].sum() + moves.beside.sum())
     area = 0.25 * np.pi * machine.matrix_diameter**2
@@ -41,6 +42,7 @@ def gcode_head(moves: Moves, plan: PrintPlan, machine: Machine, title: str) -> l
         "; mm, mm/min; X Y Z absolute, E relative; T0 matrix, T1 fibre (E in mm of fibre)",
         f";TIME:{seconds:.0f}",
         f"; estimated printing time (normal mode) = {_clock(seconds)}",
+        f"; of it waiting for tools to heat, first heating left out = {heating:.0f} s",
         f"; filament used [mm] = {matrix_fed:.2f}, {fibre_fed:.2f}",
         f"; filament used [g] = {grams[0]:.3f}, {grams[1]:.3f}",
         f";LAYER_COUNT:{len(plan.top)}",

@@ -7,7 +7,7 @@ from ccfem.checks import check_choices, check_fields
 
 __all__ = ["Process"]
 
-_WORDS = ("short", "turns", "prime")
+_WORDS = ("short", "turns", "stacks", "prime")
 _WHOLE = ("skirt_loops", "brim_loops")
 
 
@@ -54,6 +54,9 @@ class Process:
     turns : {"pad", "cut", "inside"}
         Strands that leave the part: on pads of matrix that are cut off behind the print, cut at the
         border, or refused.
+    stacks : {"keep", "end"}
+        Strands that cross or join and stand higher than the matrix above them: kept, with a warning
+        from 1 % of a layer on and refused above 10 %; or they end there alternately.
     prime : {"block", "line", "none"}
         After a change of tools matrix comes first on a block beside the part, or on a line of it
         (as long as the block's contour). The first strand lies beside the part, on a bar of matrix.
@@ -94,6 +97,7 @@ class Process:
     short: Literal["matrix", "drop", "error"] = "matrix"
     cover: float = 0.15
     turns: Literal["pad", "cut", "inside"] = "pad"
+    stacks: Literal["keep", "end"] = "keep"
     prime: Literal["block", "line", "none"] = "block"
     prime_volume: float = 10.0
     prime_size: float = 10.0

@@ -15,26 +15,22 @@ from dataclasses import replace
 
 import numpy as np
 import shapely
-from scipy.ndimage import gaussian_filter, map_coordinates
 
 from ccfem.arrays import FloatArray
 from ccfem.errors import InputError
-from ccfem.geometry.polylines import pack, sample_midpoints, starts_segment, subdivide
+from ccfem.geometry.polylines import starts_segment, subdivide
 from ccfem.geometry.shapes import Region, strings
 from ccfem.machine.machine import Machine
+from ccfem.printing.strand_density import StrandDensity
 from ccfem.toolpaths import Toolpaths
 
-__all__ = ["pad_flow", "with_flow"]
+__all__ = ["THIN", "pad_flow", "with_flow"]
 
 _PIECE = 2.0
 """Longest piece, mm, over which the height is taken as one."""
 _STEP = 0.05
 """Steps in which the height changes along a line, over that of the layer."""
-_CELL = 0.25
-_SPREAD = 0.5
-"""Cell of the grid on which fibre is counted, and standard deviation of the bell curve that spreads
-it, in fibre widths: strands a width apart then have the same density everywhere to 1.5 %."""
-_LEAST = 0.05
+THIN = 0.05
 """Least height, mm, of matrix over a strand, where its layer is as high. Our choice."""
 _SCALE = 1.1
 """Most by which a layer is scaled: where lines do not reach a tenth of a section, as between walls
@@ -52,6 +48,7 @@ def with_flow(
     below: float,
     machine: Machine,
     sections: Sequence[float] | None = None,
+    shares: FloatArray | None = None,
 ) -> tuple[Toolpaths, FloatArray, str]:
     """Lines of a matrix layer with the height that each of their steps lays.
 
@@ -70,6 +67,8 @@ def with_flow(
     machine : Machine
     sections : sequence of float, mm^2, optional
         Section of each strand; by default `Machine.strand_area`.
+    shares : (K,) array, optional
+        Width of each path over that of the machine; by default 1.
 
     Returns
     -------
@@ -92,8 +91,8 @@ def with_flow(
     if sections is None:
         sections = [machine.strand_area] * len(strands)
     volume = height + below - _density(strands, sections, middle, machine)
-    least = min(_LEAST, height)
-    warning = _check(volume, length, height, below, least)
+    least = min(THIN, height)
+    warning = _check(volume, length, height, below, least, machine)
     wanted = np.maximum(volume, least)
     # Of neighbouring pieces in one step of the height only the first keeps its point.
     level = np.full(len(points), -1)
@@ -104,6 +103,9 @@ def with_flow(
     run = (np.cumsum(keep) - 1)[start]
     long = np.bincount(run, length, len(kept))
     laid = np.bincount(run, wanted * length, len(kept)) / np.maximum(long, 1e-300)
+    if shares is not None:
+        line = np.searchsorted(np.searchsorted(kept, offsets), np.arange(len(kept)), "right") - 1
+        laid *= shares[line]
     inside = shapely.length(shapely.intersection(strings(strands), section))
     room = section.area * (height + below) - float(inside @ np.asarray(sections))
     scale = room / (machine.matrix_width * (laid * long).sum())
@@ -141,7 +143,7 @@ def pad_flow(
         offsets=offsets,
         link=np.zeros(len(points), dtype=bool),
     )
-    return finer, np.maximum(volume, min(_LEAST, height))
+    return finer, np.maximum(volume, min(THIN, height))
 
 
 def _density(
@@ -153,24 +155,16 @@ def _density(
     """Volume of strands per area, mm, round places (k, 2)."""
     if not len(strands):
         return np.zeros(len(places))
-    width = machine.fibre_width
-    cell = _CELL * width
-    lines, offsets = pack(strands)
-    samples, _, length, line = sample_midpoints(lines, offsets, 0.5 * cell)
-    low = places.min(axis=0) - 4.0 * width
-    shape = tuple(np.ceil((places.max(axis=0) + 4.0 * width - low) / cell).astype(int) + 1)
-    index = np.floor((samples - low) / cell).astype(int)
-    inside = ((index >= 0) & (index < shape)).all(axis=1)
-    flat = np.ravel_multi_index(tuple(index[inside].T), shape)
-    weight = (length * np.asarray(sections)[line])[inside]
-    count = np.bincount(flat, weight, int(np.prod(shape))).reshape(shape)
-    spread = gaussian_filter(count / cell**2, _SPREAD / _CELL, mode="constant")
-    at = (places - low) / cell - 0.5
-    return np.asarray(map_coordinates(spread, at.T, order=1, mode="nearest"))
+    return StrandDensity.of(strands, sections, machine.fibre_width, places).at(places)
 
 
 def _check(
-    volume: FloatArray, length: FloatArray, height: float, below: float, least: float
+    volume: FloatArray,
+    length: FloatArray,
+    height: float,
+    below: float,
+    least: float,
+    machine: Machine,
 ) -> str:
     """Raise where strands stand higher than the matrix above them on too much of the layer."""
     thin = length[volume < least].sum() / length.sum()
@@ -179,10 +173,11 @@ def _check(
     order = np.argsort(volume)
     share = np.cumsum(length[order]) / length.sum()
     missing = least - float(volume[order[np.searchsorted(share, 0.01)]])
+    cure = "" if machine.process.stacks == "end" else ", or set process.stacks = 'end'"
     said = (
         f"strands stand higher than the {height:.3g} mm of matrix above them on {thin:.0%} of the "
         f"layer; {height + missing:.3g} mm would do: lay fibre layers at least "
-        f"{height + below + missing:.3g} mm apart"
+        f"{height + below + missing:.3g} mm apart{cure}"
     )
     if thin > _TOO_THIN:
         raise InputError(said)

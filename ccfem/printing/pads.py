@@ -22,8 +22,9 @@ _SHARE = 0.25
 """Share of a pad that is filled (Aura)."""
 _SOLID = 2
 """So many layers of matrix under a strand are solid. Our choice."""
-_SPAN = 3.0
-"""Longest way over the gap between a pad and the part, mm."""
+_SPAN = 2.0
+"""Longest way over the gap between a pad and the part, mm; 3 mm is what a bent strand may hang, and
+lines of matrix do not reach every corner of either."""
 _ARC = 4
 """Pieces of a quarter of a circle in the borders of pads."""
 _NONE = shapely.Polygon()

@@ -1,6 +1,6 @@
 """A whole part as it is printed: layers of matrix below, between and above the layers of fibre."""
 
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
 
 import numpy as np
@@ -8,38 +8,29 @@ import shapely
 
 from ccfem.arrays import BoolArray, FloatArray, freeze, in_brief
 from ccfem.errors import InputError
-from ccfem.geometry.hatch import zigzag
-from ccfem.geometry.offsets import offset_rings
-from ccfem.geometry.polylines import (
-    is_closed,
-    line_length,
-    merge_repeated,
-    pack,
-    starts_segment,
-)
-from ccfem.geometry.shapes import Region, strings
+from ccfem.geometry.polylines import line_length, starts_segment
+from ccfem.geometry.shapes import Region
 from ccfem.layers import Layer
 from ccfem.layers.plane import Plane
-from ccfem.layers.slicing.planar import Planar
-from ccfem.linking.print_order import nearest_end_order
 from ccfem.machine.machine import Machine
 from ccfem.mesh.tet_mesh import TetMesh
-from ccfem.printing.matrix_flow import pad_flow, with_flow
+from ccfem.printing.laid_layer import (
+    COORDINATE_DIGITS,
+    SHORT,
+    Below,
+    LaidLayer,
+    fibre_layer,
+    matrix_layer,
+)
+from ccfem.printing.matrix_flow import THIN
+from ccfem.printing.matrix_lines import MatrixFill, matrix_fills
 from ccfem.printing.pads import pad_lines, pad_regions
-from ccfem.printing.slabs import LOW, Slab, check_cover, slabs_of
+from ccfem.printing.slabs import Slab, check_cover, slabs_of
+from ccfem.printing.stacks import ended_in_stacks, height_over
 from ccfem.printing.turns import turned
-from ccfem.toolpaths import FIBRE, MATRIX, SUPPORT, Toolpaths
+from ccfem.toolpaths import FIBRE, MATRIX, Toolpaths
 
 __all__ = ["COORDINATE_DIGITS", "PrintPlan", "check_machine", "plan_print"]
-
-COORDINATE_DIGITS = 3
-"""Decimals of coordinates, mm."""
-
-_OVERLAP = 0.25
-"""Overlap of the ends of the zigzag with the contour, in line widths. Our choice."""
-
-_SHORT = 1e-6
-"""Share of the cutter's distance by which a path may be too short through rounding."""
 
 
 @dataclass(frozen=True)
@@ -68,6 +59,8 @@ class PrintPlan:
     trims : (t, 3) array, mm
         Layer of this plan, X and Y of each place where a strand crosses the part's border: there
         the knife comes behind the print.
+    ended : float, mm
+        Length of strands that is left out where they would stack higher than the matrix above.
     """
 
     paths: Toolpaths
@@ -79,6 +72,7 @@ class PrintPlan:
     trims: FloatArray = None  # type: ignore[assignment]
     outside: float = 0.0
     warnings: tuple[str, ...] = ()
+    ended: float = 0.0
 
     __repr__ = in_brief
 
@@ -113,7 +107,7 @@ def check_machine(machine: Machine) -> None:
         unused = name == "fibre_speed" and machine.speeds is not None
         if getattr(machine, name) == 0.0 and not unused:
             raise InputError(f"machine.{name} must be above 0 to print; got 0: set it in [machine]")
-    if machine.minimum_length < machine.tail * (1.0 - _SHORT):
+    if machine.minimum_length < machine.tail * (1.0 - SHORT):
         raise InputError(
             f"machine.minimum_length is {machine.minimum_length:g} mm, but the cutter lies "
             f"{machine.tail:g} mm before the nozzle, so that no shorter path can be "
@@ -159,79 +153,110 @@ def plan_print(
     frame = layers[0].plane.frame
     corners = mesh.points[np.unique(mesh.corners)] @ frame.T
     lowest, highest = corners.min(axis=0), corners.max(axis=0)
-    laid = [layer for layer in layers if layer.index in fibre.layer]
-    slabs = slabs_of(laid, float(lowest[2]), float(highest[2]), machine)
-    matrix_slabs = [slab for slab in slabs if slab.fibre is None]
+    used = [layer for layer in layers if layer.index in fibre.layer]
     origin = 0.5 * (lowest[:2] + highest[:2] - machine.gcode.bed[:2])
-    matrix = iter(_matrix_lines(matrix_slabs, mesh, frame, origin, machine))
-    filled = [next(matrix) if slab.fibre is None else None for slab in slabs]
-    borders = _borders(laid, frame, origin)
-    on_slab: list[list[FloatArray]] = []
-    trims, dropped, outside = [np.zeros((0, 3))], 0.0, 0.0
-    for number, slab in enumerate(slabs):
-        lines = []
-        if slab.fibre is not None:
-            lines = [path @ frame[:2].T - origin for path in fibre.on_layer(slab.fibre)]
-            planned = sum(map(line_length, lines))
-            lines, crossings = turned(lines, borders[slab.fibre], slab.fibre, machine)
-            dropped += planned - sum(map(line_length, lines))
-            trims.append(np.column_stack([np.full(len(crossings), number), crossings]))
-        on_slab.append(lines)
-    pads = pad_regions([one and one[0] for one in filled], on_slab, machine)
-    printed, flow, short = [], [], []
-    warnings: list[str] = []
-    strands: list[FloatArray] = []  # since the last layer of matrix
-    sections: list[float] = []
-    below = 0.0
-    for number, slab in enumerate(slabs):
-        height, thickness = slab.upper - float(lowest[2]), slab.upper - slab.lower
-        if slab.fibre is None:
-            section, lines = filled[number]  # type: ignore[misc]
-            found = _printed(lines, height, number, MATRIX)
-            heights = np.zeros(0)
-            if len(found):
-                found, heights, warning = with_flow(
-                    found, section, thickness, strands, below, machine, sections
-                )
-                warnings += [f"at {height:.4g} mm {warning}"] if warning else []
-            pad = _printed(pad_lines(*pads[number], machine), height, number, SUPPORT)
-            if len(pad):
-                pad, high = pad_flow(pad, thickness, strands, below, machine, sections)
-                found, heights = Toolpaths.concatenate([found, pad]), np.append(heights, high)
-            strands, sections, below = [], [], 0.0
-            few = np.zeros(len(found), dtype=bool)
-        else:
-            lines = on_slab[number]
-            by_matrix, whole = _sorted_by_length(lines, machine)
-            dropped += sum(map(line_length, lines)) - sum(map(line_length, by_matrix + whole))
-            border = borders[slab.fibre]
-            outside += float(shapely.length(shapely.difference(strings(whole), border)).sum())
-            parts = (_printed(by_matrix, height, number, MATRIX),)
-            parts += (_printed(whole, height, number, FIBRE),)  # type: ignore[assignment]
-            found = Toolpaths.concatenate(parts)
-            heights = np.full(len(found.points), thickness)
-            few = found.kind == MATRIX
-            sections += [machine.matrix_width * thickness] * len(by_matrix)
-            sections += [machine.strand_area] * len(whole)
-            strands, below = strands + by_matrix + whole, below + thickness
-        printed.append(found)
-        flow.append(heights)
-        short.append(few)
-    paths = Toolpaths.concatenate(printed)
-    paths = replace(paths, points=paths.points.round(COORDINATE_DIGITS) + 0.0)
+    borders = _borders(used, frame, origin)
+    kept, crossings, dropped = _turned(fibre, borders, frame, origin, machine)
+    over = {index: height_over(kept[index], borders[index], machine) for index in kept}
+    slabs = slabs_of(used, float(lowest[2]), float(highest[2]), machine, over)
+    fills = matrix_fills(slabs, mesh, frame, origin, machine)
+    strands = _on_slabs(kept, slabs, borders, machine)
+    trims = [
+        np.column_stack([np.full(len(crossings[slab.fibre]), number), crossings[slab.fibre]])
+        for number, slab in enumerate(slabs)
+        if slab.fibre is not None
+    ]
+    done = _laid(slabs, fills, strands, borders, float(lowest[2]), machine)
+    paths = Toolpaths.concatenate(each.paths for each in done)
     plan = PrintPlan(
         paths,
         np.array([slab.upper - lowest[2] for slab in slabs]).round(COORDINATE_DIGITS),
         np.array([slab.upper - slab.lower for slab in slabs]),
-        np.concatenate(flow),
-        np.concatenate(short),
-        dropped,
-        np.concatenate(trims),
-        outside,
-        (*warnings, *check_cover(slabs, machine)),
+        np.concatenate([each.laid for each in done]),
+        np.concatenate([each.short for each in done]),
+        dropped + sum(each.dropped for each in done),
+        np.concatenate([np.zeros((0, 3)), *trims]),
+        sum(each.outside for each in done),
+        (*(each.warning for each in done if each.warning), *check_cover(slabs, machine)),
+        strands.ended,
     )
     _check_bed(plan, machine)
-    return replace(plan, warnings=(*_short_strands(plan), *plan.warnings))
+    said = (*_short_strands(plan), *strands.warnings)
+    return replace(plan, warnings=(*said, *plan.warnings))
+
+
+def _turned(
+    fibre: Toolpaths,
+    borders: Mapping[int, Region],
+    frame: FloatArray,
+    origin: FloatArray,
+    machine: Machine,
+) -> tuple[dict[int, list[FloatArray]], dict[int, FloatArray], float]:
+    """Strands on the bed by layer, where they cross its border, and the length that is cut off."""
+    kept, crossings, dropped = {}, {}, 0.0
+    for index, border in borders.items():
+        planned = [path @ frame[:2].T - origin for path in fibre.on_layer(index)]
+        kept[index], crossings[index] = turned(planned, border, index, machine)
+        dropped += sum(map(line_length, planned)) - sum(map(line_length, kept[index]))
+    return kept, crossings, dropped
+
+
+@dataclass(frozen=True)
+class _Strands:
+    """Strands on each slab, and what became of the others, as in `PrintPlan`."""
+
+    lines: list[list[FloatArray]]
+    ended: float
+    warnings: tuple[str, ...]
+
+
+def _on_slabs(
+    kept: Mapping[int, list[FloatArray]],
+    slabs: Sequence[Slab],
+    borders: Mapping[int, Region],
+    machine: Machine,
+) -> _Strands:
+    """Let strands end where they stack too high, if the process says so."""
+    found: list[list[FloatArray]] = []
+    ended, warnings = 0.0, []
+    for number, slab in enumerate(slabs):
+        lines = [] if slab.fibre is None else kept[slab.fibre]
+        above = slabs[min(number + 1, len(slabs) - 1)]
+        if slab.fibre is not None and above.fibre is None and machine.process.stacks == "end":
+            room = above.upper - slab.lower - THIN
+            short = ended_in_stacks(lines, borders[slab.fibre], room, machine)
+            lines, ended = short.lines, ended + short.removed
+            if short.places:
+                warnings.append(
+                    f"{short.removed:.0f} mm of fibre layer {slab.fibre} are left out in "
+                    f"{short.places} places, where strands would stack higher than the matrix above"
+                )
+        found.append(lines)
+    return _Strands(found, ended, tuple(warnings))
+
+
+def _laid(
+    slabs: Sequence[Slab],
+    fills: Sequence[MatrixFill | None],
+    strands: _Strands,
+    borders: Mapping[int, Region],
+    bottom: float,
+    machine: Machine,
+) -> list[LaidLayer]:
+    """All layers, from the bed to the top."""
+    pads = pad_regions([fill and fill.section for fill in fills], strands.lines, machine)
+    found, below = [], Below()
+    for number, (slab, fill) in enumerate(zip(slabs, fills, strict=True)):
+        size = (number, slab.upper - bottom, slab.upper - slab.lower, machine)
+        if slab.fibre is None:
+            assert fill is not None
+            found.append(matrix_layer(fill, pad_lines(*pads[number], machine), below, *size))
+            below = Below()
+        else:
+            lines, border = strands.lines[number], borders[slab.fibre]
+            each, below = fibre_layer(lines, border, below, *size)
+            found.append(each)
+    return found
 
 
 def _short_strands(plan: PrintPlan) -> list[str]:
@@ -256,7 +281,7 @@ def _check_fibre(fibre: Toolpaths, layers: Sequence[Layer], machine: Machine) ->
             "give those that it was planned on"
         )
     limit = max(machine.tail, machine.minimum_length)
-    short = fibre.lengths < limit * (1.0 - _SHORT)
+    short = fibre.lengths < limit * (1.0 - SHORT)
     if short.any() and machine.process.short == "error":
         raise InputError(
             f"fibre paths must be no shorter than the {limit:g} mm that the cutter allows; "
@@ -277,80 +302,6 @@ def _borders(layers: Sequence[Layer], frame: FloatArray, origin: FloatArray) -> 
         )
         for layer in layers
     }
-
-
-def _sorted_by_length(
-    lines: list[FloatArray], machine: Machine
-) -> tuple[list[FloatArray], list[FloatArray]]:
-    """Strands that matrix is laid instead of, and those that the cutter allows.
-
-    Of a strand that is left out, and in layers too low for a line of matrix, the matrix above fills
-    the place.
-    """
-    limit = max(machine.tail, machine.minimum_length) * (1.0 - _SHORT)
-    whole = [line for line in lines if line_length(line) >= limit]
-    if machine.process.short == "error" and len(whole) < len(lines):
-        raise InputError(
-            f"process.turns cuts strands into pieces below the {limit:g} mm that the cutter "
-            "allows: set it to 'pad', or process.short to 'matrix'"
-        )
-    if machine.process.short != "matrix" or machine.strand_height < LOW:
-        return [], whole
-    return [line for line in lines if line_length(line) < limit], whole
-
-
-def _matrix_lines(
-    slabs: Sequence[Slab],
-    mesh: TetMesh,
-    frame: FloatArray,
-    origin: FloatArray,
-    machine: Machine,
-) -> list[tuple[Region, list[FloatArray]]]:
-    """Section and lines (n, 2) of each matrix layer on the bed: a contour, a zigzag inside it."""
-    width, profile = machine.matrix_width, machine.gcode
-    lines: list[tuple[Region, list[FloatArray]]] = [(shapely.Polygon(), []) for _ in slabs]
-    middles = tuple(0.5 * (slab.lower + slab.upper) for slab in slabs)
-    for layer in Planar(heights=middles).cut(mesh, frame[2]) if middles else ():
-        plane = layer.plane
-        angle = np.radians(profile.matrix_angle + profile.matrix_turn * layer.index)
-        contours = offset_rings(plane.polygon, 0.5 * width, width, width, 1)
-        inside = zigzag(plane.polygon, (1.5 - _OVERLAP) * width, width, width, float(angle))
-        found = [ring for level in contours for ring in level] + inside
-
-        def on_bed(points: FloatArray, plane: Plane = plane) -> FloatArray:
-            return plane.to_space(points) @ frame[:2].T - origin
-
-        section = shapely.transform(plane.polygon, on_bed)
-        lines[layer.index] = section, [on_bed(line) for line in found]
-    return lines
-
-
-def _printed(lines: list[FloatArray], height: float, number: int, kind: int) -> Toolpaths:
-    """Paths of one layer in printer coordinates, rounded, in the order of printing."""
-    points, offsets = pack(lines)
-    points = points.round(COORDINATE_DIGITS) + 0.0
-    points, offsets, *_ = merge_repeated(points, offsets)
-    lines = [line for line in np.split(points, offsets[1:-1]) if len(line) > 1]
-    if not lines:
-        return Toolpaths.empty()
-    order, backward, _ = nearest_end_order(
-        np.array([line[0] for line in lines]), np.array([line[-1] for line in lines])
-    )
-    lines = [
-        lines[k][::-1] if back else lines[k]
-        for k, back in zip(order.tolist(), backward.tolist(), strict=True)
-    ]
-    points, offsets = pack(lines)
-    height = round(height, COORDINATE_DIGITS)
-    points = np.column_stack([points, np.full(len(points), height)])
-    return Toolpaths(
-        points=points,
-        normals=np.broadcast_to([0.0, 0.0, 1.0], points.shape),
-        offsets=offsets,
-        layer=np.full(len(lines), number),
-        kind=np.full(len(lines), kind),
-        closed=np.array([is_closed(line) for line in lines]),
-    )
 
 
 def _check_bed(plan: PrintPlan, machine: Machine) -> None:

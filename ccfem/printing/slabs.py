@@ -1,6 +1,6 @@
 """The layers that a part is printed in: fibre where it was planned, matrix in all that is left."""
 
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from itertools import pairwise
 
@@ -27,10 +27,28 @@ class Slab:
     fibre: int | None = None
 
 
-def slabs_of(layers: Sequence[Layer], bottom: float, top: float, machine: Machine) -> list[Slab]:
-    """All layers to print, from the bottom to the top."""
+def slabs_of(
+    layers: Sequence[Layer],
+    bottom: float,
+    top: float,
+    machine: Machine,
+    over: Mapping[int, float] | None = None,
+) -> list[Slab]:
+    """All layers to print, from the bottom to the top.
+
+    Parameters
+    ----------
+    layers : sequence of Layer
+        Those of fibre.
+    bottom, top : float, mm
+        Ends of the part along the build direction.
+    machine : Machine
+    over : mapping, optional
+        Height of matrix, mm, that levels the strands of a fibre layer, by its index: the first
+        layer of matrix over it is so high where there is room, up to `Machine.matrix_width`.
+    """
     slabs: list[Slab] = []
-    level = bottom
+    level, wanted = bottom, 0.0
     for layer in sorted(layers, key=lambda one: one.plane.height):
         lower = layer.plane.height - 0.5 * machine.strand_height
         upper = layer.plane.height + 0.5 * machine.strand_height
@@ -40,14 +58,19 @@ def slabs_of(layers: Sequence[Layer], bottom: float, top: float, machine: Machin
                 f"height of {machine.strand_height:g} mm between {level:g} and {top:g} mm: move it "
                 "with --heights, or take fewer layers"
             )
-        slabs += _matrix_slabs(level, lower, machine, first=not slabs)
+        slabs += _matrix_slabs(level, lower, machine, not slabs, wanted)
         slabs.append(Slab(lower, upper, layer.index))
-        level = upper
-    return slabs + _matrix_slabs(level, top, machine, first=not slabs)
+        level, wanted = upper, (over or {}).get(layer.index, 0.0)
+    return slabs + _matrix_slabs(level, top, machine, not slabs, wanted)
 
 
-def _matrix_slabs(lower: float, upper: float, machine: Machine, first: bool) -> list[Slab]:
-    """Matrix layers of equal height that fill a gap, the first of all lower; none without a gap."""
+def _matrix_slabs(
+    lower: float, upper: float, machine: Machine, first: bool, wanted: float = 0.0
+) -> list[Slab]:
+    """Matrix layers of equal height that fill a gap, the first of all lower; none without a gap.
+
+    The first one over fibre is as high as wanted.
+    """
     if upper - lower <= _SAME:
         return []
     low = min(machine.process.first_layer_height, machine.matrix_height)
@@ -55,6 +78,12 @@ def _matrix_slabs(lower: float, upper: float, machine: Machine, first: bool) -> 
         start = Slab(lower, lower + low)
         return [start, *_matrix_slabs(lower + low, upper, machine, first=False)]
     count = int(np.ceil((upper - lower) / machine.matrix_height - _SAME))
+    wanted = min(wanted, machine.matrix_width)
+    if wanted > (upper - lower) / count + _SAME:
+        if upper - lower - wanted < LOW:
+            return [Slab(lower, upper)]
+        start = Slab(lower, lower + wanted)
+        return [start, *_matrix_slabs(lower + wanted, upper, machine, first=False)]
     edges = np.linspace(lower, upper, count + 1).tolist()
     return [Slab(a, b) for a, b in pairwise(edges)]
 
