@@ -64,6 +64,9 @@ def part_moves(plan: PrintPlan, machine: Machine) -> Moves:
                 heights = plan.laid[start : end - 1]
                 lay_matrix(recorder, line, normals, heights, what, machine, speed)
         below = top
+    # Away from the part, before the end of the file moves the carriage home.
+    if flat:
+        recorder.rise(recorder.top + machine.process.tool_lift)
     moves = preheated(_numbered(recorder.moves()), machine)
     _check_bed(moves, machine)
     return moves

@@ -29,6 +29,8 @@ def test_the_checks_see_what_there_is_to_see(printed):
     run = printed.done
     assert len(run.strands()) == 2 * 3 + 1
     assert len(run.changes) == 4 + 1
+    highest = max(step.end[2] for step in run.steps if step.lays)
+    assert run.steps[-1].end[2] == pytest.approx(highest + printed.machine.process.tool_lift)
     assert {step.kind for step in run.steps if step.lays} >= {*PART, "Wipe tower", "Skirt/Brim"}
 
 
