@@ -4,6 +4,7 @@ It knows the words of four firmwares from their documents and nothing of who wro
 that a firmware does not know is an error.
 """
 
+import math
 import re
 from dataclasses import dataclass, field
 
@@ -23,6 +24,7 @@ KNOWN = {
 }
 LONGEST = {"klipper": 50.0}
 """max_extrude_only_distance of Klipper; EXTRUDE_MAXLENGTH of Marlin is 200."""
+_VALUE = re.compile(r"[A-Z][-+.\d]+")
 COLD = 170.0
 """EXTRUDE_MINTEMP of Marlin."""
 
@@ -45,16 +47,12 @@ class Step:
     number: int
     changed: int
     cut: bool
+    length: float = field(init=False)
+    lays: bool = field(init=False)
 
-    @property
-    def length(self) -> float:
-        """Way of the nozzle, mm."""
-        return float(np.linalg.norm(self.end - self.start))
-
-    @property
-    def lays(self) -> bool:
-        """Whether it lays something on its way."""
-        return not self.rapid and self.length > 0.0
+    def __post_init__(self) -> None:
+        self.length = math.dist(self.start.tolist(), self.end.tolist())
+        self.lays = not self.rapid and self.length > 0.0
 
 
 @dataclass
@@ -113,7 +111,7 @@ def follow(text: str, machine: str, offset=(0.0, 0.0, 0.0)) -> Run:
         if word not in known:
             run.wrong.append(f"no {machine} knows {raw}")
             continue
-        given = {w[0]: float(w[1:]) for w in words[1:] if re.fullmatch(r"[A-Z][-+.\d]+", w)}
+        given = {w[0]: float(w[1:]) for w in words[1:] if _VALUE.fullmatch(w)}
         if word in ("G0", "G1"):
             if set(given) - set("XYZFE") - (set("UV") if machine == "aura_like" else set()):
                 run.wrong.append(f"no {machine} knows {raw}")
