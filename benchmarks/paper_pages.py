@@ -41,7 +41,8 @@ def page(paper: str, folder: Path) -> str:
         text = file.read_text(encoding="utf-8").strip()
         if name == "report":
             text = re.split(r"^## Figures$", text, flags=re.M)[0]
-            text = re.sub(r"\A# .*\n+(Written by .*\n+)?", "", text)
+            text = re.sub(r"\A# .*\n+(Written by `.*?`\. ?)?", "", text)
+            text = re.sub(r"^Study .* s, figures .* s\.\n+", "", text, flags=re.M)
         else:
             text = f"## {HEADINGS[name]}\n\n{text}"
         parts.append(text.strip())
