@@ -32,6 +32,9 @@ PARTS = {"loop": "isocurve", "bridge": "svt", "bracket": "svt", "plate": "svt"}
 LAYERS = {("bridge", "aura_like"): 1}
 """Fewer layers than the case has: 1 mm has no room for two of strands .2 mm high that cross."""
 
+_BENT = 1.1
+"""How much faster a strand may be in a turn than the check's own radius allows (`Job.bent`)."""
+
 
 @dataclass(frozen=True)
 class Part:
@@ -79,7 +82,7 @@ def job_of(part: Part, machine_name: str) -> tuple[Job, dict[str, float]]:
     written = time.process_time()
     strands, section = section_on_bed(paths, mesh, case.build, machine.gcode.bed)
     job = Job(
-        machine_name, machine, printed, text, strands, section, float(mesh.volumes.sum()), 1.05
+        machine_name, machine, printed, text, strands, section, float(mesh.volumes.sum()), _BENT
     )
     followed = time.process_time()
     spent = {"plan": planned - began, "write": written - planned, "follow": followed - written}
