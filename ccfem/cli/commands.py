@@ -13,6 +13,7 @@ import typer
 from ccfem.cli.arguments import drawings_of, names_of, parameters_by_strategy, path_of
 from ccfem.cli.in_python import say_in_python
 from ccfem.cli.machines import MachineName, SetMachine, machine_choice, machines
+from ccfem.cli.optimising import optimise
 from ccfem.cli.options import (
     Backend,
     Calibration,
@@ -383,6 +384,7 @@ def calibrate(
     fit_material(read, unreinforced, reinforced, strategy, parameters, options, out)
 
 
+app.command()(optimise)
 app.command()(reproduce)
 app.command()(study)
 say_in_python(app)
