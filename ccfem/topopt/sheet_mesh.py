@@ -7,25 +7,11 @@ import shapely
 from scipy.spatial import cKDTree
 
 from ccfem.arrays import FloatArray, IntArray
+from ccfem.geometry.symmetry import mirror_image, mirrors_of
 from ccfem.mesh.tet_mesh import TetMesh
 from ccfem.meshing.planform import triangulate
 
-__all__ = ["mirrors_of", "sheet_mesh"]
-
-_ALIKE = 1e-4
-"""Share of its area by which a symmetric planform may differ from its mirror image."""
-
-
-def mirrors_of(planform: Any) -> str:
-    """Name the axes, "", "x", "y" or "xy", along which a planform is its own mirror image."""
-    left, bottom, right, top = planform.bounds
-    found = ""
-    for axis, factor in (("x", (-1.0, 1.0)), ("y", (1.0, -1.0))):
-        middle = (0.5 * (left + right), 0.5 * (bottom + top))
-        image = shapely.transform(planform, lambda p, f=factor, m=middle: m + (p - m) * f)
-        if shapely.symmetric_difference(planform, image).area <= _ALIKE * planform.area:
-            found += axis
-    return found
+__all__ = ["sheet_mesh"]
 
 
 def sheet_mesh(
@@ -55,20 +41,19 @@ def sheet_mesh(
     part = shapely.box(
         left,
         bottom,
-        middle[0] if "x" in mirrors else right,
-        middle[1] if "y" in mirrors else top,
+        middle[0] if 0 in mirrors else right,
+        middle[1] if 1 in mirrors else top,
     )
     quarter = shapely.intersection(planform, part) if mirrors else planform
     if quarter.geom_type != "Polygon":
-        mirrors, quarter = "", planform
+        mirrors, quarter = (), planform
     folded = keep.copy()
-    axes = ["xy".index(each) for each in mirrors]
-    for axis in axes:
+    for axis in mirrors:
         folded[:, axis] = middle[axis] - np.abs(folded[:, axis] - middle[axis])
     points, triangles = triangulate(quarter, edge_length, folded)
     rank = np.arange(len(points))
-    for axis in axes:
-        points, triangles, rank = _mirrored(points, triangles, rank, axis, middle)
+    for axis in mirrors:
+        points, triangles, rank = _mirrored(points, triangles, rank, planform, axis)
     n = len(points)
     # The diagonal on a side rises from the end of the higher rank: mirror images match.
     rising = np.take_along_axis(triangles, np.argsort(rank[triangles], axis=1), axis=1)
@@ -82,11 +67,10 @@ def sheet_mesh(
 
 
 def _mirrored(
-    points: FloatArray, triangles: IntArray, rank: IntArray, axis: int, middle: FloatArray
+    points: FloatArray, triangles: IntArray, rank: IntArray, planform: Any, axis: int
 ) -> tuple[FloatArray, IntArray, IntArray]:
     """Mesh with its mirror image beside it; points on the mirror are shared."""
-    image = points.copy()
-    image[:, axis] = 2.0 * middle[axis] - image[:, axis]
+    image = mirror_image(points, planform, axis)
     size = float(np.ptp(points, axis=0).max())
     away, nearest = cKDTree(points).query(image)
     shared = away <= 1e-9 * size

@@ -12,6 +12,7 @@ from ccfem.elasticity.load_kinds import Load, patches_in_use, patches_of
 from ccfem.elasticity.problem import PointForce, Problem, Support
 from ccfem.elasticity.support_kinds import AnySupport
 from ccfem.errors import InputError
+from ccfem.geometry.symmetry import mirrors_of
 from ccfem.mesh.patches import Plane
 from ccfem.mesh.tet_mesh import TetMesh
 from ccfem.meshing.prisms import extrude
@@ -19,7 +20,7 @@ from ccfem.topopt.design import Design
 from ccfem.topopt.flat_part import FlatPart
 from ccfem.topopt.material_axes import sheet
 from ccfem.topopt.outline import outline
-from ccfem.topopt.sheet_mesh import mirrors_of, sheet_mesh
+from ccfem.topopt.sheet_mesh import sheet_mesh
 
 __all__ = ["plane_stiffness", "sheet_outline", "sheet_part", "sheet_problem"]
 
@@ -141,7 +142,7 @@ def sheet_outline(design: Design, flat: FlatPart, edge_length: float, solid: Any
     nearest = NearestNDInterpolator(plane, dense)(x, y)
     image = np.where(np.isfinite(image), image, nearest).clip(0.0, 1.0)
     for axis in mirrors_of(flat.planform):
-        other = image[:, ::-1] if axis == "x" else image[::-1]
+        other = image[:, ::-1] if axis == 0 else image[::-1]
         if np.abs(image - other)[inside].mean() <= _SYMMETRIC:
             image = 0.5 * (image + other)
     domain = shapely.difference(flat.planform, void)
