@@ -54,9 +54,9 @@ class Svt:
     Members of the section are those of its medial axis. In every joint two members at a time are
     joined to a main load path, where turn, misalignment with the stress and sense of the stress
     suit best. Strands fill each main path from side to side, as many as its width asks for: where
-    it narrows they leave through its border. They cross those of other main paths in the joints and leave the section there. Links outside
-    the section join them to one path for each piece of the section. A section without members (a
-    disc, a square) is filled by concentric rings.
+    it narrows they leave through its border. They cross those of other main paths in the joints and
+    leave the section there. Links outside the section join them to one path for each piece of the
+    section. A section without members (a disc, a square) is filled by concentric rings.
 
     It is meant for frames of slim members. In parts with wide ones, as a plate with a hole, joints
     take most of the section: strands lie there side by side, or over each other, and where links
@@ -70,8 +70,8 @@ class Svt:
         parameters below up to `minimum_length`: that skips joints and leaves points over, so that
         no section is filled from them.
     spacing : float, default 1
-        Distance of neighbouring strands in fibre widths, at least 1, where the main path is wide;
-        strands are closer where it is narrow.
+        Distance of neighbouring strands in fibre widths, at least 1; nine tenths of that where the
+        width of a main path is no multiple of it.
     links : "outside" or "none", default "outside"
         Join all strands of a piece of the section to one path, or lay single strands.
     longest_inside : float, mm, default 6
