@@ -69,7 +69,7 @@ def optimise(
     element_size: float | None = None,
     radius: float | None = None,
     filter: Literal["sensitivity", "density"] = "sensitivity",
-    orientation: Literal["principal", "gradient", "fixed"] | None = None,
+    orientation: Literal["principal", "gradient", "fixed"] = "gradient",
     laminate: Sequence[float] | None = None,
     weights: Mapping[str, float] | None = None,
     keep: Sequence[str] | None = None,
@@ -98,8 +98,8 @@ def optimise(
         Of the filter; default two element sizes.
     filter, max_iterations
         As in `Simp`.
-    orientation : str, optional
-        As in `Somp`, whose default it is.
+    orientation : str, default "gradient"
+        As in `Somp`; stiffer than its default on nearly all plates, and slower.
     laminate : 4 floats, optional
         Modulus along the axis, modulus across, MPa, Poisson's ratio and shear modulus, MPa, for
         "somp"; default the part's own material where it has an axis, else that of Wang et al. 2021.
@@ -155,8 +155,7 @@ def optimise(
     own = plane_stiffness(given)
     if method == "somp":
         own = _laminate(laminate, own)
-        if orientation is not None:
-            options["orientation"] = orientation
+        options["orientation"] = orientation
     sheet, prism = sheet_problem(problem, flat, size, own)
     full = _rims(problem, flat, keep, size).union(area_of(solid))
     empty = area_of(void).difference(full)

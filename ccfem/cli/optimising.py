@@ -47,11 +47,11 @@ def optimise(
         str, typer.Option("--filter", metavar="sensitivity|density", help="What is filtered.")
     ] = "sensitivity",
     orientation: Annotated[
-        str | None,
+        str,
         typer.Option(
-            metavar="principal|gradient|fixed", help="How somp turns the axis of the laminate."
+            metavar="gradient|principal|fixed", help="How somp turns the axis of the laminate."
         ),
-    ] = None,
+    ] = "gradient",
     laminate: Annotated[
         str | None,
         typer.Option(
