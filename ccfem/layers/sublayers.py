@@ -29,6 +29,7 @@ def layers_within(
     thickest: float,
     shortest: float,
     least_area: float,
+    origin: float | None = None,
 ) -> LevelSurfaces:
     """Cut layers at every step of a field, and between them where they would be too thick.
 
@@ -45,6 +46,9 @@ def layers_within(
         Edges of the triangles shorter than this are collapsed.
     least_area : float, mm^2
         Smaller pieces are left out.
+    origin : float, optional
+        Value half a step below a layer, by default the lowest: layers that continue others have
+        theirs.
 
     Returns
     -------
@@ -53,8 +57,9 @@ def layers_within(
         triangles of which a corner would be too thick otherwise.
     """
     low, high = (float(end) for end in np.quantile(values[mesh.corners], [0.0, 1.0]))
-    count = max(int((high - low) / step), 1)
-    whole: FloatArray = low + (np.arange(count, dtype=np.float64) + 0.5) * step
+    start = low if origin is None else origin + step * np.ceil((low - origin) / step - 0.5)
+    count = max(int((high - start) / step + (0.0 if origin is None else 0.5)), 1)
+    whole: FloatArray = start + (np.arange(count, dtype=np.float64) + 0.5) * step
     raw = thickness_at_nodes(mesh, values, step)
     kept: list[tuple[float, Layer]] = []
     bubbles = specks = 0
@@ -72,7 +77,7 @@ def layers_within(
         bubbles, specks = bubbles + found.bubbles, specks + found.specks
         for layer in found.layers:
             level = float(np.median(layer.interpolate(values)))
-            number = round((level - low) / step - 0.5)
+            number = round((level - (low if origin is None else origin)) / step - 0.5)
             t = layer.local_thickness
             if halving:
                 wanted: BoolArray = t > limit
