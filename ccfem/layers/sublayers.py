@@ -17,6 +17,8 @@ from ccfem.mesh.tet_mesh import TetMesh
 
 __all__ = ["layers_within"]
 
+_OFF = 1e-3
+"""Least distance, in steps, of a layer from the ends of the field, which may be faces of cells."""
 _DEEPEST = 2
 """How often the distance of layers is halved, or doubled, at most."""
 
@@ -71,7 +73,8 @@ def layers_within(
             between = np.sort(np.add.outer(np.append(whole[0] - step, whole), odd).ravel())
             thick = np.sort(values[mesh.corners[(raw[mesh.corners] > limit).any(axis=1)]].ravel())
             reach = np.searchsorted(thick, [between - step, between + step])
-            near = (reach[0] < reach[1]) & (between > low) & (between < high)
+            within = (between > low + _OFF * step) & (between < high - _OFF * step)
+            near = (reach[0] < reach[1]) & within
             levels = np.asarray(between[near])
         found = level_surfaces(mesh, values, levels, step, shortest, least_area)
         bubbles, specks = bubbles + found.bubbles, specks + found.specks

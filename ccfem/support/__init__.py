@@ -4,6 +4,7 @@ from ccfem.support.column_mesh import ColumnMesh, column_mesh
 from ccfem.support.columns import SupportColumns, support_columns
 from ccfem.support.support_field import SupportField, support_field
 from ccfem.support.support_layers import SupportLayers, slice_with_support, support_layers
+from ccfem.support.support_paths import support_paths
 
 __all__ = [
     "ColumnMesh",
@@ -15,4 +16,5 @@ __all__ = [
     "support_columns",
     "support_field",
     "support_layers",
+    "support_paths",
 ]

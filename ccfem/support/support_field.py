@@ -14,10 +14,14 @@ import scipy.sparse as sp
 from ccfem.arrays import FloatArray, freeze
 from ccfem.elasticity.assembly import cell_gradients
 from ccfem.elasticity.direct import superlu
+from ccfem.guidance.bounded_gradient import Bounds, bounded
 from ccfem.guidance.energies import gradient_energy
 from ccfem.support.column_mesh import ColumnMesh
 
 __all__ = ["SupportField", "support_field"]
+
+_RANGE = (0.2, 6.0)
+"""Length of the gradient, in the part's, within which cells are turned up again."""
 
 
 @dataclass(frozen=True)
@@ -51,6 +55,7 @@ def support_field(
     slope: float,
     step: float,
     origin: float,
+    most_inverted: float = 0.0,
 ) -> SupportField:
     """Continue the field of a part.
 
@@ -65,6 +70,9 @@ def support_field(
         Of the value from layer to layer.
     origin : float
         Value of the lower side of a layer. The bed has this value, or one whole steps from it.
+    most_inverted : float, default 0
+        Where layers lie upside down in a larger share of the volume, the field is changed, as
+        little as it takes, until they do not, or as far as that can be done.
     """
     mesh = columns.mesh
     cells, n, m = mesh.corners, len(mesh.points), len(mesh.cells)
@@ -102,8 +110,14 @@ def support_field(
         stiff = float(lift @ (matrix @ lift))
         best = float(lift @ (fall @ target.ravel() - matrix @ without)) / max(stiff, 1e-300)
         bed = origin + step * round((best - origin) / step)
-    values = without + bed * lift
-    gradient = (difference @ values).reshape(m, 3)
-    down = gradient @ columns.up < 0.0
-    inverted = float(mesh.volumes[down].sum() / mesh.volumes.sum())
-    return SupportField(values, gradient, bed, inverted)
+    boundary = held + bed * on_bed
+
+    def found(aim: FloatArray) -> SupportField:
+        values = solved(aim, boundary)
+        gradient = (difference @ values).reshape(m, 3)
+        down = gradient @ columns.up < 0.0
+        inverted = float(mesh.volumes[down].sum() / mesh.volumes.sum())
+        return SupportField(values, gradient, bed, inverted)
+
+    bounds = Bounds(_RANGE[0] * slope, _RANGE[1] * slope, columns.up)
+    return bounded(target, bounds, found, lambda each: each.inverted <= most_inverted)

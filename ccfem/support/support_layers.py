@@ -27,11 +27,13 @@ _LIFT = 10
 _HIGHER = 1.4
 """... times this as often as it takes for none to lie upside down, so many times at most:"""
 _TIMES = 5
+_INVERTED = 5e-4
+"""Share of the volume of the support in which layers may lie upside down."""
 _RANGE = (0.57, 1.43)
 """Thickness in the support, in that of the part's layers: 0.2 to 0.5 mm for 0.35 [ditto]."""
-_SHORTEST = 0.15
+_SHORTEST = 0.3
 _LEAST_AREA = 1.0
-"""Shortest edge of the layers' triangles, in mean edges of the mesh; smallest piece, mm^2."""
+"""Shortest edge of the layers' triangles, in mean edges of the part; smallest piece, mm^2."""
 
 
 @dataclass(frozen=True)
@@ -137,8 +139,8 @@ def support_layers(
     for height in lifts if lift is None else [lift]:
         columns = column_mesh(mesh, build, angle, height, size)
         origin = float(levels[0]) - 0.5 * step
-        found = support_field(columns, field, step / nominal, step, origin)
-        if not found.inverted > 0.0:
+        found = support_field(columns, field, step / nominal, step, origin, _INVERTED)
+        if found.inverted <= _INVERTED:
             break
     else:
         raise InputError(

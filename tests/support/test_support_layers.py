@@ -6,9 +6,10 @@ import shapely
 
 from ccfem.errors import InputError
 from ccfem.layers.slicing import Planar
+from ccfem.machine import Machine
 from ccfem.mesh import box_mesh
 from ccfem.meshing import extrude
-from ccfem.support import column_mesh, support_field, support_layers
+from ccfem.support import column_mesh, support_field, support_layers, support_paths
 
 UP = (0.0, 1.0, 0.0)
 """Outlines in x and y are extruded along z and printed along y."""
@@ -83,8 +84,16 @@ def test_flat_layers_go_on_at_equal_heights(bridge):
         np.testing.assert_allclose(height, 0.25 + 0.5 * k, atol=1e-9)
     np.testing.assert_array_equal(found.before, np.arange(20))
     for layer in found.layers:
-        assert layer.areas.sum() == pytest.approx(20.0 * 6.0, rel=1e-4)
+        assert layer.areas.sum() == pytest.approx(20.0 * 6.0, rel=1e-3)
     assert found.thickness == pytest.approx(0.5, rel=1e-9)
+    # Rings of a rectangle, a width apart from half a width inside, while their sides are apart.
+    machine = Machine()
+    paths = support_paths(found, machine, spacing=1.0)
+    off = (np.arange(20) + 0.5) * machine.matrix_width
+    off = off[6.0 - 2.0 * off > machine.matrix_width]
+    round_ = (2.0 * (20.0 + 6.0 - 4.0 * off)).sum()
+    assert paths.lengths.sum() == pytest.approx(20.0 * round_, rel=0.03)  # corners are round
+    np.testing.assert_array_equal(np.unique(paths.layer), np.arange(20))
     lifted = support_layers(bridge, layers, UP, angle=0.0, lift=2.0)
     heights = [float(layer.points[:, 1].mean()) for layer in lifted.layers]
     np.testing.assert_allclose(heights, -1.75 + 0.5 * np.arange(24), atol=1e-9)
