@@ -37,9 +37,11 @@ def quantities(
         found |= {f"{part}: support, {name}": v for name, v in _support(run).items()}
         for name, figures in trades[part].items():
             found |= {f"{part}, {name}: {key}": value for key, value in figures.items()}
-        flat, ours = loads[part]["flat, z"], loads[part]["load-oriented"]
+    for part, each in loads.items():
+        flat, ours = each["flat, z"], each["load-oriented"]
         found[f"{part}: failure load over flat"] = ours[0] / flat[0]
         found[f"{part}: failure load over flat, bond strong in shear"] = ours[3] / flat[3]
+        found[f"{part}: failure load over flat, by opening"] = ours[6] / flat[6]
     found["strands: most paths"] = float(max(s.paths for s in strands.values()))
     found["strands: least coverage"] = min(s.coverage for s in strands.values())
     found["strands: least coverage, opened"] = min(s.coverage_opened for s in strands.values())
