@@ -31,8 +31,8 @@ def page(paper: str, folder: Path) -> str:
         f"# {named_papers()[paper].title}",
         sentence(paper),
         f"    ccfem reproduce {paper}",
-        "Written by `python -m benchmarks.paper_pages` from one run of that command; times are those "
-        "of its machine.",
+        "Written by `python -m benchmarks.paper_pages` from one run of that command; times are "
+        "those of its machine.",
     ]
     for name in ORDER:
         file = folder / f"{name}.md"
