@@ -35,7 +35,7 @@ class Cut:
     cell: IntArray
 
 
-def cut_at_zero(mesh: TetMesh, signed: FloatArray) -> Cut | None:
+def cut_at_zero(mesh: TetMesh, signed: FloatArray, among: IntArray | None = None) -> Cut | None:
     """Cut a mesh where a field is zero; None where it is zero nowhere.
 
     Parameters
@@ -43,10 +43,13 @@ def cut_at_zero(mesh: TetMesh, signed: FloatArray) -> Cut | None:
     mesh : TetMesh
     signed : (n,) array
         At the nodes, linear in between; nodes of value 0 become points of the surface.
+    among : (k,) int array, optional
+        Cells that may be cut, ascending; by default all.
     """
     corners = mesh.corners
-    values = signed[corners]
+    values = signed[corners if among is None else corners[among]]
     crossing = np.flatnonzero((values.min(axis=1) <= 0.0) & (values.max(axis=1) >= 0.0))
+    crossing = crossing if among is None else among[crossing]
     lines, cell = _cut_cells(corners[crossing], signed, mesh.points)
     if not len(cell):
         return None
