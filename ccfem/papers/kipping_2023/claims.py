@@ -5,6 +5,7 @@ from pathlib import Path
 
 import numpy as np
 
+from ccfem.layers.layer import Layer
 from ccfem.layers.slicing.load_oriented import LoadOriented
 from ccfem.papers.kipping_2023.chain import PAPER_SECONDS, Chain
 from ccfem.papers.kipping_2023.fiso_shapes import Strand
@@ -60,6 +61,12 @@ def _support(run: Chain) -> dict[str, float]:
     lowest = support.layers[0]
     tilt = np.degrees(np.arccos(np.clip(lowest.normals @ run.sliced.field.up, -1.0, 1.0)))
     distances = distances_below(support.layers)
+    both: list[Layer] = []
+    judged: list[bool] = []
+    for k, layer in enumerate(run.sliced.layers):
+        before = support.layers_before(k)
+        both += [*before, layer]
+        judged += [False] * len(before) + [True]
     return {
         "layers": float(len(support.layers)),
         "mm^3": support.columns.volume,
@@ -69,6 +76,7 @@ def _support(run: Chain) -> dict[str, float]:
         "inverted": support.field.inverted,
         "in range": distances.within(slicer.thinnest, slicer.thickest),
         "thickness": distances.mean,
+        "part with a layer below": distances_below(both, judged).covered,
     }
 
 
