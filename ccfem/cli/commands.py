@@ -39,6 +39,7 @@ from ccfem.cli.papers_again import reproduce
 from ccfem.cli.part_commands import add_part_commands
 from ccfem.cli.run import foreign_stress, layers_of, load, options_of, run, slicings_of
 from ccfem.cli.study_file import study
+from ccfem.cli.supporting import support
 
 __all__ = ["app"]
 
@@ -387,4 +388,5 @@ def calibrate(
 app.command()(optimise)
 app.command()(reproduce)
 app.command()(study)
+app.command()(support)
 say_in_python(app)

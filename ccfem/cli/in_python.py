@@ -22,6 +22,7 @@ CALLS = {
     "example": "ccfem.inspection.write_example(NAME)",
     "cite": "ccfem.comparison.bibtex(ccfem.comparison.cited([METHOD]))",
     "study": "ccfem.study(FILE, workers=N)",
+    "support": "ccfem.support.slice_with_support(SLICER, STRESS, BUILD)",
 }
 """Call of each command, as its help prints it."""
 
