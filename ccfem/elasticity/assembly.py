@@ -13,7 +13,7 @@ import numpy as np
 import scipy.sparse as sp
 from numba import njit
 
-from ccfem.arrays import FloatArray, IntArray, freeze
+from ccfem.arrays import FloatArray, IntArray, freeze, seen_only
 from ccfem.mesh.cell_mesh import CellMesh
 from ccfem.mesh.tet_mesh import TetMesh
 
@@ -315,7 +315,7 @@ def assemble(
     which = where.order if len(stiffness) > 1 else np.zeros_like(where.order)
     cells = mesh.cells[where.order]
     gradients, scale = np.empty((len(cells), 4, 3)), np.empty(len(cells))
-    _gradients(mesh.points, cells, gradients, scale)
+    _gradients(mesh.points, seen_only(cells), gradients, scale)
     if density is not None:
         scale *= density[where.order]
     data = np.zeros((len(where.indices), 3, 3))
