@@ -263,6 +263,15 @@ def plan(
     heights: Heights = None,
     slicing: Slicing = None,
     fibre_per_layer: Fibre = None,
+    stiffness: Annotated[
+        str | None,
+        typer.Option(
+            "--stiffness",
+            metavar="RATIO",
+            help="Lay the least fibre that makes the part so stiff: as 2.5, over the part without "
+            "fibre, or as 1200N/mm.",
+        ),
+    ] = None,
     virtual_test: VirtualTest = True,
     load_case: LoadCase = None,
     refine: Refine = False,
@@ -287,6 +296,8 @@ def plan(
     options = options_of(chosen, fibre_per_layer, virtual_test, load_case, backend)
     options["natural"] = fibre_per_layer is None
     options["print_plans"] = gcode
+    if stiffness is not None:
+        options["stiffness"] = stiffness
     options["stress"] = foreign_stress(stress, stress_unit)
     alone, suffix = (strategy,), f"-{strategy}"
     run(
