@@ -2,8 +2,8 @@
 
 Beyond the papers: the part is tested virtually with its fibre, every point of a strand is drawn to
 where the fibre is stretched more (`ccfem.strand_moves.worth`), and the strands are pushed apart
-again until they keep their distance (`ccfem.strand_moves.spacing`). A move that makes the part no
-stiffer is undone and tried again half as far. No strand is cut, joined, or led past another.
+again until they keep their distance (`ccfem.strand_moves.spacing`); and so on, in ever shorter
+steps. No strand is cut, joined, or led past another.
 """
 
 from collections.abc import Mapping, Sequence
@@ -15,7 +15,6 @@ import shapely
 from ccfem.arrays import BoolArray, FloatArray, IntArray
 from ccfem.checks import check_number
 from ccfem.elasticity.stress_field import StressField
-from ccfem.fibre_aware.prune import prune
 from ccfem.fibre_aware.smeared import SmearedPart
 from ccfem.geometry.polylines import arc_lengths, resample, sample_at, starts_segment
 from ccfem.geometry.shapes import Region
@@ -23,42 +22,30 @@ from ccfem.layers.layer import Layer
 from ccfem.machine.machine import Machine
 from ccfem.strand_moves.local_strain import LocalStrain
 from ccfem.strand_moves.smoothing import Smoothing, across
-from ccfem.strand_moves.spacing import Room, apart, crowded, pairs_of, walls_of
+from ccfem.strand_moves.spacing import Room, apart, pairs_of, walls_of
 from ccfem.strand_moves.worth import worth_of
 from ccfem.toolpaths import FIBRE, Toolpaths
-from ccfem.virtual_testing.equilibrium import Equilibrium, equilibrium
+from ccfem.virtual_testing.equilibrium import equilibrium
 from ccfem.virtual_testing.strand import Strand
 from ccfem.virtual_testing.strands import cut_strands
 
-__all__ = ["SPARE", "moved", "moved_to_length"]
-
-SPARE = 1.02
-"""Length that strands have while they are moved, over the wanted one: what they are worth is known
-better afterwards."""
+__all__ = ["moved"]
 
 _PIECE = 0.6
 """Distance of the points of a strand, in widths. They are set once: points that are set anew in
 every round cut corners, and shrink paths by half a percent each time."""
 
-_FAR, _NEAR, _SHORTER = 0.1, 0.005, 0.5
-"""Reach of the first move and of the last one worth trying, in widths: 95 % of the points move no
-further. Where a move makes the part no stiffer it is undone, and tried again half as far."""
+_FAR, _NEAR = 0.1, 0.02
+"""Reach of the first and the last move, in widths: 95 % of the points move no further."""
 
 _CHEAP = 0.1
 """Share of the fibre that is worth less than its price."""
 
-_STEPS = 4
-"""Steps of a move, with the forces anew at each, at the same strains."""
+_ONLY_APART = 3
+"""Last rounds without a force."""
 
-_SWEEPS, _MOST = 40, 3
-"""To push strands apart, a step's shares and then as often as needed, at most so many times."""
-
-_ENOUGH, _FEW = 0.985, 0.002
-"""Distance, in widths, below which strands are too near, and the share of them that is bearable: a
-move that leaves more than that, and than there were, is undone."""
-
-_SEEN = 2.0
-"""Distance from the border, in widths, from which on points look out for it."""
+_SWEEPS, _MORE_SWEEPS = 10, 40
+"""To push strands apart, in the first and in the second half of the rounds."""
 
 _CLEAR = 1.004
 """Distance of the strands, in widths."""
@@ -70,7 +57,8 @@ _TIGHT = 1.2
 """Curvature, over the machine's, from which on a turn is held: a link that is moved breaks."""
 
 _TOLERANCE = 1e-4
-"""Relative residual of the virtual tests: the error of the stiffness is its square."""
+_SAME_CELLS = 4
+"""Rounds for which the cells round a point are taken for the nearest."""
 
 
 def moved(
@@ -97,8 +85,7 @@ def moved(
     strand : Strand, optional
         Stiffness of a strand; default rho = EA/E = 4 mm^2.
     rounds : int, default 16
-        Virtual tests, of fibres in tension only, at least 0: the first tests the paths as they are,
-        each other one a move.
+        At least 0; all but the last three with a virtual test each, of fibres in tension only.
     inset : float >= 0, default 0.5
         Least distance from the boundary of the layers, in strand widths.
 
@@ -130,32 +117,6 @@ def moved(
     }
     paths = _sampled(toolpaths, machine.fibre_width)
     return _Moving(part, axial, machine, planes, paths).run(rounds)
-
-
-def moved_to_length(
-    toolpaths: Toolpaths,
-    layers: Sequence[Layer],
-    stress: StressField,
-    machine: Machine,
-    length: float,
-    strand: Strand | None = None,
-    rounds: int = 16,
-    inset: float = 0.5,
-) -> Toolpaths:
-    """Move strands as `moved` does, then take the least valuable fibre off that is too much.
-
-    Parameters
-    ----------
-    toolpaths, layers, stress, machine, strand, rounds, inset
-        As of `moved`.
-    length : float, mm
-        Largest total length of fibre that remains.
-    """
-    paths = moved(toolpaths, layers, stress, machine, strand, rounds, inset)
-    if not len(paths):
-        return paths
-    specimen = SmearedPart.of(stress, layers[0].plane.frame).specimen
-    return prune(paths, specimen, length, machine, strand, rounds=1)
 
 
 def _in_order(fibre: Toolpaths, others: Toolpaths, mask: BoolArray) -> Toolpaths:
@@ -203,65 +164,30 @@ class _Moving:
         room = Room(paths.offsets, paths.layer, paths.closed, held, _CLEAR * width, radius)
         local = LocalStrain(part.centroids @ part.frame.T, part.mesh.volumes)
         known: tuple[FloatArray, ...] = ()
-        best, stiffest, crowd = points, 0.0, np.inf
-        reach = _FAR * width
+        near: IntArray | None = None
+        forced = max(rounds - _ONLY_APART, 1)
         for k in range(rounds):
-            # Trials may leave the part: fibre outside carries nothing, and they are undone.
-            strands = cut_strands(self.at(points, height), part.mesh, most_outside=1.0)
-            found = equilibrium(
-                part.specimen, strands, self.axial, known=known, tolerance=_TOLERANCE
-            )
-            known = (found.displacement,)
-            stiffness, now = self.stiffness(found), self.crowded(points, room)
-            if stiffness > stiffest and now <= max(crowd, _FEW):
-                best, stiffest, crowd = points, stiffness, now
-                strain = part.strain(found.displacement)
-            else:
-                reach *= _SHORTER
-            if reach < _NEAR * width or k == rounds - 1:
-                break
-            points = best
-            walls = walls_of(points, layer, self.planes, _SEEN * width)
-            pairs = pairs_of(points, room)
-            for _ in range(_STEPS):
-                force = self.force(points, height, starts, local, strain)
-                way = smoothing(across(points, paths.offsets, force))
-                points = points + _stride(way, reach / _STEPS)
-                points = apart(points, room, pairs, walls, _SWEEPS // _STEPS)
-            pairs = pairs_of(points, room)
-            for _ in range(_MOST):
-                points = apart(points, room, pairs, walls, _SWEEPS)
-                if self.crowded(points, room, pairs) < _FEW:
-                    break
-        return self.at(best, height)
-
-    def crowded(self, points: FloatArray, room: Room, pairs: IntArray | None = None) -> float:
-        """Share of the points that lie too near to another strand."""
-        pairs = pairs_of(points, room) if pairs is None else pairs
-        return crowded(points, room, pairs, _ENOUGH * self.machine.fibre_width)
-
-    def stiffness(self, found: Equilibrium) -> float:
-        """Stiffness of the part, N/mm."""
-        u = found.displacement
-        energy = 0.5 * float(u.reshape(-1) @ (found.matrix @ u.reshape(-1)))
-        return self.part.specimen.stiffness(u, energy)
-
-    def force(
-        self,
-        points: FloatArray,
-        height: FloatArray,
-        starts: IntArray,
-        local: LocalStrain,
-        strain: FloatArray,
-    ) -> FloatArray:
-        """Find the forces (P, 2) at the strains of the cells (m, 3)."""
-        middle = 0.5 * (points[starts] + points[starts + 1])
-        place = np.column_stack([middle, height[starts]])
-        there = local.at(place, local.near(place), strain)
-        length = np.linalg.norm(points[starts + 1] - points[starts], axis=1)
-        value = worth_of(points, starts, there, 0.0).value / np.maximum(length, 1e-300)
-        price = np.quantile(value, _CHEAP, weights=length, method="inverted_cdf")
-        return worth_of(points, starts, there, float(price)).force
+            if k < forced:
+                strands = cut_strands(self.at(points, height), part.mesh)
+                found = equilibrium(
+                    part.specimen, strands, self.axial, known=known, tolerance=_TOLERANCE
+                )
+                known = (found.displacement,)
+                middle = 0.5 * (points[starts] + points[starts + 1])
+                place = np.column_stack([middle, height[starts]])
+                if near is None or k % _SAME_CELLS == 0:
+                    near = local.near(place)
+                there = local.at(place, near, part.strain(found.displacement))
+                length = np.linalg.norm(points[starts + 1] - points[starts], axis=1)
+                value = worth_of(points, starts, there, 0.0).value / np.maximum(length, 1e-300)
+                price = np.quantile(value, _CHEAP, weights=length, method="inverted_cdf")
+                force = worth_of(points, starts, there, float(price)).force
+                reach = width * (_FAR + (_NEAR - _FAR) * k / max(forced - 1, 1))
+                points = points + _stride(smoothing(across(points, paths.offsets, force)), reach)
+            walls = walls_of(points, layer, self.planes, 2.0 * width)
+            sweeps = _MORE_SWEEPS if 2 * k >= rounds else _SWEEPS
+            points = apart(points, room, pairs_of(points, room), walls, sweeps)
+        return self.at(points, height)
 
     def at(self, points: FloatArray, height: FloatArray) -> Toolpaths:
         """Paths whose points are at places (P, 2) in the plane."""

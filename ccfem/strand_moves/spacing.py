@@ -17,7 +17,7 @@ from ccfem.arrays import BoolArray, FloatArray, IntArray
 from ccfem.geometry.polylines import arc_lengths
 from ccfem.geometry.shapes import Region
 
-__all__ = ["Room", "Walls", "apart", "crowded", "pairs_of", "walls_of"]
+__all__ = ["Room", "Walls", "apart", "pairs_of", "walls_of"]
 
 _EASED = 1.2
 """Over-relaxation."""
@@ -141,13 +141,6 @@ def walls_of(
     return Walls(np.concatenate(number), np.concatenate(base), np.concatenate(inward))
 
 
-def crowded(points: FloatArray, room: Room, pairs: IntArray, width: float) -> float:
-    """Share of the points (P, 2) that lie nearer than a width, mm, to another strand."""
-    near = np.zeros(len(points), dtype=bool)
-    _mark(points, pairs, width, near)
-    return float((near & ~room.held).mean())
-
-
 def apart(points: FloatArray, room: Room, pairs: IntArray, walls: Walls, sweeps: int) -> FloatArray:
     """Points (P, 2) pushed apart in a number of sweeps."""
     points = points.copy()
@@ -198,36 +191,20 @@ def _push(points, free, pairs, width, move, count):  # type: ignore[no-untyped-d
 
 
 @njit(cache=True, nogil=True)
-def _mark(points, pairs, width, near):  # type: ignore[no-untyped-def]  # pragma: no cover
-    """Mark the points nearer than a width to the piece that they are paired with."""
-    for p in range(len(pairs)):
-        i, j = pairs[p, 0], pairs[p, 1]
-        dx, dy = points[j + 1, 0] - points[j, 0], points[j + 1, 1] - points[j, 1]
-        x, y = points[i, 0] - points[j, 0], points[i, 1] - points[j, 1]
-        share = (x * dx + y * dy) / max(dx * dx + dy * dy, 1e-24)
-        share = min(max(share, 0.0), 1.0)
-        x, y = x - share * dx, y - share * dy
-        near[i] |= x * x + y * y < width * width
-
-
-@njit(cache=True, nogil=True)
 def _straighten(points, free, offsets, most, move, count):  # type: ignore[no-untyped-def]  # pragma: no cover
-    """Add what keeps three points in a row from turning by more than the most, 1/mm.
-
-    Each second point is taken: what only the next ones see is how evenly the points lie.
-    """
+    """Add what keeps three points in a row from turning by more than the most, 1/mm."""
     for k in range(len(offsets) - 1):
-        for i in range(offsets[k] + 2, offsets[k + 1] - 2):
-            x = points[i - 2, 0] - 2.0 * points[i, 0] + points[i + 2, 0]
-            y = points[i - 2, 1] - 2.0 * points[i, 1] + points[i + 2, 1]
-            dx, dy = points[i + 2, 0] - points[i - 2, 0], points[i + 2, 1] - points[i - 2, 1]
+        for i in range(offsets[k] + 1, offsets[k + 1] - 1):
+            x = points[i - 1, 0] - 2.0 * points[i, 0] + points[i + 1, 0]
+            y = points[i - 1, 1] - 2.0 * points[i, 1] + points[i + 1, 1]
+            dx, dy = points[i + 1, 0] - points[i - 1, 0], points[i + 1, 1] - points[i - 1, 1]
             size = np.sqrt(x * x + y * y)
             limit = 0.25 * most * (dx * dx + dy * dy)
             if size <= limit:
                 continue
             factor = (1.0 - limit / size) / 6.0
             for a in range(3):
-                j = i + 2 * (a - 1)
+                j = i - 1 + a
                 weight = 2.0 * factor * free[j] if a == 1 else -factor * free[j]
                 move[j, 0] += weight * x
                 move[j, 1] += weight * y

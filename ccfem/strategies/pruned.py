@@ -19,9 +19,7 @@ from ccfem.machine.machine import Machine
 from ccfem.planning.equal_fibre import plan_to_length
 from ccfem.planning.strategy import Amount, LayerPlanner, Strategy
 from ccfem.planning.whole_part import WholePart, full_length
-from ccfem.strand_moves import SPARE, moved_to_length
 from ccfem.strategies import create
-from ccfem.toolpaths import Toolpaths
 from ccfem.virtual_testing.specimen import Specimen
 from ccfem.virtual_testing.strand import RHO, Strand
 
@@ -56,9 +54,6 @@ class Pruned:
         Virtual tests; each takes off half of the excess, the last one all of it.
     rho : float, mm^2, default 4
         Axial stiffness of a strand over Young's modulus of the matrix.
-    moves : int, default 0
-        Rounds in which the strands that are left are moved sideways to where they are stretched
-        more (`ccfem.strand_moves`). Strands of strategies that let them cross stay.
     """
 
     of: str = "isocurve"
@@ -67,7 +62,6 @@ class Pruned:
     overfill: float = 1.25
     rounds: int = 2
     rho: float = RHO
-    moves: int = 0
 
     amount: ClassVar[Amount] = Amount("coverage", most=0.9, least=0.1)
     flat_layers_only: ClassVar[bool] = True
@@ -81,7 +75,6 @@ class Pruned:
         check_fields(self, "coverage", above=0.0, at_most=1.0)
         check_fields(self, "overfill", "rounds", at_least=1)
         check_fields(self, "rho", above=0.0, unit="mm^2")
-        check_fields(self, "moves", at_least=0)
 
     def _planner(self) -> Strategy:
         """Strategy that plans, with its parameters."""
@@ -132,25 +125,9 @@ class Pruned:
         for length in lengths:
             kept = paths
             if len(paths):
-                kept = self._kept(paths, layers, stress, machine, length * len(layers))
+                part, strand = Specimen.of(solved(stress, "pruned")), Strand(self.rho)
+                kept = prune(paths, part, length * len(layers), machine, strand, self.rounds)
             coverage = length / full
             overfill = max(planned / full / coverage, 1.0)
             found.append((replace(self, coverage=coverage, overfill=overfill), WholePart(kept)))
         return found
-
-    def _kept(
-        self,
-        paths: Toolpaths,
-        layers: Sequence[Layer],
-        stress: PartStress,
-        machine: Machine,
-        length: float,
-    ) -> Toolpaths:
-        """Fibre that helps most, mm in all, moved to where it helps more."""
-        field, strand = solved(stress, "pruned"), Strand(self.rho)
-        planner = self._planner()
-        if not self.moves or getattr(planner, "crosses", False):
-            return prune(paths, Specimen.of(field), length, machine, strand, self.rounds)
-        spare = prune(paths, Specimen.of(field), SPARE * length, machine, strand, self.rounds)
-        inset = getattr(planner, "inset", 0.5)
-        return moved_to_length(spare, layers, field, machine, length, strand, self.moves, inset)

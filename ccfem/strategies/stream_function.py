@@ -37,10 +37,9 @@ from ccfem.linking.finishing import keep_off_border, linked_paths
 from ccfem.machine.machine import Machine
 from ccfem.planning.strategy import Amount, LayerPlanner
 from ccfem.planning.whole_part import WholePart, full_length
-from ccfem.strand_moves import SPARE, moved_to_length
 from ccfem.toolpaths import Toolpaths
 from ccfem.virtual_testing.bars import bars
-from ccfem.virtual_testing.strand import RHO, Strand
+from ccfem.virtual_testing.strand import RHO
 from ccfem.virtual_testing.strands import cut_strands
 
 __all__ = ["StreamFunction"]
@@ -107,9 +106,6 @@ class StreamFunction:
         Least distance of strands from the boundary, in strand widths. 0.5 keeps them in, and their
         ends still meet the links along the boundary; at 0 they may run along it with half of their
         width outside.
-    moves : int, default 0
-        Rounds in which the finished strands are moved sideways to where they are stretched more
-        (`ccfem.strand_moves`).
     """
 
     coverage: float = 0.45
@@ -122,7 +118,6 @@ class StreamFunction:
     phases: int = 5
     link_limit: float = 10.0
     inset: float = 0.5
-    moves: int = 0
 
     amount: ClassVar[Amount] = Amount("coverage", most=0.85, least=0.1)
     flat_layers_only: ClassVar[bool] = True
@@ -137,7 +132,7 @@ class StreamFunction:
         check_fields(self, "rho", above=0.0, unit="mm^2")
         check_fields(self, "grid", above=0.0, unit="fibre widths")
         check_fields(self, "cap", above=0.0, at_most=100.0)
-        check_fields(self, "groups", "link_limit", "inset", "moves", at_least=0)
+        check_fields(self, "groups", "link_limit", "inset", at_least=0)
 
     def natural_length(self, layers: Sequence[Layer], machine: Machine) -> float:
         """Length that the coverage asks for, mm per layer."""
@@ -210,15 +205,7 @@ class StreamFunction:
         field = solved(stress, "stream_function")
         problem, group, found = self.designed(field, layers, machine)
         extraction = _Extraction(self, problem, found, field, machine)
-        wanted = [length * len(layers) for length in lengths]
-        if not self.moves:
-            return extraction.plan(layers, group, wanted)
-        drawn = extraction.plan(layers, group, [SPARE * length for length in wanted])
-        strand = Strand(self.rho)
-        return [
-            moved_to_length(paths, layers, field, machine, length, strand, self.moves, self.inset)
-            for paths, length in zip(drawn, wanted, strict=True)
-        ]
+        return extraction.plan(layers, group, [length * len(layers) for length in lengths])
 
     def designed(
         self, stress: StressField, layers: Sequence[Layer], machine: Machine

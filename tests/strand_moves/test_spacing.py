@@ -70,7 +70,6 @@ def test_turns_get_as_wide_as_the_radius():
     # A ripple of amplitude a and wave number k is bent by a k^2 at most: 0.55 / mm here.
     tight = np.column_stack([X, 0.3 * np.cos(1.35 * X)])
     (moved,) = settled([tight], room_of(1), sweeps=300)
-    moved = moved[::2]  # about a width apart, as curvature is judged
     before, after = np.diff(moved[:-1], axis=0), np.diff(moved[1:], axis=0)
     turn = np.abs(before[:, 0] * after[:, 1] - before[:, 1] * after[:, 0])
     step = np.linalg.norm(before, axis=1) * np.linalg.norm(after, axis=1)
