@@ -37,6 +37,7 @@ if TYPE_CHECKING:
     from ccfem.inspection.part_check import check
     from ccfem.layers.slicing import slice
     from ccfem.machine import Machine
+    from ccfem.papers.reproduce import reproduce
     from ccfem.planning import plan
     from ccfem.studies import Study, study
     from ccfem.virtual_testing import virtual_test
@@ -55,6 +56,7 @@ __all__ = [
     "faces",
     "plan",
     "read",
+    "reproduce",
     "save",
     "slice",
     "solve",
@@ -79,6 +81,7 @@ _HOMES = {
     "faces": "inspection",
     "plan": "planning",
     "read": "cases",
+    "reproduce": "papers.reproduce",
     "save": "comparison",
     "slice": "layers.slicing",
     "solve": "elasticity",

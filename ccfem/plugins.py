@@ -11,19 +11,26 @@ import inspect
 import pkgutil
 import re
 from collections.abc import Mapping
-from importlib.metadata import entry_points
+from functools import cache
+from importlib.metadata import EntryPoint, entry_points
 from typing import Any
 
 from ccfem.checks import check_known
 from ccfem.errors import InputError, known_names
 from ccfem.io.toml import from_table
 
-__all__ = ["by_class", "class_name", "create", "found"]
+__all__ = ["by_class", "class_name", "create", "entries", "found"]
 
 
 def class_name(module: str) -> str:
     """Name of the class that a module of this name holds."""
     return module.title().replace("_", "")
+
+
+@cache
+def entries(group: str) -> tuple[EntryPoint, ...]:
+    """Entry points of a group: read once, since all installed packages are asked."""
+    return tuple(entry_points(group=group))
 
 
 def found(package: str, group: str) -> dict[str, Any]:
@@ -32,7 +39,7 @@ def found(package: str, group: str) -> dict[str, Any]:
     for info in pkgutil.iter_modules(importlib.import_module(package).__path__):
         module = importlib.import_module(f"{package}.{info.name}")
         members[info.name] = getattr(module, class_name(info.name))
-    for entry in entry_points(group=group):
+    for entry in entries(group):
         members[entry.name] = entry.load()
     return members
 

@@ -99,7 +99,10 @@ def test_a_comparison_draws_layers_and_fronts(compared):
         compared.plot_layer(5)
     for over in ("fibre_length", "print_time_nearest", "first_failure_load"):
         (axes,) = compared.pareto(over).axes
-        assert len(axes.lines) == 3
+        front, points = axes.lines, axes.collections[0].get_offsets()
+        assert len(front) == 1
+        table = compared.frame.set_index("strategy").loc[[run.name for run in compared.runs]]
+        np.testing.assert_allclose(points, table[[over, "stiffness"]])
     with pytest.raises(InputError, match="fronts are drawn over fibre_length"):
         compared.pareto("taste")
     assert list(pictures(compared._repr_html_()))

@@ -18,6 +18,7 @@ from ccfem.cases.part_tables import RULES
 from ccfem.cli.commands import app
 from ccfem.evaluation import COLUMNS
 from ccfem.machine import Machine, machine_from
+from ccfem.papers.reproduce import named_papers
 from ccfem.virtual_testing.force_displacement import read_curve
 
 ROOT = Path(__file__).parents[1]
@@ -49,6 +50,17 @@ def test_python_of_a_page_runs(page, capsys, monkeypatch, tmp_path):
     for block in fenced(page, "python"):
         exec(compile(block, str(page), "exec"), space)
     assert capsys.readouterr().out
+
+
+def test_every_paper_has_a_page_with_all_its_claims():
+    """Pages are written by `python -m benchmarks.paper_pages`: a new claim asks for a new run."""
+    for paper in named_papers():
+        page = (ROOT / "docs" / "papers" / f"{paper}.md").read_text()
+        claims = (ROOT / "ccfem" / "papers" / paper / "expected.toml").read_text()
+        for claim in tomllib.loads(claims)["claim"]:
+            assert f"| {claim['id']} {claim['text']} |" in page, (paper, claim["id"])
+            known = [f"| {check['quantity']} | {check['paper']} |" for check in claim["checks"]]
+            assert any(row in page for row in known), (paper, claim["id"])
 
 
 def test_the_curve_of_the_calibration_page_reads(tmp_path):

@@ -3,7 +3,6 @@
 import importlib
 import pkgutil
 from collections.abc import Callable, Mapping
-from importlib.metadata import entry_points
 from typing import Any, get_type_hints
 
 from ccfem import plugins
@@ -26,7 +25,7 @@ def named_cases() -> Mapping[str, Callable[..., Case]]:
         make = getattr(module, info.name, None)
         if callable(make) and get_type_hints(make).get("return") is Case:
             found[info.name] = make
-    for entry in entry_points(group="ccfem.cases"):
+    for entry in plugins.entries("ccfem.cases"):
         found[entry.name] = entry.load()
     return found
 

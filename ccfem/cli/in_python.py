@@ -16,7 +16,7 @@ CALLS = {
     "plan": "ccfem.compare(CASE, [S], natural=True), or ccfem.plan(STRATEGY, LAYERS, STRESS)",
     "solve": "ccfem.solve(CASE.problem)",
     "calibrate": "ccfem.calibrate(PROBLEM, CURVE)",
-    "reproduce": "ccfem.papers.reproduce.reproduce(PAPER, PART)",
+    "reproduce": "ccfem.reproduce(PAPER, PART)",
     "new": "ccfem.inspection.new_part(BODY)",
     "example": "ccfem.inspection.write_example(NAME)",
     "cite": "ccfem.comparison.bibtex(ccfem.comparison.cited([METHOD]))",

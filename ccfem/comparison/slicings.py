@@ -2,10 +2,12 @@
 
 from collections.abc import Mapping
 from dataclasses import dataclass, replace
+from pathlib import Path
 from typing import TYPE_CHECKING
 
 from ccfem.arrays import freeze
 from ccfem.cases.case import Case
+from ccfem.checks import check_known
 from ccfem.comparison.ranking import ranking
 from ccfem.comparison.remarks import remarks
 from ccfem.comparison.result import Comparison
@@ -13,10 +15,13 @@ from ccfem.comparison.runs import InAll, Run, Wanted
 from ccfem.comparison.summary import SUMMARY_OF_SLICINGS, summary_html, summary_text
 from ccfem.comparison.table import frame
 from ccfem.comparison.verdict import verdict
+from ccfem.comparison.views import front_picture
 from ccfem.elasticity.stress_field import StressField
+from ccfem.plot.scenes import View
 
 if TYPE_CHECKING:
     import pandas as pd
+    from matplotlib.figure import Figure
 
 __all__ = ["SlicingComparison"]
 
@@ -62,6 +67,39 @@ class SlicingComparison:
 
     def _repr_html_(self) -> str:
         return summary_html(self.ranking, self.verdict, SUMMARY_OF_SLICINGS)
+
+    def pareto(self, over: str = "first_failure_load") -> "Figure":
+        """Draw stiffness over another index, and the runs that no other printable one dominates.
+
+        The paths of one slicing are drawn by its own comparison: ``.slicings[name].plot()``.
+
+        Parameters
+        ----------
+        over : {"fibre_length", "print_time_nearest", "first_failure_load"}
+        """
+        return front_picture(self.succeeded, over)
+
+    def show(self, run: str | None = None, picture: str | Path | None = None) -> View | None:
+        """Show the paths of one run in the part, in a window, a notebook, or as a picture.
+
+        Parameters
+        ----------
+        run : str, optional
+            As ``"zigzag on planar:z"``; by default the best one.
+        picture : path, optional
+            Write the view to a file (.png) instead.
+        """
+        slicings = {
+            f"{one.name} on {name}": (comparison, one.name)
+            for name, comparison in self.slicings.items()
+            for one in comparison.succeeded
+            if len(one.toolpaths)
+        }
+        best = next((one.name for one in self.ranking if one.name in slicings), "")
+        name = best if run is None else run
+        check_known("run with paths", name, slicings)
+        comparison, strategy = slicings[name]
+        return comparison.show(strategy, picture)
 
     @property
     def wanted(self) -> Wanted:

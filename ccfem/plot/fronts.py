@@ -54,19 +54,28 @@ def front_figure(
 
     wide = max(min(columns, len(panels)), 1)
     tall = -(-max(len(panels), 1) // wide)
-    figure = Figure(figsize=(4.4 * wide, 3.4 * tall + 0.5), dpi=100.0, layout="constrained")
+    width, height = 4.4 * wide, 3.4 * tall + 0.5
+    figure = Figure(figsize=(width, height), dpi=100.0)
     FigureCanvasAgg(figure)
+    figure.subplots_adjust(  # in inches: room for labels and the legend
+        left=0.62 / width, right=1.0 - 0.12 / width, bottom=0.95 / height, top=1.0 - 0.3 / height,
+        wspace=0.7 / 3.6, hspace=0.8 / 2.6,
+    )  # fmt: skip
     names = list(dict.fromkeys(each.name for points in panels.values() for each in points))
     colours = palette(names)
     for number, (heading, points) in enumerate(panels.items()):
         axes = figure.add_subplot(tall, wide, number + 1)
         best = sorted((p.x, p.y) for p in points if p.on_front)
         axes.plot([x for x, _ in best], [y for _, y in best], color=OUTLINE, lw=1.0, zorder=1.0)
+        axes.scatter(
+            [p.x for p in points],
+            [p.y for p in points],
+            [36.0 if p.on_front else 16.0 for p in points],
+            facecolors=[colours[p.name] if p.printable else "white" for p in points],
+            edgecolors=[colours[p.name] for p in points],
+            zorder=2.0,
+        )
         for p in points:
-            colour = colours[p.name]
-            face = colour if p.printable else "white"
-            size = 6.0 if p.on_front else 4.0
-            axes.plot([p.x], [p.y], "o", color=colour, mfc=face, ms=size, zorder=2.0)
             if p.on_front and p.label:
                 axes.annotate(
                     p.label, (p.x, p.y), (4, -9), textcoords="offset points", size=6.5, color=INK
@@ -84,7 +93,7 @@ def front_figure(
     if marks:
         figure.legend(
             handles=marks,
-            loc="outside lower center",
+            loc="lower center",
             ncols=min(len(marks), 2 * wide + 1),
             frameon=False,
             fontsize=8,

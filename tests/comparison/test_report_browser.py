@@ -131,6 +131,10 @@ def test_a_phone_cuts_nothing(page):
     over = """[...document.querySelectorAll("td, th, p, pre, li, dd, label, select, canvas")]
         .filter((each) => each.getBoundingClientRect().right > 390.5 && each.offsetParent)
         .map((each) => each.outerHTML.slice(0, 80))"""
+    for _ in range(100):  # plotly draws the scenes anew a moment after the page narrows
+        if not page.evaluate(over):
+            break
+        page.wait_for_timeout(100)
     assert page.evaluate(over) == []
     assert page.locator(".sorter select").is_visible()
     assert page.said == []

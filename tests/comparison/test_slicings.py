@@ -5,6 +5,7 @@ import re
 from dataclasses import replace
 from pathlib import Path
 
+import numpy as np
 import pandas as pd
 import pytest
 
@@ -117,6 +118,18 @@ def test_a_run_that_cannot_be_printed_stands_below_all_that_can(compared):
     assert best in broken
     assert [run.name for run in worse.ranking][-len(broken) :] == broken
     assert best in worse.verdict.partition("Not printable as planned: ")[2]
+
+
+def test_fronts_and_views_name_strategy_and_slicing(compared, tmp_path):
+    (axes,) = compared.pareto().axes
+    table = compared.frame
+    points = sorted(axes.collections[0].get_offsets().tolist())
+    expected = table[["first_failure_load", "stiffness"]].dropna().values.tolist()
+    np.testing.assert_allclose(points, sorted(expected))
+    compared.show("zigzag on y", tmp_path / "run.png")
+    assert (tmp_path / "run.png").stat().st_size > 5000
+    with pytest.raises(InputError, match="no run with paths named 'zigzag'"):
+        compared.show("zigzag")
 
 
 def test_files_hold_every_run_and_one_report(compared, tmp_path):

@@ -6,6 +6,8 @@ import pytest
 from ccfem.errors import InputError
 from ccfem.evaluation.sensitivity import OffAxis
 from ccfem.materials import named_material
+from ccfem.papers.plocher_2022.benchmark_figures import layup_moduli
+from ccfem.papers.plocher_2022.plane_study import reduced_stiffness
 from ccfem.papers.plocher_2022.sensitivity import ANGLES, Sensitivity
 
 
@@ -27,3 +29,18 @@ def test_curves_that_are_none_are_refused():
         Sensitivity(np.array([5.0, 90.0]), np.ones(2))
     with pytest.raises(InputError, match="energies above 0"):
         Sensitivity(np.array([0.0, 90.0]), np.array([1.0, 0.0]))
+
+
+def test_modulus_of_layers():
+    angle = np.linspace(0.0, np.pi, 37)
+    one = layup_moduli(angle, (0.0,), "c_fram")
+    np.testing.assert_allclose(one, 1.0 / OffAxis(named_material("c_fram")).compliance(angle))
+    turned = layup_moduli(angle, (30.0,), "c_fram")
+    np.testing.assert_allclose(turned[6:], one[:-6], rtol=1e-9)  # 30 degrees are six steps
+    # Equal layers at right angles, in closed form: A11 - A12^2 / A22 (Jones 1999, section 4.2).
+    stiff = reduced_stiffness(named_material("c_fram"))
+    along, across = 0.5 * (stiff[0, 0] + stiff[1, 1]), stiff[0, 1]
+    expected = along - across**2 / along
+    crossed = layup_moduli(angle, (0.0, 90.0), "c_fram")
+    np.testing.assert_allclose(crossed[[0, 18, 36]], expected)
+    np.testing.assert_allclose(layup_moduli(angle, (45.0, -45.0), "c_fram")[[9, 27]], expected)

@@ -24,7 +24,7 @@ def quantities(study: Mapping[str, CaseStudy]) -> dict[str, float]:
     found: dict[str, float] = {}
     for name, case in study.items():
         have = set(case.patterns)
-        for rule in (_agreement, _energy, _printing, _sensitivity, _mixed, _ranks):
+        for rule in (_agreement, _energy, _stress, _printing, _sensitivity, _mixed, _ranks):
             found |= rule(case, name, have)
     return found
 
@@ -71,6 +71,16 @@ def _energy(case: CaseStudy, name: str, have: set[str]) -> dict[str, float]:
     return found
 
 
+def _stress(case: CaseStudy, name: str, have: set[str]) -> dict[str, float]:
+    best = case.benchmarks["C"].laid
+    largest = min(case.value(p, "stress_C") for p in have)
+    mean = min(case.value(p, "mean_stress_C") for p in have)
+    return {
+        f"stress of benchmark over least {name}": best.stress / largest,
+        f"mean stress of benchmark over least {name}": best.mean_stress / mean,
+    }
+
+
 def _printing(case: CaseStudy, name: str, have: set[str]) -> dict[str, float]:
     found = {}
     if have >= {"mps", "concentric"}:
@@ -80,6 +90,11 @@ def _printing(case: CaseStudy, name: str, have: set[str]) -> dict[str, float]:
         longer = case.value("grid 45", "print") / case.value("concentric", "print") - 1.0
         found[f"print time grid 45 over concentric {name}, %"] = 100.0 * longer
     if "concentric" in have and len(have) > 1:
+        for key, label in (("cpu_with_fe", "cpu"), ("print", "print time")):
+            others = min(case.value(p, key) for p in have - {"concentric"})
+            found[f"{label} concentric over least other {name}"] = (
+                case.value("concentric", key) / others
+            )
         long = {p: case.value(p, "over_40") for p in have}
         holds = long["concentric"] == max(long.values())
         found[f"concentric longest {name}"] = float(holds)

@@ -15,25 +15,30 @@ from ccfem.evaluation.sensitivity import OffAxis
 from ccfem.evaluation.sinuosity import LONG
 from ccfem.evaluation.stiffness_alignment import agreement
 from ccfem.materials import named_material
-from ccfem.papers.plocher_2022.plates import Plate
+from ccfem.papers.plocher_2022.benchmark_figures import (
+    benchmark_fields,
+    layups,
+    shear,
+    turned_fibre,
+)
+from ccfem.papers.plocher_2022.drawing import (
+    COLOURS,
+    image,
+    plain,
+    plates_grid,
+    section,
+    strokes,
+    title,
+)
 from ccfem.papers.plocher_2022.radar import draw_radar
 from ccfem.papers.plocher_2022.study import MATERIALS, CaseStudy, PatternStudy
 from ccfem.plot.canvas import save
-from ccfem.plot.colours import INK, OUTLINE, SECTION, scale
+from ccfem.plot.colours import INK, OUTLINE, scale
 from ccfem.raster.patterns import inside_shells
 from ccfem.raster.skeleton import skeleton
-from ccfem.tensor import strongest_in_plane
 
 __all__ = ["COLOURS", "draw_all", "figures"]
 
-COLOURS = {
-    "grid 45": "#d55e00",
-    "grid 0": "#56b4e9",
-    "concentric": "#e69f00",
-    "mat": "#009e73",
-    "mps": "#0072b2",
-    "benchmark": "#4d4d4d",
-}
 
 SPOKES = {
     "strain energy": ("energy_{}", "low"),
@@ -72,10 +77,12 @@ def figures(study: Mapping[str, CaseStudy], raster: Mapping[str, CaseStudy]) -> 
             "figure_04_long_and_short": _long_and_short(raster),
             "figure_06_patterns": _patterns(tension),
             "figure_06_patterns_raster": _patterns(pixels),
+            "figure_06_benchmark": benchmark_fields(tension),
             "figure_06_bars": _bars(tension, ("C",)),
             "figure_07_agreement": _maps(tension, _agreement_of, (0.0, 100.0), "agreement, %"),
-            "figure_07_moduli": _moduli(),
+            "figure_07_moduli": layups(),
             "figure_08_sensitivity": _sensitivity(tension),
+            "figure_08_turned_fibre": turned_fibre(next(iter(tension.values()))),
             "figure_09_energy": _energies(tension),
             "figure_10_radar": _radars(tension, "C"),
             "figure_10_radar_raster": _radars(pixels, "C", {"SI": ("si_raw_mean", "low")}),
@@ -84,66 +91,37 @@ def figures(study: Mapping[str, CaseStudy], raster: Mapping[str, CaseStudy]) -> 
         made |= {
             "figure_11_patterns": _patterns(beam),
             "figure_11_patterns_raster": _patterns({n: raster[n] for n in beam}),
+            "figure_11_shear": shear(next(iter(beam.values()))),
             "figure_12_radar_C": _radars(beam, "C"),
             "figure_12_radar_S": _radars(beam, "S"),
-            "figure_13_energy": _energies(beam),
+            "figure_13_energy_C": _energies(beam),
+            "figure_13_energy_S": _energies(beam, "S"),
             "figure_13_sensitivity": _sensitivity(beam),
         }
     made["figure_14_both_materials"] = _mixed_bars(study)
     return made
 
 
-def _grid_of(
-    rows: int, columns: int, plates: Sequence[Plate], width: float = 4.2
-) -> tuple[Figure, Any]:
-    """Figure with one picture of a plate a place; the plates of a column have one shape."""
-    shares = [plate.mask.shape[0] / plate.mask.shape[1] for plate in plates]
-    height = width * max(shares) + 0.28
-    figure = Figure(figsize=(columns * width, rows * height), dpi=130.0, facecolor="white")
-    FigureCanvasAgg(figure)
-    axes = figure.subplots(rows, columns, squeeze=False)
-    figure.subplots_adjust(0.01, 0.01, 0.99, 1.0 - 0.25 / (rows * height), 0.03, 0.18)
-    for one in axes.flat:
-        one.set_axis_off()
-        one.set_aspect("equal")
-    return figure, axes
-
-
-def _section(axes: Any, plate: Plate, filled: bool = True) -> None:
-    from matplotlib.patches import PathPatch
-    from matplotlib.path import Path as Outline
-
-    rings = [np.asarray(r.coords) for r in (plate.polygon.exterior, *plate.polygon.interiors)]
-    outline = Outline.make_compound_path(*[Outline(ring[:, :2], closed=True) for ring in rings])
-    axes.add_patch(PathPatch(outline, fc=SECTION if filled else "none", ec=OUTLINE, lw=0.4))
-    axes.set_xlim(-1.0, plate.mask.shape[1] * plate.bead + 1.0)
-    axes.set_ylim(-1.0, plate.mask.shape[0] * plate.bead + 1.0)
-
-
 def _lines(paths: PlanePaths) -> list[FloatArray]:
     return np.split(paths.points, paths.offsets[1:-1]) if len(paths) else []
-
-
-def _title(axes: Any, text: str) -> None:
-    axes.set_title(text, size=7.5, color=INK, loc="left", pad=2.0)
 
 
 def _patterns(study: Mapping[str, CaseStudy]) -> Figure:
     """Paths of every pattern, and the directions of the benchmark."""
     cases = list(study.values())
     names = list(cases[0].patterns)
-    figure, axes = _grid_of(len(names) + 1, len(cases), [c.plate for c in cases])
+    figure, axes = plates_grid(len(names) + 1, len(cases), [c.plate for c in cases])
     for column, case in enumerate(cases):
         top = axes[0, column]
-        _section(top, case.plate)
-        _strokes(top, case)
-        _title(top, f"case {case.plate.name}: direction of the largest stress (benchmark)")
+        section(top, case.plate)
+        strokes(top, case)
+        title(top, f"case {case.plate.name}: direction of the largest stress (benchmark)")
         for row, name in enumerate(names, start=1):
             one, found = axes[row, column], case.patterns[name]
-            _section(one, case.plate)
+            section(one, case.plate)
             for paths, colour in zip(found.paths, (COLOURS[name], INK), strict=False):
                 one.add_collection(LineCollection(_lines(paths), colors=colour, linewidths=0.45))
-            _title(
+            title(
                 one,
                 f"{name}: agreement {found.values['agreement']:.1f} %, "
                 f"energy {found.values['ratio_C']:.2f} x benchmark (C-FRAM)",
@@ -153,7 +131,7 @@ def _patterns(study: Mapping[str, CaseStudy]) -> Figure:
 
 def _medial_axis(case: CaseStudy) -> Figure:
     """Pixels of the shells and of what they leave: its medial axis, rings round it, the rest."""
-    figure, axes = _grid_of(3, 1, [case.plate])
+    figure, axes = plates_grid(3, 1, [case.plate])
     (made,) = case.patterns["mat"].raster
     inside = inside_shells(made.raster.mask, 3)
     axis = skeleton(inside)
@@ -163,23 +141,23 @@ def _medial_axis(case: CaseStudy) -> Figure:
         ("three shells, and the medial axis of the rest", np.where(axis, 2.0, first)),
         ("shells, rings round the medial axis, concentric rest", domain),
     )
-    for one, (heading, image) in zip(axes[:, 0], panels, strict=False):
-        height, width = (made.raster.pixel * n for n in image.shape)
+    for one, (heading, pixels) in zip(axes[:, 0], panels, strict=False):
+        height, width = (made.raster.pixel * n for n in pixels.shape)
         x, y = made.raster.origin
-        one.imshow(image, cmap=scale("field"), extent=(x, x + width, y, y + height))
-        _section(one, case.plate, filled=False)
-        _title(one, f"case {case.plate.name}: {heading}")
-    _section(axes[2, 0], case.plate)
+        one.imshow(pixels, cmap=scale("field"), extent=(x, x + width, y, y + height))
+        section(one, case.plate, filled=False)
+        title(one, f"case {case.plate.name}: {heading}")
+    section(axes[2, 0], case.plate)
     axes[2, 0].add_collection(
         LineCollection(_lines(case.patterns["mat"].paths[0]), colors=COLOURS["mat"], lw=0.6)
     )
-    _title(axes[2, 0], f"case {case.plate.name}: paths of mat")
+    title(axes[2, 0], f"case {case.plate.name}: paths of mat")
     return figure
 
 
 def _simplification(case: CaseStudy) -> Figure:
     """One corner of the concentric paths: chains of pixels, what is printed, where they start."""
-    figure, axes = _plain(1, 5.0, 4.2)
+    figure, axes = plain(1, 5.0, 4.2)
     (made,) = case.patterns["concentric"].raster
     bead = made.raster.pixel
     one = axes[0]
@@ -200,30 +178,6 @@ def _simplification(case: CaseStudy) -> Figure:
     return figure
 
 
-def _strokes(axes: Any, case: CaseStudy, every: int = 3) -> None:
-    centres, direction = case.plate.mesh.centres, case.benchmarks["C"].direction
-    place = np.floor(centres / case.plate.bead).astype(int)
-    chosen = (place % every == 1).all(axis=1)
-    tension = strongest_in_plane(case.plate.isotropic_field.stress)[0] > 0.0
-    half = 0.45 * every * case.plate.bead
-    along = half * np.stack([np.cos(direction), np.sin(direction)], axis=1)
-    for kind, colour in ((tension, "#a51f2d"), (~tension, "#1f4e9c")):
-        pick = chosen & kind
-        strokes = np.stack([centres[pick] - along[pick], centres[pick] + along[pick]], axis=1)
-        axes.add_collection(LineCollection(list(strokes), colors=colour, linewidths=0.5))
-
-
-def _image(axes: Any, plate: Plate, values: FloatArray, colours: Any, limits: Any) -> Any:
-    image = np.full(plate.mask.shape, np.nan)
-    image[plate.mask] = values
-    height, width = (plate.bead * n for n in plate.mask.shape)
-    drawn = axes.imshow(
-        image, cmap=colours, vmin=limits[0], vmax=limits[1], extent=(0.0, width, 0.0, height)
-    )
-    _section(axes, plate, filled=False)
-    return drawn
-
-
 def _agreement_of(case: CaseStudy, found: PatternStudy) -> FloatArray:
     direction = case.benchmarks["C"].direction
     return 100.0 * np.mean([agreement(m.angle - direction) for m in found.maps], axis=0)
@@ -232,30 +186,30 @@ def _agreement_of(case: CaseStudy, found: PatternStudy) -> FloatArray:
 def _maps(study: Mapping[str, CaseStudy], values_of: Any, limits: Any, label: str) -> Figure:
     cases = list(study.values())
     names = list(cases[0].patterns)
-    figure, axes = _grid_of(len(names), len(cases), [c.plate for c in cases])
+    figure, axes = plates_grid(len(names), len(cases), [c.plate for c in cases])
     for column, case in enumerate(cases):
         for row, name in enumerate(names):
             found = case.patterns[name]
             values = values_of(case, found)
-            drawn = _image(axes[row, column], case.plate, values, scale("field"), limits)
-            _title(axes[row, column], f"case {case.plate.name}, {name}: mean {values.mean():.1f} %")
+            drawn = image(axes[row, column], case.plate, values, scale("field"), limits)
+            title(axes[row, column], f"case {case.plate.name}, {name}: mean {values.mean():.1f} %")
     bar = figure.colorbar(drawn, ax=axes[:, -1], shrink=0.4, pad=0.01)
     bar.set_label(label, size=7)
     bar.ax.tick_params(labelsize=6)
     return figure
 
 
-def _energies(study: Mapping[str, CaseStudy]) -> Figure:
+def _energies(study: Mapping[str, CaseStudy], key: str = "C") -> Figure:
     """Strain energy density over its mean in the benchmark, logarithmic."""
     cases = list(study.values())
     names = ["benchmark", *cases[0].patterns]
-    figure, axes = _grid_of(len(names), len(cases), [c.plate for c in cases])
+    figure, axes = plates_grid(len(names), len(cases), [c.plate for c in cases])
     for column, case in enumerate(cases):
-        best = case.benchmarks["C"].laid
+        best = case.benchmarks[key].laid
         for row, name in enumerate(names):
-            laid = best if name == "benchmark" else case.patterns[name].laid["C"]
+            laid = best if name == "benchmark" else case.patterns[name].laid[key]
             density = laid.field.energy_density / best.field.energy_density.mean()
-            drawn = _image(
+            drawn = image(
                 axes[row, column],
                 case.plate,
                 np.log10(np.maximum(density, 1e-6)),
@@ -263,8 +217,9 @@ def _energies(study: Mapping[str, CaseStudy]) -> Figure:
                 (-1.0, 1.3),
             )
             ratio = laid.strain_energy / best.strain_energy
-            _title(
-                axes[row, column], f"case {case.plate.name}, {name}: sum {ratio:.2f} x benchmark"
+            title(
+                axes[row, column],
+                f"case {case.plate.name}, {key}-FRAM, {name}: sum {ratio:.2f} x benchmark",
             )
     bar = figure.colorbar(drawn, ax=axes[:, -1], shrink=0.4, pad=0.01)
     bar.set_label("log10 of density over mean of benchmark", size=7)
@@ -275,30 +230,19 @@ def _energies(study: Mapping[str, CaseStudy]) -> Figure:
 def _long_and_short(study: Mapping[str, CaseStudy]) -> Figure:
     cases = list(study.values())
     names = list(cases[0].patterns)
-    figure, axes = _grid_of(len(names), len(cases), [c.plate for c in cases], 3.6)
+    figure, axes = plates_grid(len(names), len(cases), [c.plate for c in cases], 3.6)
     for column, case in enumerate(cases):
         for row, name in enumerate(names):
             one, found = axes[row, column], case.patterns[name]
-            _section(one, case.plate)
+            section(one, case.plate)
             for paths in found.paths:
                 colours = np.where(paths.lengths > LONG, INK, COLOURS["concentric"])
                 one.add_collection(
                     LineCollection(_lines(paths), colors=list(colours), linewidths=0.4)
                 )
             share = found.values["over_40"]
-            _title(one, f"case {case.plate.name}, {name}: {share:.0f} % over 40 mm (dark)")
+            title(one, f"case {case.plate.name}, {name}: {share:.0f} % over 40 mm (dark)")
     return figure
-
-
-def _plain(columns: int, width: float = 4.4, height: float = 3.2) -> tuple[Figure, Any]:
-    figure = Figure(figsize=(columns * width, height), dpi=130.0, facecolor="white")
-    FigureCanvasAgg(figure)
-    axes = figure.subplots(1, columns, squeeze=False)[0]
-    figure.subplots_adjust(0.14 / columns, 0.2, 0.98, 0.88, 0.28)
-    for one in axes:
-        one.spines[["top", "right"]].set_visible(False)
-        one.tick_params(labelsize=7, colors=INK)
-    return figure, axes
 
 
 def _bar_group(axes: Any, values: Mapping[str, float], heading: str, unit: str) -> None:
@@ -312,7 +256,7 @@ def _bar_group(axes: Any, values: Mapping[str, float], heading: str, unit: str) 
 
 def _bars(study: Mapping[str, CaseStudy], materials: Sequence[str]) -> Figure:
     pairs = [(name, key) for name in study for key in materials]
-    figure, axes = _plain(2 * len(pairs))
+    figure, axes = plain(2 * len(pairs))
     for k, (name, key) in enumerate(pairs):
         case = study[name]
         best = case.benchmarks[key].laid
@@ -328,7 +272,7 @@ def _bars(study: Mapping[str, CaseStudy], materials: Sequence[str]) -> Figure:
 
 def _mixed_bars(study: Mapping[str, CaseStudy]) -> Figure:
     shown = [name for name in ("I", "III") if name in study]
-    figure, axes = _plain(2 * max(len(shown), 1))
+    figure, axes = plain(2 * max(len(shown), 1))
     for k, name in enumerate(shown):
         case = study[name]
         energy = {p: 1e6 * case.value(p, "energy_mixed") for p in case.patterns}
@@ -338,22 +282,8 @@ def _mixed_bars(study: Mapping[str, CaseStudy]) -> Figure:
     return figure
 
 
-def _moduli() -> Figure:
-    """Modulus over the angle to the fibre, as in a polar diagram."""
-    figure = Figure(figsize=(7.2, 4.0), dpi=130.0, facecolor="white")
-    FigureCanvasAgg(figure)
-    angle = np.linspace(0.0, 2.0 * np.pi, 361)
-    for k, (key, name) in enumerate(MATERIALS.items()):
-        axes = figure.add_subplot(1, 2, k + 1, projection="polar")
-        axes.plot(angle, 1e-3 / OffAxis(named_material(name)).compliance(angle), color=INK, lw=1.2)
-        axes.set_title(f"{key}-FRAM: modulus, GPa", size=8, pad=12.0)
-        axes.tick_params(labelsize=6)
-    figure.subplots_adjust(0.08, 0.1, 0.92, 0.82, 0.35)
-    return figure
-
-
 def _sensitivity(study: Mapping[str, CaseStudy]) -> Figure:
-    figure, axes = _plain(2)
+    figure, axes = plain(2)
     angle = np.radians(np.linspace(0.0, 90.0, 181))
     for one, (key, name) in zip(axes, MATERIALS.items(), strict=True):
         one.plot(

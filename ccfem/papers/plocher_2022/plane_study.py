@@ -86,6 +86,11 @@ class LaidPlate:
         return float(np.percentile(self.largest, _HEADLINE))
 
     @property
+    def mean_stress(self) -> float:
+        """Mean over layers and cells of the largest stress there, MPa."""
+        return float(self.largest.mean())
+
+    @property
     def raw_stress(self) -> float:
         """Largest stress of all, MPa; it grows as the cells shrink."""
         return float(self.largest.max())

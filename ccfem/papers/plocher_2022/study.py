@@ -282,6 +282,7 @@ def _of_plate(
             f"ratio_off_peaks_{key}": own.energy_in(off) / best.laid.energy_in(off),
             f"stress_{key}": own.stress,
             f"raw_stress_{key}": own.raw_stress,
+            f"mean_stress_{key}": own.mean_stress,
             **{f"pi_{reading}_{key}": best.index(maps, reading) for reading in READINGS},
         }
     values |= {

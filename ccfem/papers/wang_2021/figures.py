@@ -15,7 +15,7 @@ from ccfem.linking.print_speed import step_speeds
 from ccfem.papers.wang_2021.panels import (
     COLOURS,
     bar,
-    coloured,
+    by_level,
     curves,
     lines_of,
     panels,
@@ -118,14 +118,13 @@ def _stresses(plate: PlateStudy) -> Figure:
 
 
 def _speeds(plate: PlateStudy) -> Figure:
-    """Path coloured by the speed of table 2."""
+    """Path in the speeds of table 2, one colour each."""
     part = plate.optimised
     lpp = part.patterns["lpp"]
     figure, (axes,) = panels([shapely.MultiPoint(lpp.paths.points)], 1, 7.0)
     section(axes, part.layer.plane.polygon)
     speed = step_speeds(lpp.toolpaths, part.machine)
-    drawn = coloured(axes, lpp, speed, (0.0, 35.0))
-    bar(figure, axes, drawn, "mm/s")
+    by_level(axes, lpp, speed, "mm/s")
     total = lpp.total
     title(
         axes,

@@ -14,7 +14,7 @@ from matplotlib.path import Path
 from ccfem.arrays import BoolArray, FloatArray
 from ccfem.cases.designed import DesignPlate
 from ccfem.papers.wang_2021.study import PartStudy, PatternStudy
-from ccfem.plot.colours import INK, OUTLINE, SECTION, scale
+from ccfem.plot.colours import INK, OUTLINE, SECTION, palette
 from ccfem.tensor import in_plane, strongest_in_plane
 
 __all__ = [
@@ -23,7 +23,7 @@ __all__ = [
     "PRESSED",
     "PULLED",
     "bar",
-    "coloured",
+    "by_level",
     "curves",
     "lines_of",
     "panels",
@@ -142,15 +142,22 @@ def path(axes: Any, pattern: PatternStudy, colour: str = STRAND, link: str = LIN
         axes.plot(*paths.points[-1], "s", color=INK, ms=4.0, zorder=3.0)
 
 
-def coloured(axes: Any, pattern: PatternStudy, values: FloatArray, limits: Any) -> Any:
-    """Draw the steps of the paths of a pattern by values (P,) at their first points."""
+def by_level(axes: Any, pattern: PatternStudy, values: FloatArray, unit: str) -> None:
+    """Draw the steps of the paths of a pattern, one colour a value (P,), with its share."""
     steps, _ = _steps(pattern)
     kept = values[_first(pattern)]
-    lines = LineCollection(list(steps), cmap=scale("size"), lw=0.6, zorder=2.0)
-    lines.set_array(kept)
-    lines.set_clim(*limits)
-    axes.add_collection(lines)
-    return lines
+    length = np.linalg.norm(steps[:, 1] - steps[:, 0], axis=1)
+    levels = np.unique(kept)
+    colours = palette(map(str, levels)).values()
+    for level, colour in zip(levels, colours, strict=True):
+        one = kept == level
+        share = 100.0 * length[one].sum() / length.sum()
+        label = f"{level:g} {unit}: {share:.0f} % of the length"
+        lines = LineCollection(
+            list(steps[one]), colors=colour, lw=0.8, zorder=2.0, label=label, capstyle="round"
+        )
+        axes.add_collection(lines)
+    axes.legend(fontsize=6, frameon=False, loc="upper right")
 
 
 def _first(pattern: PatternStudy) -> BoolArray:
