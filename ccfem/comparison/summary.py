@@ -12,7 +12,6 @@ SUMMARY = (
     Headline("printable", "printable", "", "{}"),
     Headline("stiffness", "stiffness, N/mm", "high", "{:.4g}"),
     Headline("stiffness_ratio_tension", "times unreinforced", "high", "{:.2f}"),
-    Headline("share_of_gain", "of the possible gain", "high", "{:.0%}"),
     Headline("first_failure_load", "first failure, N", "high", "{:.0f}"),
     Headline("fibre_per_layer", "fibre, mm a layer", "", "{:.0f}"),
     Headline("efficiency", "efficiency", "high", "{:.3f}"),
@@ -20,7 +19,7 @@ SUMMARY = (
 """The columns of the summary; those that no run has are left out."""
 
 SUMMARY_OF_SLICINGS = (
-    *(head for head in SUMMARY[:5] if head.column != "share_of_gain"),
+    *SUMMARY[:4],
     Headline("interlayer_load", "layers come apart, N", "high", "{:.0f}"),
     Headline("fibre_length", "fibre, mm", "", "{:.0f}"),
     Headline("joints_linked", "joints linked", "high", "{:.2f}"),
