@@ -8,7 +8,16 @@ from typing import Any
 import numpy as np
 from numpy.typing import ArrayLike, DTypeLike, NDArray
 
-__all__ = ["BoolArray", "FloatArray", "IntArray", "freeze", "in_brief", "read_only", "repeated"]
+__all__ = [
+    "BoolArray",
+    "FloatArray",
+    "IntArray",
+    "freeze",
+    "in_brief",
+    "read_only",
+    "repeated",
+    "seen_only",
+]
 
 FloatArray = NDArray[np.float64]
 IntArray = NDArray[np.int64]
@@ -26,6 +35,17 @@ def read_only(values: ArrayLike, dtype: DTypeLike = float) -> NDArray[Any]:
     array = np.array(array, dtype=dtype, order="C")
     array.flags.writeable = False
     return array
+
+
+def seen_only(values: NDArray[Any]) -> NDArray[Any]:
+    """Return the same values as a C-contiguous array that cannot be written to, without a copy.
+
+    Numba compiles a function once for arrays that can be written to and once for others: arguments
+    that come as either go through this.
+    """
+    view = np.ascontiguousarray(values).view()
+    view.flags.writeable = False
+    return view
 
 
 def repeated(counts: IntArray) -> tuple[IntArray, IntArray]:

@@ -2,6 +2,7 @@
 
 import dataclasses
 import json
+import os
 import re
 import shutil
 import subprocess
@@ -76,9 +77,11 @@ def test_links_lead_somewhere():
 def copy(tmp_path):
     """A copy of the project, and what runs a module in it."""
     for folder in ("ccfem", "data", "tests/laws", "tests/strategies"):
-        # With what numba compiled, but not what other tests are writing there.
-        ignored = shutil.ignore_patterns("*.pyc*", "*.tmp.*")
+        ignored = shutil.ignore_patterns("__pycache__")
         shutil.copytree(ROOT / folder, tmp_path / folder, ignore=ignored)
+    # What is compiled is shared with the project, whoever compiles it first.
+    for cache in (ROOT / "ccfem").rglob("__pycache__"):
+        (tmp_path / cache.relative_to(ROOT)).symlink_to(cache)
     shutil.copy(ROOT / "pyproject.toml", tmp_path)
 
     def run(command):
@@ -88,6 +91,7 @@ def copy(tmp_path):
             capture_output=True,
             text=True,
             check=False,
+            env={**os.environ, "PYTHONDONTWRITEBYTECODE": "1"},
         )
         assert done.returncode == 0, done.stdout + done.stderr
         return done.stdout

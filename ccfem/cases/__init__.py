@@ -2,6 +2,7 @@
 
 from ccfem.cases.case import Case
 from ccfem.cases.named import create_case, named_cases
+from ccfem.cases.optimised import Optimised, optimise
 from ccfem.cases.reading import read
 
-__all__ = ["Case", "create_case", "named_cases", "read"]
+__all__ = ["Case", "Optimised", "create_case", "named_cases", "optimise", "read"]

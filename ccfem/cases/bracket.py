@@ -14,7 +14,8 @@ from ccfem.mesh.patches import Cylinder, patches_from_rules
 from ccfem.mesh.tet_mesh import TetMesh
 from ccfem.meshing import extrude
 from ccfem.progress import Progress, silent
-from ccfem.topopt import Design, Simp, as_problem
+from ccfem.topopt import Design, as_problem
+from ccfem.topopt.solid_design import solid_design
 
 __all__ = ["bracket", "bracket_design", "bracket_domain", "bracket_mesh", "bracket_outline"]
 
@@ -76,14 +77,8 @@ def bracket_design(
     The iterations stop earlier when the compliance no longer changes.
     """
     problem = _problem(bracket_domain(element_size), FORCE)
-    method = Simp(
-        VOLUME_FRACTION,
-        radius=max(3.0, 1.6 * element_size),
-        minimum_stiffness=1e-6,
-        tolerance=0.0,
-        max_iterations=max_iterations,
-    )
-    return method(problem, solid=_rims(problem.mesh), progress=progress)
+    rims = _rims(problem.mesh)
+    return solid_design(problem, VOLUME_FRACTION, element_size, rims, max_iterations, progress)
 
 
 def bracket_mesh(element_size: float) -> TetMesh:

@@ -16,7 +16,8 @@ from ccfem.materials import printed_pla
 from ccfem.mesh.patches import Cylinder
 from ccfem.mesh.tet_mesh import TetMesh
 from ccfem.progress import Progress, silent
-from ccfem.topopt import Design, Simp, as_problem
+from ccfem.topopt import Design, as_problem
+from ccfem.topopt.solid_design import solid_design
 
 __all__ = [
     "corner_bracket",
@@ -83,14 +84,8 @@ def corner_bracket_design(
 ) -> Design:
     """Densities of least compliance, a share of the domain filled."""
     problem = _problem(corner_bracket_domain(element_size), 100.0)
-    method = Simp(
-        VOLUME_FRACTION,
-        radius=max(3.0, 1.6 * element_size),
-        minimum_stiffness=1e-6,
-        tolerance=0.0,
-        max_iterations=max_iterations,
-    )
-    return method(problem, solid=_rims(problem.mesh), progress=progress)
+    rims = _rims(problem.mesh)
+    return solid_design(problem, VOLUME_FRACTION, element_size, rims, max_iterations, progress)
 
 
 def corner_bracket_mesh(element_size: float) -> TetMesh:

@@ -13,6 +13,7 @@ import typer
 from ccfem.cli.arguments import drawings_of, names_of, parameters_by_strategy, path_of
 from ccfem.cli.in_python import say_in_python
 from ccfem.cli.machines import MachineName, SetMachine, machine_choice, machines
+from ccfem.cli.optimising import optimise
 from ccfem.cli.options import (
     Backend,
     Calibration,
@@ -38,6 +39,7 @@ from ccfem.cli.papers_again import reproduce
 from ccfem.cli.part_commands import add_part_commands
 from ccfem.cli.run import foreign_stress, layers_of, load, options_of, run, slicings_of
 from ccfem.cli.study_file import study
+from ccfem.cli.supporting import support
 
 __all__ = ["app"]
 
@@ -394,6 +396,8 @@ def calibrate(
     fit_material(read, unreinforced, reinforced, strategy, parameters, options, out)
 
 
+app.command()(optimise)
 app.command()(reproduce)
 app.command()(study)
+app.command()(support)
 say_in_python(app)

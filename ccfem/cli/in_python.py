@@ -12,6 +12,7 @@ CALLS = {
     "faces": "ccfem.faces(BODY)",
     "check": "ccfem.check(CASE)",
     "mesh": "ccfem.meshing.mesh_body(BODY, SIZE)",
+    "optimise": "ccfem.cases.optimise(CASE, VOLUME_FRACTION)",
     "compare": "ccfem.compare(CASE, [A, B]), and ccfem.save(comparison, DIR)",
     "plan": "ccfem.compare(CASE, [S], natural=True), or ccfem.plan(STRATEGY, LAYERS, STRESS)",
     "solve": "ccfem.solve(CASE.problem)",
@@ -21,6 +22,7 @@ CALLS = {
     "example": "ccfem.inspection.write_example(NAME)",
     "cite": "ccfem.comparison.bibtex(ccfem.comparison.cited([METHOD]))",
     "study": "ccfem.study(FILE, workers=N)",
+    "support": "ccfem.support.slice_with_support(SLICER, STRESS, BUILD)",
 }
 """Call of each command, as its help prints it."""
 

@@ -12,6 +12,11 @@ from ccfem.virtual_testing.stiffer import RESOLUTION, SAME, UNDECIDED
 
 __all__ = ["bound_remark", "remarks"]
 
+_FULL = 0.93
+"""Coverage of a layer from which it counts as filled."""
+_NAMED = 6
+"""Layers that are named."""
+
 
 def remarks(runs: Sequence[Run], wanted: Wanted, bound: UpperBound | None = None) -> list[str]:
     """Say what has to stand next to the numbers, a line each.
@@ -49,6 +54,8 @@ def _about(run: Run, wanted: Wanted, bounded: bool) -> list[str]:
         lines += _about_links(run.evaluation.total)
         if getattr(run.strategy, "crosses", False):
             lines += _about_crossings(run.evaluation, bounded)
+            if wanted is None:
+                lines += _about_open(run.evaluation)
     if run.why_not:
         lines.append(f"not printable as planned: {run.why_not}")
     if run.print_plan is not None:
@@ -105,6 +112,18 @@ def _about_crossings(evaluation: Evaluation, bounded: bool) -> list[str]:
     )
     bound = "; the bound does not hold for strands laid over each other"
     return [line + bound if bounded else line]
+
+
+def _about_open(evaluation: Evaluation) -> list[str]:
+    """Name the layers that strands meant to fill a section leave open, and how much of them."""
+    cover = evaluation.values["coverage"][:-1]
+    open_ = np.flatnonzero(cover < _FULL)
+    if not len(open_):
+        return []
+    named = ", ".join(str(evaluation.layers[k]) for k in open_[:_NAMED])
+    more = ", ..." if len(open_) > _NAMED else ""
+    bare = 1.0 - cover[open_].min()
+    return [f"{bare:.1%} of the section stays without fibre, in layers {named}{more}"]
 
 
 def bound_remark(tested: Sequence[Run], bound: UpperBound) -> str:

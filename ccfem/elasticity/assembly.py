@@ -13,7 +13,7 @@ import numpy as np
 import scipy.sparse as sp
 from numba import njit
 
-from ccfem.arrays import FloatArray, IntArray, freeze
+from ccfem.arrays import FloatArray, IntArray, freeze, seen_only
 from ccfem.mesh.cell_mesh import CellMesh
 from ccfem.mesh.tet_mesh import TetMesh
 
@@ -306,7 +306,7 @@ def assemble(
         Its columns are sorted and its ``indptr`` and ``indices`` are those of the pattern.
     """
     where = pattern(mesh) if where is None else where
-    stiffness = np.ascontiguousarray(stiffness, dtype=np.float64).reshape(-1, 6, 6)
+    stiffness = seen_only(np.asarray(stiffness, dtype=np.float64)).reshape(-1, 6, 6)
     if len(stiffness) not in (1, len(mesh.cells)):
         raise ValueError(
             f"stiffness must have shape (6, 6) or ({len(mesh.cells)}, 6, 6); got "
@@ -315,11 +315,11 @@ def assemble(
     which = where.order if len(stiffness) > 1 else np.zeros_like(where.order)
     cells = mesh.cells[where.order]
     gradients, scale = np.empty((len(cells), 4, 3)), np.empty(len(cells))
-    _gradients(mesh.points, cells, gradients, scale)
+    _gradients(mesh.points, seen_only(cells), gradients, scale)
     if density is not None:
         scale *= density[where.order]
     data = np.zeros((len(where.indices), 3, 3))
-    arguments = (where.indptr, where.indices, where.start, where.touching, cells, which)
+    arguments = (where.indptr, where.indices, where.start, where.touching, cells, seen_only(which))
     if mesh.order == 1:
         _gather_linear(*arguments, gradients, scale, stiffness, data)
     else:
@@ -359,4 +359,6 @@ def add_blocks(matrix: sp.bsr_array, nodes: IntArray, blocks: FloatArray) -> Non
     blocks : (k, 3q, 3q) array, N/mm
         Element matrices, the components of a node together.
     """
-    _scatter(matrix.indptr, matrix.indices, nodes, np.ascontiguousarray(blocks), matrix.data)
+    _scatter(
+        matrix.indptr, matrix.indices, seen_only(nodes), np.ascontiguousarray(blocks), matrix.data
+    )

@@ -11,7 +11,7 @@ from dataclasses import dataclass
 import numpy as np
 from numba import njit
 
-from ccfem.arrays import FloatArray, read_only
+from ccfem.arrays import FloatArray, read_only, seen_only
 from ccfem.elasticity.assembly import cell_gradients
 from ccfem.elasticity.patch_recovery import SAMPLES, fitted, stress_patches
 from ccfem.mesh.tet_mesh import TetMesh
@@ -71,11 +71,11 @@ def estimate_error(
     free : (m, 6) array, optional
         Strain, Voigt, of each cell that is without stress.
     """
-    stiffness = np.ascontiguousarray(stiffness).reshape(-1, 6, 6)
+    stiffness = seen_only(stiffness).reshape(-1, 6, 6)
     m = len(mesh.cells)
-    ease = np.zeros((1, 6)) if free is None else np.ascontiguousarray(free)
+    ease = seen_only(np.zeros((1, 6)) if free is None else free)
     gradients, edges = cell_gradients(mesh), np.asarray(TetMesh.edges)
-    arguments = (mesh.cells, gradients, np.ascontiguousarray(displacement), stiffness, ease, edges)
+    arguments = (mesh.cells, gradients, seen_only(displacement), stiffness, ease, edges)
     samples = SAMPLES[mesh.order]
     stress = np.empty((m, len(samples), 6))
     _stress(*arguments, samples, stress)
@@ -88,7 +88,8 @@ def estimate_error(
     compliance = np.linalg.inv(stiffness)
     error, energy = np.empty(m), np.empty(m)
     compare = _compare_linear if mesh.order == 1 else _compare_quadratic
-    compare(mesh.points, mesh.corners, mesh.volumes, edges, patches.of_corner, patches.centre,
+    corners = seen_only(mesh.corners)
+    compare(mesh.points, corners, mesh.volumes, edges, patches.of_corner, patches.centre,
             patches.size, patches.coefficients, corner, compliance, error, energy)  # fmt: skip
     return ErrorEstimate(error, float(energy.sum()))
 

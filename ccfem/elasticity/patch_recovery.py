@@ -11,7 +11,7 @@ from dataclasses import dataclass
 import numpy as np
 from numba import njit
 
-from ccfem.arrays import FloatArray, IntArray
+from ccfem.arrays import FloatArray, IntArray, seen_only
 from ccfem.mesh.tet_mesh import TetMesh
 
 __all__ = ["SAMPLES", "Patches", "fitted", "stress_patches"]
@@ -66,19 +66,19 @@ def stress_patches(mesh: TetMesh, stress: FloatArray, stiffness: FloatArray) -> 
     kind = np.floor(np.log(stiffness) / np.log(_ALIKE)).astype(np.int64)
     if len(kind) == 1 or (kind == kind[0]).all():
         # A polynomial for each node, those without cells left empty.
-        nodes, of_corner = np.arange(len(mesh.points)), np.ascontiguousarray(mesh.corners)
+        nodes, of_corner = np.arange(len(mesh.points)), mesh.corners
     else:
         kind -= kind.min()
         kinds = int(kind.max()) + 1
         groups, of_corner = np.unique(mesh.corners * kinds + kind[:, None], return_inverse=True)
         nodes = groups // kinds
-    of_corner = of_corner.reshape(-1, 4)
+    of_corner = seen_only(of_corner.reshape(-1, 4))
     start, cells = _cells_round(of_corner, len(nodes))
     at = SAMPLES[mesh.order]
     terms = 4 if mesh.order == 1 else 10
     size = np.zeros(len(nodes))
     coefficients = np.zeros((len(nodes), terms, 6))
-    _fit(mesh.points, mesh.corners, of_corner, nodes, start, cells, at, stress,
+    _fit(mesh.points, seen_only(mesh.corners), of_corner, nodes, start, cells, at, stress,
          _LEAST[mesh.order], _RIDGE, size, coefficients)  # fmt: skip
     return Patches(of_corner, mesh.points[nodes], size, coefficients)
 

@@ -56,6 +56,14 @@ def why_not(total: Mapping[str, float], machine: Machine) -> tuple[str, ...]:
     if found["order"] > 0.0:
         said = f"{found['order']:.0f} paths come after one of a higher layer"
         broken.append((-float("inf"), said))
+    # Flat layers may be thick: matrix fills them in several lines.
+    thick = total["thickness_95"]
+    if total["tilt_mean"] > 0.0 and thick > machine.matrix_width:
+        said = (
+            f"curved layers up to {thick:.2g} mm thick, more than a line of matrix is wide "
+            f"({machine.matrix_width:g} mm): cut more layers"
+        )
+        broken.append((-thick / machine.matrix_width, said))
     return tuple(said for _, said in sorted(broken))
 
 

@@ -20,6 +20,9 @@ _STEPS = 8
 _BLOCK = 2048
 """Tensors that are turned to all planes at a time: few enough for the memory near the processor."""
 _NONE = "NaN without tension"
+_NO_LEAST = "NaN without tension, or where the lesser principal stresses are equal everywhere"
+_EQUAL = 1e-6
+"""Difference of principal stresses over the tension that is taken for rounding."""
 
 COLUMNS = (
     Column(
@@ -34,6 +37,26 @@ COLUMNS = (
         "across_tension as it would be for flat layers along that direction, of some "
         "170 about the principal axes of the mean stress, for which it is least.",
         f"0 to 1, 0 is best; {_NONE}",
+    ),
+    Column(
+        "least_angle",
+        "degrees",
+        "Angle between the normal of the layers and the direction of the least principal stress, "
+        "mean over the layers' area, weighted by the difference of the two lesser principal "
+        "stresses, up to the tension: where they are equal, every direction across is the least.",
+        f"0 to 90, 0 is best; {_NO_LEAST}",
+    ),
+    Column(
+        "least_angle_flat",
+        "degrees",
+        "least_angle as it would be for flat layers along the build direction.",
+        f"0 to 90, 0 is best; {_NO_LEAST}",
+    ),
+    Column(
+        "least_angle_best",
+        "degrees",
+        "least_angle as it would be for flat layers along the direction of across_best.",
+        f"0 to 90, 0 is best; {_NO_LEAST}",
     ),
 )
 
@@ -50,11 +73,21 @@ class TensionSamples:
         Largest principal value.
     flat : (t,) array, N
         What acts along the build direction, 0 where negative.
+    gap : (t,) array, N
+        Difference of the two lesser principal values, at most `tension`.
+    least : (t, 3) array
+        Unit vector along the least principal stress.
+    angle, angle_flat : (t,) arrays, degrees
+        Between that and the normal of the layer, and the build direction.
     """
 
     tensor: FloatArray
     tension: FloatArray
     flat: FloatArray
+    gap: FloatArray
+    least: FloatArray
+    angle: FloatArray
+    angle_flat: FloatArray
 
     def __post_init__(self) -> None:
         for name, values in vars(self).items():
@@ -64,21 +97,44 @@ class TensionSamples:
 def sample_tension(layer: Layer, stress: PartStress, build: FloatArray) -> TensionSamples:
     """Take the samples of one layer; `build` is a unit vector."""
     tensor = stress.stress[layer.cell] * layer.areas[:, None, None]
-    values = np.linalg.eigvalsh(tensor)
+    values, axes = np.linalg.eigh(tensor)
     pulled = values[:, 2] > 0.0
     flat = np.maximum(tensor @ build @ build, 0.0)
-    return TensionSamples(tensor[pulled], values[pulled, 2], flat[pulled])
+    least = axes[pulled, :, 0]
+    return TensionSamples(
+        tensor[pulled],
+        values[pulled, 2],
+        flat[pulled],
+        np.minimum(values[pulled, 1] - values[pulled, 0], values[pulled, 2]),
+        least,
+        _angle(np.einsum("td,td->t", least, layer.normals[pulled])),
+        _angle(least @ build),
+    )
+
+
+def _angle(cosine: FloatArray) -> FloatArray:
+    """Angle, degrees, between lines, whose direction has no sign."""
+    return np.asarray(np.degrees(np.arccos(np.clip(np.abs(cosine), 0.0, 1.0))))
 
 
 def tension_indices(samples: TensionSamples) -> dict[str, float]:
     """Values of `COLUMNS`."""
     total = float(samples.tension.sum())
     if not total > 0.0:
-        return dict.fromkeys(("across_flat", "across_best"), float("nan"))
+        return {column.name: float("nan") for column in COLUMNS}
     tried = _around(np.linalg.eigh(samples.tensor.sum(axis=0))[1].T)
+    acting = _acting_along(tried, samples.tensor)
+    best = tried[int(np.argmin(acting))]
+    angles = (samples.angle, samples.angle_flat, _angle(samples.least @ best))
+    gap = float(samples.gap.sum())
+    gap = gap if gap > _EQUAL * total else float("nan")
+    ours, flat, least = (float(samples.gap @ each) / gap for each in angles)
     return {
         "across_flat": float(samples.flat.sum()) / total,
-        "across_best": float(_acting_along(tried, samples.tensor).min()) / total,
+        "across_best": float(acting.min()) / total,
+        "least_angle": ours,
+        "least_angle_flat": flat,
+        "least_angle_best": least,
     }
 
 

@@ -142,7 +142,9 @@ def _lay(field, grid, laid, seeds, homes, apart, test, step, least):  # type: ig
     """
     spans = np.empty((len(laid.line) // 4, 3), np.int64)
     closed = np.zeros(len(spans), np.bool_)
-    lines = count = looked = tried = 0
+    # Literals as arguments would be signatures of their own, compiled beside those of numbers.
+    lines, count, no_line = np.int64(0), np.int64(0), np.int64(-1)
+    looked = tried = 0
     while looked < 2 * count or tried < len(seeds):
         if looked < 2 * count:
             # Beside the points of lines, to both sides.
@@ -152,10 +154,11 @@ def _lay(field, grid, laid, seeds, homes, apart, test, step, least):  # type: ig
             home = laid.home[p]
             looked += 1
         else:
-            x, y = seeds[tried]
+            x, y = seeds[tried, 0], seeds[tried, 1]
             home = homes[tried]
             tried += 1
-        taken = _crowded(laid, x, y, -1, 0.0, apart * (1.0 - _SLACK), False)
+        homing = lines < 0  # never
+        taken = _crowded(laid, x, y, no_line, 0.0, apart * (1.0 - _SLACK), homing)
         if taken or not contains(grid, x, y):
             continue
         turn, end, ring = _trace(field, grid, laid, count, lines, x, y, home, test, step)
@@ -176,7 +179,7 @@ def _trace(field, grid, laid, first, number, x0, y0, home, test, step):  # type:
     The numbers of the points start at `first`.
     """
     way = np.zeros(2)
-    dx, dy, home, fine = direction_at(field, home, x0, y0, True, way)
+    dx, dy, home, fine = direction_at(field, home, x0, y0, -1.0, way)
     count = first
     if not fine:
         return count, count, False

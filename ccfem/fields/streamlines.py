@@ -134,11 +134,11 @@ def _usual_size(corners: FloatArray, plane_stress: FloatArray) -> float:
 
 
 @njit(cache=True, nogil=True)
-def direction_at(field, cell, x, y, either, way):  # type: ignore[no-untyped-def]
+def direction_at(field, cell, x, y, sharpest, way):  # type: ignore[no-untyped-def]
     """Return the unit direction at (x, y), the triangle there, and whether there is one.
 
     The triangle is found by walking from `cell`; `way` is where the line came from, so that the
-    sign can follow; `either` at the start, where there is none.
+    sign can follow, and `sharpest` the least cosine of the turn from there: -1 at the start.
     """
     corners, values, beside, least = field
     for _ in range(len(corners)):
@@ -172,24 +172,24 @@ def direction_at(field, cell, x, y, either, way):  # type: ignore[no-untyped-def
     along = dx * way[0] + dy * way[1]
     if along < 0.0:
         dx, dy, along = -dx, -dy, -along
-    return dx, dy, cell, either or along >= _SHARPEST
+    return dx, dy, cell, along >= sharpest
 
 
 @njit(cache=True, nogil=True)
 def streamline_step(field, cell, x, y, step, way):  # type: ignore[no-untyped-def]
     """Point one step on, the triangle there, and whether there is one; turns `way`."""
     h = 0.5 * step
-    ax, ay, cell, fine = direction_at(field, cell, x, y, False, way)
+    ax, ay, cell, fine = direction_at(field, cell, x, y, _SHARPEST, way)
     if not fine:
         return x, y, cell, False
     way[0], way[1] = ax, ay
-    bx, by, near, fine = direction_at(field, cell, x + h * ax, y + h * ay, False, way)
+    bx, by, near, fine = direction_at(field, cell, x + h * ax, y + h * ay, _SHARPEST, way)
     if not fine:
         return x, y, cell, False
-    cx, cy, near, fine = direction_at(field, near, x + h * bx, y + h * by, False, way)
+    cx, cy, near, fine = direction_at(field, near, x + h * bx, y + h * by, _SHARPEST, way)
     if not fine:
         return x, y, cell, False
-    ex, ey, near, fine = direction_at(field, near, x + step * cx, y + step * cy, False, way)
+    ex, ey, near, fine = direction_at(field, near, x + step * cx, y + step * cy, _SHARPEST, way)
     if not fine:
         return x, y, cell, False
     x += step * (ax + 2.0 * bx + 2.0 * cx + ex) / 6.0
@@ -201,13 +201,13 @@ def streamline_step(field, cell, x, y, step, way):  # type: ignore[no-untyped-de
 def _follow(field, start, cell, step, most, sense):  # type: ignore[no-untyped-def]
     """Points (m, 2) from `start` in one sense, and whether they come back to it."""
     line = np.empty((most + 1, 2))
-    line[0] = start
+    x, y = start[0], start[1]
+    line[0, 0], line[0, 1] = x, y
     way = np.zeros(2)
-    dx, dy, cell, fine = direction_at(field, cell, start[0], start[1], True, way)
+    dx, dy, cell, fine = direction_at(field, cell, x, y, -1.0, way)
     if not fine:
         return line[:1].copy(), False
     way[0], way[1] = sense * dx, sense * dy
-    x, y = start
     count = 1
     while count <= most:
         x, y, cell, fine = streamline_step(field, cell, x, y, step, way)

@@ -6,7 +6,7 @@ import numpy as np
 from numba import njit
 from scipy.spatial import cKDTree
 
-from ccfem.arrays import FloatArray, IntArray
+from ccfem.arrays import FloatArray, IntArray, seen_only
 
 __all__ = ["Nearest", "nearest_on_triangles"]
 
@@ -48,7 +48,8 @@ def nearest_on_triangles(points: FloatArray, triangles: IntArray, queries: Float
     tree = cKDTree(points[triangles].mean(axis=1))
     count = min(_CANDIDATES, len(triangles))
     _, near = tree.query(queries, k=count)
-    triangle, weights = _nearest(points, triangles, queries, near.reshape(len(queries), count))
+    given = (seen_only(each) for each in (points, triangles, queries))
+    triangle, weights = _nearest(*given, near.reshape(len(queries), count))
     found = np.einsum("qk,qkd->qd", weights, points[triangles[triangle]])
     return Nearest(triangle, weights, found, np.linalg.norm(found - queries, axis=1))
 

@@ -68,7 +68,12 @@ class _Field(Protocol):
 F = TypeVar("F", bound=_Field)
 
 
-def bounded(target: FloatArray, bounds: Bounds, solve: Callable[[FloatArray], F]) -> F:
+def bounded(
+    target: FloatArray,
+    bounds: Bounds,
+    solve: Callable[[FloatArray], F],
+    enough: Callable[[F], bool] | None = None,
+) -> F:
     """Find the field near to a target whose gradient is within bounds.
 
     Parameters
@@ -78,6 +83,8 @@ def bounded(target: FloatArray, bounds: Bounds, solve: Callable[[FloatArray], F]
     bounds : Bounds
     solve : callable
         Returns the field whose gradient is nearest to a target.
+    enough : callable, optional
+        Whether a field will do; by default one that is within the bounds in every cell.
 
     Returns
     -------
@@ -87,7 +94,7 @@ def bounded(target: FloatArray, bounds: Bounds, solve: Callable[[FloatArray], F]
     found = solve(target)
     lag, before = np.zeros_like(target), _WEIGHTS[0]
     for weight in np.repeat(_WEIGHTS, _STEPS).tolist():
-        if not bounds.outside(found.gradient).any():
+        if enough(found) if enough else not bounds.outside(found.gradient).any():
             break
         lag, before = lag * (before / weight), weight
         within = bounds.nearest(found.gradient + lag)

@@ -35,7 +35,7 @@ class Cut:
     cell: IntArray
 
 
-def cut_at_zero(mesh: TetMesh, signed: FloatArray) -> Cut | None:
+def cut_at_zero(mesh: TetMesh, signed: FloatArray, among: IntArray | None = None) -> Cut | None:
     """Cut a mesh where a field is zero; None where it is zero nowhere.
 
     Parameters
@@ -43,10 +43,13 @@ def cut_at_zero(mesh: TetMesh, signed: FloatArray) -> Cut | None:
     mesh : TetMesh
     signed : (n,) array
         At the nodes, linear in between; nodes of value 0 become points of the surface.
+    among : (k,) int array, optional
+        Cells that may be cut, ascending; by default all.
     """
     corners = mesh.corners
-    values = signed[corners]
+    values = signed[corners if among is None else corners[among]]
     crossing = np.flatnonzero((values.min(axis=1) <= 0.0) & (values.max(axis=1) >= 0.0))
+    crossing = crossing if among is None else among[crossing]
     lines, cell = _cut_cells(corners[crossing], signed, mesh.points)
     if not len(cell):
         return None
@@ -130,11 +133,18 @@ def _drop_repeated(triangles: IntArray, cell: IntArray) -> tuple[IntArray, IntAr
 
 
 def border_edges(triangles: IntArray, n: int) -> IntArray:
-    """Directed edges (e, 2) that only one triangle has; the material lies on their left."""
+    """Directed edges (e, 2) that only one triangle has; the material lies on their left.
+
+    Where sheets meet, so that more triangles have an edge, it is a border as often as they run
+    along it one way more than the other: borders always close.
+    """
     edges = np.concatenate([triangles[:, [0, 1]], triangles[:, [1, 2]], triangles[:, [2, 0]]])
-    key = edges.min(axis=1) * n + edges.max(axis=1)
-    _, first, count = np.unique(key, return_index=True, return_counts=True)
-    return edges[first[count == 1]]
+    low, high = edges.min(axis=1), edges.max(axis=1)
+    known, inverse = np.unique(low * n + high, return_inverse=True)
+    net = np.bincount(inverse, np.where(edges[:, 0] == low, 1.0, -1.0), len(known)).astype(int)
+    ends = np.stack(np.divmod(known, n), axis=1)
+    ends[net < 0] = ends[net < 0, ::-1]
+    return np.asarray(np.repeat(ends, np.abs(net), axis=0))
 
 
 def chain(border: IntArray) -> tuple[IntArray, ...]:

@@ -78,10 +78,14 @@ def level_surfaces(
     thickness = thickness_at_nodes(mesh, values, step)
     on_patch = {name: _edge_keys(facets, len(mesh.points)) for name, facets in mesh.patches.items()}
 
+    in_cells = values[mesh.corners]
+    low, high = in_cells.min(axis=1) - _SNAP * step, in_cells.max(axis=1) + _SNAP * step
+
     def cut(level: float) -> tuple[dict[str, Any] | None, int, int]:
         signed = values - level
         signed[np.abs(signed) < _SNAP * step] = 0.0
-        return _surface(mesh, signed, gradient, thickness, on_patch, shortest, least_area)
+        among = np.flatnonzero((low <= level) & (high >= level))
+        return _surface(mesh, signed, among, gradient, thickness, on_patch, shortest, least_area)
 
     found = in_threads(cut, levels.tolist(), most=None)
     kept = [surface for surface, _, _ in found if surface is not None]
@@ -114,6 +118,7 @@ def _edge_keys(facets: IntArray, n: int) -> IntArray:
 def _surface(
     mesh: TetMesh,
     signed: FloatArray,
+    among: IntArray,
     gradient: FloatArray,
     thickness: FloatArray,
     on_patch: dict[str, IntArray],
@@ -121,7 +126,7 @@ def _surface(
     least_area: float,
 ) -> tuple[dict[str, Any] | None, int, int]:
     """Fields of a clean `Layer` where a field is zero; numbers of bubbles and specks left out."""
-    cut = cut_at_zero(mesh, signed)
+    cut = cut_at_zero(mesh, signed, among)
     if cut is None:
         return None, 0, 0
     n = len(mesh.points)

@@ -17,6 +17,8 @@ from ccfem.mesh.tet_mesh import TetMesh
 
 __all__ = ["layers_within"]
 
+_OFF = 1e-3
+"""Least distance, in steps, of a layer from the ends of the field, which may be faces of cells."""
 _DEEPEST = 2
 """How often the distance of layers is halved, or doubled, at most."""
 
@@ -29,6 +31,7 @@ def layers_within(
     thickest: float,
     shortest: float,
     least_area: float,
+    origin: float | None = None,
 ) -> LevelSurfaces:
     """Cut layers at every step of a field, and between them where they would be too thick.
 
@@ -45,6 +48,9 @@ def layers_within(
         Edges of the triangles shorter than this are collapsed.
     least_area : float, mm^2
         Smaller pieces are left out.
+    origin : float, optional
+        Value half a step below a layer, by default the lowest: layers that continue others have
+        theirs.
 
     Returns
     -------
@@ -53,8 +59,9 @@ def layers_within(
         triangles of which a corner would be too thick otherwise.
     """
     low, high = (float(end) for end in np.quantile(values[mesh.corners], [0.0, 1.0]))
-    count = max(int((high - low) / step), 1)
-    whole: FloatArray = low + (np.arange(count, dtype=np.float64) + 0.5) * step
+    start = low if origin is None else origin + step * np.ceil((low - origin) / step - 0.5)
+    count = max(int((high - start) / step + (0.0 if origin is None else 0.5)), 1)
+    whole: FloatArray = start + (np.arange(count, dtype=np.float64) + 0.5) * step
     raw = thickness_at_nodes(mesh, values, step)
     kept: list[tuple[float, Layer]] = []
     bubbles = specks = 0
@@ -66,13 +73,14 @@ def layers_within(
             between = np.sort(np.add.outer(np.append(whole[0] - step, whole), odd).ravel())
             thick = np.sort(values[mesh.corners[(raw[mesh.corners] > limit).any(axis=1)]].ravel())
             reach = np.searchsorted(thick, [between - step, between + step])
-            near = (reach[0] < reach[1]) & (between > low) & (between < high)
+            within = (between > low + _OFF * step) & (between < high - _OFF * step)
+            near = (reach[0] < reach[1]) & within
             levels = np.asarray(between[near])
         found = level_surfaces(mesh, values, levels, step, shortest, least_area)
         bubbles, specks = bubbles + found.bubbles, specks + found.specks
         for layer in found.layers:
             level = float(np.median(layer.interpolate(values)))
-            number = round((level - low) / step - 0.5)
+            number = round((level - (low if origin is None else origin)) / step - 0.5)
             t = layer.local_thickness
             if halving:
                 wanted: BoolArray = t > limit

@@ -125,6 +125,7 @@ def link_ends(
     along_boundary: bool = True,
     radius: float = 0.0,
     enough: float = np.inf,
+    one_by_one: bool = False,
 ) -> Joined:
     """Join ends that lie near each other by links inside the section.
 
@@ -152,6 +153,9 @@ def link_ends(
         Least radius of a turn; 0 for any, and no links that keep one.
     enough : float, mm, default inf
         Length from which on a path needs no link with corners, where there is a radius.
+    one_by_one : bool, default False
+        Whether a path goes on at either of its ends until it is long enough before another one is
+        begun, from short strands to long ones: those side by side become zigzags.
     """
     opened = [k for k, line in enumerate(lines) if not is_closed(line)]
     if not opened or limit <= 0.0:
@@ -168,9 +172,14 @@ def link_ends(
         found = smooth_links(lines, ends, limit, width, radius)
         links += [_Link(*link, smooth=True) for link in found]
     # Rounding orders no equal costs: a straight link comes before the same one along the boundary.
-    links.sort(key=lambda link: (not link.smooth, round(link.cost, 6), link.first, link.second))
-    needed = enough if radius > 0.0 else np.inf
-    return _accept(list(lines), links, section, _CLEARANCE * width, needed, radius > 0.0)
+    size = [line_length(line) if one_by_one else 0.0 for line in lines]
+    cost = [link.cost + size[link.first // 2] + size[link.second // 2] for link in links]
+    keys = [
+        (not x.smooth, round(c, 6), x.first, x.second) for x, c in zip(links, cost, strict=True)
+    ]
+    links = [links[k] for k in sorted(range(len(links)), key=keys.__getitem__)]
+    needed, apart = enough if radius > 0.0 else np.inf, _CLEARANCE * width
+    return _accept(list(lines), links, section, apart, needed, radius > 0.0, one_by_one)
 
 
 def _accept(
@@ -180,6 +189,7 @@ def _accept(
     clearance: float,
     enough: float,
     mark: bool,
+    one_by_one: bool,
 ) -> Joined:
     """Take links greedily, cheapest first, as long as they keep off everything else."""
     if not links:
@@ -192,39 +202,55 @@ def _accept(
     joints = []
     chain = np.arange(len(lines))
     length = np.array([line_length(line) for line in lines])  # of chains, at their numbers
-    # Corners last, first between paths that are both too short. A smooth link needs no second try:
-    # nothing that stood in its way has gone.
-    rounds = [(k, 0) for k in np.flatnonzero(free).tolist()]
-    if mark:
-        rounds += [(k, 1) for k, _ in rounds if not links[k].smooth]
-    for k, most_long in rounds:
+    far = np.arange(2 * len(lines)) ^ 1  # other end of the chain of each end of a chain
+
+    def take(k: int, most_long: int) -> bool:
         link, path = links[k], paths[k]
         if link.first in taken or link.second in taken:
-            continue
+            return False
         long = np.count_nonzero(length[chain[owners[k]]] >= enough)
         if not link.smooth and long > most_long:
-            continue
+            return False
         closes = chain[link.first // 2] == chain[link.second // 2]
         if closes and link.turn > _CLOSING_TURN:
-            continue
+            return False
         if accepted and shapely.dwithin(path, np.array(accepted), clearance).any():
-            continue
+            return False
         cut = {owner: _cut_back(lines[owner], link, owner) for owner in owners[k].tolist()}
         if min(len(line) for line in cut.values()) < 2:
-            continue
+            return False
         shortened = shapely.linestrings(_shorten(link.path))
         if shapely.intersects(shortened, strings(list(cut.values()))).any():
-            continue
+            return False
         for owner, line in cut.items():
             length[chain[owner]] += line_length(line) - line_length(lines[owner])
             lines[owner] = line
         into, gone = chain[owners[k]]
         length[into] += float(path.length) + (0.0 if closes else length[gone])
         chain[chain == gone] = into
-        taken |= {link.first, link.second}
+        taken.update((link.first, link.second))
         accepted.append(path)
         marked = mark and not link.smooth
         joints.append(Joint(link.first, link.second, link.path[1:-1], marked))
+        one, other = far[link.first], far[link.second]
+        far[one], far[other] = other, one
+        return True
+
+    # Corners last, first between paths that are both too short. A smooth link needs no second try:
+    # nothing that stood in its way has gone.
+    rounds = [(k, 0) for k in np.flatnonzero(free).tolist()]
+    if mark:
+        rounds += [(k, 1) for k, _ in rounds if not links[k].smooth]
+    at_end: dict[int, list[int]] = {}
+    for k in np.flatnonzero(free).tolist() if one_by_one else ():
+        for end in (links[k].first, links[k].second):
+            at_end.setdefault(end, []).append(k)
+    for k, most_long in rounds:
+        grown = k if take(k, most_long) and not links[k].smooth and not most_long else None
+        while grown is not None and one_by_one:
+            tips = far[links[grown].first], far[links[grown].second]
+            further = sorted({j for tip in tips for j in at_end.get(int(tip), ())})
+            grown = next((j for j in further if take(j, 0)), None)
     return join(lines, joints)
 
 

@@ -18,6 +18,8 @@ __all__ = ["LinkCurves", "curve_cost", "link_curve", "link_curves", "stub_points
 
 _SAMPLE = 0.25
 """Step, mm, at which a curve is looked at close to the border."""
+_STRAIGHT = np.zeros(3, dtype=np.int64)
+"""Word of a straight line: a constant, as `WORDS`, so that numba compiles one signature."""
 _NEAR = 15.0
 """Ends further apart than this, in radii and longest extensions, are joined by the first extension
 only: another one changes little on a long way."""
@@ -142,9 +144,7 @@ def _link_curves(ends, reach, radius, grid, weights, bound):  # type: ignore[no-
     for a in range(count):
         for v in range(variants):
             straight[1] = reach[a, v]
-            stub[a, v] = curve_cost(
-                ends[a], np.zeros(3, np.int64), straight, radius, grid, weights, np.inf
-            )
+            stub[a, v] = curve_cost(ends[a], _STRAIGHT, straight, radius, grid, weights, np.inf)
     for a in range(count):
         for b in range(a + 1, count):
             if a // 2 == b // 2:

@@ -36,7 +36,7 @@ _EXACT_GROUPS = 10
 """Maximum number of groups whose order is the best there is."""
 _ROUNDS = 15
 """Rounds of the search among single tracks."""
-_WEIGHTS = (8.0, 4.0, 0.0)
+_WEIGHTS = (16.0, 4.0, 0.0)
 """Extra cost of each mm of a link inside the section, over its holes, where nothing holds the
 fibre, and outside."""
 _STEP = 0.5

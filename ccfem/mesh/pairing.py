@@ -3,7 +3,7 @@
 import numpy as np
 from numba import njit
 
-from ccfem.arrays import IntArray
+from ccfem.arrays import IntArray, seen_only
 
 __all__ = ["CROWDED", "FOLDED", "FREE", "pair_facets"]
 
@@ -29,11 +29,11 @@ def pair_facets(corners: IntArray, faces: IntArray, nodes: int) -> IntArray:
         ``4 * cell + facet`` of the partner; `FREE` on the boundary; `CROWDED` where more than two
         cells have the facet; `FOLDED` where two cells that have it lie on the same side of it.
     """
-    corners = np.ascontiguousarray(corners, dtype=np.int64)
+    corners = seen_only(np.asarray(corners, dtype=np.int64))
     partner = np.full(4 * len(corners), FREE, dtype=np.int64)
     start = np.zeros(nodes + 2, dtype=np.int64)
     order = np.empty(4 * len(corners), dtype=np.int64)
-    _pair(corners, faces, start, order, partner)
+    _pair(corners, seen_only(faces), start, order, partner)
     return partner
 
 

@@ -13,6 +13,7 @@ from ccfem.geometry.sections import corners_only
 from ccfem.geometry.shapes import Region
 from ccfem.layers.layer import Layer
 from ccfem.layers.layer_stress import LayerStress
+from ccfem.linking.joining import Joined, join
 from ccfem.machine.machine import Machine
 from ccfem.planning.strategy import Amount, LayerPlanner
 from ccfem.raster.bitmap import Bitmap, bitmap
@@ -88,6 +89,10 @@ class Infill(ABC):
     ) -> list[FloatArray]:
         """Strands (n_i, 2), mm, in the plane of a layer, however short."""
 
+    def linked(self, lines: list[FloatArray], prepared: Any, machine: Machine) -> Joined:
+        """Strands joined at their ends, where a strategy does that; links are marked."""
+        return join(lines, [])
+
     @abstractmethod
     def regions(self, image: Bitmap, layer: Layer, stress: LayerStress) -> Regions:
         """Pattern of pixels of a layer."""
@@ -127,6 +132,8 @@ class _Prepared:
         if infill.mode == "raster":
             paths = infill.raster(layer, stress, machine).toolpaths(layer)
         else:
-            lines = infill.strands(layer, stress, machine, self.known[layer.index])
-            paths = Toolpaths.from_plane(lines, layer)
+            prepared = self.known[layer.index]
+            lines = infill.strands(layer, stress, machine, prepared)
+            found = infill.linked(lines, prepared, machine)
+            paths = Toolpaths.from_plane(found.lines, layer, link=found.link)
         return long_enough(paths, infill.minimum_length, machine)

@@ -4,7 +4,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from ccfem.arrays import BoolArray, IntArray, freeze
+from ccfem.arrays import BoolArray, IntArray, freeze, seen_only
 from ccfem.raster.thinning import thin
 from ccfem.raster.walking import (
     absorb,
@@ -73,8 +73,8 @@ def trace(regions: IntArray, linked: BoolArray, seed: int = 0) -> PixelPaths:
     seed : int
         Of the random pixel that each closed path starts at, so that starts make no seam.
     """
-    regions = np.ascontiguousarray(regions, dtype=np.int64)
-    linked = np.ascontiguousarray(linked)
+    regions = seen_only(np.asarray(regions, dtype=np.int64))
+    linked = seen_only(linked)
     following = np.full(regions.size, -1, dtype=np.int64)
     before = np.full(regions.size, -1, dtype=np.int64)
     used = np.zeros(regions.shape, dtype=bool)

@@ -15,14 +15,16 @@ import shapely
 from ccfem.arrays import FloatArray
 from ccfem.errors import InputError
 from ccfem.fields.streamlines import streamlines
+from ccfem.geometry.abutting import clear_ends
 from ccfem.geometry.guide_fit import fitted_guides, spaced_guides
 from ccfem.geometry.medial_axis import medial_axis
 from ccfem.geometry.parallel_strands import grow, lengthened
-from ccfem.geometry.polylines import along_line, points_along
+from ccfem.geometry.polylines import along_line, line_length, points_along
 from ccfem.geometry.shapes import Region
 from ccfem.geometry.shells import shells
 from ccfem.layers.layer import Layer
 from ccfem.layers.layer_stress import LayerStress
+from ccfem.linking.joining import Joined, join, link_ends
 from ccfem.machine.machine import Machine
 from ccfem.planning.infill import Infill, check_shells
 from ccfem.raster.bitmap import Bitmap
@@ -40,6 +42,11 @@ _BEYOND = 4.0
 """Of guides, in pitches: step along the streamline, least distance from one to the next, least
 length, distance to the shells up to which an end is taken for one at the border, and by how much it
 is then made longer, so that the strands parallel to it reach a slanted border too."""
+_LINK = 2.6
+"""Longest link to a strand that is too short to be cut, in pitches: to the next but one on a
+slanted border."""
+_WORTH = 12.0
+"""Strands shorter than this, in widths, are not linked: they would be links for the most part."""
 
 
 class _Inside(NamedTuple):
@@ -73,7 +80,9 @@ class Mps(Infill):
         Least distance of strands in spacings; where they come nearer than 1 they overlap, which
         leaves smaller gaps. 1 for no overlap.
     minimum_length : float, mm, optional
-        Shorter paths are dropped; by default the shortest that the machine can cut.
+        Shorter paths are dropped; by default the shortest that the machine can cut. Strands that
+        are too short are first joined to those beside them, by links that are marked as such; ends
+        then stop a fibre width before the sides of other strands.
     mode : {"polyline", "raster"}, default "polyline"
         Polylines; or paths of pixels a spacing wide, as in the paper: see `ccfem.raster`.
     """
@@ -114,6 +123,22 @@ class Mps(Infill):
         interior = shapely.force_2d(prepared.interior)  # a copy: threads must not share a geometry
         guides = self._guides(layer, stress, interior, prepared.middles, pitch)
         return prepared.rings + grow(guides, interior, pitch, self.closest)
+
+    def linked(self, lines: list[FloatArray], prepared: _Inside, machine: Machine) -> Joined:
+        """Strands too short to be cut, joined to their neighbours by links inside the shells."""
+        least = machine.minimum_length if self.minimum_length is None else self.minimum_length
+        short = any(line_length(line) < least for line in lines)
+        if not short or shapely.is_empty(prepared.interior):
+            return join(lines, [])
+        width, radius = machine.fibre_width, machine.minimum_radius
+        limit = _LINK * self.spacing * width
+        interior = shapely.force_2d(prepared.interior)
+        rings = len(prepared.rings)
+        worth = [line for line in lines[rings:] if line_length(line) >= _WORTH * width]
+        lines = clear_ends(lines[:rings] + worth, width, rings)
+        return link_ends(
+            lines, interior, limit, width, radius=radius, enough=least, one_by_one=True
+        )
 
     def regions(self, image: Bitmap, layer: Layer, stress: LayerStress) -> Regions:
         """Shells of pixels, guides and rings round them."""

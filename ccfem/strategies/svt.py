@@ -5,8 +5,9 @@ planning method for 3D printing of continuous fiber reinforced plastics, Composi
 (2021) 106181. The tracks and the links are reconstructed: the paper shows them and gives no rule.
 """
 
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
+from threading import Lock
 from typing import Any, ClassVar, Literal
 
 import numpy as np
@@ -14,19 +15,22 @@ import shapely
 
 from ccfem.arrays import BoolArray, FloatArray
 from ccfem.checks import check_fields
+from ccfem.elasticity.part_stress import PartStress
 from ccfem.geometry.offsets import join_rings, offset_rings, rings
 from ccfem.geometry.shapes import Region
 from ccfem.layers.layer import Layer
-from ccfem.layers.layer_stress import LayerStress
+from ccfem.layers.layer_stress import LayerStress, stress_on
 from ccfem.linking.single_path import link_tracks
 from ccfem.machine.machine import Machine
 from ccfem.planning.infill import SPACING, check_fill, long_enough
-from ccfem.planning.strategy import Amount
+from ccfem.planning.strategy import Amount, LayerPlanner
 from ccfem.stress_tracing.band import band
+from ccfem.stress_tracing.blobs import blobs
 from ccfem.stress_tracing.criterion import Criterion
 from ccfem.stress_tracing.frame import frame
 from ccfem.stress_tracing.main_paths import main_paths
-from ccfem.stress_tracing.tracks import track_count, tracks
+from ccfem.stress_tracing.symmetric import made_symmetric
+from ccfem.stress_tracing.tracks import tracks
 from ccfem.stress_tracing.walk import walk
 from ccfem.toolpaths import Toolpaths
 
@@ -34,6 +38,13 @@ __all__ = ["Svt"]
 
 _SAMPLING = 0.5
 """Distance of the samples of the border for the medial axis, in fibre widths."""
+_SAME = 1e-6
+"""Share of its area by which a section may differ from that of another layer to be the same."""
+_LEAST = 20.0
+"""Length of the shortest spiral in an open place, in fibre widths."""
+
+_Marked = tuple[FloatArray, BoolArray]
+"""Points (n, 2) of a path, mm, and the mask (n,) of its links."""
 
 
 @dataclass(frozen=True)
@@ -42,10 +53,10 @@ class Svt:
 
     Members of the section are those of its medial axis. In every joint two members at a time are
     joined to a main load path, where turn, misalignment with the stress and sense of the stress
-    suit best. Strands fill each main path from side to side, their distance following its width;
-    they cross those of other main paths in the joints and leave the section there. Links outside
-    the section join them to one path for each piece of the section. A section without members (a
-    disc, a square) is filled by concentric rings.
+    suit best. Strands fill each main path from side to side, as many as its width asks for: where
+    it narrows they leave through its border. They cross those of other main paths in the joints and
+    leave the section there. Links outside the section join them to one path for each piece of the
+    section. A section without members (a disc, a square) is filled by concentric rings.
 
     It is meant for frames of slim members. In parts with wide ones, as a plate with a hole, joints
     take most of the section: strands lie there side by side, or over each other, and where links
@@ -59,8 +70,8 @@ class Svt:
         parameters below up to `minimum_length`: that skips joints and leaves points over, so that
         no section is filled from them.
     spacing : float, default 1
-        Distance of neighbouring strands in fibre widths, at least 1, where the main path is wide;
-        strands are closer where it is narrow.
+        Distance of neighbouring strands in fibre widths, at least 1; nine tenths of that where the
+        width of a main path is no multiple of it.
     links : "outside" or "none", default "outside"
         Join all strands of a piece of the section to one path, or lay single strands.
     longest_inside : float, mm, default 6
@@ -74,6 +85,8 @@ class Svt:
     aligned : bool, default True
         Whether strands turn to the stress in joints and beside free ends; otherwise they run there
         as the medial axis and a smooth curve across the joint have it.
+    filled : bool, default True
+        Whether what the main paths leave open in wide places is filled by spirals.
     turn : float, default 75
         Largest turn, degrees, of a main path in a joint.
     width_ratio : float, default 2
@@ -89,6 +102,7 @@ class Svt:
     longest_over_void: float | None = None
     crossings: bool = True
     aligned: bool = True
+    filled: bool = True
     turn: float = 75.0
     width_ratio: float = 2.0
     minimum_length: float | None = None
@@ -98,7 +112,7 @@ class Svt:
     crosses: ClassVar[bool] = True
     variants: ClassVar[Mapping[str, Mapping[str, Any]]] = {
         "points": {"mode": "points"},
-        "plain": {"links": "none", "crossings": False, "aligned": False},
+        "plain": {"links": "none", "crossings": False, "aligned": False, "filled": False},
         "cut": {"longest_inside": 0.0, "longest_over_void": 0.0},
     }
 
@@ -110,14 +124,24 @@ class Svt:
 
     def __call__(self, layer: Layer, stress: LayerStress, machine: Machine) -> Toolpaths:
         """Plan the paths of one layer: for each piece of its section one, or as few as can be."""
-        lines: list[FloatArray] = []
-        link: list[BoolArray] = []
-        for piece in shapely.get_parts(layer.plane.polygon):
-            for line, mask in self._piece(piece, stress, machine):
-                lines.append(line)
-                link.append(mask)
-        paths = Toolpaths.from_plane(lines, layer, link=link)
+        return self._on(layer, self._lines(layer, stress, machine), machine)
+
+    def for_part(
+        self, stress: PartStress, layers: Sequence[Layer], machine: Machine
+    ) -> LayerPlanner:
+        """Plan layers of the same section once: by the stress on the first of them."""
+        return _Alike(self, stress, _twins(layers))
+
+    def _on(self, layer: Layer, lines: list[_Marked], machine: Machine) -> Toolpaths:
+        """Paths on a layer, the short ones dropped."""
+        points = [each for each, _ in lines]
+        paths = Toolpaths.from_plane(points, layer, link=[mask for _, mask in lines])
         return long_enough(paths, self.minimum_length, machine)
+
+    def _lines(self, layer: Layer, stress: LayerStress, machine: Machine) -> list[_Marked]:
+        """Paths in the plane of a layer, with the masks of their links."""
+        pieces = shapely.get_parts(layer.plane.polygon)
+        return [each for piece in pieces for each in self._piece(piece, stress, machine)]
 
     def groups(
         self, piece: Region, stress: LayerStress, machine: Machine
@@ -128,14 +152,25 @@ class Svt:
         found = []
         for path in main_paths(members, stress, criterion, self.width_ratio):
             strip = band(path, members, self.crossings)
-            count = track_count(strip, self.spacing * machine.fibre_width)
+            pitch = self.spacing * machine.fibre_width
             follow = stress if self.aligned else None
-            found.append(tracks(strip, count, piece, machine.minimum_radius, follow))
+            found.append(tracks(strip, pitch, piece, machine.minimum_radius, follow))
+        found = made_symmetric(found, piece, machine.fibre_width)
+        laid = [line for group in found for line in group]
+        if laid and self.filled:
+            width, least = (
+                machine.fibre_width,
+                max(self._least(machine), _LEAST * machine.fibre_width),
+            )
+            pitch = self.spacing * width
+            found += blobs(piece, laid, width, pitch, least)
         return found
 
-    def _piece(
-        self, piece: Region, stress: LayerStress, machine: Machine
-    ) -> list[tuple[FloatArray, BoolArray]]:
+    def _least(self, machine: Machine) -> float:
+        """Length of the shortest path that is laid, mm."""
+        return machine.minimum_length if self.minimum_length is None else self.minimum_length
+
+    def _piece(self, piece: Region, stress: LayerStress, machine: Machine) -> list[_Marked]:
         """Paths of one piece of the section, with the mask of their links."""
         if self.mode == "points":
             return _unlinked(walk(piece, stress, _SAMPLING * machine.fibre_width))
@@ -158,5 +193,43 @@ class Svt:
         return join_rings(levels, start, self.spacing * width, width) if levels else []
 
 
-def _unlinked(lines: list[FloatArray]) -> list[tuple[FloatArray, BoolArray]]:
+class _Alike:
+    """Planner of a part that plans layers of the same section once."""
+
+    def __init__(self, svt: Svt, stress: PartStress, twins: Mapping[int, Layer]) -> None:
+        self._svt, self._stress, self._twins = svt, stress, twins
+        self._locks = {twin.index: Lock() for twin in twins.values()}
+        self._known: dict[tuple[int, Machine], list[_Marked]] = {}
+
+    def __call__(self, layer: Layer, stress: LayerStress, machine: Machine) -> Toolpaths:
+        """Plan one layer, or take the plan of its twin."""
+        twin = self._twins.get(layer.index, layer)
+        key = (twin.index, machine)
+        with self._locks.setdefault(twin.index, Lock()):
+            if key not in self._known:
+                own = stress if twin is layer else stress_on(twin, self._stress)
+                self._known[key] = self._svt._lines(twin, own, machine)
+        return self._svt._on(layer, self._known[key], machine)
+
+
+def _twins(layers: Sequence[Layer]) -> dict[int, Layer]:
+    """First layer of the same section, of each flat layer by its index."""
+    first: list[Layer] = []
+    found: dict[int, Layer] = {}
+    for layer in layers:
+        if layer.flat is None:
+            continue
+        section = layer.plane.polygon
+        for other in first:
+            apart = shapely.symmetric_difference(section, other.plane.polygon).area
+            if apart <= _SAME * max(section.area, 1e-300):
+                found[layer.index] = other
+                break
+        else:
+            first.append(layer)
+            found[layer.index] = layer
+    return found
+
+
+def _unlinked(lines: list[FloatArray]) -> list[_Marked]:
     return [(line, np.zeros(len(line), dtype=bool)) for line in lines]

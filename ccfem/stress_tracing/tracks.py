@@ -13,15 +13,13 @@ from ccfem.geometry.polylines import along_line, subdivide, turning_angles
 from ccfem.geometry.shapes import Region
 from ccfem.layers.layer_stress import LayerStress
 from ccfem.stress_tracing.band import STEP, Band
+from ccfem.stress_tracing.counts import places
 from ccfem.stress_tracing.turning import relaxed
 
-__all__ = ["clipped", "eased", "track_count", "tracks"]
+__all__ = ["clipped", "eased", "tracks"]
 
-_WIDE, _NARROW = 75.0, 5.0
-"""Percentiles of the width of a band that decide how many tracks it has: wide members are to be
-filled, while in narrow ones tracks come no nearer than some share of the pitch."""
-_CLOSEST = 0.45
-"""That share."""
+_BEYOND = 6
+"""Points for which a track goes on where it leaves its band sideways."""
 _OUTSIDE = 1.5
 """Length outside the section, mm, after which a track has left it for good."""
 _INSET = 0.1
@@ -33,18 +31,9 @@ _ROUNDS = 60
 """Standard deviation, mm, of the Gaussian that eases sharp turns, and how often at most."""
 
 
-def track_count(band: Band, pitch: float) -> int:
-    """Count the tracks of a band, a pitch, mm, apart where it is wide; at least 1.
-
-    Fewer where they would be closer than 0.45 pitches along more than a twentieth of the band.
-    """
-    narrow, wide = np.percentile(band.width, [_NARROW, _WIDE])
-    return max(1, min(round(wide / pitch), int(narrow / (_CLOSEST * pitch))))
-
-
 def tracks(
     band: Band,
-    count: int,
+    pitch: float,
     section: Region,
     radius: float = 0.0,
     stress: LayerStress | None = None,
@@ -54,7 +43,8 @@ def tracks(
     Parameters
     ----------
     band : Band
-    count : int
+    pitch : float, mm
+        Distance of neighbouring tracks that is wanted.
     section : shapely (Multi)Polygon, mm
     radius : float, mm, default 0
         Tighter turns are eased; where the border leaves no room for that, they stay.
@@ -70,20 +60,44 @@ def tracks(
     shapely.prepare(section)
     inner = shapely.buffer(section, -_INSET)
     seam = shapely.get_coordinates(shapely.centroid(section))[0]
-    share = 1.0 - (2.0 * np.arange(count) + 1.0) / count
-    lines = band.middle + share[:, None, None] * band.half
+    share = places(band, pitch, section)
+    lines = band.middle + share[..., None] * band.half
     if stress is not None:
-        lines = relaxed(lines, band, stress, section)
+        lines = relaxed(lines, band, stress, section, share)
     found = []
-    for line in lines:
+    for line, place in zip(lines, share, strict=True):
         line = eased(line, radius, band.closed)
         if band.closed:
-            line = ring_from(np.concatenate([line, line[:1]]), seam)
+            pieces = [ring_from(np.concatenate([line, line[:1]]), seam)]
         else:
-            line = clipped(line, section, band.core, band.within)
-        if len(line) > 1:
-            found.append(_held(line, section, inner, band.closed))
+            pieces = [
+                clipped(line[run], section, *_parts_of(band, run))
+                for run in _stretches(place, band)
+            ]
+        found += [_held(each, section, inner, band.closed) for each in pieces if len(each) > 1]
     return found
+
+
+def _stretches(place: FloatArray, band: Band) -> list[slice]:
+    """Stretches of a track that lie within its band, or on beyond its ends."""
+    within = np.abs(place) <= 1.0
+    ends = np.flatnonzero(np.diff(np.concatenate([[False], within, [False]]).astype(np.int8)))
+    found = []
+    for a, b in ends.reshape(-1, 2):
+        # One point beyond the border at either side, so that the track is cut there.
+        run = slice(max(int(a) - _BEYOND, 0), min(int(b) + _BEYOND, len(place)))
+        if a < band.core.stop and b > band.core.start:
+            found.append(run)
+    return found
+
+
+def _parts_of(band: Band, run: slice) -> tuple[slice, slice]:
+    """Return the core of a band, and what is within it, in a stretch of it."""
+    core, within = (
+        slice(max(part.start, run.start) - run.start, min(part.stop, run.stop) - run.start)
+        for part in (band.core, band.within)
+    )
+    return core, within
 
 
 def eased(line: FloatArray, radius: float, closed: bool = False) -> FloatArray:

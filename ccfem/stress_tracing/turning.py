@@ -28,12 +28,14 @@ _BENDING = 2.0
 _HELD = 2.0
 _FREE = 12.0
 """Lengths, mm: c, and l in members and in joints."""
-_CLOSEST = 0.6
+_CLOSEST = 0.8
 """Share of their distance from each other that tracks keep."""
 _ROUNDS = 2
 
 
-def relaxed(lines: FloatArray, band: Band, stress: LayerStress, section: Region) -> FloatArray:
+def relaxed(
+    lines: FloatArray, band: Band, stress: LayerStress, section: Region, share: FloatArray
+) -> FloatArray:
     """Turn the tracks of a band to the stress.
 
     Parameters
@@ -43,6 +45,8 @@ def relaxed(lines: FloatArray, band: Band, stress: LayerStress, section: Region)
     band : Band
     stress : LayerStress
     section : shapely (Multi)Polygon, mm
+    share : (k, n) array
+        Place of the tracks across the band, from left (1) to right (-1).
 
     Returns
     -------
@@ -61,7 +65,7 @@ def relaxed(lines: FloatArray, band: Band, stress: LayerStress, section: Region)
         moved = np.stack(
             [_least(w, g, hold, band.closed) for w, g in zip(weight, slope, strict=True)]
         )
-        moved = _apart(moved, band)
+        moved = _apart(moved, band, share)
     return lines + moved[..., None] * normal
 
 
@@ -99,13 +103,14 @@ def _least(weight: FloatArray, slope: FloatArray, hold: FloatArray, closed: bool
     return np.asarray(spsolve(matrix.tocsc(), rise.T @ (weight * slope)))
 
 
-def _apart(moved: FloatArray, band: Band) -> FloatArray:
+def _apart(moved: FloatArray, band: Band, share: FloatArray) -> FloatArray:
     """Find the moves (k, n) nearest to those given that keep tracks apart."""
     count = len(moved)
     size = np.linalg.norm(band.half, axis=1)
     number = np.arange(count)[:, None]
-    even = (2.0 * number + 1.0) / count * size
-    least = _CLOSEST * 2.0 * size / count * number
+    even = (1.0 - share) * size
+    step = even[1:2] - even[:1] if count > 1 else 0.0 * even
+    least = _CLOSEST * step * number
     place = even - moved - least  # from the left, to grow from track to track
     for column in np.flatnonzero((np.diff(place, axis=0) < 0.0).any(axis=0)):
         place[:, column] = isotonic_regression(place[:, column]).x

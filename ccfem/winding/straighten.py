@@ -5,7 +5,7 @@ from dataclasses import replace
 import numpy as np
 from numba import njit
 
-from ccfem.arrays import FloatArray
+from ccfem.arrays import FloatArray, seen_only
 from ccfem.winding.triangle_mesh import EdgePath
 
 __all__ = ["straighten"]
@@ -28,7 +28,7 @@ def straighten(points: FloatArray, path: EdgePath, keep: float, sweeps: int = _S
     sweeps : int
     """
     share = path.share.copy()
-    _sweep(points, path.start, path.end, path.edges, share, keep, sweeps)
+    _sweep(seen_only(points), path.start, path.end, path.edges, share, keep, sweeps)
     return replace(path, share=share)
 
 

@@ -44,6 +44,8 @@ def assert_same(first, second, coverage=0.006):
         tolerance = 2e-3 if name.startswith("outside") else tolerance
         # on the grid of coverage
         tolerance = 1e3 * coverage if name == "gap_area" else tolerance
+        # of cells, which layers cut unlike, and whose axes swap where principal stresses do
+        tolerance = 3.0 if name.startswith("least_angle") else tolerance
         assert first[name] == pytest.approx(second[name], rel=1e-5, abs=tolerance, nan_ok=True), (
             name
         )
@@ -151,6 +153,7 @@ def test_zero_stress(make_part, uniform):
         *(f"matching_{name}_{k}" for name in ("path", "energy") for k in (10, 30)),
         *("space_angle_mean", "space_angle_stress", "across_tension"),
         *("across_flat", "across_best"),
+        *("least_angle", "least_angle_flat", "least_angle_best"),
         *(f"space_aligned_{k}" for k in (10, 20, 30)),
     }
     assert total["no_tension"] == 1.0

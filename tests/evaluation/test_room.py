@@ -99,6 +99,8 @@ GOOD = {
     "fibre_length": 1000.0,
     "fibre_fraction_99": 0.4,
     "out_of_order": 0.0,
+    "thickness_95": 4.5,
+    "tilt_mean": 0.0,
 }
 
 
@@ -113,6 +115,10 @@ GOOD = {
         ({"free_span": 12.34}, "fibre hangs free over 12.3 mm"),
         ({"link_inside": 900.0}, "91% of the fibre is marked as links"),
         ({"fibre_fraction_99": 1.3}, "a fibre volume fraction of 1.30"),
+        (
+            {"tilt_mean": 20.0},
+            "curved layers up to 4.5 mm thick, more than a line of matrix is wide",
+        ),
         ({"out_of_order": 3.0}, "3 paths come after one of a higher layer"),
     ],
 )

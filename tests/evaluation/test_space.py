@@ -113,6 +113,10 @@ def test_layers_are_compared_with_flat_ones_and_the_best():
     assert total["across_tension"] == pytest.approx((c**2 - 2.0 * s**2) / 4.0)
     assert total["across_flat"] == pytest.approx(1.0)
     assert total["across_best"] == 0.0
+    # The least principal stress, -2, is 60 degrees off the layer's normal and square to y.
+    assert total["least_angle"] == pytest.approx(60.0)
+    assert total["least_angle_flat"] == pytest.approx(90.0)
+    assert total["least_angle_best"] == pytest.approx(0.0, abs=1e-5)
     pull = uniform(np.diag([3.0, 2.0, 1.0]))
     total = evaluate(paths, [layer], pull, Machine()).total
     assert total["across_flat"] == pytest.approx(1.0 / 3.0)

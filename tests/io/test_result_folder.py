@@ -2,6 +2,7 @@
 
 import hashlib
 import json
+import multiprocessing
 import os
 import platform
 import re
@@ -140,28 +141,42 @@ def test_what_a_killed_run_left_is_removed_and_what_it_set_aside_comes_back(tmp_
 
 
 RUNS = """
-import sys
-from pathlib import Path
 from ccfem.io.result_folder import whole_folder
-print("started", flush=True)
-for k in range(int(sys.argv[2])):
-    with whole_folder(Path(sys.argv[1])) as folder:
+started.set()
+for k in range(count):
+    with whole_folder(where) as folder:
         for name in "abc":
             (folder / name).write_text(str(k))
 """
 
 
+@pytest.fixture(scope="module")
+def runs():
+    """Begin a process that writes a folder a number of times, and an event that it has begun."""
+    processes = multiprocessing.get_context("forkserver")
+    processes.set_forkserver_preload(["ccfem.io.result_folder"])  # imported once for all
+
+    def begin(where, count):
+        started = processes.Event()
+        known = {"where": where, "count": count, "started": started}
+        run = processes.Process(target=exec, args=(RUNS, known))
+        run.start()
+        return run, started
+
+    return begin
+
+
 @pytest.mark.parametrize("delay", [0.0, 0.003, 0.011, 0.05, 0.12])
-def test_a_kill_at_any_moment_leaves_whole_results(tmp_path, delay):
+def test_a_kill_at_any_moment_leaves_whole_results(tmp_path, runs, delay):
     where = tmp_path / "results"
     write(where, a="first", b="first", c="first")
     (where / "thesis.docx").write_text("three years")
-    run = subprocess.Popen([sys.executable, "-c", RUNS, where, "100000"], stdout=subprocess.PIPE)
-    run.stdout.readline()
+    run, started = runs(where, 100000)
+    assert started.wait(60.0)
     time.sleep(delay)
-    run.send_signal(signal.SIGKILL)
-    run.wait()
-    run.stdout.close()
+    run.kill()
+    run.join()
+    assert run.exitcode == -signal.SIGKILL
     write(tmp_path / "another", a="new")  # the next run mends
     found = contents(where)
     assert found.pop("thesis.docx") == "three years"
@@ -170,14 +185,15 @@ def test_a_kill_at_any_moment_leaves_whole_results(tmp_path, delay):
     assert leftovers(tmp_path) == []
 
 
-def test_runs_into_one_folder_at_once_lose_nothing(tmp_path):
+def test_runs_into_one_folder_at_once_lose_nothing(tmp_path, runs):
     pytest.importorskip("fcntl")
     where = tmp_path / "results"
     write(where, a="first", b="first", c="first")
     (where / "thesis.docx").write_text("three years")
-    command = [sys.executable, "-c", RUNS, where, "60"]
-    runs = [subprocess.Popen(command, stdout=subprocess.PIPE) for _ in range(2)]
-    assert [(run.communicate()[0], run.returncode) for run in runs] == [(b"started\n", 0)] * 2
+    both = [runs(where, 60) for _ in range(2)]
+    for run, _ in both:
+        run.join()
+    assert [run.exitcode for run, _ in both] == [0, 0]
     assert contents(where) == {"a": "59", "b": "59", "c": "59", "thesis.docx": "three years"}
     assert leftovers(tmp_path) == []
 

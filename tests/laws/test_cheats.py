@@ -56,7 +56,7 @@ def pieces(line):
 
 
 def copies(layer, stress, machine):
-    return rings(layer, stress, machine) * 8
+    return rings(layer, stress, machine) * 5
 
 
 def bundles(layer, stress, machine):
@@ -65,7 +65,7 @@ def bundles(layer, stress, machine):
 
 
 def short_pieces(layer, stress, machine):
-    return [piece for line in rings(layer, stress, machine, 1.0) for piece in pieces(line)]
+    return [piece for line in rings(layer, stress, machine, 2.0) for piece in pieces(line)]
 
 
 def micro_waves(layer, stress, machine):
@@ -81,12 +81,12 @@ def there_and_back(layer, stress, machine):
 
 
 def one_layer(layer, stress, machine):
-    return rings(layer, stress, machine, 1.0) * 4 if layer.index == 1 else []
+    return rings(layer, stress, machine, 1.0) * 3 if layer.index == 1 else []
 
 
 def winding(layer, stress, machine):
-    """Each ring as one strand of ten turns."""
-    turns = [[line] + [line[1:]] * 9 for line in rings(layer, stress, machine)]
+    """Each ring as one strand of five turns."""
+    turns = [[line] + [line[1:]] * 4 for line in rings(layer, stress, machine)]
     return [np.concatenate(line) for line in turns]
 
 

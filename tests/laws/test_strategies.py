@@ -27,12 +27,18 @@ VARIANTS = [
     f"{name}-{variant}" for name in NAMES for variant in getattr(named()[name], "variants", {})
 ]
 ALL = NAMES + VARIANTS
+QUICK = {"stream_function": {"evaluations": 5}}
+"""Parameters that none of the laws depends on, of strategies that are slow with their defaults."""
+
+
+def made(name, **parameters):
+    return create(name, QUICK.get(name, {}) | parameters)
 
 
 def strategy_of(label):
     """Strategy of a name, or of a name and one of its variants."""
     name, _, variant = label.partition("-")
-    return create(name, named()[name].variants[variant] if variant else {})
+    return made(name, **(named()[name].variants[variant] if variant else {}))
 
 
 def plate_with_hole():
@@ -165,7 +171,7 @@ def test_same_input_gives_the_same_paths(label):
 @pytest.mark.parametrize("name", NAMES)
 def test_size_of_the_load_does_not_matter(name):
     stress, layers = planned_on(load=1e3)
-    scaled = plan(create(name), layers, stress, MACHINE)
+    scaled = plan(made(name), layers, stress, MACHINE)
     np.testing.assert_array_equal(scaled.offsets, paths_of(name).offsets)
     np.testing.assert_allclose(scaled.points, paths_of(name).points, atol=1e-3)
 
@@ -175,7 +181,7 @@ def test_size_of_the_load_does_not_matter(name):
 def test_paths_turn_with_the_part_whatever_the_load(name, turn, load):
     """A strategy with a direction of its own names its parameter, in degrees, in `direction`."""
     stress, layers = planned_on(load=load, degrees=turn)
-    turned = plan(turned_with(create(name), turn), layers, stress, MACHINE)
+    turned = plan(turned_with(made(name), turn), layers, stress, MACHINE)
     assert_turned(turned, paths_of(name), turn)
 
 
@@ -223,9 +229,9 @@ def test_paths_cross_neither_each_other_nor_themselves(label):
 
 @pytest.mark.parametrize("label", ALL)
 def test_evaluator_accepts_the_paths(label):
-    stress, layers = planned_on()
-    paths = paths_of(label)
-    total = evaluate(paths, layers, stress, MACHINE).total
+    stress, (layer, _) = planned_on()
+    paths = paths_of(label).on_layer(0)
+    total = evaluate(paths, [layer], stress, MACHINE).total
     assert total["fibre_length"] == pytest.approx(paths.lengths.sum())
     assert total["paths"] == len(paths)
 
@@ -235,7 +241,7 @@ def test_amount_sets_how_much_fibre_is_laid(name):
     stress, layers = planned_on()
     amount = named()[name].amount
     most, least = (
-        plan(create(name, {amount.parameter: value}), layers, stress, MACHINE).lengths.sum()
+        plan(made(name, **{amount.parameter: value}), layers, stress, MACHINE).lengths.sum()
         for value in (amount.most, amount.least)
     )
     assert most > 1.2 * least

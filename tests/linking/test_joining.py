@@ -6,6 +6,7 @@ import shapely
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
+from ccfem.geometry.polylines import line_length
 from ccfem.linking.clearance import trim_to_clearance
 from ccfem.linking.conformal import lead_into, parallel_curve
 from ccfem.linking.finishing import close_short_ring, keep_off_border
@@ -169,3 +170,17 @@ def test_a_short_ring_runs_on_over_its_start() -> None:
     assert length(longer) >= 42.0
     assert close_short_ring(ring, 50.0) is ring
     assert close_short_ring(ring, 40.0) is ring
+
+
+def test_short_strands_side_by_side_become_zigzags():
+    """Seven strands of 15 mm, where 42 are needed: two zigzags, or one, that leave none out."""
+    lines = [np.array([[2.0, 2.0 + k], [17.0, 2.0 + k]]) for k in range(7)]
+    section = shapely.box(0.0, 0.0, 19.0, 10.0)
+    joined = link_ends(lines, section, 2.6, 1.0, radius=3.85, enough=42.0, one_by_one=True)
+    sizes = [line_length(line) for line in joined.lines]
+    assert min(sizes) > 42.0
+    assert sum(sizes) == pytest.approx(7 * 15.0 + 7.0 - len(sizes), abs=0.1)
+    for line, link in zip(joined.lines, joined.link, strict=True):
+        steps = np.abs(np.diff(line, axis=0))
+        across = steps[:, 1] > steps[:, 0]
+        np.testing.assert_array_equal(link[:-1], across)  # marked where it is no strand

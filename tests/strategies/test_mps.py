@@ -195,7 +195,9 @@ def test_guides_are_streamlines():
     """Uniform tension at 30 degrees: all strands inside the shells are straight and parallel."""
     c, s = np.cos(np.radians(30.0)), np.sin(np.radians(30.0))
     lines, _ = plan(
-        Mps(), shapely.box(0, 0, 120, 80), lambda p: [c * c, s * s, c * s] + 0 * p[:, :1]
+        Mps(minimum_length=0.0),
+        shapely.box(0, 0, 120, 80),
+        lambda p: [c * c, s * s, c * s] + 0 * p[:, :1],
     )
     inner = [x for x in lines if not np.array_equal(x[0], x[-1])]
     assert len(inner) > 60
@@ -389,3 +391,18 @@ def test_halves_of_the_loop_get_the_same_fibre():
     points = np.concatenate(list(plan_part(create("mps"), layers, stress, case.machine)))
     lugs = points[np.abs(points[:, 1]) > 50.0]
     assert (lugs[:, 0] > 0.0).mean() == pytest.approx(0.5, abs=0.05)
+
+
+def test_strands_too_short_to_be_cut_are_joined():
+    """A strip pulled across: its strands are 16 mm long, where the machine cuts 42."""
+    strip = shapely.box(0.0, 0.0, 22.0, 60.0)
+    lines, section = plan(Mps(), strip, along_x)
+    inner = [x for x in lines if not np.array_equal(x[0], x[-1])]
+    length = np.array([shapely.LineString(x).length for x in inner])
+    assert length.min() >= MACHINE.minimum_length
+    room = section.buffer(-3 * MACHINE.fibre_width).area
+    assert length.sum() > 0.9 * room / MACHINE.fibre_width
+    # Links keep a width from the shells, and strands from each other.
+    rings = shapely.MultiLineString([x for x in lines if np.array_equal(x[0], x[-1])])
+    gaps = shapely.distance(shapely.points(np.concatenate(inner)), rings)
+    assert gaps.min() > 0.98 * MACHINE.fibre_width

@@ -16,8 +16,10 @@ from ccfem.layers.layer_stress import stress_on
 from ccfem.layers.slicing.planar import Planar
 from ccfem.machine import Machine
 from ccfem.materials import isotropic
+from ccfem.mesh.box import box_mesh
 from ccfem.mesh.patches import Plane, patches_from_rules
 from ccfem.meshing import extrude
+from ccfem.planning import plan
 from ccfem.strategies import create
 
 DISC = shapely.Point(0, 0).buffer(9.0, quad_segs=32) & shapely.box(-8.9, -9, 8.9, 9)
@@ -259,3 +261,18 @@ def test_every_piece_of_a_section_has_its_path():
 def test_parameters_out_of_range_are_refused(name, value):
     with pytest.raises(InputError, match=f"svt.{name}"):
         create("svt", {name: value})
+
+
+def test_layers_of_one_section_have_one_plan():
+    """The stress differs from layer to layer, by rounding or more; the section does not."""
+    mesh = box_mesh((60.0, 9.0, 4.0), (24, 4, 3))
+    loads = {"bend": (Force("x_max", (0.0, 0.0, 20.0)),)}
+    stress = solve(Problem(mesh, isotropic(3500.0, 0.3), (Support("x_min"),), loads, order=1))
+    layers = Planar(count=3).cut(mesh)
+    paths = plan(create("svt"), layers, stress["bend"], MACHINE)
+    first, *others = (paths.on_layer(layer.index) for layer in layers)
+    assert len(first) == 1
+    for other in others:
+        np.testing.assert_array_equal(other.points[:, :2], first.points[:, :2])
+        np.testing.assert_array_equal(other.link, first.link)
+        assert other.points[0, 2] > first.points[0, 2] + 1.0

@@ -16,7 +16,7 @@ from ccfem.layers.slicing.load_oriented import LoadOriented, LoadOrientedSlicing
 from ccfem.papers.kipping_2023.thickness import Distances, distances_below
 from ccfem.planning import plan
 from ccfem.strategies import create
-from ccfem.support import SupportColumns, support_columns
+from ccfem.support import SupportLayers, support_layers
 from ccfem.toolpaths import Toolpaths
 
 __all__ = ["PAPER_SECONDS", "PARTS", "Chain", "chain", "table_1", "table_2"]
@@ -36,7 +36,7 @@ class Chain:
     stress: StressField
     sliced: LoadOrientedSlicing
     paths: Toolpaths
-    support: SupportColumns
+    support: SupportLayers
     distances: Distances
     seconds: dict[str, float]
 
@@ -67,13 +67,16 @@ def chain(name: str) -> Chain:
         whole = time.perf_counter() - start
         seconds["layers"] = max(whole - sum(list(seconds.values())[:3]), 0.0)
         start = time.perf_counter()
-        support = support_columns(stress.mesh, sliced.field.up.tolist(), lift=10 * slicer.thickness)
-        seconds["space of the support"] = time.perf_counter() - start
+        x, y, z = sliced.field.up.tolist()
+        support = support_layers(
+            stress.mesh, sliced.layers, (x, y, z), sliced.field.values, sliced.step
+        )
+        seconds["support layers"] = time.perf_counter() - start
         start = time.perf_counter()
         paths = plan(create("fiso"), sliced.layers, stress, case.machine)
         seconds["paths"] = time.perf_counter() - start
         stages = ("critical regions", "vector field", "scalar field", "layers")
-        parts = (*stages, "space of the support", "paths")
+        parts = (*stages, "support layers", "paths")
         seconds = {key: seconds[key] for key in parts}
     seconds["all"] = sum(seconds.values())
     return Chain(case, stress, sliced, paths, support, distances_below(sliced.layers), seconds)

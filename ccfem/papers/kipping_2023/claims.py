@@ -5,8 +5,11 @@ from pathlib import Path
 
 import numpy as np
 
+from ccfem.layers.layer import Layer
+from ccfem.layers.slicing.load_oriented import LoadOriented
 from ccfem.papers.kipping_2023.chain import PAPER_SECONDS, Chain
 from ccfem.papers.kipping_2023.fiso_shapes import Strand
+from ccfem.papers.kipping_2023.thickness import distances_below
 from ccfem.papers.verdicts import Check, judged
 from ccfem.support import support_columns
 
@@ -32,12 +35,14 @@ def quantities(
         found[f"{part}: paths"] = float(len(run.paths))
         layers = len(np.unique(run.paths.layer))
         found[f"{part}: layers with paths"] = float(layers)
-        found[f"{part}: support mm^3"] = run.support.volume
+        found |= {f"{part}: support, {name}": v for name, v in _support(run).items()}
         for name, figures in trades[part].items():
             found |= {f"{part}, {name}: {key}": value for key, value in figures.items()}
-        flat, ours = loads[part]["flat, z"], loads[part]["load-oriented"]
+    for part, each in loads.items():
+        flat, ours = each["flat, z"], each["load-oriented"]
         found[f"{part}: failure load over flat"] = ours[0] / flat[0]
         found[f"{part}: failure load over flat, bond strong in shear"] = ours[3] / flat[3]
+        found[f"{part}: failure load over flat, by opening"] = ours[6] / flat[6]
     found["strands: most paths"] = float(max(s.paths for s in strands.values()))
     found["strands: least coverage"] = min(s.coverage for s in strands.values())
     found["strands: least coverage, opened"] = min(s.coverage_opened for s in strands.values())
@@ -46,17 +51,49 @@ def quantities(
     return found
 
 
+def _support(run: Chain) -> dict[str, float]:
+    """Figures of the layers below a part."""
+    support, slicer = run.support, run.case.slicing
+    assert isinstance(slicer, LoadOriented)
+    node = support.columns.node
+    shared = node >= 0
+    jump = np.abs(support.field.values[shared] - run.sliced.field.values[node[shared]])
+    lowest = support.layers[0]
+    tilt = np.degrees(np.arccos(np.clip(lowest.normals @ run.sliced.field.up, -1.0, 1.0)))
+    distances = distances_below(support.layers)
+    both: list[Layer] = []
+    judged: list[bool] = []
+    for k, layer in enumerate(run.sliced.layers):
+        before = support.layers_before(k)
+        both += [*before, layer]
+        judged += [False] * len(before) + [True]
+    return {
+        "layers": float(len(support.layers)),
+        "mm^3": support.columns.volume,
+        "contact mm^2": support.columns.contact,
+        "jump in layers": float(jump.max()) / run.sliced.step,
+        "tilt of the lowest": float(np.average(tilt, weights=lowest.areas)),
+        "inverted": support.field.inverted,
+        "in range": distances.within(slicer.thinnest, slicer.thickest),
+        "thickness": distances.mean,
+        "part with a layer below": distances_below(both, judged).covered,
+    }
+
+
 def support_table(chains: Mapping[str, Chain]) -> str:
-    """Table of the space below each part: layers along the stress, and flat ones that carry 45."""
-    lines = ["| part | layers | mm^3 | contact mm^2 | part mm^3 |", "|---" * 5 + "|"]
+    """Table of the support of each part: layers along the stress, and flat ones that carry 45."""
+    head = "| part | layers | mm^3 | contact mm^2 | part mm^3 | number | 0.2 to 0.5 mm | inverted |"
+    lines = [head, "|---" * 8 + "|"]
     for part, run in chains.items():
-        mesh = run.stress.mesh
+        mesh, own = run.stress.mesh, _support(run)
         flat = support_columns(mesh, angle=45.0)
-        for name, support in (("load-oriented", run.support), ("flat, over 45 degrees", flat)):
-            lines.append(
-                f"| {part} | {name} | {support.volume:.0f} | {support.contact:.0f} | "
-                f"{mesh.volumes.sum():.0f} |"
-            )
+        lines += [
+            f"| {part} | load-oriented | {own['mm^3']:.0f} | {own['contact mm^2']:.0f} | "
+            f"{mesh.volumes.sum():.0f} | {own['layers']:.0f} | {own['in range']:.1%} | "
+            f"{own['inverted']:.2%} |",
+            f"| {part} | flat, over 45 degrees | {flat.volume:.0f} | {flat.contact:.0f} | "
+            f"{mesh.volumes.sum():.0f} | | | |",
+        ]
     return "\n".join(lines) + "\n"
 
 

@@ -4,7 +4,7 @@ from ccfem.papers.contents import Contents
 from ccfem.papers.kipping_2023.chain import PARTS, Chain, chain, table_1, table_2
 from ccfem.papers.kipping_2023.claims import support_table
 from ccfem.papers.kipping_2023.fiso_shapes import shapes_table
-from ccfem.papers.kipping_2023.strength import failure_loads, strength_table
+from ccfem.papers.kipping_2023.strength import failure_loads, on_pressing_supports, strength_table
 from ccfem.papers.kipping_2023.whole import write_all
 
 __all__ = ["CONTENTS"]
@@ -16,7 +16,9 @@ def _run() -> dict[str, Chain]:
 
 
 def _strength(chains: dict[str, Chain]) -> str:
-    return strength_table({part: failure_loads(run) for part, run in chains.items()})
+    loads = {part: failure_loads(run) for part, run in chains.items()}
+    loads["B, pressed"] = failure_loads(chains["B"], on_pressing_supports(chains["B"]))
+    return strength_table(loads)
 
 
 CONTENTS = Contents(

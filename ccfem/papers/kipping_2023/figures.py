@@ -35,8 +35,8 @@ def blank(width: float, height: float) -> "Figure":
 
 def _space(figure: "Figure", place: int, title: str, points: FloatArray) -> Any:
     axes = figure.add_subplot(1, 3, place, projection="3d")
-    axes.set_title(title)
-    axes.set_box_aspect(np.ptp(points, axis=0))
+    axes.set_title(title, y=0.9)
+    axes.set_box_aspect(np.ptp(points, axis=0), zoom=1.3)
     axes.view_init(20.0, -60.0)
     axes.set_axis_off()
     return axes
@@ -75,13 +75,15 @@ def part_figures(name: str, run: "Chain") -> dict[str, bytes]:
         axes.plot_trisurf(*layer.points.T, triangles=layer.triangles, lw=0.0, alpha=0.8)
     found[f"figure_4_5_{name}.png"] = png(figure)
     figure = blank(18.0, 6.0)
-    axes = _space(figure, 1, "space of the support", mesh.points)
-    columns = _some(np.arange(len(run.support.low)))
-    for k in columns[:1500].tolist():
-        x, y = run.support.place[k]
-        axes.plot([x, x], [y, y], [run.support.low[k], run.support.high[k]], c="C1", lw=0.3)
+    both = np.concatenate([mesh.points, run.support.columns.mesh.points])
+    axes = _space(figure, 1, "every sixth layer, and every third of the support", both)
+    for layer in run.support.layers[::3]:
+        axes.plot_trisurf(*layer.points.T, triangles=layer.triangles, lw=0.0, color="C1")
+    for layer in sliced.layers[::6]:
+        axes.plot_trisurf(*layer.points.T, triangles=layer.triangles, lw=0.0, color="C0")
     for place, share in ((2, 0.35), (3, 0.7)):
-        layer = sliced.layers[int(share * len(sliced.layers))]
+        with_paths = np.unique(run.paths.layer)
+        layer = sliced.layers[int(with_paths[int(share * len(with_paths))])]
         paths = run.paths.on_layer(layer.index)
         axes = _space(figure, place, f"layer {layer.index}", layer.points)
         if len(paths):

@@ -41,10 +41,12 @@ class Distances:
         return float(self.area[inside].sum() / self.area.sum())
 
 
-def distances_below(layers: Sequence[Layer]) -> Distances:
-    """Measure the distance of all layers from those below."""
+def distances_below(layers: Sequence[Layer], judged: Sequence[bool] | None = None) -> Distances:
+    """Measure the distance of all layers, or of those that are judged, from those below."""
     found, areas = [], []
     for k, layer in enumerate(layers[1:], 1):
+        if judged is not None and not judged[k]:
+            continue
         middle = layer.points[layer.triangles].mean(axis=1)
         nearest = np.full(len(middle), np.inf)
         for below in layers[max(0, k - _REACH) : k]:

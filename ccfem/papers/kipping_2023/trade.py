@@ -67,7 +67,7 @@ def trade_picture(found: dict[str, dict[str, dict[str, float]]]) -> bytes:
     figure = blank(6.0, 4.0)
     axes = figure.subplots()
     for part, variants in found.items():
-        rows = [v for name, v in variants.items() if name == "default" or name.startswith("blend ")]
+        rows = [v for name, v in variants.items() if set(VARIANTS[name]) <= {"blend"}]
         rows = sorted((v for v in rows if v["inverted"] == 0.0), key=lambda v: v["blend"])
         axes.plot([v["blend"] for v in rows], [v["tension"] for v in rows], "o-", label=part)
     axes.set_xlabel("blend")

@@ -7,7 +7,12 @@ from ccfem.papers.kipping_2023.chain import PARTS, chain, table_1, table_2
 from ccfem.papers.kipping_2023.claims import quantities, support_table, verdicts
 from ccfem.papers.kipping_2023.figures import part_figures, senses_figure
 from ccfem.papers.kipping_2023.fiso_shapes import options_table, shapes_picture, shapes_table
-from ccfem.papers.kipping_2023.strength import failure_loads, strength_table
+from ccfem.papers.kipping_2023.strength import (
+    failure_loads,
+    on_pressing_supports,
+    sliding_picture,
+    strength_table,
+)
 from ccfem.papers.kipping_2023.trade import trade, trade_picture, trade_table
 from ccfem.papers.verdicts import claim_table
 
@@ -22,10 +27,14 @@ def write_all(folder: Path) -> None:
     print("\n".join(tables), flush=True)
     trades = {part: trade(run) for part, run in chains.items()}
     loads = {part: failure_loads(run) for part, run in chains.items()}
+    pressed = on_pressing_supports(chains["B"])
+    loads["B, pressed"] = failure_loads(chains["B"], pressed)
     shapes, strands = shapes_table()
     tables += [trade_table(trades), strength_table(loads), shapes, options_table()]
     print("\n".join(tables[3:]), flush=True)
     pictures = {"figure_7.png": shapes_picture(strands), "trade.png": trade_picture(trades)}
+    models = {"holes held": chains["B"].stress, "supports press": pressed}
+    pictures["sliding_B.png"] = sliding_picture(chains["B"], models)
     pictures["figure_1_3.png"] = senses_figure()[0]
     for part, run in chains.items():
         pictures |= part_figures(part, run)

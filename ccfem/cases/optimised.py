@@ -1,0 +1,284 @@
+"""Topology optimisation of a case: the part that is left, as a case of its own."""
+
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, replace
+from typing import Any, Literal
+
+import numpy as np
+import shapely
+from scipy.spatial import cKDTree
+
+from ccfem.arrays import FloatArray, in_brief
+from ccfem.cases.case import Case
+from ccfem.cases.designed import LAMINATE
+from ccfem.cases.passive import Place, area_of, cells_in, check_places
+from ccfem.checks import check_known, check_number
+from ccfem.elasticity.load_kinds import patches_in_use
+from ccfem.elasticity.problem import Problem
+from ccfem.errors import InputError
+from ccfem.materials import plane_stress
+from ccfem.progress import Progress, silent
+from ccfem.topopt import Design, Simp, Somp, as_problem
+from ccfem.topopt.flat_part import FlatPart, flat_part
+from ccfem.topopt.sheet_part import plane_stiffness, sheet_outline, sheet_part, sheet_problem
+
+__all__ = ["Optimised", "optimise"]
+
+_CELLS = 4000.0
+"""Squares of the element size that a sheet is divided into."""
+_RIM = 2.0
+"""Width of what stays solid beside a patch, in element sizes."""
+_REACH = 2.0
+"""Radius of the filter, in element sizes."""
+_AS_WANTED = 0.1
+"""Share by which the part may miss the volume fraction before it is said."""
+
+
+@dataclass(frozen=True)
+class Optimised:
+    """A part that an optimisation found.
+
+    Attributes
+    ----------
+    case : Case
+        The part that is left, held, loaded and printed as the whole one.
+    design : Design
+        Densities, and the compliance of every iteration.
+    element_size : float, mm
+        Of the cells of the design.
+    planform : shapely Polygon, mm, or None
+        Outline of the part, where it was optimised as a sheet.
+    remarks : tuple of str
+        What there is to say about it, one line each.
+    """
+
+    case: Case
+    design: Design
+    element_size: float
+    planform: Any
+    remarks: tuple[str, ...]
+
+    __repr__ = in_brief
+
+
+def optimise(
+    case: Case,
+    volume_fraction: float,
+    method: Literal["simp", "somp"] = "somp",
+    *,
+    element_size: float | None = None,
+    radius: float | None = None,
+    filter: Literal["sensitivity", "density"] = "sensitivity",
+    orientation: Literal["principal", "gradient", "fixed"] = "gradient",
+    laminate: Sequence[float] | None = None,
+    weights: Mapping[str, float] | None = None,
+    keep: Sequence[str] | None = None,
+    solid: Sequence[Place] = (),
+    void: Sequence[Place] = (),
+    max_iterations: int = 200,
+    in_space: bool = False,
+    progress: Progress = silent,
+) -> Optimised:
+    """Find the stiffest part with a share of the volume of a case.
+
+    A prism along z whose loads lie in its plane is optimised as a sheet in plane stress, by one
+    layer of cells of its own, and the outline of the design is extruded again; all else in space,
+    on the cells that the part has. Sums of load cases (combinations) are no load cases here.
+
+    Parameters
+    ----------
+    case : Case
+        The part to begin with: its whole volume may be used.
+    volume_fraction : float in (0, 1)
+    method : str
+        "somp": densities, and the axis of a laminate, of a sheet. "simp": densities alone.
+    element_size : float, mm, optional
+        Edge length of the cells of a sheet; default the side of a square that 4000 of make it.
+    radius : float, mm, optional
+        Of the filter; default two element sizes.
+    filter, max_iterations
+        As in `Simp`.
+    orientation : str, default "gradient"
+        As in `Somp`; stiffer than its default on nearly all plates, and slower.
+    laminate : 4 floats, optional
+        Modulus along the axis, modulus across, MPa, Poisson's ratio and shear modulus, MPa, for
+        "somp"; default the part's own material where it has an axis, else that of Wang et al. 2021.
+    weights : mapping of load case name to float, optional
+        Compliances are summed with these; default 1 each.
+    keep : sequence of str, optional
+        Patches beside which two element sizes stay solid; default those that are loaded, and
+        curved ones that hold the part.
+    solid, void : sequences of places
+        That stay full, and empty: (x, y, radius), or the corners of a rectangle or a box, mm.
+    in_space : bool
+        Do not take a flat part for a sheet.
+    progress : callable, optional
+
+    Raises
+    ------
+    InputError
+        For what cannot be optimised so; when the design falls apart.
+    SolveError
+        When a solve misses its tolerance.
+    """
+    check_number("volume fraction", volume_fraction, above=0.0, below=1.0)
+    check_known("method", method, ("simp", "somp"))
+    check_places("solid", solid)
+    check_places("void", void)
+    problem = case.problem
+    if not any(problem.loads.values()):
+        raise InputError(f"'{case.name}' has no load, and nothing to be stiff against: add one")
+    if problem.regions:
+        raise InputError(
+            f"'{case.name}' has regions of other materials, which would not know where they end: "
+            "leave them out, and keep their places with --solid"
+        )
+    for name in keep or ():
+        check_known("patch", name, sorted(problem.mesh.patches))
+    flat = None if in_space else flat_part(problem.mesh)
+    if method == "somp" and flat is None:
+        raise InputError(
+            f"'{case.name}' is {'to be designed in space' if in_space else 'no plate'}: SOMP turns "
+            "the fibre in the plane of a prism along z: take --method simp"
+        )
+    if keep is None:
+        keep = _to_keep(problem)
+    options: dict[str, Any] = {"filter": filter, "max_iterations": max_iterations}
+    if flat is None:
+        return _of_solid(
+            case, volume_fraction, radius, weights, keep, solid, void, options, progress
+        )
+    size = float(np.sqrt(flat.planform.area / _CELLS)) if element_size is None else element_size
+    check_number("element size", size, above=0.0, unit="mm")
+    options["radius"] = _REACH * size if radius is None else radius
+    given = problem.material.stiffness
+    own = plane_stiffness(given)
+    if method == "somp":
+        own = _laminate(laminate, own)
+        options["orientation"] = orientation
+    sheet, prism = sheet_problem(problem, flat, size, own)
+    full = _rims(problem, flat, keep, size).union(area_of(solid))
+    empty = area_of(void).difference(full)
+    x, y = _middles(sheet.mesh.points, sheet.mesh.cells, prism)
+    masks = {"solid": shapely.contains_xy(full, x, y), "void": shapely.contains_xy(empty, x, y)}
+    common = {"weights": weights, "groups": prism, "progress": progress, **masks}
+    if method == "somp":
+        design = Somp(volume_fraction, **options)(sheet, own, **common)
+    else:
+        options["minimum_stiffness"] = 1e-6
+        design = Simp(volume_fraction, **options)(sheet, **common)
+    planform = sheet_outline(design, flat, size, full, empty)
+    edge = min(size, _edge(problem))
+    part = sheet_part(problem, flat, planform, edge)
+    share = planform.area / flat.planform.area
+    return _found(case, part, design, size, planform, share)
+
+
+def _of_solid(
+    case: Case,
+    volume_fraction: float,
+    radius: float | None,
+    weights: Mapping[str, float] | None,
+    keep: Sequence[str],
+    solid: Sequence[Place],
+    void: Sequence[Place],
+    options: dict[str, Any],
+    progress: Progress,
+) -> Optimised:
+    """Optimise a part in space, on its own cells."""
+    problem = case.problem
+    mesh = problem.mesh if problem.mesh.order == 1 else problem.mesh.linear()
+    whole = replace(problem, mesh=mesh, order=1, combinations={})
+    size = _edge(whole)
+    centres = mesh.points[mesh.cells].mean(axis=1)
+    full = cells_in(solid, centres)
+    for name in keep:
+        nodes = mesh.points[np.unique(mesh.patch(name))]
+        full |= cKDTree(nodes).query(centres)[0] <= _RIM * size
+    empty = cells_in(void, centres) & ~full
+    options |= {"radius": max(3.0, 1.6 * size) if radius is None else radius}
+    method = Simp(volume_fraction, minimum_stiffness=1e-6, **options)
+    design = method(whole, weights=weights, solid=full, void=empty, progress=progress)
+    part = as_problem(design, problem.material)
+    part = replace(part, axes=None, order=problem.order, combinations=problem.combinations)
+    share = float(part.mesh.volumes.sum() / mesh.volumes.sum())
+    return _found(case, part, design, size, None, share)
+
+
+def _found(
+    case: Case, part: Problem, design: Design, size: float, planform: Any, share: float
+) -> Optimised:
+    """Gather what was found, with what there is to say about it."""
+    wanted, remarks = design.volume_fraction, []
+    if not design.converged:
+        remarks.append(
+            f"not converged after {design.iterations} iterations (last change "
+            f"{design.change[-1]:.2g}): --iterations for more"
+        )
+    if abs(share - wanted) > _AS_WANTED * wanted:
+        remarks.append(
+            f"the part fills {share:.3f} of the volume, not {wanted:.3f}: hairs and pieces that "
+            "carry nothing are left out; a larger --radius makes fewer of them"
+        )
+    new = replace(
+        case,
+        name=f"{case.name}-optimised",
+        title=f"{case.title}, optimised",
+        problem=part,
+        findings=(),
+    )
+    return Optimised(new, design, size, planform, tuple(remarks))
+
+
+def _laminate(given: Sequence[float] | None, own: FloatArray) -> FloatArray:
+    """Plane stress stiffness of what is laid: as given, of the part, or of the paper."""
+    if given is not None:
+        if (
+            len(given) != 4
+            or not np.isfinite(given).all()
+            or min(given[0], given[1], given[3]) <= 0
+        ):
+            raise InputError(
+                "a laminate is E1,E2,NU12,G12, moduli above 0 MPa; got "
+                f"{','.join(f'{value:g}' for value in given)}: correct it"
+            )
+        return plane_stress(*given)
+    isotropic = np.isclose(own[0, 0], own[1, 1], rtol=1e-6) and np.isclose(
+        own[2, 2], 0.5 * (own[0, 0] - own[0, 1]), rtol=1e-6
+    )
+    return LAMINATE if isotropic else own
+
+
+def _to_keep(problem: Problem) -> tuple[str, ...]:
+    """Patches that stay whole: loaded ones, and curved ones that hold the part."""
+    loaded = set(patches_in_use((), problem.loads))
+    mesh = problem.mesh
+    for name in patches_in_use(problem.supports, {}):
+        _, normal = mesh.facet_areas(mesh.patch(name))
+        if np.linalg.norm(normal.mean(axis=0)) < 0.9:
+            loaded.add(name)
+    return tuple(sorted(loaded))
+
+
+def _rims(problem: Problem, flat: FlatPart, keep: Sequence[str], size: float) -> Any:
+    """Area beside patches that stays solid, mm."""
+    traces = [flat.traces[name] for name in keep]
+    walls = [trace.wall.buffer(_RIM * size) for trace in traces if not trace.wall.is_empty]
+    areas = [face for trace in traces for face in trace.faces]
+    whole = [area for area in areas if area.area > 0.99 * flat.planform.area]
+    found = shapely.union_all([*walls, *(area for area in areas if area not in whole)])
+    return shapely.intersection(found, flat.planform)
+
+
+def _middles(points: FloatArray, cells: Any, prism: Any) -> tuple[FloatArray, FloatArray]:
+    """Middle of the prism of each cell: x and y (m,)."""
+    count = np.bincount(prism)
+    x, y = (np.bincount(prism, points[cells][..., axis].mean(axis=1)) / count for axis in (0, 1))
+    return x[prism], y[prism]
+
+
+def _edge(problem: Problem) -> float:
+    """Median edge length of a mesh, mm."""
+    mesh = problem.mesh
+    ends = mesh.points[mesh.corners[:, mesh.edges]]
+    return float(np.median(np.linalg.norm(ends[..., 0, :] - ends[..., 1, :], axis=-1)))

@@ -1,0 +1,214 @@
+"""``ccfem optimise``: the stiffest part with a share of the volume, as a part file."""
+
+from collections.abc import Sequence
+from contextlib import ExitStack
+from pathlib import Path
+from typing import TYPE_CHECKING, Annotated, Any
+
+import typer
+
+from ccfem.cli.arguments import names_of, numbers_of, path_of
+from ccfem.cli.options import CasePath, SetCase
+from ccfem.errors import InputError
+from ccfem.io.toml import assignment
+
+if TYPE_CHECKING:
+    from ccfem.cases.optimised import Optimised
+    from ccfem.progress import Progress
+
+__all__ = ["optimise"]
+
+_TENTH = 0.1
+"""Share of the iterations after which the next one is named."""
+
+
+def optimise(
+    case: CasePath,
+    volume_fraction: Annotated[
+        float, typer.Option(metavar="F", help="Share of the volume that is left, above 0, below 1.")
+    ],
+    method: Annotated[
+        str,
+        typer.Option(
+            metavar="somp|simp",
+            help="Densities and the axis of a laminate, for plates; or densities alone.",
+        ),
+    ] = "somp",
+    set_case: SetCase = None,
+    element_size: Annotated[
+        float | None,
+        typer.Option(metavar="MM", help="Cells of a plate; default 4000 squares make it."),
+    ] = None,
+    radius: Annotated[
+        float | None,
+        typer.Option(metavar="MM", help="Radius of the filter; default two element sizes."),
+    ] = None,
+    filter_: Annotated[
+        str, typer.Option("--filter", metavar="sensitivity|density", help="What is filtered.")
+    ] = "sensitivity",
+    orientation: Annotated[
+        str,
+        typer.Option(
+            metavar="gradient|principal|fixed", help="How somp turns the axis of the laminate."
+        ),
+    ] = "gradient",
+    laminate: Annotated[
+        str | None,
+        typer.Option(
+            metavar="E1,E2,NU12,G12",
+            help="Of somp, MPa; default the part's own material where it has an axis, else the "
+            "woven laminate of Wang et al. 2021.",
+        ),
+    ] = None,
+    weight: Annotated[
+        list[str] | None,
+        typer.Option(metavar="CASE=W", help="Weight of a load case, default 1; repeatable."),
+    ] = None,
+    keep: Annotated[
+        str | None,
+        typer.Option(
+            metavar="A,B,..",
+            help="Patches beside which the part stays solid; default loaded ones and holes that "
+            "hold it; '' for none.",
+        ),
+    ] = None,
+    solid: Annotated[
+        list[str] | None,
+        typer.Option(
+            metavar="X,Y,R",
+            help="A disc that stays solid, or X,Y,X,Y a rectangle, X,Y,Z,X,Y,Z a box; repeatable.",
+        ),
+    ] = None,
+    void: Annotated[
+        list[str] | None,
+        typer.Option(metavar="X,Y,R", help="Likewise what stays empty; repeatable."),
+    ] = None,
+    iterations: Annotated[int, typer.Option(metavar="N", help="Iterations at most.")] = 200,
+    in_space: Annotated[
+        bool, typer.Option("--in-space", help="Design a flat part in space, too (simp).")
+    ] = False,
+    out: Annotated[
+        Path | None,
+        typer.Option(
+            "--out",
+            metavar="PART.toml",
+            parser=path_of,
+            help="Part file; beside it mesh, picture and history. Default NAME-optimised.toml.",
+        ),
+    ] = None,
+    force: Annotated[bool, typer.Option("--force", help="Replace files that are there.")] = False,
+) -> None:
+    """Optimise the topology of a part; the new part is a part file with its mesh.
+
+    Supports, loads and their patches are carried over. Beside PART.toml lie its mesh (.npz), a
+    picture of densities and outline (.png) and the compliance of every iteration (.csv).
+    """
+    from ccfem.cases.optimised import optimise as find
+    from ccfem.cli.run import load
+    from ccfem.progress import progress_bar
+
+    options: dict[str, Any] = {
+        "element_size": element_size,
+        "radius": radius,
+        "filter": filter_,
+        "orientation": orientation,
+        "laminate": None if laminate is None else numbers_of(laminate),
+        "keep": None if keep is None else names_of(keep),
+        "solid": [numbers_of(place) for place in solid or ()],
+        "void": [numbers_of(place) for place in void or ()],
+        "max_iterations": iterations,
+        "in_space": in_space,
+    }
+    whole = load(case, set_case)
+    if weight:
+        options["weights"] = dict.fromkeys(whole.problem.loads, 1.0)
+        options["weights"] |= dict(assignment(text) for text in weight)
+    files = _files(Path(f"{whole.name}-optimised.toml") if out is None else out, force)
+    with progress_bar(lines=True) as progress:
+        told = _now_and_then(progress)
+        found = find(whole, volume_fraction, method, progress=told, **options)  # type: ignore[arg-type]
+    _write(found, files, case)
+    _say(found, files)
+
+
+def _now_and_then(progress: "Progress") -> "Progress":
+    """Progress that names a step only where a tenth of the work is done since the one before."""
+    said, at = "", -1.0
+
+    def tell(what: str, share: float) -> None:
+        nonlocal said, at
+        if share >= at + _TENTH or share >= 1.0:
+            said, at = what, share
+        progress(said, share)
+
+    return tell
+
+
+def _files(part: Path, force: bool) -> tuple[Path, Path, Path, Path]:
+    """Part file, mesh, picture and history, none of which is there already."""
+    from ccfem.io.whole import check_writable
+
+    if part.suffix != ".toml":
+        raise InputError(f"a part file ends in .toml; got --out {part}: name it so")
+    files = (part, *(part.with_suffix(suffix) for suffix in (".npz", ".png", ".csv")))
+    for file in files:
+        check_writable(file)
+        if file.exists() and not force:
+            raise InputError(f"{file} is there already: name another part (--out), or --force")
+    return files  # type: ignore[return-value]
+
+
+def _write(found: "Optimised", files: Sequence[Path], case: str) -> None:
+    """Write all files, or none of them."""
+    import shlex
+    import sys
+
+    from ccfem.cases.part_writing import part_text
+    from ccfem.io.npz import write_npz
+    from ccfem.io.whole import whole_file
+    from ccfem.plot.canvas import png
+    from ccfem.plot.design_picture import design_picture
+
+    _, mesh, picture, history = files
+    design, new = found.design, found.case
+    text = part_text(
+        new,
+        mesh.name,
+        f"{case}, optimised by: {shlex.join(['ccfem', *sys.argv[1:]])}\n"
+        f"Densities: {picture.name}; compliance of every iteration: {history.name}",
+    )
+    heading = f"{new.name}: {design.compliance[-1]:.4g} N mm, {design.volume_fraction:.0%}"
+    rows = [
+        f"{k},{value:.10g},{change}"
+        for k, (value, change) in enumerate(
+            zip(design.compliance, ("", *(f"{c:.6g}" for c in design.change)), strict=True)
+        )
+    ]
+    with ExitStack() as stack:
+        to_part, to_mesh, to_picture, to_history = (
+            stack.enter_context(whole_file(file)) for file in files
+        )
+        figure = design_picture(design, found.planform, new.problem.mesh, heading)
+        to_picture.write_bytes(png(figure))
+        to_history.write_text(
+            "\n".join(["iteration,compliance_N_mm,largest_change", *rows, ""]), encoding="utf-8"
+        )
+        write_npz(new.problem.mesh, to_mesh)
+        to_part.write_text(text, encoding="utf-8")
+
+
+def _say(found: "Optimised", files: Sequence[Path]) -> None:
+    """Print what was found."""
+    design, mesh = found.design, found.case.problem.mesh
+    part, _, picture, history = files
+    print(
+        f"{design.iterations} iterations: compliance {design.compliance[0]:.4g} to "
+        f"{design.compliance[-1]:.4g} N mm at {design.volume_fraction:.3f} of the volume"
+    )
+    for line in found.remarks:
+        print(f"note: {line}")
+    print(
+        f"{part}: {len(mesh.cells):,} cells, patches {', '.join(sorted(mesh.patches))}; "
+        f"picture {picture}, history {history}"
+    )
+    print(f"try: ccfem plan {part} --strategy svt")

@@ -1,0 +1,138 @@
+"""How many tracks a band has along its length: whole numbers, changed where its width asks for it.
+
+Where the number changes, tracks go out of the section through the border, on one side or on both,
+and the others spread out over a length: so the distance of tracks stays near the pitch, and they
+end outside, where links turn.
+"""
+
+import numpy as np
+import shapely
+from scipy.ndimage import gaussian_filter1d, maximum_filter1d
+
+from ccfem.arrays import BoolArray, FloatArray, IntArray
+from ccfem.geometry.shapes import Region
+from ccfem.stress_tracing.band import STEP, Band
+
+__all__ = ["places"]
+
+_CHANGE = 0.3
+"""Cost of one track more or less: as much as a tenth of the band left open over 3 mm."""
+_CROWDED = 4.0
+"""Cost of tracks that are too near to each other, over that of a gap as wide as they overlap."""
+_OVER = 0.02
+"""Cost of tracks that overlap less."""
+_ROUNDING = 1.002
+"""Distance over the pitch that is taken for one."""
+_LESS = 0.3
+"""Weight of what lies in joints, which other tracks cross too."""
+_NEAREST = 0.9
+"""Share of the pitch below which they are."""
+_IN_JOINT = 6.0
+"""How much dearer a change is in joints."""
+_CLEAR = 5.0
+"""Distance, mm, from a joint, within which a change would reach into it."""
+_SPREAD = 3.0
+"""Standard deviation, mm, of the Gaussian over which a change of the number is spread."""
+_ON_BORDER = 0.5
+"""Distance, mm, of a side of a band from the border that it runs along."""
+_CLEARLY = 0.2
+"""Share of a side by which more of it lies on the outside."""
+_ONE_SIDE = 1.0
+"""How much less changes on one side must cost than even ones on both to be taken."""
+
+
+def places(band: Band, pitch: float, section: Region) -> FloatArray:
+    """Place of every track across a band, as shares of half its width.
+
+    Parameters
+    ----------
+    band : Band
+    pitch : float, mm
+        Distance of neighbouring tracks that is wanted.
+    section : shapely (Multi)Polygon, mm
+
+    Returns
+    -------
+    (k, n) array
+        From left (1) to right (-1) at each point of the band; a track lies out of it beyond.
+    """
+    width = np.maximum(2.0 * np.linalg.norm(band.half, axis=1), 1e-9)
+    wanted = width / pitch
+    if band.closed:
+        number = np.full(len(wanted), max(1, round(float(np.median(wanted)))))
+        return _spread(number.astype(np.float64), 0.0)
+    inner = wanted[band.core]
+    reach = 2 * round(_CLEAR / STEP) + 1
+    joint = maximum_filter1d(band.free, reach, mode="constant", cval=1.0)[band.core] > 0.5
+    even, even_cost = min(
+        (_numbers(inner, joint, first, 2) for first in (1, 2)), key=lambda found: found[1]
+    )
+    any_, any_cost = _numbers(inner, joint, 1, 1)
+    shift = 0.0
+    number = even
+    if any_cost < _ONE_SIDE * even_cost:
+        number, shift = any_, _outer(band, section)
+    whole = np.concatenate(
+        [
+            np.full(band.core.start, number[0]),
+            number,
+            np.full(len(width) - band.core.stop, number[-1]),
+        ]
+    )
+    return _spread(
+        gaussian_filter1d(whole.astype(np.float64), _SPREAD / STEP, mode="nearest"), shift
+    )
+
+
+def _outer(band: Band, section: Region) -> float:
+    """1 where tracks leave through the left side of a band, else -1.
+
+    That is the side on the outside of the section, where links lead anywhere, not into a hole; of
+    two alike the longer one.
+    """
+    left, right = (band.middle[band.core] + sign * band.half[band.core] for sign in (1.0, -1.0))
+    outside = shapely.union_all(shapely.get_exterior_ring(shapely.get_parts(section)))
+    near = [
+        float(np.mean(shapely.dwithin(shapely.points(side), outside, _ON_BORDER)))
+        for side in (left, right)
+    ]
+    if abs(near[0] - near[1]) > _CLEARLY:
+        return 1.0 if near[0] > near[1] else -1.0
+    sizes = [np.linalg.norm(np.diff(side, axis=0), axis=1).sum() for side in (left, right)]
+    return 1.0 if sizes[0] > sizes[1] else -1.0
+
+
+def _spread(number: FloatArray, shift: float) -> FloatArray:
+    """Places (k, n) of tracks whose number (n,) changes on both sides (0) or on one (1, -1)."""
+    most = int(np.ceil(number.max() - 1e-9))
+    k = np.arange(most)[:, None]
+    centred = most - 1.0 - 2.0 * k
+    # On one side: the tracks of the other side keep their place at the border.
+    return np.asarray((centred + shift * (most - number)) / number)
+
+
+def _numbers(wanted: FloatArray, joint: BoolArray, first: int, step: int) -> tuple[IntArray, float]:
+    """Whole numbers (n,) near to those wanted (n,) that change seldom, and what they cost.
+
+    In joints (n,) they hardly change: there is no border to leave through. They are
+    `first` plus multiples of `step`; found by dynamic programming.
+    """
+    most = max(first, int(np.ceil(wanted.max())) + 1)
+    numbers = np.arange(first, most + 1, step)
+    apart = wanted[:, None] / numbers
+    # A single track may lie in what is narrower than itself.
+    near = np.where(numbers == 1, 0.0, np.maximum(_NEAREST - apart, 0.0))
+    over = np.maximum(1.0 - apart, 0.0)
+    cost = STEP * (np.maximum(apart - _ROUNDING, 0.0) + _CROWDED * near + _OVER * over)
+    cost[joint] *= _LESS
+    change = _CHANGE * np.abs(numbers[:, None] - numbers)
+    best, came = cost[0], np.zeros(cost.shape, dtype=np.int64)
+    for n in range(1, len(cost)):
+        over = best[:, None] + (_IN_JOINT if joint[n] else 1.0) * change
+        came[n] = over.argmin(axis=0)
+        best = over.min(axis=0) + cost[n]
+    chosen = np.empty(len(cost), dtype=np.int64)
+    chosen[-1] = best.argmin()
+    for n in range(len(cost) - 1, 0, -1):
+        chosen[n - 1] = came[n, chosen[n]]
+    return numbers[chosen], float(best.min())

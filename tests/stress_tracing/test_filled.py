@@ -1,0 +1,46 @@
+"""What is done to the tracks of all main paths together: open places filled, symmetry."""
+
+import numpy as np
+import shapely
+
+from ccfem.stress_tracing.blobs import blobs, rest_of
+from ccfem.stress_tracing.symmetric import made_symmetric
+
+
+def test_an_open_place_is_filled_and_keeps_off_the_strands():
+    """A box with strands over its left half: the right half is laid full."""
+    section = shapely.box(0, 0, 60, 30)
+    lines = [np.array([[x, 0.0], [x, 30.0]]) for x in np.arange(0.5, 30.0)]
+    (spirals,) = blobs(section, lines, 1.0, 1.0, 20.0)
+    laid = shapely.union_all([shapely.LineString(line).buffer(0.5) for line in spirals])
+    open_ = shapely.box(30, 0, 60, 30)
+    assert shapely.intersection(laid, open_).area > 0.95 * open_.area
+    assert shapely.difference(laid, open_).area < 1e-6
+    assert rest_of(section, [*lines, *spirals], 1.0, 2.0).is_empty
+    # What is laid full has no open place, and a spiral shorter than is allowed is none.
+    full = [np.array([[x, 0.0], [x, 30.0]]) for x in np.arange(0.5, 60.0)]
+    assert blobs(section, full, 1.0, 1.0, 20.0) == []
+    assert blobs(section, full[:-2], 1.0, 1.0, 80.0) == []
+
+
+def test_tracks_become_mirror_images_of_each_other():
+    section = shapely.box(0, 0, 60, 30)
+    x = np.linspace(0.0, 60.0, 61)
+    wave = 0.2 * np.sin(0.3 * x)
+    across = [np.stack([x, y + wave], axis=1) for y in (10.0, 15.0, 20.0)]
+    up = np.stack([np.linspace(5.0, 20.0, 31), np.linspace(0.0, 30.0, 31)], axis=1)
+    down = np.stack([np.linspace(55.3, 40.2, 41), np.linspace(0.0, 30.0, 41)], axis=1)
+    lone = np.array([[30.0, 0.0], [48.0, 30.0]])
+    found = made_symmetric([across, [up], [down], [lone]], section, 1.0)
+    curves = [shapely.LineString(line) for group in found[:3] for line in group]
+    for axis, middle in ((0, 30.0),):
+        for curve in curves:
+            points = shapely.get_coordinates(curve).copy()
+            points[:, axis] = 2.0 * middle - points[:, axis]
+            image = shapely.LineString(points)
+            assert min(image.hausdorff_distance(other) for other in curves) < 0.02
+    np.testing.assert_array_equal(found[3][0], lone)
+    # Nothing is symmetric in a section that is not.
+    wedge = shapely.Polygon([(0, 0), (60, 0), (60, 30), (0, 20)])
+    same = made_symmetric([across, [up]], wedge, 1.0)
+    np.testing.assert_array_equal(same[0][1], across[1])
