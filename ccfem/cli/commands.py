@@ -31,6 +31,7 @@ from ccfem.cli.options import (
     SetCase,
     Slicing,
     Slicings,
+    Stiffness,
     StressFile,
     StressUnit,
     VirtualTest,
@@ -265,15 +266,7 @@ def plan(
     heights: Heights = None,
     slicing: Slicing = None,
     fibre_per_layer: Fibre = None,
-    stiffness: Annotated[
-        str | None,
-        typer.Option(
-            "--stiffness",
-            metavar="RATIO",
-            help="Lay the least fibre that makes the part so stiff: as 2.5, over the part without "
-            "fibre, or as 1200N/mm.",
-        ),
-    ] = None,
+    stiffness: Stiffness = None,
     virtual_test: VirtualTest = True,
     load_case: LoadCase = None,
     refine: Refine = False,
