@@ -31,6 +31,7 @@ from ccfem.cli.options import (
     SetCase,
     Slicing,
     Slicings,
+    Stiffness,
     StressFile,
     StressUnit,
     VirtualTest,
@@ -265,6 +266,7 @@ def plan(
     heights: Heights = None,
     slicing: Slicing = None,
     fibre_per_layer: Fibre = None,
+    stiffness: Stiffness = None,
     virtual_test: VirtualTest = True,
     load_case: LoadCase = None,
     refine: Refine = False,
@@ -289,6 +291,8 @@ def plan(
     options = options_of(chosen, fibre_per_layer, virtual_test, load_case, backend)
     options["natural"] = fibre_per_layer is None
     options["print_plans"] = gcode
+    if stiffness is not None:
+        options["stiffness"] = stiffness
     options["stress"] = foreign_stress(stress, stress_unit)
     alone, suffix = (strategy,), f"-{strategy}"
     run(

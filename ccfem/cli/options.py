@@ -22,6 +22,7 @@ __all__ = [
     "SetCase",
     "Slicing",
     "Slicings",
+    "Stiffness",
     "StressFile",
     "StressUnit",
     "VirtualTest",
@@ -138,6 +139,15 @@ Backend = Annotated[
         "--backend",
         metavar="NAME",
         help="Linear solver, such as superlu, amg or pypardiso; default by size.",
+    ),
+]
+Stiffness = Annotated[
+    str | None,
+    typer.Option(
+        "--stiffness",
+        metavar="RATIO",
+        help="Lay the least fibre that makes the part so stiff: as 2.5, over the part without "
+        "fibre, or as 1200N/mm.",
     ),
 ]
 StressFile = Annotated[

@@ -170,7 +170,8 @@ def run(
     strategies : sequence of str
     parameters : mapping of strategy name to parameters
     options : mapping
-        From `options_of`, and others that `compare` knows.
+        From `options_of`, and others that `compare` knows; with ``stiffness``, a text, the one
+        strategy lays the least fibre that reaches it.
     calibration : Path, optional
         Material that goes before the part's own.
     out : Path, optional
@@ -209,6 +210,10 @@ def run(
         case, options = _calibrated(case, options, calibration)
     chosen = create_all(case, strategies, parameters) if strategies or not paths else {}
     chosen |= _given(case, paths, frame, chosen)
+    if options.get("stiffness") is not None:
+        from ccfem.cli.wanted_stiffness import least_fibre_options
+
+        options = least_fibre_options(case, next(iter(chosen.values())), options)
     where = out if out is not None else Path("results") / f"{case.name}{suffix}"
     part_file = _text_of(name)
     slicer = member_name(_slicer_of(case, options.get("layers")))

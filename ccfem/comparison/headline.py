@@ -59,6 +59,13 @@ TEST_COLUMNS = (
         "> 0, lower is better under forces",
     ),
     Column(
+        "share_of_gain",
+        "1",
+        "(stiffness_ratio_tension - 1) over the same of the bound that no paths of the compared "
+        "length exceed, strands beside each other carrying tension only; empty at another length.",
+        "at most 1, but where strands cross; higher is better",
+    ),
+    Column(
         "gain_per_metre",
         "1/m",
         "(stiffness_ratio_tension - 1) over the length of fibre inside the part.",
@@ -184,6 +191,7 @@ HEADLINE = (
     Headline("printable", "printable", "", "{}"),
     Headline("stiffness", "stiffness, N/mm", "high", "{:.4g}"),
     Headline("stiffness_ratio_tension", "stiffness ×, tension only", "high", "{:.2f}"),
+    Headline("share_of_gain", "share of the possible gain", "high", "{:.0%}"),
     Headline("stiffness_ratio_bonded", "stiffness ×, bonded", "high", "{:.2f}"),
     Headline("stiffness_ratio_tension_alternative", "stiffness ×, other supports", "", "{:.2f}"),
     Headline("displacement", "displacement, mm", "low", "{:.3g}"),
@@ -265,6 +273,8 @@ def _values_of(tested: Tested) -> dict[str, float]:
         "gain_per_metre": tension.gain_per_metre,
         "strain_energy": tension.solution.strain_energy,
     }
+    if tested.most > 1.0:
+        values["share_of_gain"] = (tension.ratio - 1.0) / (tested.most - 1.0)
     if tension.span:
         ratios = [ratio for _, ratio in tension.span]
         values["stiffness_ratio_low"] = min(ratios)

@@ -108,8 +108,17 @@ def judged(
                 along = _curve(runs, asked_for, part, wanted, solved.tests, tell)
     if bounded:
         bound = _bound(solved, part, runs, wanted, tell, seconds)
+        if bound is not None:
+            runs = [_bounded(run, bound, wanted) for run in runs]
     case, field, given = solved.case, solved.field, solved.given
     return Comparison(case, field, part.layers, tuple(runs), wanted, seconds, bound, given, along)
+
+
+def _bounded(run: Run, bound: UpperBound, wanted: float | None) -> Run:
+    """Run with the most that paths of its length can reach."""
+    if run.tested is None or off_length(run, wanted):
+        return run
+    return replace(run, tested=replace(run.tested, most=bound.ratio))
 
 
 def _misses(runs: Sequence[Run], wanted: float | None) -> bool:

@@ -49,6 +49,8 @@ class Tested:
         Peak of the averaged von Mises stress without fibre; NaN where it cannot be judged.
     alternative : Tested, optional
         The same under the alternative supports of the case, where it has some.
+    most : float
+        Stiffness ratio that no paths of the compared length exceed; NaN where there is no bound.
     """
 
     bracket: Bracket
@@ -56,6 +58,7 @@ class Tested:
     note: str = ""
     matrix_before: float = float("nan")
     alternative: "Tested | None" = None
+    most: float = float("nan")
 
     __repr__ = in_brief
 

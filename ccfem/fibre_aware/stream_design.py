@@ -21,7 +21,7 @@ from ccfem.fibre_aware.spline_grid import SplineGrid
 
 __all__ = ["DENSEST", "Objective", "StreamDesign", "StreamProblem", "design"]
 
-DENSEST = 0.95
+DENSEST = 0.975
 """Strands a width that should not be exceeded."""
 
 _OVER_BUDGET = 20.0
@@ -72,7 +72,7 @@ class Objective:
 class StreamProblem:
     """What a stream function is designed for.
 
-    Minimised is ``-log(stiffness) + 20 max(length / budget - 1, 0)^2 + 100 mean(max(|g| - 0.95,
+    Minimised is ``-log(stiffness) + 20 max(length / budget - 1, 0)^2 + 100 mean(max(|g| - 0.975,
     0)^2) + 0.001 mean((Laplacian s)^2)``, g in strands a width, means over the part and over the
     coefficients.
 

@@ -45,7 +45,7 @@ from ccfem.virtual_testing.strands import cut_strands
 __all__ = ["StreamFunction"]
 
 _CLEARANCE = 0.95
-"""Least distance of strands in widths: they are designed to be 1 / 0.95 apart, and what is cut for
+"""Least distance of strands in widths: they are designed to be 1 / 0.975 apart, and what is cut for
 a hundredth of a width would be lost."""
 
 _SHORTEST = 5.0
@@ -83,7 +83,7 @@ class StreamFunction:
     ----------
     coverage : float, default 0.45
         Fibre length times strand width over area of the layers, in (0, 1].
-    overfill : float, default 1.25
+    overfill : float, default 1.15
         Fibre length of the design over that kept, at least 1.
     rho : float, mm^2, default 4
         Axial stiffness of a strand over Young's modulus of the matrix.
@@ -109,7 +109,7 @@ class StreamFunction:
     """
 
     coverage: float = 0.45
-    overfill: float = 1.25
+    overfill: float = 1.15
     rho: float = RHO
     evaluations: int = 50
     groups: int = 0

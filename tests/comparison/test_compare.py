@@ -434,6 +434,18 @@ def test_no_run_exceeds_the_bound(compared):
     assert f"more than {compared.bound.ratio:.2f} times" in compared.remarks[-1]
 
 
+def test_tables_say_what_share_of_the_possible_gain_each_strategy_reaches(compared):
+    """Of a bar in uniform tension, whose most is that of parallel bars: 1 + 4 L / V."""
+    tested = [run for run in compared.runs if run.tested is not None]
+    length = max(run.length_per_layer for run in tested) * len(compared.layers)
+    most = 4.0 * length / float(compared.stress.mesh.volumes.sum())
+    for run in tested:
+        values = headline_values(run)
+        gain = values["stiffness_ratio_tension"] - 1.0
+        assert values["share_of_gain"] == pytest.approx(gain / most, rel=0.03)
+        assert 0.0 < values["share_of_gain"] <= 1.0
+
+
 def test_strands_that_overlap_may_exceed_the_bound(compared):
     best = compared.ranking[0]
     ratio = 0.5 * (1.0 + best.tested.bracket.tension.ratio)
