@@ -46,9 +46,12 @@ def support(
     from ccfem.cli.run import layers_of, load
     from ccfem.elasticity.solve import solve
     from ccfem.export.vtk import write_paths
+    from ccfem.io.whole import check_writable
     from ccfem.layers.slicing import as_slicer
     from ccfem.support import slice_with_support, support_paths
 
+    if out is not None:
+        check_writable(out)
     part = load(case, set_case)
     names = part.problem.cases
     if load_case is not None:
