@@ -259,13 +259,14 @@ def _other_methods(plate: PlateStudy) -> Figure:
     section(axes[0], plate.plate.domain, filled=False)
     section(axes[0], part.layer.plane.polygon)
     show_load(axes[0], plate.plate)
-    title(axes[0], "(a) load and supports")
+    title(axes[0], "(a) load and supports; outline ours")
     for letter, one, name in zip("bcd", axes[1:], have, strict=False):
         section(one, part.layer.plane.polygon)
         path(one, part.patterns[name], COLOURS[name])
         total = part.patterns[name].total
         text = f"{total['paths']:.0f} pieces, {100.0 * total['coverage']:.0f} % covered"
-        title(one, f"({letter}) {name}: {text}")
+        reading = ", our reading" if name == "eqs" else ""
+        title(one, f"({letter}) {name}{reading}: {text}")
     return figure
 
 

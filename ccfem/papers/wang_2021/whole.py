@@ -46,6 +46,10 @@ def write_all(folder: Path) -> None:
         "Written by `ccfem reproduce wang_2021`. lpp is strategy `svt`; lpp uncrossed "
         "ends its strands in the middle of a joint. The slicer's patterns and lpp uncrossed are "
         "laid by this project too.\n",
+        "The cantilever, the M-shape and the L-shape are optimised here under loads as in the "
+        "paper, which gives no measures: their outlines are ours, and the M-shape, where the "
+        "paper's has members in tension and in compression, is pressed nearly everywhere. `eqs` is "
+        "our reading of a method that the paper shows in pictures alone.\n",
         f"Study {computed:.1f} s, figures {perf_counter() - begun - computed:.1f} s.\n",
         "## Claims\n",
         claim_table(checks),
