@@ -18,15 +18,15 @@ __all__ = ["places"]
 _CHANGE = 0.3
 """Cost of one track more or less: as much as a tenth of the band left open over 3 mm."""
 _CROWDED = 4.0
-"""Cost of tracks that are too near to each other, over that of a gap as wide as they overlap."""
+"""Cost of tracks nearer than `_NEAREST`, over that of a gap as wide as they overlap."""
 _OVER = 0.02
-"""Cost of tracks that overlap less."""
+"""Cost of tracks that overlap, but are not nearer than `_NEAREST`, likewise."""
 _ROUNDING = 1.002
 """Distance over the pitch that is taken for one."""
 _LESS = 0.3
 """Weight of what lies in joints, which other tracks cross too."""
 _NEAREST = 0.9
-"""Share of the pitch below which they are."""
+"""Share of the pitch below which tracks are too near to each other."""
 _IN_JOINT = 6.0
 """How much dearer a change is in joints."""
 _CLEAR = 5.0
