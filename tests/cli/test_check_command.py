@@ -5,8 +5,6 @@ import sys
 
 import pytest
 
-from ccfem.cli.main import main
-
 PART = """
 title = "Strip, 60 mm"
 material = "pla"
@@ -29,21 +27,6 @@ kind = "force"
 patch = "end"
 vector = [100, 0, 0]
 """
-
-
-@pytest.fixture
-def ccfem(monkeypatch, capsys, tmp_path):
-    """Call the command line in a folder: exit code, stdout, stderr."""
-
-    def call(*arguments):
-        monkeypatch.chdir(tmp_path)
-        monkeypatch.setattr(sys, "argv", ["ccfem", *map(str, arguments)])
-        with pytest.raises(SystemExit) as ended:
-            main()
-        said = capsys.readouterr()
-        return ended.value.code, said.out, said.err
-
-    return call
 
 
 def test_check_says_and_draws(ccfem, tmp_path):

@@ -1,28 +1,12 @@
 """Part files to start from, and what to cite."""
 
-import sys
-
 import numpy as np
 import pytest
 
 from ccfem.cases.part_file import read_part
-from ccfem.cli.main import main
 from ccfem.inspection import check
 from ccfem.io import write_mesh
 from ccfem.mesh.box import box_mesh
-
-
-@pytest.fixture
-def ccfem(monkeypatch, capsys, tmp_path):
-    def call(*arguments):
-        monkeypatch.chdir(tmp_path)
-        monkeypatch.setattr(sys, "argv", ["ccfem", *map(str, arguments)])
-        with pytest.raises(SystemExit) as ended:
-            main()
-        said = capsys.readouterr()
-        return ended.value.code, said.out, said.err
-
-    return call
 
 
 def test_a_body_is_no_part_and_a_new_part_file_is_one(ccfem, tmp_path):

@@ -1,28 +1,9 @@
 """``ccfem solve``, and planning on the stress that it wrote."""
 
 import json
-import sys
 
 import numpy as np
-import pytest
 import pyvista
-
-from ccfem.cli.main import main
-
-
-@pytest.fixture
-def ccfem(monkeypatch, capsys, tmp_path):
-    """Call the command line in a folder with a part: exit code, stdout, stderr."""
-
-    def call(*arguments):
-        monkeypatch.chdir(tmp_path)
-        monkeypatch.setattr(sys, "argv", ["ccfem", *map(str, arguments)])
-        with pytest.raises(SystemExit) as ended:
-            main()
-        said = capsys.readouterr()
-        return ended.value.code, said.out, said.err
-
-    return call
 
 
 def test_solve_writes_and_prints_each_load_case(ccfem, tmp_path):

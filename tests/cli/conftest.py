@@ -1,0 +1,22 @@
+"""The command line, called in the test's own process."""
+
+import sys
+
+import pytest
+
+from ccfem.cli.main import main
+
+
+@pytest.fixture
+def ccfem(monkeypatch, capsys, tmp_path):
+    """Call the command line in a folder of its own: exit code, stdout, stderr."""
+
+    def call(*arguments):
+        monkeypatch.chdir(tmp_path)
+        monkeypatch.setattr(sys, "argv", ["ccfem", *map(str, arguments)])
+        with pytest.raises(SystemExit) as ended:
+            main()
+        said = capsys.readouterr()
+        return ended.value.code, said.out, said.err
+
+    return call
