@@ -119,15 +119,20 @@ def follow(text: str, machine: str, offset=(0.0, 0.0, 0.0)) -> Run:
             end = np.array([given.get(axis, at) for axis, at in zip("XYZ", place, strict=True)])
             off = np.array(offset) * (tool == 1)
             step = Step(
-                *(
-                    place + off,
-                    end + off,
-                    given.get(feeds.get(tool, "E"), 0.0),
-                    given.get("V", 0.0),
-                    speed,
-                ),
-                *(word == "G0", tool, heat.get(tool, 0.0), waited.get(tool, False), kind),
-                *(strand, len(run.steps), changed, cut),
+                start=place + off,
+                end=end + off,
+                fed=given.get(feeds.get(tool, "E"), 0.0),
+                beside=given.get("V", 0.0),
+                speed=speed,
+                rapid=word == "G0",
+                tool=tool,
+                heat=heat.get(tool, 0.0),
+                waited=waited.get(tool, False),
+                kind=kind,
+                strand=strand,
+                number=len(run.steps),
+                changed=changed,
+                cut=cut,
             )
             longest = LONGEST.get(machine, 200.0)
             if not step.length and abs(step.fed) > longest:
