@@ -20,6 +20,7 @@ from ccfem.errors import InputError
 from ccfem.geometry.locate import locate
 from ccfem.layers.plane import plane_frame
 from ccfem.mesh.tet_mesh import TetMesh
+from ccfem.support.overhang import hanging_facets
 
 __all__ = ["ColumnMesh", "column_mesh"]
 
@@ -114,11 +115,8 @@ def column_mesh(
     frame = plane_frame(tuple(build))
     turned = mesh.points @ frame.T
     bed = float(turned[np.unique(mesh.corners), 2].min()) - lift
-    area, normal = mesh.facet_areas(mesh.boundary)
-    lean = normal @ frame[2]
     reach = 1e-6 * float(np.ptp(turned, axis=0).max())
-    flat_on_bed = (turned[mesh.boundary, 2] <= bed + reach).all(axis=1)
-    hanging = (lean < -max(np.sin(np.radians(angle)), _STEEPEST)) & ~flat_on_bed
+    area, lean, hanging = hanging_facets(mesh, frame, bed, angle, reach, _STEEPEST)
     if not hanging.any():
         raise InputError(
             f"nothing of the part hangs over by more than {angle:g} degrees: it needs no support"

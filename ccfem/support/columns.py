@@ -15,6 +15,7 @@ from ccfem.checks import check_number
 from ccfem.errors import InputError
 from ccfem.layers.plane import plane_frame
 from ccfem.mesh.tet_mesh import TetMesh
+from ccfem.support.overhang import hanging_facets
 
 __all__ = ["SupportColumns", "support_columns"]
 
@@ -96,12 +97,10 @@ def support_columns(
     check_number("angle", angle, at_least=0.0, below=90.0, unit="degrees")
     check_number("lift", lift, at_least=0.0, unit="mm")
     check_number("pitch", pitch, above=0.0, unit="mm")
-    turned = mesh.points @ plane_frame(tuple(build)).T
-    area, normal = mesh.facet_areas(mesh.boundary)
-    lean = normal @ np.asarray(build, dtype=np.float64) / np.linalg.norm(build)
+    frame = plane_frame(tuple(build))
+    turned = mesh.points @ frame.T
     bed = float(turned[np.unique(mesh.corners), 2].min()) - lift
-    on_bed = (turned[mesh.boundary, 2] <= bed + 1e-3 * pitch).all(axis=1)
-    hanging = (lean < -max(np.sin(np.radians(angle)), 1e-9)) & ~on_bed
+    area, _, hanging = hanging_facets(mesh, frame, bed, angle, 1e-3 * pitch, 1e-9)
     grid = np.floor(turned[:, :2].min(axis=0) / pitch)
     facet, column, height = _crossings(turned[mesh.boundary], grid, pitch)
     order = np.lexsort((height, column[:, 1], column[:, 0]))
