@@ -1,6 +1,6 @@
 import numpy as np
 import pytest
-from hypothesis import given, settings
+from hypothesis import example, given, settings
 from hypothesis import strategies as st
 
 from ccfem.elasticity.assembly import assemble
@@ -74,6 +74,7 @@ def test_free_rotation_about_an_edge_is_named():
 
 
 @given(st.integers(0, 10_000))
+@example(474)  # the edge lies along x but for a thousandth
 @settings(max_examples=15, deadline=None)
 def test_free_motion_turns_with_the_part(seed):
     generator = np.random.default_rng(seed)
