@@ -272,8 +272,8 @@ def _axes(span: FloatArray) -> list[FloatArray]:
         return []
     basis = np.linalg.svd(span, full_matrices=False)[0]
     # Each as it lies in the span: a direction may be a coordinate axis but for a thousandth.
-    near = [basis @ (basis.T @ axis) for axis in np.eye(3)]
-    inside = [axis / size for axis in near if (size := np.linalg.norm(axis)) > 1.0 - 1e-6]
+    near = [np.asarray(basis @ (basis.T @ axis)) for axis in np.eye(3)]
+    inside = [axis / np.linalg.norm(axis) for axis in near if np.linalg.norm(axis) > 1.0 - 1e-6]
     rest = basis - sum((np.outer(axis, axis @ basis) for axis in inside), np.zeros_like(basis))
     more, size, _ = np.linalg.svd(rest, full_matrices=False)
     return inside + [more[:, k] for k in np.flatnonzero(size > 1e-6)]
