@@ -39,11 +39,14 @@ __all__ = [
     "cases_certificate",
     "largest_gathered",
     "objective_value",
+    "single_bounds",
 ]
 
 WORST, SUM = OBJECTIVES = ("worst", "sum")
 """What is made small: the largest of ``bound_i / ratio_i``, or their weighted mean."""
 
+_SINGLE_ITERATIONS = 30
+"""Of the bounds of each case alone, at most."""
 _ANGLES = 12
 _CERTIFIED_ANGLES = 360
 _FULL_STEPS = 10
@@ -138,9 +141,7 @@ def cases_bound(
     check_number("iterations", iterations, at_least=1)
     check_number("number of layers", len(layers), at_least=1)
     parts = smeared_cases(cases.fields, layers[0].plane.frame)
-    singles = np.array(
-        [upper_bound(field, layers, length, machine, strand).ratio for field in cases.fields]
-    )
+    singles = single_bounds(cases, layers, length, machine, strand, _SINGLE_ITERATIONS)
     axial = (Strand() if strand is None else strand).stiffness(parts[0].modulus)
     most = fibre_capacity(parts[0], layers, machine)
     volume = parts[0].mesh.volumes
@@ -183,6 +184,23 @@ def cases_bound(
         )
         density = criterion_step(density, stretch, volume, most, length)
     return CasesBound(objective, singles, cases.weights, max(bounds), reached, best)
+
+
+def single_bounds(
+    cases: WeightedCases,
+    layers: Sequence[Layer],
+    length: float,
+    machine: Machine,
+    strand: Strand | None = None,
+    iterations: int = 7,
+) -> FloatArray:
+    """Stiffness ratio (n,) of each case alone that no paths exceed; parameters as `upper_bound`."""
+    smeared_cases(cases.fields, layers[0].plane.frame)  # one factorisation for all
+    found = (
+        upper_bound(field, layers, length, machine, strand, iterations=iterations)
+        for field in cases.fields
+    )
+    return np.array([one.ratio for one in found])
 
 
 def cases_certificate(

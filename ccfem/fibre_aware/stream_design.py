@@ -226,6 +226,16 @@ class StreamProblem:
         gradient += 2.0 * _ROUGH / len(bend) * (self.laplacian @ bend)
         return np.asarray(gradient)
 
+    def signed(self, field: FloatArray, group: int) -> FloatArray:
+        """Coefficients (k,) of one group, with the sign that does not depend on the axes."""
+        count = len(self.grid)
+        field = field[group * count : (group + 1) * count]
+        inside = self.group == group
+        values = self.grid.values(self.centres[inside]) @ field
+        weight = self.part.mesh.volumes[inside]
+        values = values - weight @ values / weight.sum()
+        return field if weight @ values**3 >= 0.0 else -field
+
     def length(self, laid: Laid) -> float:
         """Length of fibre, mm."""
         return float(self.room @ (laid.size - _SMALLEST))
