@@ -19,6 +19,7 @@ from dataclasses import dataclass
 
 import numpy as np
 from numba import njit
+from numpy.typing import ArrayLike
 
 from ccfem.arrays import FloatArray, freeze, in_brief
 from ccfem.checks import check_known, check_number
@@ -88,15 +89,15 @@ class CasesBound:
     def __post_init__(self) -> None:
         freeze(self, singles=float, case_weights=float, factors=float)
 
-    def value(self, ratios: Sequence[float]) -> float:
+    def value(self, ratios: ArrayLike) -> float:
         """Objective of a design with these stiffness ratios (n,)."""
         return objective_value(self.singles / np.asarray(ratios), self.case_weights, self.objective)
 
-    def gap(self, ratios: Sequence[float]) -> float:
+    def gap(self, ratios: ArrayLike) -> float:
         """How far the objective of a design lies above what is certified; 0 is the best."""
         return self.value(ratios) / self.least - 1.0
 
-    def shares(self, ratios: Sequence[float]) -> FloatArray:
+    def shares(self, ratios: ArrayLike) -> FloatArray:
         """Stiffness ratio of each case over its own bound."""
         return np.asarray(ratios) / self.singles
 
