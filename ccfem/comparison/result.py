@@ -166,7 +166,8 @@ class Comparison:
         found = remarks(self.runs, self.fibre_per_layer, self.bound)
         if self.cases is not None:
             about, case = (self.runs, self.fibre_per_layer, self.cases), self.stress.case
-            found += cases_remarks(*about, case, self.cases_bound)
+            others = bool(self.case.alternative_supports)
+            found += cases_remarks(*about, case, self.cases_bound, others)
         if self.given is not None:
             found.append("paths are planned and evaluated on the stress of another program")
         return found

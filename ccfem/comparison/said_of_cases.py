@@ -57,6 +57,7 @@ def cases_remarks(
     cases: WeightedCases,
     reference: str,
     bound: CasesBound | None,
+    others: bool = False,
 ) -> list[str]:
     """Say which cases count how much, which one the other tables speak of, and what is possible.
 
@@ -68,12 +69,16 @@ def cases_remarks(
     reference : str
         Name of the case that the other tables speak of.
     bound : CasesBound, optional
+    others : bool
+        Whether the part has alternative supports.
     """
     said = ", ".join(f"{n} {w:.2g}" for n, w in zip(cases.names, cases.weights, strict=True))
     found = [
         f"planned for {len(cases)} load cases, by weight: {said}; stiffness, first failure and "
         f"indices of stress in the first table are those of '{reference}'"
     ]
+    if others:
+        found.append("alternative supports are not tested with several load cases")
     tested = [
         run
         for run in ranking(runs, wanted)
