@@ -56,6 +56,9 @@ _MOST_GROUPS = 6
 _ENOUGH = 0.99
 """Share of a wanted length below which the design is made once more."""
 
+_NEAR = 0.95
+"""Share of the largest length above which shorter ones are cut from its design."""
+
 _MORE = 1.03
 """By how much more it then asks for than by proportion."""
 
@@ -160,10 +163,12 @@ class StreamFunction:
         machine: Machine,
         lengths: Sequence[float],
     ) -> list[tuple["StreamFunction", LayerPlanner]]:
-        """Design for the largest of some lengths, mm per layer, and cut that to each.
+        """Design for the largest of some lengths, mm per layer, and cut that to those near it.
 
         Lengths above the most of the coverage are taken for that. Where the paths of the design
-        are too short in all it is made once more, with as much more fibre.
+        are too short in all it is made once more, with as much more fibre. Much shorter lengths
+        are designed for anew: a design that is cut to less than it was made for ends strands
+        where they carry.
 
         Raises
         ------
@@ -340,6 +345,13 @@ def _to_lengths(
     most = max(strategy.amount.most, strategy.coverage) * full
     lengths = [min(length, most) for length in lengths]
     longest = max(lengths)
+    short = [k for k, length in enumerate(lengths) if length < _NEAR * longest]
+    if short:
+        anew = _to_lengths(strategy, layers, machine, [lengths[k] for k in short], cut)
+        near = [length for length in lengths if length >= _NEAR * longest]
+        rest = iter(_to_lengths(strategy, layers, machine, near, cut))
+        of = dict(zip(short, anew, strict=True))
+        return [of[k] if k in of else next(rest) for k in range(len(lengths))]
     told = replace(strategy, coverage=longest / full)
     found = cut(told, lengths)
     laid = max(float(paths.lengths.sum()) for paths in found) / len(layers)
