@@ -11,6 +11,7 @@ from collections.abc import Sequence
 import numpy as np
 
 from ccfem.elasticity.weighted_cases import WeightedCases
+from ccfem.errors import InputError
 from ccfem.fibre_aware.cases_bound import WORST, single_bounds
 from ccfem.fibre_aware.layer_shares import layers_by_case
 from ccfem.fibre_aware.prune_cases import prune_cases
@@ -77,6 +78,12 @@ def plan_cases(
             return plan_to_length(strategy, layers, field, machine, wanted)
         paths = plan(strategy, layers, field, machine)
         return Planned(strategy, paths, length_per_layer(paths, layers))
+    curved = [layer.index for layer in layers if layer.flat is None]
+    if curved:
+        raise InputError(
+            f"several load cases are planned for on flat layers only; layer {curved[0]} is curved: "
+            "choose a planar slicing, or one load case"
+        )
     if wanted is None:
         return _told(strategy, plan_by_layers(strategy, layers, cases, machine), layers)
     too_much = plan_by_layers(strategy, layers, cases, machine, _TOO_MUCH * wanted)

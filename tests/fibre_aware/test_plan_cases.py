@@ -1,3 +1,5 @@
+from dataclasses import replace
+
 import numpy as np
 import pytest
 
@@ -139,6 +141,13 @@ def test_strategies_that_ignore_the_stress_stay_as_they_are(planned, two_bends):
     cases, layers = two_bends
     alone = plan_to_length(Zigzag(), layers, cases.fields[1], MACHINE, 500.0)
     np.testing.assert_array_equal(planned["zigzag"].toolpaths.points, alone.toolpaths.points)
+
+
+def test_curved_layers_are_refused(two_bends):
+    cases, layers = two_bends
+    curved = [*layers[:2], replace(layers[2], flat=None)]
+    with pytest.raises(InputError, match="on flat layers only; layer 2 is curved"):
+        plan_cases(Isocurve(), curved, cases, MACHINE, 500.0)
 
 
 def test_no_tension_in_any_case_is_refused(two_pulls):
