@@ -30,7 +30,7 @@ __all__ = ["PARTS", "compared"]
 COVERAGE = 0.45
 PARTS = {
     "two_load_plate": ("two_load_plate", {}),
-    "two_load_plate, three cases": ("two_load_plate", {"both_ways": True}),
+    "two_load_plate, 3 cases": ("two_load_plate", {"both_ways": True}),
     "two_pull_loop": ("two_pull_loop", {}),
     "two_angle_bracket": ("two_angle_bracket", {}),
 }
@@ -41,6 +41,8 @@ def compared(name: str, parameters: Mapping[str, object], pictures: Path | None)
     """Rows of the table for one part."""
     case = create_case(name, **parameters)
     cases = WeightedCases.of(solve(case.problem))
+    if len(cases) > 2:
+        name = f"{name}, {len(cases)} cases"
     layers, machine = case.slicing(cases.fields[0], case.build, case.machine), case.machine
     wanted = COVERAGE * full_length(layers, machine)
     strategy = StreamFunction()
@@ -59,7 +61,7 @@ def compared(name: str, parameters: Mapping[str, object], pictures: Path | None)
         if pictures is not None:
             for layer in range(2):
                 figure = planned.toolpaths.plot(layer=layer)
-                figure.savefig(pictures / f"{name}-{len(cases)}-{what}-{layer}.png", dpi=100)
+                figure.savefig(pictures / f"{name}-{what}-{layer}.png", dpi=100)
     bound = cases_bound(cases, layers, wanted * len(layers), machine)
     alone = np.mean([spent[f"for {field.case}"] for field in cases.fields])
     rows = []

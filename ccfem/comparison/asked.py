@@ -10,8 +10,12 @@ __all__ = ["check_all", "check_amount"]
 
 def check_all(strand: Strand | None, stress: object, curve: bool | None, slicings: object) -> None:
     """Refuse what is not done for all load cases at once."""
+    if strand is None:
+        raise InputError(
+            "plans for all load cases are cut and ranked by virtual tests: leave these in, or name "
+            "one load case"
+        )
     refused = {
-        "no virtual test": strand is None,
         "stress of another program": stress is not None,
         "a curve": bool(curve),
         "several slicings": slicings is not None,

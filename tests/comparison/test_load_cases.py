@@ -101,10 +101,11 @@ def test_what_makes_no_sense_is_refused():
     with pytest.raises(InputError, match="no load case named 'up'"):
         case_of(weights={"up": 1.0})
     refused = {
-        "no virtual test": {"strand": None},
         "a curve": {"curve": True},
         "several slicings": {"slicings": ["planar:z"]},
     }
     for what, options in refused.items():
         with pytest.raises(InputError, match=f"planned for at once; got {what} too"):
             compare(case_of(), ["zigzag"], load_case="all", **options)
+    with pytest.raises(InputError, match="are cut and ranked by virtual tests: leave these in"):
+        compare(case_of(), ["zigzag"], load_case="all", strand=None)
