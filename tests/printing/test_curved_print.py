@@ -12,7 +12,8 @@ from ccfem.geometry.nearest_on_triangles import nearest_on_triangles
 from ccfem.layers.level_surfaces import level_surfaces
 from ccfem.machine import Kinematics, Machine
 from ccfem.mesh.box import box_mesh
-from ccfem.printing.curved_plan import curved_plan, limited_tilt
+from ccfem.printing.curved_plan import curved_plan
+from ccfem.printing.poses import limited_tilt
 from ccfem.toolpaths import FIBRE, Toolpaths
 
 MACHINE = Machine(filament_area=0.05, minimum_length=30.0, cutter_distance=30.0)
