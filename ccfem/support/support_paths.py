@@ -3,7 +3,6 @@
 from dataclasses import replace
 
 import numpy as np
-import shapely
 
 from ccfem.arrays import FloatArray
 from ccfem.checks import check_number
@@ -17,9 +16,6 @@ from ccfem.threads import in_threads
 from ccfem.toolpaths import MATRIX, Toolpaths
 
 __all__ = ["support_paths"]
-
-_CORNERS = 0.01
-"""How far, mm, the border may be smoothed: without edges so short that offsets fail on them."""
 
 
 def support_paths(support: SupportLayers, machine: Machine, spacing: float = 3.0) -> Toolpaths:
@@ -47,8 +43,8 @@ def support_paths(support: SupportLayers, machine: Machine, spacing: float = 3.0
 
     def filled(layer: Layer) -> Toolpaths:
         width, seen = machine.matrix_width, _from_above(layer, support.columns.up)
-        section = shapely.simplify(seen.flat.plane.polygon, _CORNERS)
-        levels = offset_rings(section, 0.5 * width, spacing * width, width)
+        with np.errstate(divide="ignore", invalid="ignore"):  # of mitres of edges nearly in line
+            levels = offset_rings(seen.flat.plane.polygon, 0.5 * width, spacing * width, width)
         paths = Toolpaths.from_plane([ring for level in levels for ring in level], seen.flat)
         paths = replace(paths, kind=np.full(len(paths), MATRIX, dtype=paths.kind.dtype))
         return paths if seen.flat is layer else seen.lifted(paths)
