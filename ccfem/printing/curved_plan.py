@@ -9,6 +9,8 @@ from ccfem.arrays import FloatArray, IntArray
 from ccfem.errors import InputError
 from ccfem.layers.layer import Layer
 from ccfem.layers.plane import plane_frame
+from ccfem.layers.slicer import Vector
+from ccfem.layers.standing import standing
 from ccfem.machine.machine import Machine
 from ccfem.mesh.tet_mesh import TetMesh
 from ccfem.printing.curved_layers import FilledLayer, filled_layers, in_order
@@ -31,7 +33,7 @@ def curved_plan(
     layers: Sequence[Layer],
     mesh: TetMesh,
     machine: Machine,
-    build: Sequence[float] = (0.0, 0.0, 1.0),
+    build: Vector = (0.0, 0.0, 1.0),
     support: SupportLayers | None = None,
 ) -> PrintPlan:
     """Plan the print of a part of curved layers.
@@ -57,8 +59,9 @@ def curved_plan(
     machine : Machine
     build : sequence of 3 floats
         Build direction.
+        Where layers look down from there, the part stands along their mean normal (`standing`).
     support : SupportLayers, optional
-        Of these layers.
+        Of these layers; the part stands as it does there.
 
     Raises
     ------
@@ -67,7 +70,11 @@ def curved_plan(
         of a machine of three axes would touch the layer that it lays.
     """
     fibre, dropped = _long_enough(toolpaths.of_kind(FIBRE), machine)
-    frame = plane_frame(build)
+    wanted = plane_frame(build)[2]
+    if support is None:
+        frame = plane_frame(standing(layers, build))
+    else:
+        frame = plane_frame(support.columns.up.tolist())
     filled = filled_layers(fibre, layers, support, machine)
     islands = islands_of([each.layer for each in filled])
     clash = clashes(islands, frame[2], machine)
@@ -102,7 +109,11 @@ def curved_plan(
         np.array([filled[k].layer.thickness for k in source.tolist()]),
         np.concatenate([laid for _, _, laid in steps]),
         dropped=dropped,
-        warnings=(*_not_full(filled, mesh), *_said(before, found.before, found.after, found.place)),
+        warnings=(
+            *_stands(frame[2], wanted, support),
+            *_not_full(filled, mesh),
+            *_said(before, found.before, found.after, found.place),
+        ),
     )
 
 
@@ -144,6 +155,20 @@ def _shift(
     if support is not None:
         bed = min(bed, float((support.columns.mesh.points @ frame[2]).min()))
     return np.append(0.5 * (low + high)[:2] - 0.5 * np.array(machine.gcode.bed[:2]), bed)
+
+
+def _stands(up: FloatArray, wanted: FloatArray, support: SupportLayers | None) -> list[str]:
+    """Say how the part stands, where it was not asked to, and on what."""
+    said = []
+    if up @ wanted < np.cos(np.radians(0.1)):
+        x, y, z = up.tolist()
+        said.append(
+            f"the part stands with ({x:.3f}, {y:.3f}, {z:.3f}) upwards: along its build direction "
+            "layers would look down"
+        )
+    if support is None:
+        said.append("nothing is laid below layers that hang over: plan with support (--support)")
+    return said
 
 
 def _not_full(filled: Sequence[FilledLayer], mesh: TetMesh) -> list[str]:
