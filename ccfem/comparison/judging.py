@@ -70,10 +70,12 @@ class Solved:
             Where the part cannot be cut, or support is wanted below flat layers.
         """
         stress, build, machine = self.planned_on, self.case.build, self.case.machine
-        if not support:
-            return slicer(stress, build, machine), None
-        stack, below = slice_with_support(slicer, stress, build, machine)
-        if all(layer.flat is not None for layer in stack):
+        below = None
+        if support and hasattr(slicer, "slice"):
+            stack, below = slice_with_support(slicer, stress, build, machine)
+        else:
+            stack = slicer(stress, build, machine)
+        if support and all(layer.flat is not None for layer in stack):
             raise InputError(
                 "support is printed below curved layers alone; these are flat: leave out support, "
                 "or choose curved layers (--slicing load_oriented or spatial)"

@@ -7,7 +7,7 @@ import numpy as np
 
 from ccfem.arrays import BoolArray, FloatArray, read_only
 from ccfem.evaluation.column import Column
-from ccfem.geometry.cones import groups_in_cones
+from ccfem.geometry.cones import earlier_in_cones
 from ccfem.geometry.nearest_on_triangles import nearest_on_triangles
 from ccfem.geometry.polylines import merge_repeated, sample_midpoints
 from ccfem.layers.layer import Layer
@@ -65,10 +65,6 @@ class Printed:
     points: FloatArray
     index: FloatArray
     build: FloatArray
-
-    def before(self, layer: Layer) -> FloatArray:
-        """Points of the layers under one."""
-        return self.points[: int(np.searchsorted(self.index, layer.index))]
 
 
 @dataclass(frozen=True)
@@ -144,12 +140,11 @@ def sample_head(
     axis = np.einsum("sk,skd->sd", found.weights, corners)
     axis /= np.maximum(np.linalg.norm(axis, axis=1, keepdims=True), 1e-300)
     tilt = np.degrees(np.arccos(np.clip(axis @ stack.build, -1.0, 1.0)))
-    before = stack.before(layer)
-    ends = np.array([0, len(before)])
-    hits = groups_in_cones(
-        found.points, axis, before, ends, machine.head_angle, machine.head_length
-    )
-    return HeadSamples(length, tilt, hits[:, 0])
+    when = np.full(len(axis), layer.index)
+    size = (machine.head_angle, machine.head_length)
+    index = stack.index.astype(np.int64)
+    hits = earlier_in_cones(found.points, axis, when, stack.points, index, *size) >= 0
+    return HeadSamples(length, tilt, hits)
 
 
 def head_indices(samples: HeadSamples) -> dict[str, float]:

@@ -1,20 +1,21 @@
-"""Which groups of points lie in cones: a head above its tip, and what stands round it."""
-
-from itertools import pairwise
+"""What lies in cones: a head above its tip, and what stands round it."""
 
 import numpy as np
 from numba import njit
 
 from ccfem.arrays import BoolArray, FloatArray, IntArray
 
-__all__ = ["groups_in_cones"]
+__all__ = ["earlier_in_cones", "groups_in_cones"]
+
+_BLOCK = 32
+"""So many points, one after the other, have a common sphere that is looked at first."""
 
 
 def groups_in_cones(
     tips: FloatArray,
     axes: FloatArray,
     points: FloatArray,
-    offsets: IntArray,
+    group: IntArray,
     half_angle: float,
     length: float,
 ) -> BoolArray:
@@ -25,9 +26,8 @@ def groups_in_cones(
     tips, axes : (n, 3) arrays, mm
         Tips of the cones, and unit vectors along which they open.
     points : (p, 3) array, mm
-        Group after group.
-    offsets : (g + 1,) int array
-        Where each group begins, and the last one ends.
+    group : (p,) int array
+        Of each point, ascending from 0 on. Points that follow each other are best near each other.
     half_angle : float, degrees
         Below 90.
     length : float, mm
@@ -37,44 +37,96 @@ def groups_in_cones(
     -------
     (n, g) bool array
     """
-    groups = [points[a:b] for a, b in pairwise(offsets.tolist())]
-    low = np.array([each.min(axis=0) if len(each) else np.full(3, np.inf) for each in groups])
-    high = np.array([each.max(axis=0) if len(each) else np.full(3, np.inf) for each in groups])
-    return np.asarray(
-        _in_cones(
-            *(np.ascontiguousarray(each, dtype=np.float64) for each in (tips, axes, points)),
-            np.ascontiguousarray(offsets, dtype=np.int64),
-            low.reshape(-1, 3),
-            high.reshape(-1, 3),
-            float(np.tan(np.radians(half_angle))),
-            length,
-        )
+    count = int(group.max(initial=-1)) + 1
+    every = np.full(len(tips), count)
+    return _in_cones(tips, axes, every, points, group, half_angle, length, count) >= 0
+
+
+def earlier_in_cones(
+    tips: FloatArray,
+    axes: FloatArray,
+    when: IntArray,
+    points: FloatArray,
+    step: IntArray,
+    half_angle: float,
+    length: float,
+) -> IntArray:
+    """Point of an earlier step in each cone (n,), -1 where there is none.
+
+    Parameters and rules are those of `groups_in_cones`; points count whose `step` (p,), ascending,
+    is below the cone's own, `when` (n,).
+    """
+    return _in_cones(tips, axes, when, points, step, half_angle, length, 0)[:, 0]
+
+
+def _in_cones(
+    tips: FloatArray,
+    axes: FloatArray,
+    when: IntArray,
+    points: FloatArray,
+    group: IntArray,
+    half_angle: float,
+    length: float,
+    columns: int,
+) -> IntArray:
+    """Find a point in each cone, of each group, or of all where there are no columns."""
+    new = np.diff(group, prepend=-1) != 0
+    start = np.maximum.accumulate(np.where(new, np.arange(len(group)), 0))
+    first = np.flatnonzero((np.arange(len(group)) - start) % _BLOCK == 0)
+    ends = np.append(first, len(group))
+    centre, radius = np.zeros((0, 3)), np.zeros(0)
+    if len(points):
+        size = np.diff(ends)
+        centre = np.add.reduceat(points, first) / size[:, None]
+        off = np.linalg.norm(points - np.repeat(centre, size, axis=0), axis=1)
+        radius = np.maximum.reduceat(off, first)
+    half = np.radians(half_angle)
+    found = _point_in_cones(
+        *(np.ascontiguousarray(each, dtype=np.float64) for each in (tips, axes, points)),
+        np.ascontiguousarray(when, dtype=np.int64),
+        ends.astype(np.int64),
+        np.ascontiguousarray(group[first], dtype=np.int64),
+        centre,
+        radius,
+        np.array([np.cos(half), np.sin(half), length]),
+        columns,
     )
+    return np.asarray(found)
 
 
 @njit(cache=True, nogil=True)
-def _in_cones(  # type: ignore[no-untyped-def]
-    tips, axes, points, offsets, low, high, slope, length
+def _point_in_cones(  # type: ignore[no-untyped-def]
+    tips, axes, points, when, ends, group, centre, radius, cone, columns
 ):  # pragma: no cover, compiled
-    """Do the same number by number, slope radius over height: boxes round groups first."""
-    found = np.zeros((len(tips), len(offsets) - 1), dtype=np.bool_)
-    reach = length * length * (1.0 + slope * slope)
+    """Do the same number by number."""
+    cosine, sine, length = cone[0], cone[1], cone[2]
+    found = np.full((len(tips), max(columns, 1)), -1)
     for k in range(len(tips)):
-        for g in range(len(offsets) - 1):
-            away = 0.0
-            for d in range(3):
-                off = max(low[g, d] - tips[k, d], tips[k, d] - high[g, d], 0.0)
-                away += off * off
-            if not away < reach:
+        for b in range(len(group)):
+            if group[b] >= when[k]:
+                break
+            g = group[b] if columns else 0
+            if found[k, g] >= 0:
                 continue
-            for p in range(offsets[g], offsets[g + 1]):
+            a = centre[b, 0] - tips[k, 0]
+            c = centre[b, 1] - tips[k, 1]
+            d = centre[b, 2] - tips[k, 2]
+            up = a * axes[k, 0] + c * axes[k, 1] + d * axes[k, 2]
+            if up < -radius[b] or up > length + radius[b]:
+                continue
+            side = np.sqrt(max(a * a + c * c + d * d - up * up, 0.0))
+            if side * cosine - up * sine > radius[b]:
+                continue
+            for p in range(ends[b], ends[b + 1]):
                 a = points[p, 0] - tips[k, 0]
-                b = points[p, 1] - tips[k, 1]
-                c = points[p, 2] - tips[k, 2]
-                up = a * axes[k, 0] + b * axes[k, 1] + c * axes[k, 2]
+                c = points[p, 1] - tips[k, 1]
+                d = points[p, 2] - tips[k, 2]
+                up = a * axes[k, 0] + c * axes[k, 1] + d * axes[k, 2]
                 if up <= 0.0 or up > length:
                     continue
-                if a * a + b * b + c * c < up * up * (1.0 + slope * slope):
-                    found[k, g] = True
+                if (a * a + c * c + d * d) * cosine * cosine < up * up:
+                    found[k, g] = p
                     break
+            if columns == 0 and found[k, 0] >= 0:
+                break
     return found

@@ -5,7 +5,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from ccfem.arrays import BoolArray, FloatArray, IntArray, freeze
-from ccfem.geometry.cones import groups_in_cones
+from ccfem.geometry.cones import earlier_in_cones
 from ccfem.geometry.polylines import along_line
 from ccfem.machine.machine import Machine
 from ccfem.printing.poses import under_bed
@@ -85,20 +85,21 @@ def cleared(paths: Toolpaths, axes: FloatArray, matter: Matter, machine: Machine
     """
     sample, length, step = _samples(paths)
     tips = paths.points[sample]
-    hits = _touched(tips, axes[sample], step, matter, machine)
+    hits, point = _touched(tips, axes[sample], step, matter, machine)
     before = float(length[hits].sum())
     if machine.kinematics.kind == "three_axes" or not hits.any():
         return Cleared(axes, before, before, _first(tips, hits))
-    turned = _turned(tips[hits], axes[sample][hits], step[hits], matter, machine)
-    axes = _spread(paths, axes, sample[hits], turned, machine)
-    hits = _touched(tips, axes[sample], step, matter, machine)
+    off = _way_off(tips[hits], axes[sample][hits], point[hits], matter.points)
+    turned = _turned(tips[hits], axes[sample][hits], off, step[hits], matter, machine)
+    axes = _spread(paths, axes, sample[hits], turned)
+    hits, _ = _touched(tips, axes[sample], step, matter, machine)
     return Cleared(axes, before, float(length[hits].sum()), _first(tips, hits))
 
 
 def touched_length(paths: Toolpaths, axes: FloatArray, matter: Matter, machine: Machine) -> float:
     """Length of paths, mm, along which the head touches earlier steps or the bed, as `cleared`."""
     sample, length, step = _samples(paths)
-    hits = _touched(paths.points[sample], axes[sample], step, matter, machine)
+    hits, _ = _touched(paths.points[sample], axes[sample], step, matter, machine)
     return float(length[hits].sum())
 
 
@@ -122,24 +123,22 @@ def _samples(paths: Toolpaths) -> tuple[IntArray, FloatArray, IntArray]:
 
 def _touched(
     tips: FloatArray, axes: FloatArray, step: IntArray, matter: Matter, machine: Machine
-) -> BoolArray:
-    """Whether the head touches earlier steps, or the bed."""
-    found = under_bed(tips, axes, machine)
+) -> tuple[BoolArray, IntArray]:
+    """Whether the head touches earlier steps, or the bed, and a point of the former, or -1."""
     size = (machine.head_angle, machine.head_length)
-    for number in np.unique(step).tolist():
-        own, known = step == number, int(np.searchsorted(matter.step, number))
-        ends = np.array([0, known])
-        found[own] |= groups_in_cones(tips[own], axes[own], matter.points[:known], ends, *size)[
-            :, 0
-        ]
-    return found
+    point = earlier_in_cones(tips, axes, step, matter.points, matter.step, *size)
+    return (point >= 0) | under_bed(tips, axes, machine), point
 
 
 def _turned(
-    tips: FloatArray, axes: FloatArray, step: IntArray, matter: Matter, machine: Machine
+    tips: FloatArray,
+    axes: FloatArray,
+    off: FloatArray,
+    step: IntArray,
+    matter: Matter,
+    machine: Machine,
 ) -> FloatArray:
     """Axes that clear, by the least lean; those for which none does stay."""
-    off = _way_off(tips, axes, step, matter, machine)
     across = np.cross(axes, off)
     left = np.ones(len(tips), dtype=bool)
     found = axes.copy()
@@ -149,9 +148,8 @@ def _turned(
         for turn in np.radians(_TURNS):
             way = np.cos(turn) * off[left] + np.sin(turn) * across[left]
             tried = np.cos(lean) * axes[left] + np.sin(lean) * way
-            clear = (tried[:, 2] >= limit) & ~_touched(
-                tips[left], tried, step[left], matter, machine
-            )
+            hits, _ = _touched(tips[left], tried, step[left], matter, machine)
+            clear = (tried[:, 2] >= limit) & ~hits
             done = np.flatnonzero(left)[clear]
             found[done] = tried[clear]
             left[done] = False
@@ -160,30 +158,16 @@ def _turned(
     return found
 
 
-def _way_off(
-    tips: FloatArray, axes: FloatArray, step: IntArray, matter: Matter, machine: Machine
-) -> FloatArray:
-    """Direction square to each axis, away from what the head touches; from the bed, upright."""
-    slope = float(np.tan(np.radians(machine.head_angle)))
-    found = np.empty_like(tips)
-    for k, (tip, axis) in enumerate(zip(tips, axes, strict=True)):
-        known = int(np.searchsorted(matter.step, step[k]))
-        off = matter.points[:known] - tip
-        up = off @ axis
-        aside = off - up[:, None] * axis
-        size = np.linalg.norm(aside, axis=1)
-        inside = (up > 0.0) & (up <= machine.head_length) & (size < slope * up)
-        way = -aside[inside].sum(axis=0) if inside.any() else np.array([0.0, 0.0, 1.0])
-        way = way - (way @ axis) * axis
-        if not np.linalg.norm(way) > 1e-9:
-            way = np.cross(axis, np.eye(3)[int(np.abs(axis).argmin())])
-        found[k] = way / np.linalg.norm(way)
-    return found
+def _way_off(tips: FloatArray, axes: FloatArray, at: IntArray, points: FloatArray) -> FloatArray:
+    """Direction square to each axis, away from a point that the head touches; else upright."""
+    way = np.where(at[:, None] >= 0, tips - points[np.maximum(at, 0)], [0.0, 0.0, 1.0])
+    way -= np.einsum("kd,kd->k", way, axes)[:, None] * axes
+    alike = np.linalg.norm(way, axis=1) < 1e-6
+    way[alike] = np.cross(axes[alike], np.eye(3)[np.abs(axes[alike]).argmin(axis=1)])
+    return np.asarray(way / np.linalg.norm(way, axis=1, keepdims=True))
 
 
-def _spread(
-    paths: Toolpaths, axes: FloatArray, at: IntArray, turned: FloatArray, machine: Machine
-) -> FloatArray:
+def _spread(paths: Toolpaths, axes: FloatArray, at: IntArray, turned: FloatArray) -> FloatArray:
     """Axes at all points, which turn to those at some points and back along the paths."""
     found = axes.copy()
     path = np.searchsorted(paths.offsets, at, side="right") - 1

@@ -131,7 +131,7 @@ def clashes(islands: Islands, build: FloatArray, machine: Machine) -> FloatArray
     """
     axes = poses(islands.normals, build, machine)
     size = (machine.head_angle, machine.head_length)
-    met = groups_in_cones(islands.points, axes, islands.points, islands.offsets, *size)
+    met = groups_in_cones(islands.points, axes, islands.points, islands.owner, *size)
     table = np.zeros((len(islands),) * 2)
     np.add.at(table, islands.owner, met * islands.area[:, None])
     return table
