@@ -109,6 +109,7 @@ def curved_plan(
         np.array([filled[k].layer.thickness for k in source.tolist()]),
         np.concatenate([laid for _, _, laid in steps]),
         dropped=dropped,
+        touched=(before, found.before, found.after),
         warnings=(
             *_stands(frame[2], wanted, support),
             *_not_full(filled, mesh),

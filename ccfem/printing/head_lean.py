@@ -91,8 +91,9 @@ def cleared(paths: Toolpaths, axes: FloatArray, matter: Matter, machine: Machine
         return Cleared(axes, before, before, _first(tips, hits))
     off = _way_off(tips[hits], axes[sample][hits], point[hits], matter.points)
     turned = _turned(tips[hits], axes[sample][hits], off, step[hits], matter, machine)
-    axes = _spread(paths, axes, sample[hits], turned)
-    hits, _ = _touched(tips, axes[sample], step, matter, machine)
+    axes, old = _spread(paths, axes, sample[hits], turned), axes
+    new = np.abs(axes - old).max(axis=1)[sample] > 0.0
+    hits[new], _ = _touched(tips[new], axes[sample][new], step[new], matter, machine)
     return Cleared(axes, before, float(length[hits].sum()), _first(tips, hits))
 
 

@@ -22,6 +22,8 @@ __all__ = ["Islands", "clashes", "island_order", "islands_of", "rests_on", "step
 
 _COARSE = 2.0
 """Side, mm, of the cubes in each of which one point stands for an island."""
+_PATCH = 6
+"""Cubes along the side of a patch."""
 _LEAST = 1.0
 """Area, mm^2, over which a head would touch another island: less is below what points resolve."""
 
@@ -77,7 +79,8 @@ def islands_of(layers: Sequence[Layer]) -> Islands:
     for number, layer in enumerate(layers):
         middle = layer.points[layer.triangles].mean(axis=1)
         cube = np.floor(middle / _COARSE).astype(np.int64)
-        key = np.column_stack([layer.component, cube])
+        # Piece by piece, and in each one patch after the other: see `groups_in_cones`.
+        key = np.column_stack([layer.component, cube // _PATCH, cube])
         _, first, which = np.unique(key, axis=0, return_index=True, return_inverse=True)
         stands = np.bincount(which.ravel(), layer.areas, minlength=len(first))
         count = np.bincount(layer.component[first])
