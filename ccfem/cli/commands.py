@@ -28,6 +28,7 @@ from ccfem.cli.options import (
     LoadCase,
     Out,
     Pictures,
+    PrintedSupport,
     Refine,
     SetCase,
     Slicing,
@@ -279,6 +280,7 @@ def plan(
         bool,
         typer.Option("--gcode", help="Also write STRATEGY.gcode, matrix and fibre of the part."),
     ] = False,
+    support: PrintedSupport = False,
     stress: StressFile = None,
     stress_unit: StressUnit = None,
     pictures: Pictures = False,
@@ -291,7 +293,7 @@ def plan(
     chosen = layers_of(layers, heights, slicing)
     options = options_of(chosen, fibre_per_layer, virtual_test, load_case, backend)
     options["natural"] = fibre_per_layer is None
-    options["print_plans"] = gcode
+    options["print_plans"], options["support"] = gcode, support
     if stiffness is not None:
         options["stiffness"] = stiffness
     options["stress"] = foreign_stress(stress, stress_unit)

@@ -19,6 +19,7 @@ __all__ = [
     "LoadCase",
     "Out",
     "Pictures",
+    "PrintedSupport",
     "SetCase",
     "Slicing",
     "Slicings",
@@ -105,6 +106,10 @@ Drawings = Annotated[
         metavar="svg,dxf",
         help="Also draw every flat layer of every strategy to scale, in mm: border, fibre, links.",
     ),
+]
+PrintedSupport = Annotated[
+    bool,
+    typer.Option("--support", help="With --gcode: print support below curved layers, too."),
 ]
 VirtualTest = Annotated[
     bool,

@@ -42,11 +42,14 @@ def support(
     ] = None,
 ) -> None:
     """Lay support below a part, in layers that continue its own down to the bed."""
+    import numpy as np
+
     from ccfem.checks import check_known
     from ccfem.cli.run import layers_of, load
     from ccfem.elasticity.solve import solve
     from ccfem.export.vtk import write_paths
     from ccfem.io.whole import check_writable
+    from ccfem.layers.plane import plane_frame
     from ccfem.layers.slicing import as_slicer
     from ccfem.support import slice_with_support, support_paths
 
@@ -61,6 +64,9 @@ def support(
     slicer = as_slicer(part.slicing if chosen is None else chosen)
     own, found = slice_with_support(slicer, stress, part.build, part.machine, angle, lift)
     columns = found.columns
+    x, y, z = columns.up.tolist()
+    if np.abs(columns.up - plane_frame(part.build)[2]).max() > 1e-3:
+        print(f"the part stands with ({x:.3f}, {y:.3f}, {z:.3f}) upwards: else layers look down")
     print(
         f"{len(found.layers)} layers of support below {len(own)} of the part, "
         f"{found.thickness:.3g} mm in the mean: {columns.volume:.5g} mm^3; "

@@ -182,6 +182,7 @@ def compare(
     load_case: str | None = ...,
     backend: str = ...,
     print_plans: bool = ...,
+    support: bool = ...,
     stress: ForeignStress | None = ...,
     curve: bool | None = ...,
     progress: Progress = ...,
@@ -201,6 +202,7 @@ def compare(
     load_case: str | None = ...,
     backend: str = ...,
     print_plans: bool = ...,
+    support: bool = ...,
     stress: ForeignStress | None = ...,
     curve: bool | None = ...,
     progress: Progress = ...,
@@ -220,6 +222,7 @@ def compare(
     load_case: str | None = None,
     backend: str = "auto",
     print_plans: bool = False,
+    support: bool = False,
     stress: ForeignStress | None = None,
     curve: bool | None = None,
     progress: Progress = silent,
@@ -261,6 +264,8 @@ def compare(
         As in `solve`.
     print_plans : bool, default False
         Also plan the print of the whole part by every strategy, matrix and fibre.
+    support : bool, default False
+        Also print support below a part of curved layers (`ccfem.support`).
     stress : ForeignStress, optional
         File of another program with the stress, on the same mesh, to plan and evaluate on. Virtual
         tests and the bound solve the part themselves all the same.
@@ -295,6 +300,8 @@ def compare(
         raise InputError("the curve is one of stiffness: leave the virtual test in, or it out")
     if print_plans:
         check_machine(case.machine)
+    elif support:
+        raise InputError("support is laid in a print: plan that too (print_plans, --gcode)")
     if not isinstance(strategies, Mapping):
         strategies = create_all(case, strategies)
     foreign = [one for one in strategies.values() if isinstance(one, GivenPaths)]
@@ -315,8 +322,8 @@ def compare(
     solved, seconds = _solved(case, strand, load_case, backend, stress, progress)
     with timed(seconds, "slice"):
         slicer = case.slicing if layers is None else as_slicer(layers)
-        stack = slicer(solved.planned_on, case.build, case.machine)
-    part = solved.part(stack)
+        stack, below = solved.cut(slicer, support)
+    part = solved.part(stack, below)
     tell = counted(progress, 0.1, (5 if print_plans else 4) * len(strategies) + 1)
     runs = [
         Run(name, one.on(stack) if isinstance(one, GivenPaths) else one, Toolpaths.empty(), None)

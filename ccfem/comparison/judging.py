@@ -23,9 +23,12 @@ from ccfem.elasticity.stress_field import StressField
 from ccfem.elasticity.support_kinds import PressingSupport
 from ccfem.elasticity.weighted_cases import WeightedCases
 from ccfem.fibre_aware.cases_bound import CasesBound, cases_bound
+from ccfem.errors import InputError
 from ccfem.fibre_aware.upper_bound import UpperBound, upper_bound
 from ccfem.layers import Layer
+from ccfem.layers.slicer import Slicer
 from ccfem.planning.given_paths import GivenPaths
+from ccfem.support import SupportLayers, slice_with_support
 
 __all__ = ["Solved", "judged"]
 
@@ -61,12 +64,35 @@ class Solved:
         """Stress that paths are planned and evaluated on."""
         return self.field if self.given is None else self.given
 
-    def part(self, layers: Sequence[Layer]) -> Part:
+    def cut(
+        self, slicer: Slicer, support: bool = False
+    ) -> tuple[tuple[Layer, ...], SupportLayers | None]:
+        """Layers, and if wanted those of their support.
+
+        Raises
+        ------
+        InputError
+            Where the part cannot be cut, or support is wanted below flat layers.
+        """
+        stress, build, machine = self.planned_on, self.case.build, self.case.machine
+        below = None
+        if support and hasattr(slicer, "slice"):
+            stack, below = slice_with_support(slicer, stress, build, machine)
+        else:
+            stack = slicer(stress, build, machine)
+        if support and all(layer.flat is not None for layer in stack):
+            raise InputError(
+                "support is printed below curved layers alone; these are flat: leave out support, "
+                "or choose curved layers (--slicing load_oriented or spatial)"
+            )
+        return stack, below
+
+    def part(self, layers: Sequence[Layer], support: SupportLayers | None = None) -> Part:
         """Return what all runs on a stack of layers share."""
         strand = None if self.tests is None else self.tests.strand
         case = self.case
         stack, cases = tuple(layers), self.cases
-        return Part(self.planned_on, stack, case.machine, strand, case.build, cases)
+        return Part(self.planned_on, stack, case.machine, strand, case.build, cases, support)
 
 
 def judged(

@@ -31,6 +31,7 @@ from ccfem.planning.strategy import LengthStrategy
 from ccfem.printing.curved_plan import curved_plan
 from ccfem.printing.print_plan import plan_print
 from ccfem.progress import Progress
+from ccfem.support import SupportLayers
 from ccfem.toolpaths import Toolpaths
 from ccfem.virtual_testing.equilibrium import BONDED, TENSION
 from ccfem.virtual_testing.specimen import Specimen
@@ -79,7 +80,7 @@ def counted(progress: Progress, first: float, steps: int) -> Tell:
 
 @dataclass(frozen=True)
 class Part:
-    """What all runs share: stress that counts, layers, machine, strand and build direction.
+    """What all runs share: stress that counts, layers and what supports them, machine, strand.
 
     With `cases` paths are planned for and tested under all of them; the stress is that of one.
     """
@@ -90,6 +91,7 @@ class Part:
     strand: Strand | None = None
     build: tuple[float, float, float] | None = None
     cases: WeightedCases | None = None
+    support: SupportLayers | None = None
 
 
 def planned(
@@ -278,7 +280,8 @@ def with_print(run: Run, part: Part, tell: Tell) -> Run:
     try:
         what = (run.toolpaths, part.layers, part.stress.mesh, part.machine)
         flat = all(layer.flat is not None for layer in part.layers)
-        found = plan_print(*what) if flat else curved_plan(*what, part.build or (0.0, 0.0, 1.0))
+        build = part.build or (0.0, 0.0, 1.0)
+        found = plan_print(*what) if flat else curved_plan(*what, build, part.support)
     except InputError as error:
         return replace(run, unprinted=str(error))
     share = found.volume(part.machine) / float(part.stress.mesh.volumes.sum())

@@ -4,10 +4,10 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 
 import numpy as np
-from numba import njit
 
 from ccfem.arrays import BoolArray, FloatArray, read_only
 from ccfem.evaluation.column import Column
+from ccfem.geometry.cones import earlier_in_cones
 from ccfem.geometry.nearest_on_triangles import nearest_on_triangles
 from ccfem.geometry.polylines import merge_repeated, sample_midpoints
 from ccfem.layers.layer import Layer
@@ -65,10 +65,6 @@ class Printed:
     points: FloatArray
     index: FloatArray
     build: FloatArray
-
-    def before(self, layer: Layer) -> FloatArray:
-        """Points of the layers under one."""
-        return self.points[: int(np.searchsorted(self.index, layer.index))]
 
 
 @dataclass(frozen=True)
@@ -144,29 +140,11 @@ def sample_head(
     axis = np.einsum("sk,skd->sd", found.weights, corners)
     axis /= np.maximum(np.linalg.norm(axis, axis=1, keepdims=True), 1e-300)
     tilt = np.degrees(np.arccos(np.clip(axis @ stack.build, -1.0, 1.0)))
-    slope = float(np.tan(np.radians(machine.head_angle)))
-    hits = _meets(found.points, axis, stack.before(layer), slope, machine.head_length)
+    when = np.full(len(axis), layer.index)
+    size = (machine.head_angle, machine.head_length)
+    index = stack.index.astype(np.int64)
+    hits = earlier_in_cones(found.points, axis, when, stack.points, index, *size) >= 0
     return HeadSamples(length, tilt, hits)
-
-
-@njit(cache=True, nogil=True)
-def _meets(  # type: ignore[no-untyped-def]
-    tips, axes, points, slope, length
-):  # pragma: no cover, compiled
-    """Whether a point lies in the cone at each tip, slope its radius over its height."""
-    found = np.zeros(len(tips), dtype=np.bool_)
-    for k in range(len(tips)):
-        x, y, z = tips[k]
-        u, v, w = axes[k]
-        for p in range(len(points)):
-            a, b, c = points[p, 0] - x, points[p, 1] - y, points[p, 2] - z
-            high = a * u + b * v + c * w
-            if high <= 0.0 or high > length:
-                continue
-            if a * a + b * b + c * c < high * high * (1.0 + slope * slope):
-                found[k] = True
-                break
-    return found
 
 
 def head_indices(samples: HeadSamples) -> dict[str, float]:

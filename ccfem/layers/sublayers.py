@@ -71,11 +71,11 @@ def layers_within(
         if halving:
             odd = np.arange(1, 2**halving, 2) * (step / 2**halving)
             between = np.sort(np.add.outer(np.append(whole[0] - step, whole), odd).ravel())
-            thick = np.sort(values[mesh.corners[(raw[mesh.corners] > limit).any(axis=1)]].ravel())
-            reach = np.searchsorted(thick, [between - step, between + step])
+            thick = values[mesh.corners[(raw[mesh.corners] > limit).any(axis=1)]]
+            begun = np.searchsorted(np.sort(thick.min(axis=1)), between, side="right")
+            ended = np.searchsorted(np.sort(thick.max(axis=1)), between, side="left")
             within = (between > low + _OFF * step) & (between < high - _OFF * step)
-            near = (reach[0] < reach[1]) & within
-            levels = np.asarray(between[near])
+            levels = np.asarray(between[(begun > ended) & within])
         found = level_surfaces(mesh, values, levels, step, shortest, least_area)
         bubbles, specks = bubbles + found.bubbles, specks + found.specks
         for layer in found.layers:

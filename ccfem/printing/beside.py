@@ -8,13 +8,15 @@ import shapely
 from ccfem.arrays import FloatArray
 from ccfem.geometry.shapes import Region
 from ccfem.machine.machine import Machine
+from ccfem.printing.poses import poses
 from ccfem.printing.print_plan import COORDINATE_DIGITS, PrintPlan
 from ccfem.toolpaths import FIBRE
 
 __all__ = ["Beside", "beside"]
 
 _GAP = 4.0
-"""From the part to the block and the bar, mm. Our choice."""
+"""From the part to the block and the bar, mm, where the head stands upright. Our choice."""
+_UP = np.array([0.0, 0.0, 1.0])
 _BAR_LINES = 3
 """Lines of matrix under the first strand."""
 _BAR_MORE = 20.0
@@ -61,7 +63,8 @@ def beside(plan: PrintPlan, machine: Machine) -> Beside:
     process, width = machine.process, machine.matrix_width
     low, high = plan.paths.points[:, :2].min(axis=0), plan.paths.points[:, :2].max(axis=0)
     half = 0.5 * width
-    low, high = low - half, high + half
+    aside = _head_aside(plan, machine)
+    low, high = low - half - aside, high + half + aside
     block: list[FloatArray] = []
     bar: list[FloatArray] = []
     strand = None
@@ -80,6 +83,16 @@ def beside(plan: PrintPlan, machine: Machine) -> Beside:
         strand = strand.round(COORDINATE_DIGITS)
     skirt = _skirt(plan, (*block, *bar), machine)
     return Beside(tuple(skirt), tuple(block), tuple(bar), strand)
+
+
+def _head_aside(plan: PrintPlan, machine: Machine) -> float:
+    """How far a head that tilts on the part may reach beyond its tip, mm."""
+    axes = poses(plan.paths.normals, _UP, machine)
+    if not len(axes) or axes[:, 2].min() > 1.0 - 1e-9:
+        return 0.0
+    half = np.radians(machine.head_angle)
+    tilt = float(np.arccos(axes[:, 2].min()))
+    return machine.head_length / float(np.cos(half)) * float(np.sin(min(tilt + half, np.pi / 2)))
 
 
 def _block(right: float, middle: float, machine: Machine) -> list[FloatArray]:

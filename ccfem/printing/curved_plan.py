@@ -1,27 +1,31 @@
-"""A part of curved layers as it is printed: each layer filled with matrix, then its fibre."""
+"""A part of curved layers as it is printed: support, then each layer's matrix, then its fibre."""
 
 from collections.abc import Sequence
 from dataclasses import replace
 
 import numpy as np
 
-from ccfem.arrays import FloatArray
+from ccfem.arrays import FloatArray, IntArray
 from ccfem.errors import InputError
-from ccfem.geometry.nearest_on_triangles import nearest_on_triangles
-from ccfem.geometry.polylines import is_closed, pack
 from ccfem.layers.layer import Layer
 from ccfem.layers.plane import plane_frame
-from ccfem.linking.print_order import nearest_end_order
+from ccfem.layers.slicer import Vector
+from ccfem.layers.standing import standing
 from ccfem.machine.machine import Machine
 from ccfem.mesh.tet_mesh import TetMesh
-from ccfem.printing.layer_matrix import layer_matrix
+from ccfem.printing.curved_layers import FilledLayer, filled_layers, in_order
+from ccfem.printing.head_lean import Matter, cleared, touched_length
+from ccfem.printing.islands import Islands, clashes, island_order, islands_of, rests_on, steps_of
+from ccfem.printing.poses import poses
 from ccfem.printing.print_plan import COORDINATE_DIGITS, PrintPlan
+from ccfem.support import SupportLayers
 from ccfem.toolpaths import FIBRE, Toolpaths
 
-__all__ = ["curved_plan", "limited_tilt"]
+__all__ = ["curved_plan"]
 
-_LEAST = 0.2
-"""Least share of a layer's height that matrix fills, whatever its fibre takes. Our choice."""
+_MISSING = 0.01
+"""Share of the part's volume that may be missing in silence."""
+_UP = np.array([0.0, 0.0, 1.0])
 
 
 def curved_plan(
@@ -29,15 +33,20 @@ def curved_plan(
     layers: Sequence[Layer],
     mesh: TetMesh,
     machine: Machine,
-    build: Sequence[float] = (0.0, 0.0, 1.0),
+    build: Vector = (0.0, 0.0, 1.0),
+    support: SupportLayers | None = None,
 ) -> PrintPlan:
     """Plan the print of a part of curved layers.
 
     Layer by layer matrix comes first, rings as high as the layer is where they lie, less the share
     of its volume that its fibre takes; then the fibre, always on to the strand with the nearest
-    end. The head stands along the normal of the layer, as far as `Kinematics.tilt_limit` lets it.
-    The part stands in the middle of the bed, on its lowest point. Support under it, a skirt and
-    priming are not planned.
+    end. A layer of support is printed just before the layer of the part at its level. Pieces of
+    layers over which the head would touch others are printed before those, where nothing forbids it
+    (`ccfem.printing.islands`). The head stands along the normal of the layer, as far as
+    `Kinematics.tilt_limit` lets it, and leans where it would still touch something
+    (`ccfem.printing.head_lean`); what remains is said in the warnings. The nozzle is at the top of
+    a layer, half its thickness over its middle. The part stands in the middle of the bed, on its
+    support or on its lowest point.
 
     Parameters
     ----------
@@ -50,18 +59,67 @@ def curved_plan(
     machine : Machine
     build : sequence of 3 floats
         Build direction.
+        Where layers look down from there, the part stands along their mean normal (`standing`).
+    support : SupportLayers, optional
+        Of these layers; the part stands as it does there.
 
     Raises
     ------
     InputError
         Where a strand is shorter than the cutter allows and `Process.short` is "error", or the head
-        of a machine of three axes would touch a layer.
+        of a machine of three axes would touch the layer that it lays.
     """
-    fibre = toolpaths.of_kind(FIBRE)
-    frame = plane_frame(build)
-    corners = mesh.points[np.unique(mesh.corners)] @ frame.T
-    low, high = corners.min(axis=0), corners.max(axis=0)
-    shift = np.append(0.5 * (low + high)[:2] - 0.5 * np.array(machine.gcode.bed[:2]), low[2])
+    fibre, dropped = _long_enough(toolpaths.of_kind(FIBRE), machine)
+    wanted = plane_frame(build)[2]
+    if support is None:
+        frame = plane_frame(standing(layers, build))
+    else:
+        frame = plane_frame(support.columns.up.tolist())
+    filled = filled_layers(fibre, layers, support, machine)
+    islands = islands_of([each.layer for each in filled])
+    clash = clashes(islands, frame[2], machine)
+    steps = [
+        (step, *_of_step(filled, islands, step))
+        for step in steps_of(islands, island_order(rests_on(islands), clash), clash)
+    ]
+    steps = [step for step in steps if len(step[1])]
+    if not steps:
+        raise InputError("there is nothing to print: the part is thinner than a line of matrix")
+    paths = Toolpaths.concatenate(
+        replace(own, layer=np.full(len(own), number)) for number, (_, own, _) in enumerate(steps)
+    )
+    shift = _shift(mesh, support, frame, machine)
+    points = (paths.points @ frame.T - shift).round(COORDINATE_DIGITS) + 0.0
+    normals = paths.normals @ frame.T
+    _check_tilt(normals, machine)
+    paths = replace(paths, points=points)
+    axes, tops = poses(normals, _UP, machine), islands.tops @ frame.T - shift
+    source = np.array([islands.layer[step[0]] for step, _, _ in steps])
+    level = replace(paths, layer=source[paths.layer])
+    before = touched_length(level, axes, Matter.of(tops, islands.layer[islands.owner]), machine)
+    when = np.full(len(islands), -1)
+    for number, (step, _, _) in enumerate(steps):
+        when[step] = number
+    found = cleared(paths, axes, Matter.of(tops, when[islands.owner]), machine)
+    upright = machine.kinematics.kind == "three_axes"
+    owner = np.repeat(paths.layer, np.diff(paths.offsets))
+    return PrintPlan(
+        replace(paths, normals=normals if upright else found.axes),
+        np.array([points[owner <= k, 2].max() for k in range(len(steps))]),
+        np.array([filled[k].layer.thickness for k in source.tolist()]),
+        np.concatenate([laid for _, _, laid in steps]),
+        dropped=dropped,
+        touched=(before, found.before, found.after),
+        warnings=(
+            *_stands(frame[2], wanted, support),
+            *_not_full(filled, mesh),
+            *_said(before, found.before, found.after, found.place),
+        ),
+    )
+
+
+def _long_enough(fibre: Toolpaths, machine: Machine) -> tuple[Toolpaths, float]:
+    """Strands that the cutter allows, and the length of the others."""
     limit = max(machine.tail, machine.minimum_length) * (1.0 - 1e-6)
     whole = fibre.lengths >= limit
     if not whole.all() and machine.process.short == "error":
@@ -69,68 +127,75 @@ def curved_plan(
             f"{int((~whole).sum())} of {len(fibre)} strands are shorter than the {limit:.4g} mm "
             "that the cutter allows: plan with that minimum_length, or set process.short = 'drop'"
         )
+    return fibre.select(whole), float(fibre.lengths[~whole].sum())
+
+
+def _of_step(
+    filled: Sequence[FilledLayer], islands: Islands, step: IntArray
+) -> tuple[Toolpaths, FloatArray]:
+    """Paths of some islands of a layer in the order of printing, and the height that they lay."""
+    own = filled[int(islands.layer[step[0]])]
+    here = np.isin(own.piece, islands.piece[step])
     parts, laid = [], []
-    for number, layer in enumerate(layers):
-        own = fibre.select(whole & (fibre.layer == layer.index))
-        room = float(layer.areas @ layer.local_thickness[layer.triangles].mean(axis=1))
-        share = max(1.0 - machine.strand_area * float(own.lengths.sum()) / room, _LEAST)
-        for paths in (layer_matrix([layer], machine), own):
-            found = _in_order(paths, number)
-            parts.append(found)
-            laid.append(share * _heights(layer, found.points))
-    paths = Toolpaths.concatenate(parts)
-    normals = limited_tilt(paths.normals @ frame.T, machine.kinematics.tilt_limit)
-    points = (paths.points @ frame.T - shift).round(COORDINATE_DIGITS) + 0.0
-    paths = replace(paths, points=points, normals=normals)
-    _check_tilt(normals, machine)
-    owner = np.repeat(paths.layer, np.diff(paths.offsets))
-    tops = [points[owner <= k, 2].max() for k in range(len(layers))]
-    thickness = np.array([float(np.mean(layer.local_thickness)) for layer in layers])
-    return PrintPlan(
-        paths,
-        np.array(tops),
-        thickness,
-        np.concatenate(laid),
-        dropped=float(fibre.lengths[~whole].sum()),
-    )
+    for wanted in (own.paths.kind != FIBRE, own.paths.kind == FIBRE):
+        chosen = here & wanted
+        heights = own.laid[np.repeat(chosen, np.diff(own.paths.offsets))]
+        paths, at = in_order(own.paths.select(chosen))
+        parts.append(paths)
+        laid.append(heights[at])
+    return Toolpaths.concatenate(parts), np.concatenate(laid)
 
 
-def limited_tilt(normals: FloatArray, limit: float) -> FloatArray:
-    """Turn directions (n, 3) that tilt from z by more than a limit, degrees, back to it."""
-    tilt = np.arctan2(np.hypot(normals[:, 0], normals[:, 1]), normals[:, 2])
-    most = np.minimum(tilt, np.radians(limit))
-    level = normals[:, :2] / np.maximum(np.hypot(*normals[:, :2].T), 1e-300)[:, None]
-    return np.column_stack([level * np.sin(most)[:, None], np.cos(most)])
+def _shift(
+    mesh: TetMesh, support: SupportLayers | None, frame: FloatArray, machine: Machine
+) -> FloatArray:
+    """Where the origin of the printer lies, (3,), in the frame of the build direction."""
+    corners = mesh.points[np.unique(mesh.corners)] @ frame.T
+    low, high = corners.min(axis=0), corners.max(axis=0)
+    bed = float(low[2])
+    if support is not None:
+        bed = min(bed, float((support.columns.mesh.points @ frame[2]).min()))
+    return np.append(0.5 * (low + high)[:2] - 0.5 * np.array(machine.gcode.bed[:2]), bed)
 
 
-def _in_order(paths: Toolpaths, number: int) -> Toolpaths:
-    """Paths of a layer in the order of printing, with a number for the layer."""
-    lines, across = list(paths), np.split(paths.normals, paths.offsets[1:-1])
-    if not lines:
-        return Toolpaths.empty()
-    ends = [np.array([line[k] for line in lines]) for k in (0, -1)]
-    order, backward, _ = nearest_end_order(*ends)
-    steps = [
-        (k, slice(None, None, -1 if back else 1)) for k, back in zip(order, backward, strict=True)
+def _stands(up: FloatArray, wanted: FloatArray, support: SupportLayers | None) -> list[str]:
+    """Say how the part stands, where it was not asked to, and on what."""
+    said = []
+    if up @ wanted < np.cos(np.radians(0.1)):
+        x, y, z = up.tolist()
+        said.append(
+            f"the part stands with ({x:.3f}, {y:.3f}, {z:.3f}) upwards: along its build direction "
+            "layers would look down"
+        )
+    if support is None:
+        said.append("nothing is laid below layers that hang over: plan with support (--support)")
+    return said
+
+
+def _not_full(filled: Sequence[FilledLayer], mesh: TetMesh) -> list[str]:
+    """Say how much of the part's volume rings cannot fill."""
+    missing, whole = sum(each.missing for each in filled), float(mesh.volumes.sum())
+    if missing < _MISSING * whole:
+        return []
+    return [
+        f"{missing:.0f} mm^3 of the part, {missing / whole:.1%}, stay empty: there its layers are "
+        "too narrow for lines of matrix"
     ]
-    points, offsets = pack([lines[k][way] for k, way in steps])
-    return Toolpaths(
-        points=points,
-        normals=np.concatenate([across[k][way] for k, way in steps]),
-        offsets=offsets,
-        layer=np.full(len(lines), number),
-        kind=paths.kind[order],
-        closed=np.array([is_closed(lines[k]) for k, _ in steps]),
-    )
 
 
-def _heights(layer: Layer, points: FloatArray) -> FloatArray:
-    """Thickness of a layer at points on it, mm."""
-    if not len(points):
-        return np.zeros(0)
-    found = nearest_on_triangles(layer.points, layer.triangles, points)
-    corners = layer.local_thickness[layer.triangles[found.triangle]]
-    return np.asarray(np.einsum("qk,qk->q", found.weights, corners))
+def _said(level: float, ordered: float, after: float, place: FloatArray | None) -> list[str]:
+    """Say where the head touches what is printed, and what was done about it."""
+    if not level > 0.0 and not after > 0.0:
+        return []
+    done = f"layer by layer along {level:.0f} mm, in the order chosen along {ordered:.0f} mm"
+    if place is None:
+        return [f"the head would touch what is printed {done}, leaning nowhere"]
+    x, y, z = place.tolist()
+    return [
+        f"the head touches what is printed along {after:.0f} mm, first at X {x:.1f} Y {y:.1f} Z "
+        f"{z:.1f} (upright or along the normal {done}): choose other layers, a smaller "
+        "machine.kinematics.tilt_limit, or watch it there"
+    ]
 
 
 def _check_tilt(normals: FloatArray, machine: Machine) -> None:

@@ -10,7 +10,7 @@ from ccfem.machine.machine import Machine
 from ccfem.printing.beside import Beside, beside
 from ccfem.printing.moves import FEED, LAY, TRAVEL, Moves
 from ccfem.printing.preheating import preheated
-from ccfem.printing.print_plan import PrintPlan
+from ccfem.printing.print_plan import COORDINATE_DIGITS, PrintPlan
 from ccfem.printing.recorder import Recorder
 from ccfem.printing.tools import begin_layer, change_tool, lay_matrix, lay_strand
 from ccfem.toolpaths import FIBRE, SUPPORT
@@ -24,8 +24,7 @@ def part_moves(plan: PrintPlan, machine: Machine) -> Moves:
     """Turn the plan of a part into moves.
 
     Layer by layer: tool changes with their lifts and temperatures, first filament on a block beside
-    the part and on a bar, the skirt, lines of matrix, strands with their cuts. Nothing is laid
-    beside a part of curved layers.
+    the part and on a bar, the skirt, lines of matrix, strands with their cuts.
 
     Parameters
     ----------
@@ -39,8 +38,8 @@ def part_moves(plan: PrintPlan, machine: Machine) -> Moves:
         Where a nozzle would leave the bed.
     """
     flat = bool((plan.paths.normals[:, 2] > 1.0 - 1e-9).all())
-    recorder, around = Recorder(machine), beside(plan, machine) if flat else Beside()
-    paths, site = plan.paths, _Site(around)
+    recorder = Recorder(machine)
+    paths, site = plan.paths, _Site(beside(plan, machine), None if flat else plan.thickness.max())
     below = 0.0
     for number in np.unique(paths.layer).tolist():
         top, thickness = float(plan.top[number]), float(plan.thickness[number])
@@ -50,9 +49,9 @@ def part_moves(plan: PrintPlan, machine: Machine) -> Moves:
             line, normals = paths.points[start:end], paths.normals[start:end]
             tool = int(paths.kind[k] == FIBRE)
             changed = change_tool(recorder, tool, top, machine)
-            if flat and tool == 0 and (changed or site.height < top):
+            if tool == 0 and (changed or site.height < top):
                 site.prime(recorder, top, below == 0.0, changed, machine)
-            if tool and flat:
+            if tool:
                 site.first_strand(recorder, top, thickness, machine)
             if tool:
                 recorder.strand += 1
@@ -65,8 +64,7 @@ def part_moves(plan: PrintPlan, machine: Machine) -> Moves:
                 lay_matrix(recorder, line, normals, heights, what, machine, speed)
         below = top
     # Away from the part, before the end of the file moves the carriage home.
-    if flat:
-        recorder.rise(recorder.top + machine.process.tool_lift)
+    recorder.rise(recorder.top + machine.process.tool_lift)
     moves = preheated(_numbered(recorder.moves()), machine)
     _check_bed(moves, machine)
     return moves
@@ -84,16 +82,32 @@ def _numbered(moves: Moves) -> Moves:
 
 
 class _Site:
-    """How high block and bar are by now."""
+    """How high block and bar are by now; beside curved layers their own are so high at most."""
 
-    def __init__(self, around: Beside) -> None:
+    def __init__(self, around: Beside, highest: float | None) -> None:
         self.around, self.height, self.bar = around, 0.0, 0.0
-        self.strand = around.strand
+        self.strand, self.highest = around.strand, highest
 
     def prime(
         self, recorder: Recorder, top: float, first: bool, changed: bool, machine: Machine
     ) -> None:
-        """Lay the block, higher by what it lacks to a top; the skirt first; and the bar."""
+        """Lay block and bar, higher by what they lack to a top; the skirt with their first layer.
+
+        Tops of curved layers do not grow evenly: beside them this takes several layers of the
+        block, or one more after a change of tools though the top is reached.
+        """
+        levels = np.array([top])
+        if self.highest is not None:
+            top = max(top, self.height + changed * self.highest)
+            count = int(np.ceil((top - self.height) / self.highest - 1e-6))
+            levels = np.linspace(self.height, top, count + 1)[1:]
+        for level in levels.round(COORDINATE_DIGITS).tolist():
+            self._layer(recorder, level, first and self.height == 0.0, changed, machine)
+
+    def _layer(
+        self, recorder: Recorder, top: float, first: bool, changed: bool, machine: Machine
+    ) -> None:
+        """Lay one layer of block and bar."""
         height, process = top - self.height, machine.process
         self.height = top
         if height <= 0.0:
@@ -127,7 +141,8 @@ class _Site:
         """Lay the first strand on the bar, before any of the part."""
         if self.strand is None:
             return
-        points = np.column_stack([self.strand, np.full(2, top)])
+        level = top if self.highest is None else self.bar + machine.strand_height
+        points = np.column_stack([self.strand, np.full(2, level)])
         self.strand = None
         lay_strand(recorder, points, np.tile(_UP, (2, 1)), thickness, machine)
 

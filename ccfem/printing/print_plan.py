@@ -61,6 +61,9 @@ class PrintPlan:
         the knife comes behind the print.
     ended : float, mm
         Length of strands that is left out where they would stack higher than the matrix above.
+    touched : tuple of 3 floats, mm
+        Length of the paths on curved layers along which the head touches what is printed: layer by
+        layer, in the order chosen, and as it leans.
     """
 
     paths: Toolpaths
@@ -73,6 +76,7 @@ class PrintPlan:
     outside: float = 0.0
     warnings: tuple[str, ...] = ()
     ended: float = 0.0
+    touched: tuple[float, float, float] = (0.0, 0.0, 0.0)
 
     __repr__ = in_brief
 

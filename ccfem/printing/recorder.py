@@ -13,6 +13,8 @@ __all__ = ["Recorder"]
 _FEED_DIGITS = 5
 """Decimals of what is fed, mm."""
 _SAME = 1e-9
+_LEVEL = 0.1
+"""Cosine of the tilt below which a head's own axis leads too far aside to leave along it."""
 
 
 class Recorder:
@@ -41,28 +43,62 @@ class Recorder:
             self._row(FEED, feed=part, beside=beside * part / length, speed=speed)
 
     def travel(self, place: FloatArray, normal: FloatArray) -> None:
-        """Go above all that is printed to a place, and down to it along its normal."""
-        lift = self.machine.gcode.lift
+        """Go above all that is printed to a place, and down to it.
+
+        A tilted head leaves and comes along its own axis: there it meets nothing that it did not
+        meet where it lays. Above, its lower side clears what is printed too.
+        """
+        lift, axis = self.machine.gcode.lift, self._axis(normal)
+        low = self._dip(axis)
         if self.place is not None:
-            level = max(self.top + lift, float(place[2]) + lift, float(self.place[2]))
-            self._to(np.append(self.place[:2], level), self.normal)
+            low = max(low, self._dip(self._axis(self.normal)))
+            level = max(self.top + lift, float(place[2]) + lift) + low
+            self._leave(max(level, float(self.place[2])))
+            level = float(self.place[2])
         else:
-            level = max(self.top, float(place[2])) + lift
-        above = place + lift * normal
+            level = max(self.top, float(place[2])) + lift + low
+        above = self._along(place, axis, level)
         self._to(np.append(above[:2], level), normal, across=True)
-        if normal[2] < 1.0 - _SAME:
+        if axis[2] < 1.0 - _SAME:
             self._to(above, normal)
         self._to(place, normal)
+
+    def _axis(self, normal: FloatArray) -> FloatArray:
+        """Direction that the head stands in."""
+        upright = self.machine.kinematics.kind == "three_axes"
+        return np.array([0.0, 0.0, 1.0]) if upright else normal
+
+    def _dip(self, axis: FloatArray) -> float:
+        """How far the side of a tilted head reaches below its tip, mm."""
+        half = np.radians(self.machine.head_angle)
+        tilt = float(np.arctan2(np.hypot(axis[0], axis[1]), axis[2]))
+        down = -np.cos(min(tilt + half, np.pi))
+        return max(float(self.machine.head_length / np.cos(half) * down), 0.0)
+
+    def _along(self, place: FloatArray, axis: FloatArray, level: float) -> FloatArray:
+        """Place on the axis from here at a level, or as far as the head is long."""
+        most = max(self.machine.head_length, self.machine.gcode.lift)
+        far = (level - float(place[2])) / float(axis[2]) if axis[2] > _LEVEL else most
+        return np.asarray(place + np.clip(far, 0.0, most) * axis)
+
+    def _leave(self, level: float) -> None:
+        """Go up to a level, along the head's axis first."""
+        assert self.place is not None
+        axis = self._axis(self.normal)
+        if axis[2] < 1.0 - _SAME:
+            self._to(self._along(self.place, axis, level), self.normal)
+        self._to(np.append(self.place[:2], level), self.normal)
 
     def retreat(self, more: float = 0.0) -> None:
         """Leave what was laid, along the normal."""
         assert self.place is not None
-        self._to(self.place + (self.machine.gcode.lift + more) * self.normal, self.normal)
+        far = self.machine.gcode.lift + more
+        self._to(self.place + far * self._axis(self.normal), self.normal)
 
     def rise(self, height: float) -> None:
-        """Go straight up to a height, if the nozzle is below it."""
+        """Go up to a height, if the nozzle is below it."""
         if self.place is not None and self.place[2] < height:
-            self._to(np.append(self.place[:2], height), self.normal)
+            self._leave(height)
 
     def lay(
         self,

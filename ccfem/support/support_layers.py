@@ -11,6 +11,7 @@ from ccfem.elasticity.part_stress import PartStress
 from ccfem.errors import InputError
 from ccfem.layers.layer import Layer
 from ccfem.layers.slicer import Slicer, Vector
+from ccfem.layers.standing import standing
 from ccfem.layers.sublayers import layers_within
 from ccfem.machine.machine import Machine
 from ccfem.mesh.tet_mesh import TetMesh
@@ -182,6 +183,8 @@ def slice_with_support(
         Of flat layers, or one that says the field of its layers (`slice`).
     stress : PartStress
     build : tuple of 3 floats, default z
+        Where curved layers look down from there, the support is laid below the part as it stands
+        along their mean normal (`standing`): ``support.columns.up``.
     machine : Machine, optional
     angle, lift : float, optional
         As of `support_layers`.
@@ -195,6 +198,12 @@ def slice_with_support(
     if sliced is None:
         layers = slicer(stress, build, Machine() if machine is None else machine)
         return layers, support_layers(stress.mesh, layers, build, None, None, angle, lift)
-    field, step = sliced.field.values, sliced.step
-    found = support_layers(stress.mesh, sliced.layers, build, field, step, angle, lift)
-    return sliced.layers, found
+    if getattr(sliced, "inverted", 0.0) > 0.0:
+        raise InputError(
+            f"layers lie upside down in {100.0 * sliced.inverted:.2g} % of the part, where no "
+            "support carries them: raise load_oriented.blend, or leave it out"
+        )
+    layers, up = sliced.layers, standing(sliced.layers, build)
+    values = None if all(layer.flat is not None for layer in layers) else sliced.field.values
+    step = None if values is None else sliced.step
+    return layers, support_layers(stress.mesh, layers, up, values, step, angle, lift)

@@ -4,10 +4,12 @@ from dataclasses import replace
 
 import numpy as np
 
+from ccfem.arrays import FloatArray
 from ccfem.checks import check_number
-from ccfem.fields.chart import chart_of, flat_view
+from ccfem.fields.chart import Chart
 from ccfem.geometry.offsets import offset_rings
 from ccfem.layers.layer import Layer
+from ccfem.layers.plane import Plane, plane_frame
 from ccfem.machine.machine import Machine
 from ccfem.support.support_layers import SupportLayers
 from ccfem.threads import in_threads
@@ -18,6 +20,8 @@ __all__ = ["support_paths"]
 
 def support_paths(support: SupportLayers, machine: Machine, spacing: float = 3.0) -> Toolpaths:
     """Fill the layers of a support with rings, open enough to be broken off or dissolved.
+
+    Distances are those seen along the build direction: on a tilted layer they are longer.
 
     Parameters
     ----------
@@ -38,10 +42,21 @@ def support_paths(support: SupportLayers, machine: Machine, spacing: float = 3.0
     numbered = [replace(layer, index=k) for k, layer in enumerate(support.layers)]
 
     def filled(layer: Layer) -> Toolpaths:
-        width, view = machine.matrix_width, flat_view(layer)
-        levels = offset_rings(view.plane.polygon, 0.5 * width, spacing * width, width)
-        paths = Toolpaths.from_plane([ring for level in levels for ring in level], view)
+        width, seen = machine.matrix_width, _from_above(layer, support.columns.up)
+        with np.errstate(divide="ignore", invalid="ignore"):  # of mitres of edges nearly in line
+            levels = offset_rings(seen.flat.plane.polygon, 0.5 * width, spacing * width, width)
+        paths = Toolpaths.from_plane([ring for level in levels for ring in level], seen.flat)
         paths = replace(paths, kind=np.full(len(paths), MATRIX, dtype=paths.kind.dtype))
-        return paths if view is layer else chart_of(layer).lifted(paths)
+        return paths if seen.flat is layer else seen.lifted(paths)
 
     return Toolpaths.concatenate(in_threads(filled, numbered))
+
+
+def _from_above(layer: Layer, up: FloatArray) -> Chart:
+    """Look at a layer along the build direction: none of a support lies upside down to it."""
+    lengths = np.ones((len(layer.triangles), 2))
+    if layer.flat is not None:
+        return Chart(layer, layer, lengths)
+    points = layer.points @ plane_frame(tuple(up.tolist())).T
+    flat = replace(layer, points=points * [1.0, 1.0, 0.0], flat=Plane(np.eye(3), 0.0))
+    return Chart(layer, flat, lengths)

@@ -258,3 +258,12 @@ def test_a_part_in_two_pieces_is_layered_in_both(block):
         found.field.gradient[other], UP + np.zeros((other.sum(), 3)), atol=1e-9
     )
     np.testing.assert_allclose(found.field.gradient[~other] @ tilted(20.0)[2], 1.0, atol=1e-9)
+
+
+def test_layers_are_put_in_where_a_cell_is_higher_than_many_steps():
+    """One cell 12 mm high: levels of 0.35 lie 0.7 mm apart, and one comes between each two."""
+    mesh = box_mesh((6.0, 6.0, 12.0), (2, 2, 1))
+    found = layers_within(mesh, 0.5 * mesh.points[:, 2], 0.35, 0.2, 0.5, 0.5, 1.0)
+    heights = np.array([float(layer.points[:, 2].mean()) for layer in found.layers])
+    np.testing.assert_allclose(np.diff(heights), 0.35, atol=1e-6)
+    assert len(heights) >= 2 * 17 - 1

@@ -1,0 +1,132 @@
+"""What lies in cones: a head above its tip, and what stands round it."""
+
+import numpy as np
+from numba import njit
+
+from ccfem.arrays import BoolArray, FloatArray, IntArray
+
+__all__ = ["earlier_in_cones", "groups_in_cones"]
+
+_BLOCK = 32
+"""So many points, one after the other, have a common sphere that is looked at first."""
+
+
+def groups_in_cones(
+    tips: FloatArray,
+    axes: FloatArray,
+    points: FloatArray,
+    group: IntArray,
+    half_angle: float,
+    length: float,
+) -> BoolArray:
+    """Whether a point of a group lies in a cone.
+
+    Parameters
+    ----------
+    tips, axes : (n, 3) arrays, mm
+        Tips of the cones, and unit vectors along which they open.
+    points : (p, 3) array, mm
+    group : (p,) int array
+        Of each point, ascending from 0 on. Points that follow each other are best near each other.
+    half_angle : float, degrees
+        Below 90.
+    length : float, mm
+        Height of the cones.
+
+    Returns
+    -------
+    (n, g) bool array
+    """
+    count = int(group.max(initial=-1)) + 1
+    every = np.full(len(tips), count)
+    return _in_cones(tips, axes, every, points, group, half_angle, length, count) >= 0
+
+
+def earlier_in_cones(
+    tips: FloatArray,
+    axes: FloatArray,
+    when: IntArray,
+    points: FloatArray,
+    step: IntArray,
+    half_angle: float,
+    length: float,
+) -> IntArray:
+    """Point of an earlier step in each cone (n,), -1 where there is none.
+
+    Parameters and rules are those of `groups_in_cones`; points count whose `step` (p,), ascending,
+    is below the cone's own, `when` (n,).
+    """
+    return _in_cones(tips, axes, when, points, step, half_angle, length, 0)[:, 0]
+
+
+def _in_cones(
+    tips: FloatArray,
+    axes: FloatArray,
+    when: IntArray,
+    points: FloatArray,
+    group: IntArray,
+    half_angle: float,
+    length: float,
+    columns: int,
+) -> IntArray:
+    """Find a point in each cone, of each group, or of all where there are no columns."""
+    new = np.diff(group, prepend=-1) != 0
+    start = np.maximum.accumulate(np.where(new, np.arange(len(group)), 0))
+    first = np.flatnonzero((np.arange(len(group)) - start) % _BLOCK == 0)
+    ends = np.append(first, len(group))
+    centre, radius = np.zeros((0, 3)), np.zeros(0)
+    if len(points):
+        size = np.diff(ends)
+        centre = np.add.reduceat(points, first) / size[:, None]
+        off = np.linalg.norm(points - np.repeat(centre, size, axis=0), axis=1)
+        radius = np.maximum.reduceat(off, first)
+    half = np.radians(half_angle)
+    found = _point_in_cones(
+        *(np.ascontiguousarray(each, dtype=np.float64) for each in (tips, axes, points)),
+        np.ascontiguousarray(when, dtype=np.int64),
+        ends.astype(np.int64),
+        np.ascontiguousarray(group[first], dtype=np.int64),
+        centre,
+        radius,
+        np.array([np.cos(half), np.sin(half), length]),
+        columns,
+    )
+    return np.asarray(found)
+
+
+@njit(cache=True, nogil=True)
+def _point_in_cones(  # type: ignore[no-untyped-def]
+    tips, axes, points, when, ends, group, centre, radius, cone, columns
+):  # pragma: no cover, compiled
+    """Do the same number by number."""
+    cosine, sine, length = cone[0], cone[1], cone[2]
+    found = np.full((len(tips), max(columns, 1)), -1)
+    for k in range(len(tips)):
+        for b in range(len(group)):
+            if group[b] >= when[k]:
+                break
+            g = group[b] if columns else 0
+            if found[k, g] >= 0:
+                continue
+            a = centre[b, 0] - tips[k, 0]
+            c = centre[b, 1] - tips[k, 1]
+            d = centre[b, 2] - tips[k, 2]
+            up = a * axes[k, 0] + c * axes[k, 1] + d * axes[k, 2]
+            if up < -radius[b] or up > length + radius[b]:
+                continue
+            side = np.sqrt(max(a * a + c * c + d * d - up * up, 0.0))
+            if side * cosine - up * sine > radius[b]:
+                continue
+            for p in range(ends[b], ends[b + 1]):
+                a = points[p, 0] - tips[k, 0]
+                c = points[p, 1] - tips[k, 1]
+                d = points[p, 2] - tips[k, 2]
+                up = a * axes[k, 0] + c * axes[k, 1] + d * axes[k, 2]
+                if up <= 0.0 or up > length:
+                    continue
+                if (a * a + c * c + d * d) * cosine * cosine < up * up:
+                    found[k, g] = p
+                    break
+            if columns == 0 and found[k, 0] >= 0:
+                break
+    return found
