@@ -30,6 +30,7 @@ from ccfem.stress_tracing.criterion import Criterion
 from ccfem.stress_tracing.frame import frame
 from ccfem.stress_tracing.main_paths import main_paths
 from ccfem.stress_tracing.symmetric import made_symmetric
+from ccfem.stress_tracing.tails import tail_turns
 from ccfem.stress_tracing.tracks import tracks
 from ccfem.stress_tracing.walk import walk
 from ccfem.toolpaths import Toolpaths
@@ -150,9 +151,11 @@ class Svt:
         members = frame(piece, _SAMPLING * machine.fibre_width)
         criterion = Criterion(turn=self.turn)
         found = []
-        for path in main_paths(members, stress, criterion, self.width_ratio):
-            strip = band(path, members, self.crossings)
-            pitch = self.spacing * machine.fibre_width
+        pitch = self.spacing * machine.fibre_width
+        paths = main_paths(members, stress, criterion, self.width_ratio)
+        turns = tail_turns(paths, members, pitch, piece)
+        for path, turn in zip(paths, turns, strict=True):
+            strip = band(path, members, self.crossings, turn)
             follow = stress if self.aligned else None
             found.append(tracks(strip, pitch, piece, machine.minimum_radius, follow))
         found = made_symmetric(found, piece, machine.fibre_width)
@@ -162,7 +165,6 @@ class Svt:
                 machine.fibre_width,
                 max(self._least(machine), _LEAST * machine.fibre_width),
             )
-            pitch = self.spacing * width
             found += blobs(piece, laid, width, pitch, least)
         return found
 
