@@ -59,8 +59,9 @@ def places(band: Band, pitch: float, section: Region) -> FloatArray:
     width = np.maximum(2.0 * np.linalg.norm(band.half, axis=1), 1e-9)
     wanted = width / pitch
     if band.closed:
-        number = np.full(len(wanted), max(1, round(float(np.median(wanted)))))
-        return _spread(number.astype(np.float64), 0.0)
+        number = _round(wanted, band.free > 0.5)
+        shift = _outer(band, section) if np.ptp(number) else 0.0
+        return _spread(gaussian_filter1d(number, _SPREAD / STEP, mode="wrap"), shift)
     inner = wanted[band.core]
     reach = 2 * round(_CLEAR / STEP) + 1
     joint = maximum_filter1d(band.free, reach, mode="constant", cval=1.0)[band.core] > 0.5
@@ -109,6 +110,16 @@ def _spread(number: FloatArray, shift: float) -> FloatArray:
     centred = most - 1.0 - 2.0 * k
     # On one side: the tracks of the other side keep their place at the border.
     return np.asarray((centred + shift * (most - number)) / number)
+
+
+def _round(wanted: FloatArray, joint: BoolArray) -> FloatArray:
+    """Find whole numbers (n,) round a closed band: two rounds, cut in the middle of the first."""
+    count = len(wanted)
+    number, _ = _numbers(np.tile(wanted, 2), np.tile(joint, 2), 1, 1)
+    found = np.roll(number[count // 2 : count // 2 + count], count // 2)
+    if number[count // 2] != number[count // 2 + count]:
+        found = np.full(count, max(1, round(float(np.median(wanted)))))
+    return found.astype(np.float64)
 
 
 def _numbers(wanted: FloatArray, joint: BoolArray, first: int, step: int) -> tuple[IntArray, float]:

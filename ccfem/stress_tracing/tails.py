@@ -36,7 +36,7 @@ _OUTSIDE = 1.5
 def tail_turns(
     paths: Sequence[MainPath], frame: Frame, pitch: float, section: Region
 ) -> list[tuple[float, float]]:
-    """Turns, radians to the left, of the bands of main paths behind the joints that they end in.
+    """Find the turns, radians to the left, of main paths behind the joints that they end in.
 
     Parameters
     ----------
