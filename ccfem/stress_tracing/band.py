@@ -59,6 +59,8 @@ class Band:
         From 0 where rails guide the band to 1 where it is bridged or extended.
     closed : bool
         Whether the last point leads to the first.
+    joined : 2 bools
+        Whether it starts, and whether it ends, in a joint.
     """
 
     middle: FloatArray
@@ -68,6 +70,7 @@ class Band:
     width: FloatArray
     free: FloatArray
     closed: bool = False
+    joined: tuple[bool, bool] = (True, True)
 
     def __post_init__(self) -> None:
         freeze(self, middle=float, half=float, width=float, free=float)
@@ -121,7 +124,8 @@ def band(
         max(0, core.start - round(middle[0] / STEP)),
         min(len(strip), core.stop + round(middle[1] / STEP)),
     )
-    return Band(strip[:, :2], strip[:, 2:4], core, within, width, strip[:, 4])
+    joined = (ends[0] != FREE, ends[1] != FREE)
+    return Band(strip[:, :2], strip[:, 2:4], core, within, width, strip[:, 4], joined=joined)
 
 
 def _stub(strip: FloatArray) -> FloatArray:
