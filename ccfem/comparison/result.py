@@ -10,7 +10,7 @@ from ccfem.cases.case import Case
 from ccfem.checks import check_known
 from ccfem.comparison.curve import Curve
 from ccfem.comparison.ranking import ranking
-from ccfem.comparison.remarks import remarks
+from ccfem.comparison.remarks import open_remarks, remarks
 from ccfem.comparison.runs import Run
 from ccfem.comparison.summary import summary_html, summary_text
 from ccfem.comparison.table import frame
@@ -152,6 +152,8 @@ class Comparison:
     def remarks(self) -> list[str]:
         """What has to stand next to the numbers, a line each."""
         found = remarks(self.runs, self.fibre_per_layer, self.bound)
+        if self.fibre_per_layer is None:
+            found += open_remarks(self.succeeded, self.layers, self.case.machine.fibre_width)
         if self.given is not None:
             found.append("paths are planned and evaluated on the stress of another program")
         return found
