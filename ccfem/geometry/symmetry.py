@@ -58,7 +58,10 @@ def mirror_lines(region: Region) -> tuple[Mirror, ...]:
     xx, yy, xy = _moments(shapely.transform(region, lambda points: points - centre))
     apart = np.hypot(xx - yy, 2.0 * xy)
     if apart > _EQUAL * (xx + yy):
-        angles = 0.5 * np.arctan2(2.0 * xy, xx - yy) + np.array([0.0, 0.5 * np.pi])
+        angle = 0.5 * np.arctan2(2.0 * xy, xx - yy)
+        # A section along the axes of the plane is so to the last digit.
+        angle = 0.0 if abs(np.sin(2.0 * angle)) < _EQUAL else angle
+        angles = angle + np.array([0.0, 0.5 * np.pi])
     else:
         border = shapely.get_coordinates(region) - centre
         away = np.linalg.norm(border, axis=1)
@@ -66,14 +69,22 @@ def mirror_lines(region: Region) -> tuple[Mirror, ...]:
         angles = (np.arctan2(y, x)[:, None] + np.pi * np.arange(_STEPS) / _STEPS).ravel()
     found: list[Mirror] = []
     for angle in angles:
-        mirror = Mirror(centre, np.array([np.cos(angle), np.sin(angle)]))
-        image = shapely.transform(region, lambda points, m=mirror: reflected(points, m))
+        along = np.array([np.cos(angle), np.sin(angle)]).round(15)
+        mirror = Mirror(_middle(region, centre, along), along)
         if len(found) == 2:
             break
+        image = shapely.transform(region, lambda points, m=mirror: reflected(points, m))
         across = all(abs(each.direction @ mirror.direction) < 1e-6 for each in found)
         if across and shapely.symmetric_difference(region, image).area <= _ALIKE * region.area:
             found.append(mirror)
     return tuple(found)
+
+
+def _middle(region: Region, centre: FloatArray, along: FloatArray) -> FloatArray:
+    """Point on a line through the centroid; on one along x or y, the middle of the extent."""
+    left, bottom, right, top = region.bounds
+    box = np.array([0.5 * (left + right), 0.5 * (bottom + top)])
+    return np.where(along == 0.0, box, centre) if (along == 0.0).any() else centre
 
 
 def reflected(points: FloatArray, mirror: Mirror) -> FloatArray:

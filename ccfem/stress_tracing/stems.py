@@ -17,6 +17,8 @@ __all__ = ["with_shared_stems"]
 
 _ALONG = np.cos(np.radians(35.0))
 """A path runs along a stem that it would enter with a turn of up to 35 degrees."""
+_FORK = np.cos(np.radians(70.0))
+"""A stem forks into paths that leave it at up to 70 degrees."""
 _ALIKE = 3.0
 """Paths share a stem where neither is more than three times as wide as the other."""
 
@@ -32,9 +34,10 @@ def with_shared_stems(paths: Sequence[MainPath], frame: Frame) -> list[MainPath]
     Returns
     -------
     list of MainPath
-        In the same order. A shared member is divided along its length, by the widths of both.
+        In the same order. A shared member is divided along its length, by the widths of both; one
+        that is a path of its own, and forks into two others, goes to these.
     """
-    found = list(paths)
+    found = _forked(paths, frame)
     for k in range(len(found)):
         for backward in (False, True):
             own = _turned(found[k], backward)
@@ -59,6 +62,43 @@ def with_shared_stems(paths: Sequence[MainPath], frame: Frame) -> list[MainPath]
                 rest = replace(whole, members=(*whole.members[:-1], others))
                 found[of] = _turned(rest, turned)
     return found
+
+
+def _forked(paths: Sequence[MainPath], frame: Frame) -> list[MainPath]:
+    """Divide stems that no path runs through between the paths on both sides that end there."""
+    found: list[MainPath | None] = list(paths)
+    for k, whole in enumerate(paths):
+        stem = whole.members[0] if whole.members[0].ends[1] == FREE else whole.members[0].reversed
+        joint = stem.ends[0]
+        if len(whole.members) > 1 or whole.closed or stem.ends[1] != FREE or joint == FREE:
+            continue
+        along = outward(stem, frame, joint)
+        sides: dict[bool, tuple[float, int, bool]] = {}
+        for n, path in enumerate(found):
+            for way in (False, True):
+                if n == k or path is None or path.closed:
+                    continue
+                own = _turned(path, way)
+                if own.members[-1].ends[1] != joint:
+                    continue
+                arrival = -outward(own.members[-1].reversed, frame, joint)
+                side = _on_left(along, arrival)
+                near = float(arrival @ along)
+                if near > max(_FORK, sides.get(side, (0.0,))[0]):
+                    sides[side] = (near, n, way)
+        if len(sides) < 2 or sides[True][1] == sides[False][1]:
+            continue
+        left, right = (found[sides[side][1]] for side in (True, False))
+        assert left is not None
+        assert right is not None
+        ends = [_turned(left, sides[True][2]), _turned(right, sides[False][2])]
+        wide = [float(np.median(own.members[-1].width)) for own in ends]
+        parts = _cut(stem, wide[0] / sum(wide))
+        for side, own, part in zip((True, False), ends, parts, strict=True):
+            longer = replace(own, members=(*own.members, part))
+            found[sides[side][1]] = _turned(longer, sides[side][2])
+        found[k] = None
+    return [path for path in found if path is not None]
 
 
 def _turned(path: MainPath, backward: bool) -> MainPath:
@@ -94,9 +134,20 @@ def _divided(
     stem = whole.members[-1]
     wide, beside = _widths(own, whole)
     share = wide / (wide + beside)
-    # Coming from the left one walks to the right.
-    on_left = along[0] * arrival[1] - along[1] * arrival[0] < 0.0
-    cut = stem.left + (share if on_left else 1.0 - share) * (stem.right - stem.left)
+    if _on_left(along, arrival):
+        return _cut(stem, share)
+    others, mine = _cut(stem, 1.0 - share)
+    return mine, others
+
+
+def _on_left(along: FloatArray, arrival: FloatArray) -> bool:
+    """Whether one comes from the left of a direction: then one walks to the right."""
+    return bool(along[0] * arrival[1] - along[1] * arrival[0] < 0.0)
+
+
+def _cut(stem: Member, share: float) -> tuple[Member, Member]:
+    """Left and right part of a stem, of which the left one has a share of the width."""
+    cut = stem.left + share * (stem.right - stem.left)
     left = Member(0.5 * (stem.left + cut), stem.left, cut, stem.ends)
     right = Member(0.5 * (cut + stem.right), cut, stem.right, stem.ends)
-    return (left, right) if on_left else (right, left)
+    return left, right
