@@ -55,13 +55,15 @@ class Svt:
     Members of the section are those of its medial axis. In every joint two members at a time are
     joined to a main load path, where turn, misalignment with the stress and sense of the stress
     suit best. Strands fill each main path from side to side, as many as its width asks for: where
-    it narrows they leave through its border. They cross those of other main paths in the joints and
-    leave the section there. Links outside the section join them to one path for each piece of the
-    section. A section without members (a disc, a square) is filled by concentric rings.
+    it narrows they leave through its border. They cross those of other main paths in the joints,
+    as steeply as a turn of up to 60 degrees makes it, and leave the section there. Two main paths
+    share a member that leads to a clamp or a load, or that forks into them. Links outside the
+    section join them to one path for each piece of the section. A section without members (a disc,
+    a square) is filled by concentric rings.
 
-    It is meant for frames of slim members. In parts with wide ones, as a plate with a hole, joints
-    take most of the section: strands lie there side by side, or over each other, and where links
-    would lead through the section for long the path is cut.
+    It is meant for frames of slim members. In parts with wide ones joints take most of the section:
+    strands fan out there, or lie over each other, and where links would lead through the section
+    for long the path is cut.
 
     Attributes
     ----------

@@ -31,6 +31,10 @@ _TURNING = 2.0
 """Cost of a turn of a radian, in mm beside other strands, for each strand."""
 _OUTSIDE = 1.5
 """Length, mm, outside the section, after which a tail has left it."""
+_TIED = 1e-3
+"""Share by which turns to the left and to the right must differ in cost: a path on an axis of
+symmetry stays there."""
+_NONE = np.zeros((0, 2))
 
 
 def tail_turns(
@@ -51,6 +55,7 @@ def tail_turns(
     list of 2 floats
         At the start and at the end of each; 0 where it ends freely.
     """
+    section = shapely.force_2d(section)
     shapely.prepare(section)
     bands = [band(path, frame) for path in paths]
     shares = [places(strip, pitch, section) for strip in bands]
@@ -71,12 +76,18 @@ def tail_turns(
                         _cost(lines, tree, along, pitch, section) + _TURNING * len(lines) * abs(t)
                         for t, lines in zip(_TURNS, tails, strict=True)
                     ]
-                    turns[side] = float(_TURNS[int(np.argmin(costs))])
+                    turns[side] = _best(costs)
         found.append((turns[0], turns[1]))
     return found
 
 
-_NONE = np.zeros((0, 2))
+def _best(costs: Sequence[float]) -> float:
+    """Turn that costs least; none where that to the left costs as much as that to the right."""
+    best = int(np.argmin(costs))
+    # Turns come in pairs behind the first one, which is none.
+    other = best + 1 if best % 2 else best - 1
+    alike = best > 0 and costs[other] <= (1.0 + _TIED) * costs[best]
+    return 0.0 if alike else float(_TURNS[best])
 
 
 def _fixed(path: MainPath, strip: Band, share: FloatArray) -> tuple[FloatArray, FloatArray]:

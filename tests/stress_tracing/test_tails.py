@@ -62,6 +62,16 @@ def test_a_path_that_would_run_along_another_turns_away_from_it():
         assert (end < -np.radians(10.0)) if turns else (end == 0.0)
 
 
+def test_a_path_on_an_axis_of_symmetry_stays_there():
+    """A post under a beam that strands of both sides bend down to: no side is better."""
+    post = straight((50, -40), (50, 0), 5.0, (FREE, 0))
+    sides = [straight((50 + 2 * x, -41), (50 + x, 4), 5.0, (FREE, FREE)) for x in (-3, 3)]
+    section = shapely.box(0, -45, 100, 30)
+    frame = Frame((post, *sides), np.array([[50.0, 0.0]]), np.array([5.0]))
+    paths = [MainPath((member,)) for member in (post, *sides)]
+    assert tail_turns(paths, frame, 0.9, section)[0] == (0.0, 0.0)
+
+
 def test_two_paths_share_the_member_to_a_clamp():
     """Chord and diagonal run into one member: the one from above has its upper part."""
     stem = straight((0, 0), (20, 0), 10.0, (0, FREE))
