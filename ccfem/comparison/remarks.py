@@ -134,6 +134,8 @@ def _about_open(evaluation: Evaluation) -> list[str]:
 def open_remarks(runs: Sequence[Run], layers: Sequence[Layer], width: float) -> list[str]:
     """Say where strands meant to fill a section leave the most of it open, a line each run.
 
+    Of runs that lay as much fibre as their strategy can: others leave it open by intention.
+
     Parameters
     ----------
     runs : sequence of Run
@@ -144,7 +146,7 @@ def open_remarks(runs: Sequence[Run], layers: Sequence[Layer], width: float) -> 
     """
     found = []
     for run in runs:
-        if run.evaluation is None or not getattr(run.strategy, "crosses", False):
+        if run.evaluation is None or not _filling(run):
             continue
         cover = run.evaluation.values["coverage"][:-1]
         worst = int(run.evaluation.layers[int(cover.argmin())])
@@ -162,6 +164,14 @@ def open_remarks(runs: Sequence[Run], layers: Sequence[Layer], width: float) -> 
             f"fan out and along the border, too narrow for one more{wide}"
         )
     return found
+
+
+def _filling(run: Run) -> bool:
+    """Whether a run is meant to fill the section: with strands that cross, as many as it can."""
+    amount = getattr(run.strategy, "amount", None)
+    if amount is None or not getattr(run.strategy, "crosses", False):
+        return False
+    return bool(getattr(run.strategy, amount.parameter) == amount.most)
 
 
 def bound_remark(tested: Sequence[Run], bound: UpperBound) -> str:

@@ -152,8 +152,7 @@ class Comparison:
     def remarks(self) -> list[str]:
         """What has to stand next to the numbers, a line each."""
         found = remarks(self.runs, self.fibre_per_layer, self.bound)
-        if self.fibre_per_layer is None:
-            found += open_remarks(self.succeeded, self.layers, self.case.machine.fibre_width)
+        found += open_remarks(self.succeeded, self.layers, self.case.machine.fibre_width)
         if self.given is not None:
             found.append("paths are planned and evaluated on the stress of another program")
         return found
