@@ -6,6 +6,7 @@ from dataclasses import dataclass, field
 from typing import Any
 
 from ccfem.arrays import freeze
+from ccfem.checks import check_known, check_number
 from ccfem.display import Shown
 from ccfem.elasticity.problem import Force, Order, Problem, Support
 from ccfem.elasticity.support_kinds import AnySupport
@@ -50,6 +51,9 @@ class Case(Shown):
         Another model of how the part is held, such as bolts that only press in place of walls that
         are held. Where there are some, strategies are tested under both, and no order is told that
         the two do not agree on.
+    weights : mapping of load case to float
+        Of the load cases, combinations among them, that are planned for when all are asked for;
+        those that are not named do not count. Default: all but combinations, alike.
     findings : tuple of str
         What was found and repaired in a mesh from a file, one line each.
     """
@@ -64,12 +68,16 @@ class Case(Shown):
     source: str = ""
     findings: tuple[str, ...] = ()
     alternative_supports: tuple[AnySupport, ...] = ()
+    weights: Mapping[str, float] = field(default_factory=dict)
 
     def __repr__(self) -> str:
         return f"Case {self.name}: {self.title}"
 
     def __post_init__(self) -> None:
-        freeze(self, parameters=dict, alternative_supports=tuple)
+        freeze(self, parameters=dict, alternative_supports=tuple, weights=dict)
+        for name, weight in self.weights.items():
+            check_known("load case", name, self.problem.cases)
+            check_number(f"weight of load case '{name}'", weight, above=0.0)
         check_name(self.name, self.title)
 
 

@@ -183,6 +183,10 @@ them with a minus ("-z"), or three numbers.
     pull = 1.5
     heat = 1.0
 
+    [weights]                         # what each case counts where all are planned for at once
+    pull = 1.0                        # (--load-case all); cases that are left out do not count,
+    weight = 0.5                      # without this table all but combinations count alike
+
     [machine]                         # what differs from ccfem.machine.machine.Machine, or from a
     profile = "klipper"               # machine of ccfem machines
     minimum_length = 45.0
@@ -221,6 +225,7 @@ from ccfem.cases.part_loads import (
     combinations_of,
     loads_of,
     supports_of,
+    weights_of,
 )
 from ccfem.cases.part_regions import region_rules_of, regions_of
 from ccfem.cases.part_tables import check_strategies, material_of, named_table, rules_of
@@ -297,6 +302,7 @@ def _case(content: Mapping[str, Any], path: Path) -> Case:
     others = alternative_supports_of(part.alternative_supports, found)
     loads = loads_of(part.loads, found) if "loads" not in unread else {}
     combinations = combinations_of(part.combinations, part.loads, found)
+    weights = weights_of(part.weights, {**part.loads, **part.combinations}, found)
     regions = region_rules_of(part.regions, found)
     with found.noted():
         part.check(path.parent)
@@ -333,6 +339,7 @@ def _case(content: Mapping[str, Any], path: Path) -> Case:
         source=part.source,
         findings=findings,
         alternative_supports=others,
+        weights=weights,
     )
 
 
