@@ -123,86 +123,126 @@ def optimise(
     """
     check_number("volume fraction", volume_fraction, above=0.0, below=1.0)
     check_known("method", method, ("simp", "somp"))
-    check_places("solid", solid)
-    check_places("void", void)
-    problem = case.problem
-    if not any(problem.loads.values()):
+    flat = None if in_space else flat_part(case.problem.mesh)
+    _check_case(case, method, flat, in_space)
+    wanted = _Wanted(
+        case,
+        volume_fraction,
+        weights,
+        _to_keep(case.problem) if keep is None else _known(keep, case.problem),
+        _places("solid", solid),
+        _places("void", void),
+        radius,
+        {"filter": filter, "max_iterations": max_iterations},
+        progress,
+    )
+    if flat is None:
+        return _of_solid(wanted)
+    turned = None if method == "simp" else (orientation, laminate)
+    return _of_sheet(wanted, flat, element_size, turned)
+
+
+@dataclass(frozen=True)
+class _Wanted:
+    """What is asked for of a part, whether it is a sheet or not."""
+
+    case: Case
+    volume_fraction: float
+    weights: Mapping[str, float] | None
+    keep: Sequence[str]
+    solid: Sequence[Place]
+    void: Sequence[Place]
+    radius: float | None
+    options: Mapping[str, Any]
+    progress: Progress
+
+
+def _check_case(case: Case, method: str, flat: FlatPart | None, in_space: bool) -> None:
+    """Raise on a case that cannot be optimised by a method."""
+    if not any(case.problem.loads.values()):
         raise InputError(f"'{case.name}' has no load, and nothing to be stiff against: add one")
-    if problem.regions:
+    if case.problem.regions:
         raise InputError(
             f"'{case.name}' has regions of other materials, which would not know where they end: "
             "leave them out, and keep their places with --solid"
         )
-    for name in keep or ():
-        check_known("patch", name, sorted(problem.mesh.patches))
-    flat = None if in_space else flat_part(problem.mesh)
     if method == "somp" and flat is None:
         raise InputError(
             f"'{case.name}' is {'to be designed in space' if in_space else 'no plate'}: SOMP turns "
             "the fibre in the plane of a prism along z: take --method simp"
         )
-    if keep is None:
-        keep = _to_keep(problem)
-    options: dict[str, Any] = {"filter": filter, "max_iterations": max_iterations}
-    if flat is None:
-        return _of_solid(
-            case, volume_fraction, radius, weights, keep, solid, void, options, progress
-        )
+
+
+def _places(name: str, places: Sequence[Place]) -> Sequence[Place]:
+    """Check places that stay full, or empty."""
+    check_places(name, places)
+    return places
+
+
+def _known(keep: Sequence[str], problem: Problem) -> Sequence[str]:
+    """Check that a part has the patches that are to be kept."""
+    for name in keep:
+        check_known("patch", name, sorted(problem.mesh.patches))
+    return keep
+
+
+def _of_sheet(
+    wanted: _Wanted,
+    flat: FlatPart,
+    element_size: float | None,
+    turned: tuple[str, Sequence[float] | None] | None,
+) -> Optimised:
+    """Optimise a flat part as a sheet: by SOMP with an orientation and a laminate, or by SIMP."""
+    problem = wanted.case.problem
     size = float(np.sqrt(flat.planform.area / _CELLS)) if element_size is None else element_size
     check_number("element size", size, above=0.0, unit="mm")
-    options["radius"] = _REACH * size if radius is None else radius
-    given = problem.material.stiffness
-    own = plane_stiffness(given)
-    if method == "somp":
-        own = _laminate(laminate, own)
-        options["orientation"] = orientation
+    options = dict(wanted.options)
+    options["radius"] = _REACH * size if wanted.radius is None else wanted.radius
+    own = plane_stiffness(problem.material.stiffness)
+    if turned is not None:
+        own = _laminate(turned[1], own)
+        options["orientation"] = turned[0]
     sheet, prism = sheet_problem(problem, flat, size, own)
-    full = _rims(problem, flat, keep, size).union(area_of(solid))
-    empty = area_of(void).difference(full)
+    full = _rims(problem, flat, wanted.keep, size).union(area_of(wanted.solid))
+    empty = area_of(wanted.void).difference(full)
     x, y = _middles(sheet.mesh.points, sheet.mesh.cells, prism)
-    masks = {"solid": shapely.contains_xy(full, x, y), "void": shapely.contains_xy(empty, x, y)}
-    common = {"weights": weights, "groups": prism, "progress": progress, **masks}
-    if method == "somp":
-        design = Somp(volume_fraction, **options)(sheet, own, **common)
+    common: dict[str, Any] = {
+        "weights": wanted.weights,
+        "groups": prism,
+        "progress": wanted.progress,
+        "solid": shapely.contains_xy(full, x, y),
+        "void": shapely.contains_xy(empty, x, y),
+    }
+    if turned is not None:
+        design = Somp(wanted.volume_fraction, **options)(sheet, own, **common)
     else:
         options["minimum_stiffness"] = 1e-6
-        design = Simp(volume_fraction, **options)(sheet, **common)
+        design = Simp(wanted.volume_fraction, **options)(sheet, **common)
     planform = sheet_outline(design, flat, size, full, empty)
-    edge = min(size, _edge(problem))
-    part = sheet_part(problem, flat, planform, edge)
+    part = sheet_part(problem, flat, planform, min(size, _edge(problem)))
     share = planform.area / flat.planform.area
-    return _found(case, part, design, size, planform, share)
+    return _found(wanted.case, part, design, size, planform, share)
 
 
-def _of_solid(
-    case: Case,
-    volume_fraction: float,
-    radius: float | None,
-    weights: Mapping[str, float] | None,
-    keep: Sequence[str],
-    solid: Sequence[Place],
-    void: Sequence[Place],
-    options: dict[str, Any],
-    progress: Progress,
-) -> Optimised:
+def _of_solid(wanted: _Wanted) -> Optimised:
     """Optimise a part in space, on its own cells."""
-    problem = case.problem
+    problem = wanted.case.problem
     mesh = problem.mesh if problem.mesh.order == 1 else problem.mesh.linear()
     whole = replace(problem, mesh=mesh, order=1, combinations={})
     size = _edge(whole)
     centres = mesh.points[mesh.cells].mean(axis=1)
-    full = cells_in(solid, centres)
-    for name in keep:
+    full = cells_in(wanted.solid, centres)
+    for name in wanted.keep:
         nodes = mesh.points[np.unique(mesh.patch(name))]
         full |= cKDTree(nodes).query(centres)[0] <= _RIM * size
-    empty = cells_in(void, centres) & ~full
-    options |= {"radius": max(3.0, 1.6 * size) if radius is None else radius}
-    method = Simp(volume_fraction, minimum_stiffness=1e-6, **options)
-    design = method(whole, weights=weights, solid=full, void=empty, progress=progress)
+    empty = cells_in(wanted.void, centres) & ~full
+    reach = max(3.0, 1.6 * size) if wanted.radius is None else wanted.radius
+    method = Simp(wanted.volume_fraction, minimum_stiffness=1e-6, radius=reach, **wanted.options)
+    design = method(whole, weights=wanted.weights, solid=full, void=empty, progress=wanted.progress)
     part = as_problem(design, problem.material)
     part = replace(part, axes=None, order=problem.order, combinations=problem.combinations)
     share = float(part.mesh.volumes.sum() / mesh.volumes.sum())
-    return _found(case, part, design, size, None, share)
+    return _found(wanted.case, part, design, size, None, share)
 
 
 def _found(

@@ -127,6 +127,8 @@ def optimise(
     with progress_bar(lines=True) as progress:
         told = _now_and_then(progress)
         found = find(whole, volume_fraction, method, progress=told, **options)  # type: ignore[arg-type]
+    # Another run may have written them since.
+    files = _files(files[0], force)
     _write(found, files, case)
     _say(found, files)
 

@@ -7,15 +7,20 @@ import numpy as np
 from ccfem.comparison.ranking import off_length, order_of, ranking, stiffness_ratio
 from ccfem.comparison.runs import Run, Wanted
 from ccfem.evaluation.evaluation import Evaluation
+from ccfem.evaluation.open_places import open_places
+from ccfem.evaluation.plane_paths import plane_paths
 from ccfem.fibre_aware.upper_bound import UpperBound
+from ccfem.layers.layer import Layer
 from ccfem.virtual_testing.stiffer import RESOLUTION, SAME, UNDECIDED
 
-__all__ = ["bound_remark", "remarks"]
+__all__ = ["bound_remark", "open_remarks", "remarks"]
 
 _FULL = 0.93
 """Coverage of a layer from which it counts as filled."""
 _NAMED = 6
 """Layers that are named."""
+_PLACES = 3
+"""Open places that are named."""
 
 
 def remarks(runs: Sequence[Run], wanted: Wanted, bound: UpperBound | None = None) -> list[str]:
@@ -124,6 +129,49 @@ def _about_open(evaluation: Evaluation) -> list[str]:
     more = ", ..." if len(open_) > _NAMED else ""
     bare = 1.0 - cover[open_].min()
     return [f"{bare:.1%} of the section stays without fibre, in layers {named}{more}"]
+
+
+def open_remarks(runs: Sequence[Run], layers: Sequence[Layer], width: float) -> list[str]:
+    """Say where strands meant to fill a section leave the most of it open, a line each run.
+
+    Of runs that lay as much fibre as their strategy can: others leave it open by intention.
+
+    Parameters
+    ----------
+    runs : sequence of Run
+    layers : sequence of Layer
+        That the runs were planned on.
+    width : float, mm
+        Of the fibre.
+    """
+    found = []
+    for run in runs:
+        if run.evaluation is None or not _filling(run):
+            continue
+        cover = run.evaluation.values["coverage"][:-1]
+        worst = int(run.evaluation.layers[int(cover.argmin())])
+        layer = next(each for each in layers if each.index == worst)
+        if cover.min() >= _FULL or layer.flat is None:
+            continue
+        left = open_places(plane_paths(run.toolpaths, layer), width)
+        largest = ", ".join(
+            f"{place.area:.1f} mm2 at ({place.x:.1f}, {place.y:.1f})"
+            for place in left.places[:_PLACES]
+        )
+        wide = f", {left.wide:.1%} where one would fit, the largest {largest} mm" if largest else ""
+        found.append(
+            f"{run.name}: layer {layer.index} is open in {left.narrow:.1%} between strands that "
+            f"fan out and along the border, too narrow for one more{wide}"
+        )
+    return found
+
+
+def _filling(run: Run) -> bool:
+    """Whether a run is meant to fill the section: with strands that cross, as many as it can."""
+    amount = getattr(run.strategy, "amount", None)
+    if amount is None or not getattr(run.strategy, "crosses", False):
+        return False
+    return bool(getattr(run.strategy, amount.parameter) == amount.most)
 
 
 def bound_remark(tested: Sequence[Run], bound: UpperBound) -> str:

@@ -10,7 +10,7 @@ from ccfem.cases.case import Case
 from ccfem.checks import check_known
 from ccfem.comparison.curve import Curve
 from ccfem.comparison.ranking import ranking
-from ccfem.comparison.remarks import remarks
+from ccfem.comparison.remarks import open_remarks, remarks
 from ccfem.comparison.runs import Run
 from ccfem.comparison.said_of_cases import cases_remarks, cases_verdict
 from ccfem.comparison.summary import summary_html, summary_text
@@ -164,6 +164,7 @@ class Comparison:
     def remarks(self) -> list[str]:
         """What has to stand next to the numbers, a line each."""
         found = remarks(self.runs, self.fibre_per_layer, self.bound)
+        found += open_remarks(self.succeeded, self.layers, self.case.machine.fibre_width)
         if self.cases is not None:
             about, case = (self.runs, self.fibre_per_layer, self.cases), self.stress.case
             others = bool(self.case.alternative_supports)

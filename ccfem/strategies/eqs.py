@@ -1,4 +1,4 @@
-"""Lines equally spaced from one streamline of the principal stress: a strategy to compare with.
+"""Lines equally spaced from one streamline of the stress a member: a strategy to compare with.
 
 One of the three ways that Wang et al. 2021 show beside their own, after V. S.
 Papapetrou, C. Patel, A. Y. Tamijani, Stiffness-based optimization framework for the topology and
@@ -16,12 +16,14 @@ from ccfem.arrays import FloatArray
 from ccfem.errors import InputError
 from ccfem.fields.streamlines import streamlines
 from ccfem.geometry.own_way import until_itself
+from ccfem.geometry.polylines import along_line, between, line_length, points_along
 from ccfem.geometry.shapes import Region, open_lines
 from ccfem.layers.layer import Layer
 from ccfem.layers.layer_stress import LayerStress
 from ccfem.machine.machine import Machine
 from ccfem.planning.infill import SPACING, check_fill, long_enough
 from ccfem.planning.strategy import Amount
+from ccfem.stress_tracing.stress_lines import misalignment, plane_stress_at, stress_lines
 from ccfem.tensor import in_plane, strongest_in_plane
 from ccfem.toolpaths import Toolpaths
 
@@ -33,26 +35,38 @@ _CANDIDATES = 20
 """Most stressed places whose streamlines are compared."""
 _OFF = 0.005
 """Largest deviation from the distance, in fibre widths."""
+_SEEDS = 100
+"""Most seed lines of a layer."""
+_SHORTEST = 10.0
+"""Shortest seed line after the first, in fibre widths."""
+_CLEAR = 0.99
+"""Share of the spacing that the lines of one seed keep from those of another."""
+_ALONG = 45.0
+"""Largest angle, degrees, from a line to the stress: beyond, it runs across its member."""
+_BESIDE = 1.25
+"""Distance, in spacings, up to which a line lies beside the one before."""
+_PIECE = 1.0
+"""Length, in fibre widths, of the pieces of a line that are kept or left out."""
 
 
 @dataclass(frozen=True)
 class Eqs:
-    """A seed line along the stress, and lines at whole multiples of the spacing from it.
+    """Seed lines along the stress, one a member, and lines at whole multiples of the spacing.
 
-    The seed line is the longest of the streamlines through the twenty most stressed places of the
-    layer, or the one through a given point; it stops where it comes within a fibre width of itself,
-    and does not wind round a hole again and again. The others are iso-lines of the Euclidean
-    distance from it, to its sides and round its ends: exactly parallel, whatever voids lie between.
-    Distance measured within the section would lay them across every member that leads away from the
-    seed line, and break them behind every hole, where two fronts meet. Away from the seed line the
-    stress has no influence.
+    A seed line is the longest of the streamlines through the twenty most stressed places of what is
+    left of the layer, or the one through a given point; it stops where it comes within a fibre
+    width of itself, and does not wind round a hole again and again. The others are iso-lines of the
+    distance from it, to its sides: exactly parallel, each as far as it lies beside the one before
+    and within 45 degrees of the stress, so that they keep to the member. Then the next seed line is
+    laid in what is left, until none is as long as ten fibre widths. Where members meet, their lines
+    end: the joints stay open, as the paper shows.
 
     Attributes
     ----------
     spacing : float, default 1
         Distance of neighbouring lines in fibre widths, at least 1.
     seed : tuple of 2 floats, mm, optional
-        Point in the plane of the layer that the seed line goes through.
+        Point in the plane of the layer that the first seed line goes through.
     minimum_length : float, mm, optional
         Shorter paths are dropped; by default the shortest that the machine can cut.
     """
@@ -72,45 +86,96 @@ class Eqs:
 
     def __call__(self, layer: Layer, stress: LayerStress, machine: Machine) -> Toolpaths:
         """Plan the paths of one layer; none where the section is thinner than a fibre."""
-        width = machine.fibre_width
-        region = shapely.buffer(layer.plane.polygon, -0.5 * width)
-        seed = self._seed_line(layer, stress, region, _STEP * width)
-        if len(seed) < 2:
-            return Toolpaths.empty()
-        lines = _iso_lines(seed, region, self.spacing * width, _OFF * width)
+        width, pitch = machine.fibre_width, self.spacing * machine.fibre_width
+        left = shapely.buffer(layer.plane.polygon, -0.5 * width)
+        places = _stressed_places(layer, stress, left)
+        lines: list[FloatArray] = []
+        for k in range(_SEEDS):
+            given = self.seed is not None and k == 0
+            starts = np.array([self.seed]) if given else places[:_CANDIDATES]
+            seed = _seed_line(layer, stress, starts, left, width)
+            if len(seed) > 1 and (k == 0 or line_length(seed) >= _SHORTEST * width):
+                family = _family(seed, left, pitch, width, stress)
+                lines += family
+                curves = shapely.multilinestrings([shapely.LineString(line) for line in family])
+                around = shapely.buffer(shapely.simplify(curves, _OFF * width), _CLEAR * pitch)
+                left = shapely.difference(left, around)
+            elif not given:
+                places = places[_CANDIDATES:]
+            places = places[shapely.contains_xy(left, places)]
+            if not len(places):
+                break
         return long_enough(Toolpaths.from_plane(lines, layer), self.minimum_length, machine)
 
-    def _seed_line(
-        self, layer: Layer, stress: LayerStress, region: Region, step: float
-    ) -> FloatArray:
-        """Longest candidate (n, 2); empty where no candidate lies in the region."""
-        plane = in_plane(stress.nodal, layer.plane.frame)
-        if self.seed is None:
-            value, _, _ = strongest_in_plane(plane[layer.triangles].mean(axis=1))
-            middles = layer.plane.points[layer.triangles].mean(axis=1)
-            order = np.argsort(-np.abs(value), kind="stable")
-            starts = middles[order[shapely.contains_xy(region, middles[order])]][:_CANDIDATES]
-        else:
-            starts = np.array([self.seed])
-        lines = streamlines(layer.plane.points, layer.triangles, plane, starts, step)
-        width = step / _STEP
-        lines = [
-            until_itself(line, start, width) for line, start in zip(lines, starts, strict=True)
-        ]
-        if not lines:
-            return np.zeros((0, 2))
-        return lines[int(np.argmax([len(line) for line in lines]))]
+
+def _stressed_places(layer: Layer, stress: LayerStress, region: Region) -> FloatArray:
+    """Middles (k, 2) of the triangles in a region, the most stressed first, mm."""
+    plane = in_plane(stress.nodal, layer.plane.frame)
+    value, _, _ = strongest_in_plane(plane[layer.triangles].mean(axis=1))
+    middles = layer.plane.points[layer.triangles].mean(axis=1)
+    order = np.argsort(-np.abs(value), kind="stable")
+    return middles[order[shapely.contains_xy(region, middles[order])]]
 
 
-def _iso_lines(seed: FloatArray, region: Region, pitch: float, off: float) -> list[FloatArray]:
-    """Lines (k, 2), mm, at whole multiples of a pitch from a seed line, clipped to a region."""
+def _seed_line(
+    layer: Layer, stress: LayerStress, starts: FloatArray, region: Region, width: float
+) -> FloatArray:
+    """Longest streamline (n, 2) through one of some places, within a region; empty without any."""
+    plane = in_plane(stress.nodal, layer.plane.frame)
+    lines = streamlines(layer.plane.points, layer.triangles, plane, starts, _STEP * width)
+    longest = np.zeros((0, 2))
+    for line, start in zip(lines, starts, strict=True):
+        whole = until_itself(line, start, width)
+        if len(whole) < 2:
+            continue
+        pieces = open_lines(shapely.intersection(shapely.LineString(whole), region))
+        if not pieces:
+            continue
+        own = min(
+            pieces, key=lambda piece: shapely.LineString(piece).distance(shapely.Point(start))
+        )
+        if line_length(own) > (line_length(longest) if len(longest) else 0.0) + _OFF * width:
+            longest = own
+    return longest
+
+
+def _family(
+    seed: FloatArray, region: Region, pitch: float, width: float, stress: LayerStress
+) -> list[FloatArray]:
+    """Lines (k, 2), mm, at whole multiples of a pitch from a seed line, along its member."""
+    off = _OFF * width
     curve = shapely.simplify(shapely.LineString(seed), 0.5 * off)
-    lines = open_lines(shapely.intersection(curve, region))
-    farthest = shapely.hausdorff_distance(region, curve)
-    for level in range(1, int(farthest / pitch) + 1):
+    found, before = [seed], [seed]
+    # Round its ends, too, the distance has iso-lines: they run across the stress and are left out.
+    for level in range(1, int(shapely.hausdorff_distance(region, curve) / pitch) + 1):
         distance = level * pitch
         # Of arcs by chords: as many that these are off by no more than half of what is allowed.
         quarter = int(np.ceil(0.25 * np.pi / np.sqrt(off / distance)))
         around = shapely.boundary(shapely.buffer(curve, distance, quad_segs=max(quarter, 4)))
-        lines += open_lines(shapely.intersection(around, region))
-    return lines
+        curves = [shapely.LineString(line) for line in before]
+        near = shapely.simplify(shapely.multilinestrings(curves), off)
+        near = shapely.buffer(near, _BESIDE * pitch, quad_segs=4)
+        beside = open_lines(shapely.intersection(around, shapely.intersection(region, near)))
+        before = _along_stress(beside, stress, width)
+        if not before:
+            break
+        found += before
+    return found
+
+
+def _along_stress(lines: list[FloatArray], stress: LayerStress, width: float) -> list[FloatArray]:
+    """Parts of lines (n, 2) that run along the stress, or where it has no direction."""
+    if not lines:
+        return []
+    counts = [max(1, round(line_length(line) / (_PIECE * width))) for line in lines]
+    at = [np.linspace(0.0, line_length(line), n + 1) for line, n in zip(lines, counts, strict=True)]
+    points = [points_along(line, along_line(line), a) for line, a in zip(lines, at, strict=True)]
+    middles = np.concatenate([0.5 * (each[1:] + each[:-1]) for each in points])
+    along = stress_lines(plane_stress_at(stress, middles, width))
+    angle = misalignment(np.concatenate([np.diff(each, axis=0) for each in points]), along, 0.0)
+    found = []
+    for line, a, own in zip(lines, at, np.split(angle, np.cumsum(counts)[:-1]), strict=True):
+        kept = np.concatenate([[False], own <= _ALONG, [False]])
+        edges = np.flatnonzero(kept[1:] != kept[:-1]).reshape(-1, 2)
+        found += [between(line, float(a[i]), float(a[j])) for i, j in edges]
+    return found

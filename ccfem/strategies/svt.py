@@ -24,12 +24,15 @@ from ccfem.linking.single_path import link_tracks
 from ccfem.machine.machine import Machine
 from ccfem.planning.infill import SPACING, check_fill, long_enough
 from ccfem.planning.strategy import Amount, LayerPlanner
+from ccfem.stress_tracing.alike import alike
 from ccfem.stress_tracing.band import band
 from ccfem.stress_tracing.blobs import blobs
 from ccfem.stress_tracing.criterion import Criterion
 from ccfem.stress_tracing.frame import frame
 from ccfem.stress_tracing.main_paths import main_paths
+from ccfem.stress_tracing.stems import with_shared_stems
 from ccfem.stress_tracing.symmetric import made_symmetric
+from ccfem.stress_tracing.tails import tail_turns
 from ccfem.stress_tracing.tracks import tracks
 from ccfem.stress_tracing.walk import walk
 from ccfem.toolpaths import Toolpaths
@@ -38,8 +41,6 @@ __all__ = ["Svt"]
 
 _SAMPLING = 0.5
 """Distance of the samples of the border for the medial axis, in fibre widths."""
-_SAME = 1e-6
-"""Share of its area by which a section may differ from that of another layer to be the same."""
 _LEAST = 20.0
 """Length of the shortest spiral in an open place, in fibre widths."""
 
@@ -54,13 +55,15 @@ class Svt:
     Members of the section are those of its medial axis. In every joint two members at a time are
     joined to a main load path, where turn, misalignment with the stress and sense of the stress
     suit best. Strands fill each main path from side to side, as many as its width asks for: where
-    it narrows they leave through its border. They cross those of other main paths in the joints and
-    leave the section there. Links outside the section join them to one path for each piece of the
-    section. A section without members (a disc, a square) is filled by concentric rings.
+    it narrows they leave through its border. They cross those of other main paths in the joints,
+    as steeply as a turn of up to 60 degrees makes it, and leave the section there. Two main paths
+    share a member that leads to a clamp or a load, or that forks into them. Links outside the
+    section join them to one path for each piece of the section. A section without members (a disc,
+    a square) is filled by concentric rings.
 
-    It is meant for frames of slim members. In parts with wide ones, as a plate with a hole, joints
-    take most of the section: strands lie there side by side, or over each other, and where links
-    would lead through the section for long the path is cut.
+    It is meant for frames of slim members. In parts with wide ones joints take most of the section:
+    strands fan out there, or lie over each other, and where links would lead through the section
+    for long the path is cut.
 
     Attributes
     ----------
@@ -129,8 +132,8 @@ class Svt:
     def for_part(
         self, stress: PartStress, layers: Sequence[Layer], machine: Machine
     ) -> LayerPlanner:
-        """Plan layers of the same section once: by the stress on the first of them."""
-        return _Alike(self, stress, _twins(layers))
+        """Plan layers of the same section, under stress of the same directions, once."""
+        return _Alike(self, stress, alike(layers, stress))
 
     def _on(self, layer: Layer, lines: list[_Marked], machine: Machine) -> Toolpaths:
         """Paths on a layer, the short ones dropped."""
@@ -150,9 +153,15 @@ class Svt:
         members = frame(piece, _SAMPLING * machine.fibre_width)
         criterion = Criterion(turn=self.turn)
         found = []
-        for path in main_paths(members, stress, criterion, self.width_ratio):
-            strip = band(path, members, self.crossings)
-            pitch = self.spacing * machine.fibre_width
+        pitch = self.spacing * machine.fibre_width
+        paths = main_paths(members, stress, criterion, self.width_ratio)
+        if self.crossings:
+            paths = with_shared_stems(paths, members)
+        turns = [(0.0, 0.0)] * len(paths)
+        if self.crossings:
+            turns = tail_turns(paths, members, pitch, piece)
+        for path, turn in zip(paths, turns, strict=True):
+            strip = band(path, members, self.crossings, turn)
             follow = stress if self.aligned else None
             found.append(tracks(strip, pitch, piece, machine.minimum_radius, follow))
         found = made_symmetric(found, piece, machine.fibre_width)
@@ -162,7 +171,6 @@ class Svt:
                 machine.fibre_width,
                 max(self._least(machine), _LEAST * machine.fibre_width),
             )
-            pitch = self.spacing * width
             found += blobs(piece, laid, width, pitch, least)
         return found
 
@@ -194,7 +202,7 @@ class Svt:
 
 
 class _Alike:
-    """Planner of a part that plans layers of the same section once."""
+    """Planner of a part that plans layers that are alike once."""
 
     def __init__(self, svt: Svt, stress: PartStress, twins: Mapping[int, Layer]) -> None:
         self._svt, self._stress, self._twins = svt, stress, twins
@@ -210,25 +218,6 @@ class _Alike:
                 own = stress if twin is layer else stress_on(twin, self._stress)
                 self._known[key] = self._svt._lines(twin, own, machine)
         return self._svt._on(layer, self._known[key], machine)
-
-
-def _twins(layers: Sequence[Layer]) -> dict[int, Layer]:
-    """First layer of the same section, of each flat layer by its index."""
-    first: list[Layer] = []
-    found: dict[int, Layer] = {}
-    for layer in layers:
-        if layer.flat is None:
-            continue
-        section = layer.plane.polygon
-        for other in first:
-            apart = shapely.symmetric_difference(section, other.plane.polygon).area
-            if apart <= _SAME * max(section.area, 1e-300):
-                found[layer.index] = other
-                break
-        else:
-            first.append(layer)
-            found[layer.index] = layer
-    return found
 
 
 def _unlinked(lines: list[FloatArray]) -> list[_Marked]:

@@ -17,7 +17,7 @@ from ccfem.geometry.polylines import along_line, points_along
 from ccfem.stress_tracing.frame import FREE, Frame, Member
 from ccfem.stress_tracing.main_paths import MainPath
 
-__all__ = ["STEP", "Band", "band"]
+__all__ = ["STEP", "Band", "band", "extension"]
 
 STEP = 0.5
 """Distance of the points of a band, mm."""
@@ -33,6 +33,8 @@ _TURNED = np.array([1.0, 1.0, -1.0, -1.0, 1.0])
 """Factors on a strip that is walked the other way."""
 _PADDING = 10.0
 """Length, mm, that is cut off at both ends after that."""
+_INNER_RADIUS = 4.0
+"""Radius, mm, of the inner side of a band that turns as it leaves a joint."""
 _EXTENSION = 5.0
 _LEAST_HALF = 5.0
 """A band is extended at both ends by this many times the sum of half its width and this many mm;
@@ -57,6 +59,8 @@ class Band:
         From 0 where rails guide the band to 1 where it is bridged or extended.
     closed : bool
         Whether the last point leads to the first.
+    joined : 2 bools
+        Whether it starts, and whether it ends, in a joint.
     """
 
     middle: FloatArray
@@ -66,12 +70,18 @@ class Band:
     width: FloatArray
     free: FloatArray
     closed: bool = False
+    joined: tuple[bool, bool] = (True, True)
 
     def __post_init__(self) -> None:
         freeze(self, middle=float, half=float, width=float, free=float)
 
 
-def band(path: MainPath, frame: Frame, crossing: bool = True) -> Band:
+def band(
+    path: MainPath,
+    frame: Frame,
+    crossing: bool = True,
+    turns: tuple[float, float] = (0.0, 0.0),
+) -> Band:
     """Band of a main path.
 
     Parameters
@@ -79,7 +89,9 @@ def band(path: MainPath, frame: Frame, crossing: bool = True) -> Band:
     path : MainPath
     frame : Frame
     crossing : bool, default True
-        Whether an end in a joint goes straight on beyond it; otherwise it stops in its middle.
+        Whether an end in a joint goes on beyond it; otherwise it stops in its middle.
+    turns : 2 floats, radians, default 0
+        By which it turns there to the left, at the start and at the end, as it leaves the band.
     """
     own = np.concatenate([_own(member, frame) for member in path.members])
     left = np.concatenate([member.left for member in path.members])[own]
@@ -103,8 +115,8 @@ def band(path: MainPath, frame: Frame, crossing: bool = True) -> Band:
         for end, place, far in zip(ends, strip[[0, -1], :2], farthest, strict=True)
     ]
     reach = farthest if crossing else middle
-    before = _extension(strip[::-1], reach[0] + _PADDING)[::-1]
-    after = _extension(strip, reach[1] + _PADDING)
+    before = extension(strip[::-1] * _TURNED, reach[0] + _PADDING, turns[0])[::-1] * _TURNED
+    after = extension(strip, reach[1] + _PADDING, turns[1])
     padding = round(_PADDING / STEP)
     core = slice(len(before) - padding, len(before) - padding + len(strip))
     strip = _smoothed(np.concatenate([before, strip, after]), "nearest")[padding:-padding]
@@ -112,7 +124,8 @@ def band(path: MainPath, frame: Frame, crossing: bool = True) -> Band:
         max(0, core.start - round(middle[0] / STEP)),
         min(len(strip), core.stop + round(middle[1] / STEP)),
     )
-    return Band(strip[:, :2], strip[:, 2:4], core, within, width, strip[:, 4])
+    joined = (ends[0] != FREE, ends[1] != FREE)
+    return Band(strip[:, :2], strip[:, 2:4], core, within, width, strip[:, 4], joined=joined)
 
 
 def _stub(strip: FloatArray) -> FloatArray:
@@ -229,13 +242,33 @@ def _smoothed(strip: FloatArray, mode: str) -> FloatArray:
     return np.asarray(smooth)
 
 
-def _extension(strip: FloatArray, reach: float) -> FloatArray:
-    """Strip that goes straight on for `reach`, mm, beyond the last point."""
+def extension(strip: FloatArray, reach: float, turn: float = 0.0) -> FloatArray:
+    """Strip (m, 5) that goes on for `reach`, mm, beyond the last point of one.
+
+    Straight, or to the left by a turn, radians, whose inner side has a radius of 4 mm; it is not
+    free there.
+    """
     middle = strip[:, :2]
     tangent = middle[-1] - middle[max(len(middle) - 1 - round(_TANGENT[1] / STEP), 0)]
     tangent = tangent / np.linalg.norm(tangent)
     half = strip[-round(_NORMAL / STEP) :, 2:4].mean(axis=0)
-    half = half - (half @ tangent) * tangent
-    at = STEP * np.arange(1, int(reach / STEP) + 1)[:, None]
-    ones = np.ones_like(at)
-    return np.column_stack([middle[-1] + at * tangent, half * ones, ones])
+    across = np.array([-tangent[1], tangent[0]])
+    size = float(half @ across)
+    radius = _INNER_RADIUS + abs(size)
+    at = STEP * np.arange(1, int(reach / STEP) + 1)
+    turned = np.copysign(np.minimum(at / radius, abs(turn)), turn)
+    arc = np.minimum(at, radius * abs(turn))
+    # The chord of the arc, then straight on.
+    chord = 2.0 * radius * np.sin(0.5 * arc / radius)
+    rest = (at - arc)[:, None]
+    place = middle[-1] + chord[:, None] * _turned_by(tangent, 0.5 * turned)
+    place = place + rest * _turned_by(tangent, turned)
+    free = np.full(len(at), 1.0 if turn == 0.0 else 0.0)
+    return np.column_stack([place, size * _turned_by(across, turned), free])
+
+
+def _turned_by(vector: FloatArray, angle: FloatArray) -> FloatArray:
+    """Vector (2,) turned to the left by angles (n,): (n, 2)."""
+    c, s = np.cos(angle), np.sin(angle)
+    x, y = vector
+    return np.stack([c * x - s * y, s * x + c * y], axis=1)

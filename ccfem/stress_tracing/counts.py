@@ -59,11 +59,24 @@ def places(band: Band, pitch: float, section: Region) -> FloatArray:
     width = np.maximum(2.0 * np.linalg.norm(band.half, axis=1), 1e-9)
     wanted = width / pitch
     if band.closed:
-        number = np.full(len(wanted), max(1, round(float(np.median(wanted)))))
-        return _spread(number.astype(np.float64), 0.0)
-    inner = wanted[band.core]
+        number = _round_ring(wanted, band.free > 0.5)
+        shift = _outer(band, section) if np.ptp(number) else 0.0
+        return _spread(gaussian_filter1d(number, _SPREAD / STEP, mode="wrap"), shift)
+    return _along(band, wanted, pitch, section)
+
+
+def _along(band: Band, wanted: FloatArray, pitch: float, section: Region) -> FloatArray:
+    """Places (k, n) of tracks in a band with two ends, which wants so many (n,) at a pitch, mm."""
+    # A free end goes on to the border: as far again as half its width.
+    first, last = band.core.start, band.core.stop
+    if not band.joined[0]:
+        first = max(0, first - round(0.5 * wanted[first] * pitch / STEP))
+    if not band.joined[1]:
+        last = min(len(wanted), last + round(0.5 * wanted[last - 1] * pitch / STEP))
+    inner = wanted[first:last]
     reach = 2 * round(_CLEAR / STEP) + 1
     joint = maximum_filter1d(band.free, reach, mode="constant", cval=1.0)[band.core] > 0.5
+    joint = np.pad(joint, (band.core.start - first, last - band.core.stop))
     even, even_cost = min(
         (_numbers(inner, joint, first, 2) for first in (1, 2)), key=lambda found: found[1]
     )
@@ -74,9 +87,9 @@ def places(band: Band, pitch: float, section: Region) -> FloatArray:
         number, shift = any_, _outer(band, section)
     whole = np.concatenate(
         [
-            np.full(band.core.start, number[0]),
+            np.full(first, number[0]),
             number,
-            np.full(len(width) - band.core.stop, number[-1]),
+            np.full(len(wanted) - last, number[-1]),
         ]
     )
     return _spread(
@@ -109,6 +122,15 @@ def _spread(number: FloatArray, shift: float) -> FloatArray:
     centred = most - 1.0 - 2.0 * k
     # On one side: the tracks of the other side keep their place at the border.
     return np.asarray((centred + shift * (most - number)) / number)
+
+
+def _round_ring(wanted: FloatArray, joint: BoolArray) -> FloatArray:
+    """Find whole numbers (n,) round a closed band: two rounds, cut in the middle of the first."""
+    count = len(wanted)
+    number, _ = _numbers(np.tile(wanted, 2), np.tile(joint, 2), 1, 1)
+    if number[count // 2] != number[count // 2 + count]:
+        return np.full(count, float(max(1, round(float(np.median(wanted))))))
+    return np.roll(number[count // 2 : count // 2 + count], count // 2).astype(np.float64)
 
 
 def _numbers(wanted: FloatArray, joint: BoolArray, first: int, step: int) -> tuple[IntArray, float]:

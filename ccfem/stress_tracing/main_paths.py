@@ -17,7 +17,7 @@ from ccfem.stress_tracing.criterion import Criterion
 from ccfem.stress_tracing.frame import Frame, Member, ends_at
 from ccfem.stress_tracing.stress_lines import misalignment, plane_stress_at, stress_lines
 
-__all__ = ["MainPath", "main_paths"]
+__all__ = ["MainPath", "main_paths", "outward"]
 
 _REACH = 5.0
 """Length, mm, beyond the disc of a joint over which the direction of a member is taken."""
@@ -111,6 +111,11 @@ def _ends(frame: Frame, stress: LayerStress, limit: float) -> list[_End]:
     beta = np.minimum(misalignment(np.array(outward), lines, 0.5 * limit), limit)
     found = zip(places, outward, lines.value.tolist(), beta.tolist(), strict=True)
     return [_End(*place, *rest) for place, *rest in found]
+
+
+def outward(member: Member, frame: Frame, joint: int) -> FloatArray:
+    """Direction (2,) of a member away from a joint that it starts in: a unit vector."""
+    return _stretch(member.points, frame.joints[joint], frame.radius[joint])[1]
 
 
 def _stretch(

@@ -8,7 +8,7 @@ import shapely
 from ccfem.arrays import FloatArray
 from ccfem.geometry.polylines import along_line, points_along
 from ccfem.geometry.shapes import Region
-from ccfem.geometry.symmetry import mirror_image, mirrors_of
+from ccfem.geometry.symmetry import mirror_lines, reflected
 
 __all__ = ["made_symmetric"]
 
@@ -34,8 +34,8 @@ def made_symmetric(
         Largest distance of a track from the mirror image of its partner.
     """
     found = [list(group) for group in groups]
-    for axis in mirrors_of(section):
-        images = [[mirror_image(line, section, axis) for line in group] for group in found]
+    for mirror in mirror_lines(section):
+        images = [[reflected(line, mirror) for line in group] for group in found]
         done: set[int] = set()
         for k, group in enumerate(images):
             for other in range(k, len(found)):

@@ -67,18 +67,25 @@ def tracks(
     found = []
     for line, place in zip(lines, share, strict=True):
         line = eased(line, radius, band.closed)
-        if band.closed:
+        whole = band.closed and bool((np.abs(place) <= 1.0).all())
+        if whole:
             pieces = [ring_from(np.concatenate([line, line[:1]]), seam)]
+        elif band.closed:
+            # Open where it lies farthest outside.
+            start = -int(np.argmax(np.abs(place)))
+            line, place = np.roll(line, start, axis=0), np.roll(place, start)
+            runs = _stretches(place, slice(0, len(line)))
+            pieces = [clipped(line[r], section, *2 * (slice(0, r.stop - r.start),)) for r in runs]
         else:
             pieces = [
                 clipped(line[run], section, *_parts_of(band, run))
-                for run in _stretches(place, band)
+                for run in _stretches(place, band.core)
             ]
-        found += [_held(each, section, inner, band.closed) for each in pieces if len(each) > 1]
+        found += [_held(each, section, inner, whole) for each in pieces if len(each) > 1]
     return found
 
 
-def _stretches(place: FloatArray, band: Band) -> list[slice]:
+def _stretches(place: FloatArray, core: slice) -> list[slice]:
     """Stretches of a track that lie within its band, or on beyond its ends."""
     within = np.abs(place) <= 1.0
     ends = np.flatnonzero(np.diff(np.concatenate([[False], within, [False]]).astype(np.int8)))
@@ -86,7 +93,7 @@ def _stretches(place: FloatArray, band: Band) -> list[slice]:
     for a, b in ends.reshape(-1, 2):
         # One point beyond the border at either side, so that the track is cut there.
         run = slice(max(int(a) - _BEYOND, 0), min(int(b) + _BEYOND, len(place)))
-        if a < band.core.stop and b > band.core.start:
+        if a < core.stop and b > core.start:
             found.append(run)
     return found
 

@@ -28,7 +28,7 @@ _BENDING = 2.0
 _HELD = 2.0
 _FREE = 12.0
 """Lengths, mm: c, and l in members and in joints."""
-_CLOSEST = 0.8
+_CLOSEST = 0.9
 """Share of their distance from each other that tracks keep."""
 _ROUNDS = 2
 

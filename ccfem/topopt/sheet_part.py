@@ -21,11 +21,14 @@ from ccfem.topopt.flat_part import FlatPart
 from ccfem.topopt.material_axes import sheet
 from ccfem.topopt.outline import outline
 from ccfem.topopt.sheet_mesh import sheet_mesh
+from ccfem.topopt.short_edges import without_short_edges
 
 __all__ = ["plane_stiffness", "sheet_outline", "sheet_part", "sheet_problem"]
 
 _IN_PLANE = np.ix_([0, 1, 5], [0, 1, 5])
 _FACES = ("sheet_bottom", "sheet_top")
+_SHORTEST = 0.05
+"""Shortest edge of the outline, in element sizes."""
 _SYMMETRIC = 0.1
 """Mean difference from its mirror image of a design that is meant to be symmetric."""
 
@@ -157,12 +160,18 @@ def sheet_outline(design: Design, flat: FlatPart, edge_length: float, solid: Any
         keep=plane[keep] - origin,
     )
     found = shapely.transform(found, lambda points: points + origin)
-    if shapely.is_empty(solid):
-        return found
+    if not shapely.is_empty(solid):
+        found = _with_solid(found, shapely.intersection(solid, domain), domain, edge_length)
+    ends = flat.ends()
+    return without_short_edges(found, flat.planform, ends, _SHORTEST * edge_length)
+
+
+def _with_solid(found: Any, solid: Any, domain: Any, edge_length: float) -> Any:
+    """Outline with areas that stay full, joined to it by rounded corners."""
     round_ = 0.5 * edge_length
-    joined = shapely.union(found, shapely.intersection(solid, domain))
+    joined = shapely.union(found, solid)
     joined = shapely.intersection(joined.buffer(round_).buffer(-round_), domain)
-    pieces = shapely.get_parts(shapely.union(joined, shapely.intersection(solid, domain)))
+    pieces = shapely.get_parts(shapely.union(joined, solid))
     return max(pieces, key=lambda piece: piece.area)
 
 

@@ -82,6 +82,18 @@ def test_a_new_part_file_with_mesh_picture_and_history(plate, tmp_path):
     assert history[:, 0].tolist() == list(range(len(history)))
 
 
+def test_files_that_another_run_wrote_meanwhile_stay(plate, tmp_path, monkeypatch):
+    def meanwhile(*arguments, **options):
+        (tmp_path / "plate-optimised.csv").write_text("theirs")
+
+    monkeypatch.setattr("ccfem.cases.optimised.optimise", meanwhile)
+    code, out, err = plate("plate.toml", "--volume-fraction", "0.5")
+    assert (code, out) == (2, "")
+    assert "plate-optimised.csv is there already" in err
+    assert (tmp_path / "plate-optimised.csv").read_text() == "theirs"
+    assert not (tmp_path / "plate-optimised.toml").exists()
+
+
 def test_patches_stay_where_they_are_and_what_is_symmetric_stays_so(plate, tmp_path):
     code, _, err = plate(
         *("plate.toml", "--volume-fraction", "0.6", "--element-size", "2", "--iterations", "12"),

@@ -9,10 +9,12 @@ from ccfem.elasticity import Force, Problem, Support, solve
 from ccfem.errors import InputError
 from ccfem.evaluation import evaluate
 from ccfem.geometry.own_way import until_itself
+from ccfem.layers import LayerStress
 from ccfem.layers.slicing.planar import Planar
 from ccfem.machine import Machine
 from ccfem.materials import isotropic
 from ccfem.mesh.box import box_mesh
+from ccfem.meshing import extrude
 from ccfem.planning import plan
 from ccfem.strategies import create
 from ccfem.strategies.offset import _level_sets
@@ -96,16 +98,39 @@ def test_eqs_lines_of_a_straight_seed_are_straight_and_equally_spaced(bar) -> No
         assert np.ptp(path[:, 0]) == pytest.approx(59.0, abs=0.01)
 
 
-def test_eqs_lines_lie_at_multiples_of_the_spacing_from_the_seed(holed) -> None:
-    stress, layers = holed
-    paths = plan(create("eqs", {"spacing": 2.0}), layers, stress, MACHINE)
-    lines = [shapely.linestrings(path[:, :2]) for path in paths]
-    seed = shapely.union_all(lines[:1])
-    for path in paths:
-        distance = shapely.distance(seed, shapely.points(path[:, :2]))
-        away = distance / 2.0 - np.round(distance / 2.0)
-        assert np.abs(away).max() < 0.02
-    assert max(float(line.distance(seed)) for line in lines) > 15.0
+def test_eqs_lines_lie_at_multiples_of_the_spacing_from_the_seed() -> None:
+    """Round a quarter of a ring under stress along it: arcs about the same centre."""
+    sector = shapely.Point(0, 0).buffer(30.0, quad_segs=64) - shapely.Point(0, 0).buffer(18.0)
+    layer = Planar(count=1).cut(extrude(sector & shapely.box(0, 0, 40, 40), 1.0, 1.5, 1))[0]
+    x, y = layer.plane.points.T
+    around = np.stack([-y, x], axis=1) / np.hypot(x, y)[:, None]
+    nodal = np.zeros((len(x), 3, 3))
+    nodal[:, :2, :2] = around[:, :, None] * around[:, None, :]
+    stress = LayerStress(layer, nodal[layer.triangles].mean(axis=1), nodal)
+    paths = create("eqs", {"spacing": 2.0, "seed": (17.0, 17.0)})(layer, stress, MACHINE)
+    radius = [np.linalg.norm(path[:, :2], axis=1) for path in paths]
+    for each in radius:
+        assert np.ptp(each) < 0.05
+    off = np.sort([each.mean() for each in radius]) - np.hypot(17.0, 17.0)
+    np.testing.assert_allclose(off, [-4.0, -2.0, 0.0, 2.0, 4.0], atol=0.05)
+
+
+def test_eqs_lines_keep_to_their_members() -> None:
+    """Two bars that cross: the lines of one end where they would run across the other."""
+    cross = shapely.box(-30, -5, 30, 5) | shapely.box(-5, -30, 5, 30)
+    layer = Planar(count=1).cut(extrude(cross, 1.0, 2.0, 1))[0]
+    x, y = layer.plane.points.T
+    nodal = np.zeros((len(x), 3, 3))
+    nodal[:, 0, 0] = np.where(np.abs(y) <= 5.0, 2.0, 0.0)
+    nodal[:, 1, 1] = np.where(np.abs(y) > 5.0, 1.0, 0.0)
+    stress = LayerStress(layer, nodal[layer.triangles].mean(axis=1), nodal)
+    paths = create("eqs", {"seed": (0.0, 0.0)})(layer, stress, MACHINE)
+    level = [path for path in paths if np.ptp(path[:, 1]) < 0.1]
+    upright = [path for path in paths if np.ptp(path[:, 0]) < 1.0 and np.ptp(path[:, 1]) > 10.0]
+    assert len(level) in (9, 10, 11)
+    assert len(upright) >= 16
+    assert len(level) + len(upright) >= 0.9 * len(paths)
+    assert all(np.abs(path[:, 1]).min() > 4.0 for path in upright)
 
 
 @pytest.mark.parametrize("name", ["offset", "streamline", "eqs"])

@@ -165,6 +165,20 @@ def plate_with_hole():
     return pulled(shapely.box(-60, -12, 60, 12) - shapely.Point(0, 0).buffer(5.0))
 
 
+def test_strands_flow_round_a_hole(plate_with_hole):
+    """Those of both wide ends share the two members beside it: none crosses another."""
+    layer, stress = plate_with_hole
+    groups = create("svt").groups(layer.plane.polygon, stress, MACHINE)
+    lines = [shapely.LineString(track) for group in groups for track in group]
+    assert not any(a.crosses(b) for k, a in enumerate(lines) for b in lines[:k])
+    through = [line for line in lines if np.ptp(line.xy[0]) > 119.0]
+    assert len(through) >= 12
+    # As many above the hole as below.
+    assert sum(line.interpolate(0.5, normalized=True).y > 0.0 for line in through) * 2 == len(
+        through
+    )
+
+
 def test_wide_members_are_not_laid_over_each_other(plate_with_hole):
     layer, stress = plate_with_hole
     paths = create("svt", {"links": "none"})(layer, stress, MACHINE)
@@ -181,7 +195,9 @@ def test_wide_members_are_not_laid_over_each_other(plate_with_hole):
 def test_no_link_lies_inside_for_longer_than_is_allowed(plate_with_hole, longest):
     layer, stress = plate_with_hole
     machine = replace(MACHINE, fibre_width=1.8, minimum_radius=3.0)
-    paths = create("svt", {"longest_inside": longest})(layer, stress, machine)
+    # Strands that end in the joints are linked there, or not at all.
+    strategy = create("svt", {"longest_inside": longest, "crossings": False})
+    paths = strategy(layer, stress, machine)
     edges = np.flatnonzero(np.diff(np.concatenate([[False], paths.link]).astype(int)))
     plane = paths.points[:, :2]
     links = [plane[a : b + 1] for a, b in zip(edges[::2], edges[1::2], strict=True)]
@@ -198,14 +214,13 @@ def test_no_link_lies_inside_for_longer_than_is_allowed(plate_with_hole, longest
 def test_no_link_lies_over_voids_where_none_may(plate_with_hole):
     layer, stress = plate_with_hole
     hole = shapely.Polygon(layer.plane.polygon.interiors[0]).buffer(-1e-3)
-    machine = replace(MACHINE, fibre_width=1.8, minimum_radius=3.0)
     over = []
     for parameters in ({}, {"longest_over_void": 0.0}):
-        paths = create("svt", parameters)(layer, stress, machine)
+        paths = create("svt", parameters)(layer, stress, MACHINE)
         start = np.flatnonzero(paths.link)
         steps = np.stack([paths.points[start, :2], paths.points[start + 1, :2]], axis=1)
         over.append(shapely.length(shapely.intersection(shapely.linestrings(steps), hole)).sum())
-    assert over[0] > 10.0
+    assert over[0] > 9.0
     assert over[1] == 0.0
 
 

@@ -47,9 +47,9 @@ def write_all(folder: Path) -> None:
         "ends its strands in the middle of a joint. The slicer's patterns and lpp uncrossed are "
         "laid by this project too.\n",
         "The cantilever, the M-shape and the L-shape are optimised here under loads as in the "
-        "paper, which gives no measures: their outlines are ours, and the M-shape, where the "
-        "paper's has members in tension and in compression, is pressed nearly everywhere. `eqs` is "
-        "our reading of a method that the paper shows in pictures alone.\n",
+        "paper, which gives no measures: their outlines are ours. The M-shape hangs its load "
+        "between its feet, so that members are in tension and in compression, as the paper's are. "
+        "`eqs` is our reading of a method that the paper shows in pictures alone.\n",
         f"Study {computed:.1f} s, figures {perf_counter() - begun - computed:.1f} s.\n",
         "## Claims\n",
         claim_table(checks),
