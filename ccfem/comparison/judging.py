@@ -22,8 +22,8 @@ from ccfem.elasticity.part_stress import GivenStress, PartStress
 from ccfem.elasticity.stress_field import StressField
 from ccfem.elasticity.support_kinds import PressingSupport
 from ccfem.elasticity.weighted_cases import WeightedCases
-from ccfem.fibre_aware.cases_bound import CasesBound, cases_bound
 from ccfem.errors import InputError
+from ccfem.fibre_aware.cases_bound import CasesBound, cases_bound
 from ccfem.fibre_aware.upper_bound import UpperBound, upper_bound
 from ccfem.layers import Layer
 from ccfem.layers.slicer import Slicer
