@@ -50,6 +50,20 @@ them with a minus ("-z"), or three numbers.
     method = "planar"                 # and its parameters; default: 12 flat layers
     thickness = 0.4
 
+    [fibre]                           # which layers get fibre, for every strategy; default all
+    layers = "3:20:2"                 # first, end (not included), step, or a list; the lowest is 0
+    from = 0.4                        # mm over the lowest point of the part; or to
+    every = 2                         # every how many of these layers
+    between = 1                       # least number of matrix layers between two of fibre
+    covered = true                    # none where matrix would not hold it (process.cover)
+
+    [[fibre.regions]]                 # where on these layers
+    rule = "patch"                    # or "box", "cylinder" as below, "body" with file = "a.stl"
+    patch = "pin"
+    within = 6.0                      # mm
+    mode = "only"                     # fibre in such regions alone, or "exclude": none in it
+    priority = 1                      # where regions overlap the lowest number counts
+
     # Patches: boundary facets chosen by a rule (ccfem.mesh.patches). Groups of a mesh file
     # are patches already.
     [patches.foot]
@@ -215,6 +229,7 @@ from typing import Any
 from ccfem.arrays import FloatArray
 from ccfem.cases.before_meshing import check_before_meshing
 from ccfem.cases.case import Case, check_name
+from ccfem.cases.part_fibre import fibre_of, patches_of_fibre
 from ccfem.cases.part_keys import Part
 from ccfem.cases.part_loads import (
     alternative_supports_of,
@@ -239,6 +254,7 @@ from ccfem.materials import Material
 from ccfem.mesh.face_rules import without_faces
 from ccfem.mesh.patch_findings import about_patches
 from ccfem.mesh.patches import patches_from_rules, unit_vector
+from ccfem.placement.fibre_places import FibrePlaces
 
 __all__ = ["read_part"]
 
@@ -291,6 +307,9 @@ def _case(content: Mapping[str, Any], path: Path) -> Case:
     if "material" not in unread:
         with found.noted():
             given.material = material_of(part.material)
+    if part.fibre is not None:
+        with found.noted():
+            given.fibre = fibre_of(part.fibre, path.parent)
     check_strategies(part.strategies, found)
     rules = rules_of(part.patches, found)
     supports = supports_of(part.supports, found) if "supports" not in unread else ()
@@ -312,7 +331,10 @@ def _case(content: Mapping[str, Any], path: Path) -> Case:
             mesh = patches_from_rules(mesh, {each: rule})
     found.complain()
     findings = (*findings, *about_patches(mesh, rules))
-    mesh = without_faces(mesh, (*rules, *patches_in_use((*supports, *others), loads)))
+    near = patches_of_fibre(given.fibre)
+    for each in near:
+        mesh.patch(each)
+    mesh = without_faces(mesh, (*rules, *near, *patches_in_use((*supports, *others), loads)))
     build, slicing, machine, material = given.whole()
     return Case(
         name=name,
@@ -333,6 +355,7 @@ def _case(content: Mapping[str, Any], path: Path) -> Case:
         source=part.source,
         findings=findings,
         alternative_supports=others,
+        fibre=given.fibre,
     )
 
 
@@ -344,6 +367,7 @@ class _Values:
     slicing: Slicer | None = None
     machine: Machine | None = None
     material: Material | None = None
+    fibre: FibrePlaces | None = None
 
     def whole(self) -> tuple[FloatArray, Slicer, Machine, Material]:
         """All of them; none is missing where there was no mistake."""

@@ -152,6 +152,8 @@ class Comparison:
     def remarks(self) -> list[str]:
         """What has to stand next to the numbers, a line each."""
         found = remarks(self.runs, self.fibre_per_layer, self.bound)
+        if self.case.fibre is not None:
+            found.insert(0, f"fibre on {len(self.layers)} layers: {self.case.fibre.about()}")
         if self.given is not None:
             found.append("paths are planned and evaluated on the stress of another program")
         return found
