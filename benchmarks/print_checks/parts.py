@@ -1,14 +1,13 @@
 """Parts that are printed on paper: three cases and a plate from a part file."""
 
 import time
-from collections.abc import Callable, Sequence
+from collections.abc import Sequence
 from dataclasses import dataclass
 
 import numpy as np
-import shapely
 
 from benchmarks.print_checks.job import Job
-from benchmarks.print_checks.sections import section_of
+from benchmarks.print_checks.sections import Sections
 from ccfem.cases import Case, create_case
 from ccfem.cases.part_file import read_part
 from ccfem.elasticity import solve
@@ -25,7 +24,7 @@ from ccfem.printing.print_plan import plan_print
 from ccfem.strategies import create
 from ccfem.toolpaths import Toolpaths
 
-__all__ = ["PARTS", "Part", "job_of", "section_on_bed"]
+__all__ = ["PARTS", "Part", "job_of", "on_bed"]
 
 PARTS = {"loop": "isocurve", "bridge": "svt", "bracket": "svt", "plate": "svt"}
 """Strategy for each part."""
@@ -80,30 +79,29 @@ def job_of(part: Part, machine_name: str) -> tuple[Job, dict[str, float]]:
     printed = plan_print(paths, layers, mesh, machine)
     text = gcode(printed, machine)
     written = time.process_time()
-    strands, section = section_on_bed(paths, mesh, case.build, machine.gcode.bed)
+    strands, sections = on_bed(paths, mesh, case.build, machine.gcode.bed)
     job = Job(
-        machine_name, machine, printed, text, strands, section, float(mesh.volumes.sum()), _BENT
+        machine_name,
+        machine,
+        printed,
+        text,
+        strands,
+        sections.region,
+        sections.area,
+        float(mesh.volumes.sum()),
+        _BENT,
     )
     followed = time.process_time()
     spent = {"plan": planned - began, "write": written - planned, "follow": followed - written}
     return job, spent
 
 
-def section_on_bed(
+def on_bed(
     paths: Toolpaths, mesh: TetMesh, build: Sequence[float], bed: Sequence[float]
-) -> tuple[list[np.ndarray], Callable[[float], shapely.Geometry]]:
+) -> tuple[list[np.ndarray], Sections]:
     """Strands on the bed, the part in its middle; and sections of the part there by height."""
     frame = plane_frame(tuple(build))
     corners = mesh.points[np.unique(mesh.corners)] @ frame.T
     low, high = corners.min(axis=0), corners.max(axis=0)
     shift = np.append(0.5 * (low + high)[:2] - 0.5 * np.array(bed[:2]), low[2])
-    known: dict[float, shapely.Geometry] = {}
-
-    def section(height: float) -> shapely.Geometry:
-        at = round(height, 4)
-        if at not in known:
-            found = section_of(mesh, frame, at + low[2])
-            known[at] = shapely.transform(found, lambda points: points - shift[:2])
-        return known[at]
-
-    return [line @ frame.T - shift for line in paths], section
+    return [line @ frame.T - shift for line in paths], Sections(mesh, frame, shift)
