@@ -31,7 +31,7 @@ PARTS = {"loop": "isocurve", "bridge": "svt", "bracket": "svt", "plate": "svt"}
 LAYERS = {("bridge", "aura_like"): 1}
 """Fewer layers than the case has: 1 mm has no room for two of strands .2 mm high that cross."""
 
-_BENT = 1.1
+_BENT = 1.01
 """How much faster a strand may be in a turn than the check's own radius allows (`Job.bent`)."""
 
 
