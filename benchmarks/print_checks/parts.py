@@ -16,7 +16,6 @@ from ccfem.export.gcode import gcode
 from ccfem.inspection.beginning import examples
 from ccfem.layers.layer import Layer
 from ccfem.layers.plane import plane_frame
-from ccfem.layers.slicing.planar import Planar
 from ccfem.machine import machine_table, updated
 from ccfem.mesh.tet_mesh import TetMesh
 from ccfem.planning import plan
@@ -28,8 +27,6 @@ __all__ = ["PARTS", "Part", "job_of", "on_bed"]
 
 PARTS = {"loop": "isocurve", "bridge": "svt", "bracket": "svt", "plate": "svt"}
 """Strategy for each part."""
-LAYERS = {("bridge", "aura_like"): 1}
-"""Fewer layers than the case has: 1 mm has no room for two of strands .2 mm high that cross."""
 
 _BENT = 1.01
 """How much faster a strand may be in a turn than the check's own radius allows (`Job.bent`)."""
@@ -50,11 +47,9 @@ class Part:
         stress = solve(case.problem)
         return cls(case, name, stress[case.problem.cases[0]])
 
-    def layers(self, machine: str) -> Sequence[Layer]:
-        """Layers of the case, or as many as a machine has room for."""
-        count = LAYERS.get((self.name, machine))
-        slicer = self.case.slicing if count is None else Planar(count=count)
-        return slicer(self.stress, self.case.build, self.case.machine)
+    def layers(self) -> Sequence[Layer]:
+        """Layers of the case."""
+        return self.case.fibre_layers(self.stress)
 
 
 def _plate() -> Case:
@@ -71,7 +66,7 @@ def job_of(part: Part, machine_name: str) -> tuple[Job, dict[str, float]]:
     """Plan a part for a machine, write its file and follow it; seconds of each."""
     case = part.case
     machine, mesh = updated(case.machine, machine_table(machine_name)), case.problem.mesh
-    chosen, layers = PARTS[part.name], part.layers(machine_name)
+    chosen, layers = PARTS[part.name], part.layers()
     began = time.process_time()
     strategy = create(chosen, dict(case.parameters.get(chosen, {})))
     paths = plan(strategy, layers, part.stress, machine)
