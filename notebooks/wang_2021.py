@@ -28,8 +28,9 @@ from ccfem.plates import solve_plane
 from ccfem.evaluation import evaluate
 from ccfem.evaluation.matching import THRESHOLDS, matching_rate
 from ccfem.evaluation.plane_paths import plane_paths
+from ccfem.virtual_testing.equilibrium import BONDED
 from ccfem.virtual_testing.strand import RHO, Strand
-from ccfem.virtual_testing.virtual_test import virtual_bracket
+from ccfem.virtual_testing.virtual_test import virtual_test
 from ccfem.layers.slicing.planar import Planar
 from ccfem.planning import plan
 from ccfem.strategies import create
@@ -135,7 +136,7 @@ for name in strategies:
     lines = plane_paths(laid["optimised", name], layer).in_part
     fibre = Toolpaths.from_plane(np.split(lines.points, lines.offsets[1:-1]), layer)
     strand = Strand(RHO / indices["optimised", name]["overfill"])
-    bonded = virtual_bracket(fibre, field, strand, span=()).bonded
+    bonded = virtual_test(fibre, field, strand, BONDED, span=())
     stiffness[name] = bonded.stiffness / bonded.unreinforced_stiffness
 print("stiffness over that without fibre:", {k: round(v, 2) for k, v in stiffness.items()})
 assert stiffness["svt"] > 1.05 * stiffness["concentric"]

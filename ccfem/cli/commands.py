@@ -11,6 +11,7 @@ from typing import Annotated, Any
 import typer
 
 from ccfem.cli.arguments import drawings_of, names_of, parameters_by_strategy, path_of
+from ccfem.cli.fibre_amounts import front
 from ccfem.cli.fibre_choice import SetFibre, fibre_choice
 from ccfem.cli.in_python import say_in_python
 from ccfem.cli.machines import MachineName, SetMachine, machine_choice, machines
@@ -370,6 +371,7 @@ def calibrate(
     fit_material(read, unreinforced, reinforced, strategy, parameters, options, out)
 
 
+app.command()(front)
 app.command()(optimise)
 app.command()(reproduce)
 app.command()(study)

@@ -167,8 +167,15 @@ def direction_at(field, cell, x, y, sharpest, way):  # type: ignore[no-untyped-d
         return 0.0, 0.0, cell, False
     if mean < 0.0:
         half, shear = -half, -shear
-    angle = 0.5 * np.arctan2(shear, half)
-    dx, dy = np.cos(angle), np.sin(angle)
+    # Half the angle of (half, shear), by roots: the larger component first, so none cancels.
+    if half >= 0.0:
+        dx = np.sqrt(0.5 * (1.0 + half / radius))
+        dy = 0.5 * shear / (radius * dx)
+    else:
+        dy = np.sqrt(0.5 * (1.0 - half / radius))
+        dx = 0.5 * shear / (radius * dy)
+        if dx < 0.0:
+            dx, dy = -dx, -dy
     along = dx * way[0] + dy * way[1]
     if along < 0.0:
         dx, dy, along = -dx, -dy, -along

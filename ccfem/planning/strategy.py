@@ -110,7 +110,7 @@ class LengthStrategy(PartStrategy, Protocol):
         machine: Machine,
         lengths: Sequence[float],
     ) -> "Sequence[tuple[Strategy, LayerPlanner]]":
-        """Plan once, for the largest of some lengths, mm per layer, and cut that to each.
+        """Plan to several lengths, mm per layer, by cutting one plan where that is as good.
 
         Returns
         -------

@@ -13,7 +13,7 @@ from ccfem.plot.colours import INK, OUTLINE, palette
 if TYPE_CHECKING:
     from matplotlib.figure import Figure
 
-__all__ = ["axes_below", "curvature_curves", "legend_below", "matching_curves"]
+__all__ = ["axes_below", "curvature_curves", "legend_below", "matching_curves", "style_axes"]
 
 _LEAST, _MOST = 0.01, 10.0
 """Ends, 1/mm, of the scale of curvature; what is straighter counts at its left end."""
@@ -107,15 +107,20 @@ def axes_below(heading: str, across: str, up: str) -> tuple["Figure", Any]:
     FigureCanvasAgg(figure)
     axes = figure.add_axes((0.13, 0.24, 0.82, 0.65))
     figure.text(0.03, 0.94, heading, size=10, weight="bold", color=INK)
+    style_axes(axes, across, up)
+    axes.set_ylim(0.0, 101.0)
+    return figure, axes
+
+
+def style_axes(axes: Any, across: str, up: str) -> None:
+    """Give axes their labels, a faint grid, and lines at the left and below only."""
     axes.set_xlabel(across, size=8, color=INK)
     axes.set_ylabel(up, size=8, color=INK)
-    axes.set_ylim(0.0, 101.0)
     axes.grid(color=OUTLINE, alpha=0.2, lw=0.5)
     axes.set_axisbelow(True)
     axes.tick_params(labelsize=7.5, colors=INK, length=2.5)
     for side, spine in axes.spines.items():
         spine.set(visible=side in ("left", "bottom"), color=OUTLINE, linewidth=0.6)
-    return figure, axes
 
 
 def legend_below(axes: Any, colours: Mapping[str, str], names: Sequence[str]) -> None:

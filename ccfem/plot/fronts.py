@@ -4,6 +4,7 @@ from collections.abc import Mapping, Sequence
 from typing import TYPE_CHECKING, NamedTuple
 
 from ccfem.plot.colours import INK, OUTLINE, palette
+from ccfem.plot.curves import style_axes
 
 if TYPE_CHECKING:
     from matplotlib.figure import Figure
@@ -82,13 +83,7 @@ def front_figure(
                 )
         axes.margins(0.12)
         axes.set_title(heading, size=9, loc="left", color=INK, weight="bold")
-        axes.set_xlabel(across, size=8, color=INK)
-        axes.set_ylabel(up, size=8, color=INK)
-        axes.grid(color=OUTLINE, alpha=0.2, lw=0.5)
-        axes.set_axisbelow(True)
-        axes.tick_params(labelsize=7.5, colors=INK, length=2.5)
-        for side, spine in axes.spines.items():
-            spine.set(visible=side in ("left", "bottom"), color=OUTLINE, linewidth=0.6)
+        style_axes(axes, across, up)
     marks = [Line2D([], [], color=colours[k], marker="o", ls="", label=k) for k in names]
     if marks:
         figure.legend(

@@ -66,6 +66,9 @@ that are best for one layer are then taken for the other."""
 _ENOUGH = 0.99
 """Share of a wanted length below which the design is made once more."""
 
+_NEAR = 0.95
+"""Share of the largest length above which shorter ones are cut from its design."""
+
 _MORE = 1.03
 """By how much more it then asks for than by proportion."""
 
@@ -160,10 +163,12 @@ class StreamFunction:
         machine: Machine,
         lengths: Sequence[float],
     ) -> list[tuple["StreamFunction", LayerPlanner]]:
-        """Design for the largest of some lengths, mm per layer, and cut that to each.
+        """Design for the largest of some lengths, mm per layer, and cut that to those near it.
 
         Lengths above the most of the coverage are taken for that. Where the paths of the design
-        are too short in all it is made once more, with as much more fibre.
+        are too short in all it is made once more, with as much more fibre. Much shorter lengths
+        are designed for anew: a design that is cut to less than it was made for ends strands
+        where they carry.
 
         Raises
         ------
@@ -174,6 +179,13 @@ class StreamFunction:
         most = max(self.amount.most, self.coverage) * full
         lengths = [min(length, most) for length in lengths]
         longest = max(lengths)
+        short = [k for k, length in enumerate(lengths) if length < _NEAR * longest]
+        if short:
+            anew = self.to_lengths(stress, layers, machine, [lengths[k] for k in short])
+            near = [length for length in lengths if length >= _NEAR * longest]
+            cut = iter(self.to_lengths(stress, layers, machine, near))
+            of = dict(zip(short, anew, strict=True))
+            return [of[k] if k in of else next(cut) for k in range(len(lengths))]
         told = replace(self, coverage=longest / full)
         found = told._cut(stress, layers, machine, lengths)
         laid = max(float(paths.lengths.sum()) for paths in found) / len(layers)

@@ -1,8 +1,10 @@
-"""``ccfem calibrate`` and ``--calibration``, run as a user runs them."""
+"""``ccfem calibrate`` and ``--calibration``, called with the words of a user."""
 
-import subprocess
+import io
 import sys
+from contextlib import redirect_stderr, redirect_stdout
 from pathlib import Path
+from typing import NamedTuple
 
 import numpy as np
 import pytest
@@ -13,9 +15,25 @@ from ccfem.virtual_testing.calibration import read_calibration
 QUICK = ["--set-case", "element_size=4.0", "--layers", "2"]
 
 
-def ccfem(*arguments: str, folder: Path) -> subprocess.CompletedProcess[str]:
-    command = [sys.executable, "-m", "ccfem", *arguments]
-    return subprocess.run(command, capture_output=True, text=True, cwd=folder, check=False)
+class Ended(NamedTuple):
+    """What a command left."""
+
+    returncode: int
+    stdout: str
+    stderr: str
+
+
+def ccfem(*arguments: str, folder: Path) -> Ended:
+    """Call the command line in a folder."""
+    out, err = io.StringIO(), io.StringIO()
+    with pytest.MonkeyPatch.context() as patch, redirect_stdout(out), redirect_stderr(err):
+        patch.chdir(folder)
+        patch.setattr(sys, "argv", ["ccfem", *arguments])
+        with pytest.raises(SystemExit) as ended:
+            main()
+    code = ended.value.code or 0
+    assert isinstance(code, int)
+    return Ended(code, out.getvalue(), err.getvalue())
 
 
 def curve(path: Path, slope: float, peak: float) -> None:

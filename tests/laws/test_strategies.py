@@ -27,7 +27,7 @@ VARIANTS = [
     f"{name}-{variant}" for name in NAMES for variant in getattr(named()[name], "variants", {})
 ]
 ALL = NAMES + VARIANTS
-QUICK = {"stream_function": {"evaluations": 5}}
+QUICK = {"stream_function": {"evaluations": 5, "phases": 2}}
 """Parameters that none of the laws depends on, of strategies that are slow with their defaults."""
 
 
@@ -160,23 +160,16 @@ def test_lays_fibre_on_every_layer(label):
     np.testing.assert_array_equal(np.unique(paths.normals, axis=0), [[0.0, 0.0, 1.0]])
 
 
-@pytest.mark.parametrize("label", ALL)
-def test_same_input_gives_the_same_paths(label):
-    stress, layers = planned_on()
-    again = plan(strategy_of(label), layers, stress, MACHINE)
-    np.testing.assert_array_equal(again.points, paths_of(label).points)
-    np.testing.assert_array_equal(again.offsets, paths_of(label).offsets)
-
-
 @pytest.mark.parametrize("name", NAMES)
-def test_size_of_the_load_does_not_matter(name):
-    stress, layers = planned_on(load=1e3)
-    scaled = plan(made(name), layers, stress, MACHINE)
-    np.testing.assert_array_equal(scaled.offsets, paths_of(name).offsets)
-    np.testing.assert_allclose(scaled.points, paths_of(name).points, atol=1e-3)
+def test_same_input_gives_the_same_paths(name):
+    """Variants are planned twice too, the second time turned, by a law of their own."""
+    stress, layers = planned_on()
+    again = plan(made(name), layers, stress, MACHINE)
+    np.testing.assert_array_equal(again.points, paths_of(name).points)
+    np.testing.assert_array_equal(again.offsets, paths_of(name).offsets)
 
 
-@pytest.mark.parametrize(("turn", "load"), [(33.0, 1e-3), (90.0, 1.0)])
+@pytest.mark.parametrize(("turn", "load"), [(33.0, 1e-3), (90.0, 1e3)])
 @pytest.mark.parametrize("name", NAMES)
 def test_paths_turn_with_the_part_whatever_the_load(name, turn, load):
     """A strategy with a direction of its own names its parameter, in degrees, in `direction`."""

@@ -66,6 +66,20 @@ def test_uniform_tension_gets_straight_fibre_and_the_stiffness_of_parallel_bars(
     assert 1.0 + 0.97 * (exact - 1.0) < reached <= exact
 
 
+def test_little_fibre_beside_much_joins_the_ends_of_a_pulled_bar_too(pulled_bar):
+    """Cut from a plan of three times as much, its strands would end where they carry."""
+    stress, layers = pulled_bar
+    strategy = StreamFunction(evaluations=5, overfill=1.0, inset=0.0)
+    full = 20.0 * 60.0 / MACHINE.fibre_width
+    planned = strategy.to_lengths(stress, layers, MACHINE, (0.2 * full, 0.6 * full))
+    for (_, planner), share in zip(planned, (0.2, 0.6), strict=True):
+        paths = planner.toolpaths
+        laid = paths.lengths.sum()
+        assert 0.8 * share < coverage_of(paths, layers) <= share
+        exact = 1.0 + 4.0 * laid / (60.0 * 20.0 * 4.0)  # bars in parallel
+        assert virtual_test(paths, stress, span=()).ratio > 1.0 + 0.9 * (exact - 1.0)
+
+
 def test_stiffer_than_isocurves_of_the_same_length(bent_beam):
     stress, layers = bent_beam
     paths = plan(StreamFunction(coverage=0.3), layers, stress, MACHINE)

@@ -1,0 +1,105 @@
+"""What ``ccfem front`` does: stiffness and strength over the length of fibre, in a folder."""
+
+import shlex
+import sys
+from pathlib import Path
+from typing import TYPE_CHECKING, Annotated
+
+import typer
+
+from ccfem.cli.arguments import numbers_of, parameters_by_strategy
+from ccfem.cli.machines import MachineName, SetMachine, machine_choice
+from ccfem.cli.options import Backend, CasePath, Force, LoadCase, Out, SetCase
+
+if TYPE_CHECKING:
+    from ccfem.comparison.fibre_front import FibreFront
+
+__all__ = ["front"]
+
+
+def front(
+    case: CasePath,
+    strategy: Annotated[
+        str, typer.Option(metavar="S", help="See ccfem strategies.")
+    ] = "stream_function",
+    set_: Annotated[
+        list[str] | None,
+        typer.Option("--set", metavar="NAME=VALUE", help="Set a parameter; repeatable."),
+    ] = None,
+    set_case: SetCase = None,
+    layers: Annotated[
+        str | None,
+        typer.Option(
+            metavar="N,N,..",
+            help="Numbers of fibre layers; default the part's own, and twice as many where a "
+            "strand has room in layers half as high.",
+        ),
+    ] = None,
+    points: Annotated[
+        int, typer.Option(metavar="N", help="Lengths of fibre, up to what fills most layers.")
+    ] = 5,
+    load_case: LoadCase = None,
+    machine: MachineName = None,
+    set_machine: SetMachine = None,
+    backend: Backend = "auto",
+    out: Out = None,
+    force: Force = False,
+) -> None:
+    """Show how stiff and strong a part gets with how much fibre, beside what no paths exceed."""
+    from ccfem.checks import check_known
+    from ccfem.cli.run import load
+    from ccfem.comparison.compare import create_all
+    from ccfem.comparison.fibre_front import fibre_front, layer_counts
+    from ccfem.elasticity.solve import solve
+    from ccfem.errors import InputError
+    from ccfem.io.result_folder import whole_folder
+    from ccfem.progress import progress_bar
+
+    parameters = parameters_by_strategy(set_ or (), strategy)
+    counts = None if layers is None else numbers_of(layers)
+    if counts is not None and any(count != int(count) for count in counts):
+        raise InputError(f"--layers expects whole numbers as 6,12; got '{layers}'")
+    part = load(case, set_case, machine=machine_choice(machine, set_machine))
+    chosen = create_all(part, (strategy,), parameters)[strategy]
+    names = part.problem.cases
+    if load_case is not None:
+        check_known("load case", load_case, names)
+    where = out if out is not None else Path("results") / f"{part.name}-front"
+    with whole_folder(where, force) as folder, progress_bar(lines=True) as progress:
+        progress(f"solving {part.name}", 0.0)
+        stress = solve(part.problem, backend=backend)[load_case or names[0]]
+        several = layer_counts(part, stress) if counts is None else [int(each) for each in counts]
+        found = fibre_front(
+            part, stress, strategy, chosen, several, points, backend=backend, progress=progress
+        )
+        found.to_frame().to_csv(folder / "front.csv", index=False)
+        found.plot().savefig(folder / "front.png")
+        command = shlex.join(["ccfem", *sys.argv[1:]])
+        (folder / "command.txt").write_text(command + "\n", encoding="utf-8")
+    _say(found)
+    print(f"\n{where}: front.png, front.csv")
+
+
+def _say(found: "FibreFront") -> None:
+    """Print the plans as a table; marked are those that none with as little fibre exceeds."""
+    print(f"{'layers':>6}{'fibre, m':>10}{'stiffness':>11}{'bound':>8}{'first failure':>17}")
+    rows = zip(found.points, found.stiffest.tolist(), found.strongest.tolist(), strict=True)
+    for each, stiffest, strongest in rows:
+        failure = f"{each.failure:.0f} N" if each.failure == each.failure else "not known"
+        print(
+            f"{each.layers:>6}{1e-3 * each.length:>10.2f}{each.ratio:>10.3f}{'*' * stiffest:<1}"
+            f"{each.bound:>8.3f}{failure:>15}{'*' * strongest:<2}"
+            + (f" not printable: {each.why_not}" if each.why_not else "")
+        )
+    for count, reason in found.refused.items():
+        print(f"{count:>6} no plan: {reason}")
+    print("* none with as little fibre is better. One of them again:")
+    best = max(
+        (each for each, kept in zip(found.points, found.stiffest.tolist(), strict=True) if kept),
+        key=lambda each: each.ratio,
+        default=found.points[-1],
+    )
+    print(
+        f"ccfem plan ... --strategy {found.strategy} --layers {best.layers} "
+        f"--fibre-per-layer {best.asked:.0f}"
+    )

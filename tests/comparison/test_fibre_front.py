@@ -1,0 +1,118 @@
+"""Stiffness and first failure over the length of fibre."""
+
+import csv
+from dataclasses import replace
+
+import numpy as np
+import pytest
+
+from ccfem.cases.case import Case
+from ccfem.comparison.fibre_front import FibreFront, FrontPoint, fibre_front, layer_counts
+from ccfem.elasticity import Force, Problem, Support, solve
+from ccfem.errors import InputError
+from ccfem.layers.slicing.planar import Planar
+from ccfem.machine import Machine
+from ccfem.materials import isotropic
+from ccfem.mesh.box import box_mesh
+from ccfem.strategies import create
+from ccfem.toolpaths import Toolpaths
+from ccfem.virtual_testing.strand import RHO
+
+ALONG = {"angle": 0.0, "turn": 0.0}
+
+
+@pytest.fixture(scope="module")
+def bar():
+    """Bar of 60 x 8 x 4 mm under a pull along x, with two layers."""
+    mesh = box_mesh((60.0, 8.0, 4.0), (12, 4, 4))
+    material = replace(isotropic(3500.0, 0.0), tensile_strength=50.0)
+    pull = {"pull": (Force("x_max", (1000.0, 0.0, 0.0)),)}
+    problem = Problem(mesh, material, (Support("x_min"),), pull, order=1)
+    case = Case("bar", "", problem, slicing=Planar(count=2), machine=Machine())
+    return case, solve(problem)["pull"]
+
+
+@pytest.fixture(scope="module")
+def front(bar):
+    return fibre_front(*bar, "zigzag", create("zigzag", ALONG), (2, 1), points=2)
+
+
+def test_straight_strands_add_their_section(bar, front):
+    """Bar in parallel: EA of the strands that cross every section adds to that of the matrix."""
+    best = max(front.points, key=lambda each: each.ratio)
+    assert best.layers == 2
+    # Strands of length l along x spread over 60 mm: rho E A_strands / (E A) of a mixture, at most.
+    mixture = 1.0 + RHO * (best.length / 60.0) / (8.0 * 4.0)
+    assert 0.8 * mixture < best.ratio <= mixture * (1.0 + 1e-6)
+
+
+def test_no_plan_exceeds_the_bound(front):
+    assert len(front.points) >= 3
+    for each in front.points:
+        assert 1.0 < each.ratio <= each.bound
+        assert each.toolpaths.lengths.sum() == pytest.approx(each.length, rel=1e-9)
+
+
+def test_fewer_layers_reach_less(front):
+    most = {n: max(p.length for p in front.points if p.layers == n) for n in (1, 2)}
+    assert most[2] == pytest.approx(2.0 * most[1], rel=0.02)
+
+
+def point(layers, asked, length, ratio, failure, why_not=""):
+    return FrontPoint(
+        layers, asked, length, ratio, failure, "fibre", 9.0, why_not, Toolpaths.empty()
+    )
+
+
+def test_marked_are_those_that_none_with_as_little_fibre_exceeds():
+    points = (
+        point(1, 500.0, 499.0, 2.0, 90.0),  # as much was asked for as of the next: exceeded
+        point(2, 250.0, 500.0, 2.5, 80.0),
+        point(2, 400.0, 700.0, 2.4, 95.0),  # lays less than asked; weaker than the one before
+        point(2, 450.0, 900.0, 3.5, 99.0, "turns tighter than it may"),
+        point(2, 475.0, 950.0, 3.0, np.nan),
+    )
+    front = FibreFront("bar", "zigzag", points, {})
+    assert front.stiffest.tolist() == [False, True, False, False, True]
+    assert front.strongest.tolist() == [True, False, True, False, False]
+
+
+def test_table_and_picture_show_every_plan(front, tmp_path):
+    front.to_frame().to_csv(tmp_path / "front.csv", index=False)
+    with (tmp_path / "front.csv").open() as file:
+        rows = list(csv.DictReader(file))
+    assert [float(row["stiffness_ratio_tension"]) for row in rows] == pytest.approx(
+        [each.ratio for each in front.points]
+    )
+    share = [float(row["share_of_gain"]) for row in rows]
+    assert all(0.0 < each <= 1.0 for each in share)
+    axes = front.plot().axes
+    drawn = [line for line in axes[0].lines if line.get_marker() == "o"]
+    assert sorted(float(line.get_ydata()[0]) for line in drawn) == pytest.approx(
+        sorted(each.ratio for each in front.points)
+    )
+
+
+def test_twice_as_many_layers_where_strands_have_room(bar):
+    case, stress = bar
+    assert layer_counts(case, stress) == (2, 4)
+    thick = Machine(filament_area=1.2)  # 1.2 mm high: no room in layers of 1 mm
+    assert layer_counts(
+        Case("bar", "", case.problem, slicing=Planar(count=2), machine=thick), stress
+    ) == (2,)
+
+
+def test_refused(bar):
+    with pytest.raises(InputError, match="points must be at least 2; got 1"):
+        fibre_front(*bar, "zigzag", create("zigzag", ALONG), (2,), points=1)
+    with pytest.raises(InputError, match="at least one number of layers"):
+        fibre_front(*bar, "zigzag", create("zigzag", ALONG), ())
+    with pytest.raises(InputError, match="number of layers must be at least 1"):
+        fibre_front(*bar, "zigzag", create("zigzag", ALONG), (0,))
+
+
+def test_no_plan_says_why(bar):
+    case, stress = bar
+    cutter = Case("bar", "", case.problem, machine=Machine(minimum_length=500.0))
+    with pytest.raises(InputError, match="zigzag finds no plan of 'bar': 2 layers: laid no fibre"):
+        fibre_front(cutter, stress, "zigzag", create("zigzag", ALONG), (2,), points=2)
