@@ -69,7 +69,10 @@ def fibre_of(
         names = {name: getattr(read, name) for name in given}
         places = replace(base or FibrePlaces(), **names)
     for key, name in _KEYS.items():
-        found.lines = [line.replace(name, key) for line in found.lines]
+        found.lines = [
+            line.replace("fibre: fibre_places.", "fibre.").replace(name, key)
+            for line in found.lines
+        ]
     found.complain()
     assert places is not None
     return replace(places, regions=tuple(regions))

@@ -211,7 +211,8 @@ def _about_fibre(case: Case, layers: Sequence[Layer]) -> tuple[str, ...]:
     shortened = numbers if len(numbers) <= 60 else f"{numbers[:40].rpartition(',')[0]}, ..."
     area = np.mean([layer.areas.sum() for layer in layers])
     return (
-        f"fibre on {len(layers)} layers ({shortened}), {area:.4g} mm^2 each in the mean: "
+        f"fibre on {len(layers)} layer{'s' * (len(layers) > 1)} ({shortened}), {area:.4g} mm^2 "
+        "each in the mean: "
         f"{case.fibre.about()}",
     )
 
