@@ -6,6 +6,7 @@ from dataclasses import dataclass, field
 from typing import Any
 
 from ccfem.arrays import freeze
+from ccfem.checks import check_known, check_number
 from ccfem.display import Shown
 from ccfem.elasticity.part_stress import PartStress
 from ccfem.elasticity.problem import Force, Order, Problem, Support
@@ -55,6 +56,9 @@ class Case(Shown):
         the two do not agree on.
     fibre : FibrePlaces, optional
         Which of the layers, and which regions of them, get fibre; by default all.
+    weights : mapping of load case to float
+        Of the load cases, combinations among them, that are planned for when all are asked for;
+        those that are not named do not count. Default: all but combinations, alike.
     findings : tuple of str
         What was found and repaired in a mesh from a file, one line each.
     """
@@ -70,12 +74,16 @@ class Case(Shown):
     findings: tuple[str, ...] = ()
     alternative_supports: tuple[AnySupport, ...] = ()
     fibre: FibrePlaces | None = None
+    weights: Mapping[str, float] = field(default_factory=dict)
 
     def __repr__(self) -> str:
         return f"Case {self.name}: {self.title}"
 
     def __post_init__(self) -> None:
-        freeze(self, parameters=dict, alternative_supports=tuple)
+        freeze(self, parameters=dict, alternative_supports=tuple, weights=dict)
+        for name, weight in self.weights.items():
+            check_known("load case", name, self.problem.cases)
+            check_number(f"weight of load case '{name}'", weight, above=0.0)
         check_name(self.name, self.title)
 
     def fibre_layers(self, stress: PartStress, slicer: Slicer | None = None) -> tuple[Layer, ...]:

@@ -197,6 +197,10 @@ them with a minus ("-z"), or three numbers.
     pull = 1.5
     heat = 1.0
 
+    [weights]                         # what each case counts where all are planned for at once
+    pull = 1.0                        # (--load-case all); cases that are left out do not count,
+    weight = 0.5                      # without this table all but combinations count alike
+
     [machine]                         # what differs from ccfem.machine.machine.Machine, or from a
     profile = "klipper"               # machine of ccfem machines
     minimum_length = 45.0
@@ -236,18 +240,18 @@ from ccfem.cases.part_loads import (
     combinations_of,
     loads_of,
     supports_of,
+    weights_of,
 )
 from ccfem.cases.part_regions import region_rules_of, regions_of
-from ccfem.cases.part_tables import check_strategies, material_of, named_table, rules_of
+from ccfem.cases.part_slicing import slicing_of
+from ccfem.cases.part_tables import check_strategies, material_of, rules_of
 from ccfem.elasticity.load_kinds import patches_in_use
 from ccfem.elasticity.problem import Problem
 from ccfem.errors import InputError, Mistakes
 from ccfem.io.surface import Surface
 from ccfem.io.toml import from_table
 from ccfem.io.whole import existing_file
-from ccfem.layers import slicing as slicers
 from ccfem.layers.slicer import Slicer
-from ccfem.layers.slicing.planar import Planar
 from ccfem.machine.machine import Machine
 from ccfem.machine.named_machines import machine_from
 from ccfem.materials import Material
@@ -301,7 +305,7 @@ def _case(content: Mapping[str, Any], path: Path) -> Case:
     with found.noted():
         given.build = unit_vector(part.build, "build")
     with found.noted():
-        given.slicing = _slicing(part)
+        given.slicing = slicing_of(part)
     with found.noted():
         given.machine = machine_from(part.machine)
     if "material" not in unread:
@@ -316,6 +320,7 @@ def _case(content: Mapping[str, Any], path: Path) -> Case:
     others = alternative_supports_of(part.alternative_supports, found)
     loads = loads_of(part.loads, found) if "loads" not in unread else {}
     combinations = combinations_of(part.combinations, part.loads, found)
+    weights = weights_of(part.weights, {**part.loads, **part.combinations}, found)
     regions = region_rules_of(part.regions, found)
     with found.noted():
         part.check(path.parent)
@@ -356,6 +361,7 @@ def _case(content: Mapping[str, Any], path: Path) -> Case:
         findings=findings,
         alternative_supports=others,
         fibre=given.fibre,
+        weights=weights,
     )
 
 
@@ -384,16 +390,3 @@ def _readable(content: Mapping[str, Any], found: Mistakes) -> tuple[Part, set[st
             from_table(Part, {key: value}, "the part file")
             good[key] = value
     return from_table(Part, good, "the part file"), set(content) - set(good)
-
-
-def _slicing(part: Part) -> Slicer:
-    """Slicer of a part file: of its number of layers, their heights, or the table slicing."""
-    given = [key for key in ("layers", "heights", "slicing") if getattr(part, key) is not None]
-    if len(given) > 1:
-        raise InputError(
-            f"a part needs one of layers, heights and slicing; got {' and '.join(given)}: choose "
-            "one"
-        )
-    if part.slicing is not None:
-        return slicers.create(*named_table(part.slicing, "method", slicers.named(), "slicing"))
-    return Planar(count=part.layers, heights=part.heights)

@@ -26,6 +26,9 @@ class Part(Body):
         told that the two do not agree on.
     combinations : dict
         Load cases that are sums of others times factors.
+    weights : dict
+        What each load case counts when all are planned for at once (``--load-case all``); those
+        that are not named do not count. Without any all but combinations count alike.
     regions : dict
         Cells of another material.
     name : str
@@ -58,6 +61,7 @@ class Part(Body):
     loads: dict[str, Any] = field(default_factory=dict)
     alternative_supports: tuple[dict[str, Any], ...] = ()
     combinations: dict[str, Any] = field(default_factory=dict)
+    weights: dict[str, Any] = field(default_factory=dict)
     regions: dict[str, Any] = field(default_factory=dict)
     name: str = ""
     title: str = ""

@@ -4,6 +4,7 @@ from collections.abc import Callable, Mapping
 from typing import Any
 
 from ccfem.cases.part_tables import named_table
+from ccfem.checks import check_number
 from ccfem.elasticity.load_kinds import (
     Bearing,
     BodyForce,
@@ -39,6 +40,7 @@ __all__ = [
     "combinations_of",
     "loads_of",
     "supports_of",
+    "weights_of",
 ]
 
 LOADS: dict[str, Callable[..., Load]] = {
@@ -151,3 +153,19 @@ def _factors(name: str, table: object, cases: Mapping[str, Any]) -> dict[str, fl
     if name in cases:
         raise InputError(f"{where} has the name of a load case: rename one of them")
     return {case: float(factor) for case, factor in table.items()}
+
+
+def weights_of(
+    table: Mapping[str, Any], cases: Mapping[str, Any], found: Mistakes
+) -> dict[str, float]:
+    """Weights of load cases and combinations, of the table [weights]; what is wrong is noted."""
+    weights = {}
+    for name, weight in table.items():
+        with found.noted():
+            if name not in cases:
+                raise InputError(
+                    f"weights names no load case '{name}'; there are: {known_names(name, cases)}"
+                )
+            check_number(f"weights.{name}", weight, above=0.0)
+            weights[name] = float(weight)
+    return weights

@@ -57,6 +57,7 @@ def part_text(case: Case, mesh: str, comment: str = "") -> str:
             name: [_kind(each, LOADS) for each in loads] for name, loads in problem.loads.items()
         },
         "combinations": {name: dict(each) for name, each in problem.combinations.items()},
+        "weights": dict(case.weights),
         "machine": _changed(case.machine, Machine()),
         "strategies": {name: dict(each) for name, each in case.parameters.items()},
     }

@@ -123,7 +123,11 @@ Refine = Annotated[
 ]
 LoadCase = Annotated[
     str | None,
-    typer.Option("--load-case", metavar="NAME", help="Load case to plan for; default the first."),
+    typer.Option(
+        "--load-case",
+        metavar="NAME",
+        help='Load case to plan for; default the first. "all" plans for all at once, by [weights].',
+    ),
 ]
 Calibration = Annotated[
     Path | None,

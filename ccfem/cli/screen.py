@@ -26,6 +26,7 @@ from ccfem.comparison.headline import (
 from ccfem.comparison.ranking import best_values
 from ccfem.comparison.result import Comparison
 from ccfem.comparison.runs import Run
+from ccfem.comparison.said_of_cases import cases_rows
 from ccfem.comparison.slicings import SlicingComparison
 from ccfem.elasticity.stress_field import StressField, about_cells
 from ccfem.tensor import von_mises
@@ -161,6 +162,7 @@ def print_comparison(comparison: Comparison, where: Path, seconds: float) -> Non
         console.width = max(console.width, _TITLES + _NUMBERS * len(runs))
     console.print(comparison.case.title, style="bold", markup=False)
     console.print(_headline_table(runs, best_values(comparison.runs, comparison.fibre_per_layer)))
+    _print_load_cases(console, runs)
     for line in (*comparison.case.findings, *comparison.stress.findings):
         console.print(f"mesh: {line}", style="dim", markup=False)
     console.print(about_cells(comparison.stress), style="dim", markup=False)
@@ -171,6 +173,20 @@ def print_comparison(comparison: Comparison, where: Path, seconds: float) -> Non
     if any(run.tested is not None for run in runs):
         console.print(HONEST_PROMISE, style="dim", markup=False)
     console.print(f"{where / 'report.html'}  ({seconds:.1f} s)", markup=False, soft_wrap=True)
+
+
+def _print_load_cases(console: Console, runs: Sequence[Run]) -> None:
+    """Print what every run does under every load case, where there are several."""
+    heads, rows = cases_rows(runs)
+    if not rows:
+        return
+    table = Table(header_style="bold", box=box.SIMPLE_HEAD)
+    table.add_column("load cases")
+    for name, _ in rows:
+        table.add_column(escape(name), justify="right", overflow="fold")
+    for k, head in enumerate(heads):
+        table.add_row(escape(head), *(cells[k] for _, cells in rows))
+    console.print(table)
 
 
 def print_slicings(comparison: SlicingComparison, where: Path, seconds: float) -> None:

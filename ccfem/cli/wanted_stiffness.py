@@ -27,6 +27,7 @@ def least_fibre_options(
         From `ccfem.cli.run.options_of`, and ``stiffness``: a text, the ratio to the part without
         fibre or a number with ``N/mm`` behind it.
     """
+    from ccfem.cases.load_cases import asks_for_all
     from ccfem.comparison.compare import solve_and_slice
     from ccfem.fibre_aware.least_fibre import least_fibre
     from ccfem.virtual_testing.specimen import Specimen
@@ -39,6 +40,8 @@ def least_fibre_options(
         raise InputError("--stiffness is that of the virtual test: drop --no-virtual-test")
     if rest.get("stress") is not None:
         raise InputError("--stiffness solves the part itself: drop --stress")
+    if asks_for_all(case, rest["load_case"]):
+        raise InputError("--stiffness is that of one load case: name it in place of all")
     names = (rest[name] for name in ("layers", "load_case", "backend"))
     stress, _, layers, _ = solve_and_slice(case, *names)
     ratio = number

@@ -10,9 +10,13 @@ from dataclasses import dataclass, replace
 from itertools import count
 from typing import Any, overload
 
+import numpy as np
+
 from ccfem.cases.case import Case
+from ccfem.cases.load_cases import asks_for_all, weighted_cases
 from ccfem.cases.reading import read
-from ccfem.checks import check_known, check_number, member_name
+from ccfem.checks import check_known, member_name
+from ccfem.comparison.asked import check_all, check_amount
 from ccfem.comparison.judging import Solved, judged
 from ccfem.comparison.over_slicings import named_slicers, over_slicings
 from ccfem.comparison.result import Comparison
@@ -28,13 +32,13 @@ from ccfem.layers import Layer
 from ccfem.layers.plane import plane_frame
 from ccfem.layers.slicer import Slicer
 from ccfem.layers.slicing import as_slicer
-from ccfem.planning.equal_fibre import check_wanted
 from ccfem.planning.given_paths import GivenPaths
 from ccfem.planning.strategy import Strategy
 from ccfem.printing.print_plan import check_machine
 from ccfem.progress import Progress, silent
 from ccfem.strategies import create
 from ccfem.toolpaths import Toolpaths
+from ccfem.virtual_testing.several_cases import specimens
 from ccfem.virtual_testing.strand import Strand
 
 __all__ = [
@@ -251,7 +255,8 @@ def compare(
     strand : Strand or None
         What a strand is worth in the virtual test; None leaves the test out.
     load_case : str, optional
-        Load case to plan, evaluate and test for; by default the first one.
+        Load case to plan, evaluate and test for; by default the first one. "all" plans for all of
+        them at once, by `Case.weights`, tests under all and ranks by the worst.
     backend : str, default "auto"
         As in `solve`.
     print_plans : bool, default False
@@ -283,7 +288,9 @@ def compare(
         When the solve misses its tolerance.
     """
     case = read(case)
-    _check_amount(fibre_per_layer, fibre, natural)
+    if asks_for_all(case, load_case):
+        check_all(strand, stress, curve, slicings)
+    check_amount(fibre_per_layer, fibre, natural)
     if curve and strand is None:
         raise InputError("the curve is one of stiffness: leave the virtual test in, or it out")
     if print_plans:
@@ -326,20 +333,6 @@ def compare(
     )
 
 
-def _check_amount(fibre_per_layer: float | None, fibre: float | None, natural: bool) -> None:
-    """Refuse two amounts at once, and one that is none."""
-    if fibre is not None and fibre_per_layer is not None:
-        raise InputError("give the fibre per layer or the fibre in all, not both: drop one")
-    if fibre is None and fibre_per_layer is None:
-        return
-    if natural:
-        raise InputError("give either a fibre length or the natural amount, not both: drop one")
-    if fibre_per_layer is not None:
-        check_wanted(fibre_per_layer)
-    else:
-        check_number("fibre in all", fibre, above=0.0, unit="mm")
-
-
 def _solved(
     case: Case,
     strand: Strand | None,
@@ -350,6 +343,15 @@ def _solved(
 ) -> tuple[Solved, dict[str, float]]:
     """Solve a case, and make what virtual tests stand on; the seconds of each."""
     progress(f"solving {case.name}", 0.0)
+    if asks_for_all(case, load_case) and strand is not None:
+        seconds: dict[str, float] = {}
+        with timed(seconds, "solve"):
+            cases = weighted_cases(case, solve(case.problem, backend=backend))
+        first = cases.fields[int(np.argmax(cases.weights))]
+        with timed(seconds, "specimens"):
+            specimens(cases, backend)
+            tests = Tests.of(first, None, strand, backend)
+        return Solved(case, first, None, tests, cases), seconds
     field, given, seconds = _stress_of(case, load_case, backend, stress)
     if strand is None:
         return Solved(case, field, given), seconds

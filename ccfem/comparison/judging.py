@@ -21,6 +21,8 @@ from ccfem.comparison.stages import (
 from ccfem.elasticity.part_stress import GivenStress, PartStress
 from ccfem.elasticity.stress_field import StressField
 from ccfem.elasticity.support_kinds import PressingSupport
+from ccfem.elasticity.weighted_cases import WeightedCases
+from ccfem.fibre_aware.cases_bound import CasesBound, cases_bound
 from ccfem.fibre_aware.upper_bound import UpperBound, upper_bound
 from ccfem.layers import Layer
 from ccfem.planning.given_paths import GivenPaths
@@ -44,12 +46,15 @@ class Solved:
         Stress of another program to plan and evaluate on.
     tests : Tests, optional
         None where nothing is tested.
+    cases : WeightedCases, optional
+        Where paths are planned for several load cases.
     """
 
     case: Case
     field: StressField
     given: GivenStress | None = None
     tests: Tests | None = None
+    cases: WeightedCases | None = None
 
     @property
     def planned_on(self) -> PartStress:
@@ -60,7 +65,8 @@ class Solved:
         """Return what all runs on a stack of layers share."""
         strand = None if self.tests is None else self.tests.strand
         case = self.case
-        return Part(self.planned_on, tuple(layers), case.machine, strand, case.build)
+        stack, cases = tuple(layers), self.cases
+        return Part(self.planned_on, stack, case.machine, strand, case.build, cases)
 
 
 def judged(
@@ -103,15 +109,31 @@ def judged(
     along, bound = None, None
     if solved.tests is not None:
         runs = all_tested(runs, solved.tests, part, tell)
-        if curve or (curve is None and _misses(runs, wanted)):
+        one_case = solved.cases is None
+        if curve or (curve is None and one_case and _misses(runs, wanted)):
             with timed(seconds, "curve"):
                 along = _curve(runs, asked_for, part, wanted, solved.tests, tell)
-    if bounded:
+    together = None
+    if bounded and solved.cases is not None:
+        together = _bound_of_cases(solved, solved.cases, part, runs, wanted, tell, seconds)
+        if together is not None:
+            runs = [_bounded_cases(run, together, wanted) for run in runs]
+    elif bounded:
         bound = _bound(solved, part, runs, wanted, tell, seconds)
         if bound is not None:
             runs = [_bounded(run, bound, wanted) for run in runs]
     case, field, given = solved.case, solved.field, solved.given
-    return Comparison(case, field, part.layers, tuple(runs), wanted, seconds, bound, given, along)
+    stack, cases = part.layers, solved.cases
+    return Comparison(
+        case, field, stack, tuple(runs), wanted, seconds, bound, given, along, cases, together
+    )
+
+
+def _bounded_cases(run: Run, bound: CasesBound, wanted: float | None) -> Run:
+    """Run with the bound of several load cases."""
+    if run.tested is None or run.tested.cases is None or off_length(run, wanted):
+        return run
+    return replace(run, tested=replace(run.tested, cases=replace(run.tested.cases, bound=bound)))
 
 
 def _bounded(run: Run, bound: UpperBound, wanted: float | None) -> Run:
@@ -160,15 +182,42 @@ def _bound(
     None where no run of the wanted length was tested, for curved layers, and for supports that do
     not hold both ways.
     """
-    equal = [run for run in runs if run.tested is not None and not off_length(run, wanted)]
-    field, layers = solved.field, part.layers
-    pressing = any(isinstance(each, PressingSupport) for each in field.problem.supports)
-    flat = all(layer.flat is not None for layer in layers)
-    if solved.tests is None or not equal or pressing or not flat:
+    longest = _longest_bounded(solved, part, runs, wanted)
+    if longest is None or solved.tests is None:
         return None
     tell("bounding what any paths could reach")
-    longest = max(float(run.toolpaths.lengths.sum()) for run in equal)
+    strand, iterations = solved.tests.strand, _BOUND_ITERATIONS
     with timed(seconds, "bound"):
         return upper_bound(
-            field, layers, longest, part.machine, solved.tests.strand, iterations=_BOUND_ITERATIONS
+            solved.field, part.layers, longest, part.machine, strand, iterations=iterations
         )
+
+
+def _bound_of_cases(
+    solved: Solved,
+    cases: WeightedCases,
+    part: Part,
+    runs: Sequence[Run],
+    wanted: float | None,
+    tell: Tell,
+    seconds: dict[str, float],
+) -> CasesBound | None:
+    """Bound what any paths could reach in all load cases together; None as `_bound`."""
+    longest = _longest_bounded(solved, part, runs, wanted)
+    if longest is None or solved.tests is None:
+        return None
+    tell("bounding what any paths could reach in all load cases")
+    with timed(seconds, "bound"):
+        return cases_bound(cases, part.layers, longest, part.machine, solved.tests.strand)
+
+
+def _longest_bounded(
+    solved: Solved, part: Part, runs: Sequence[Run], wanted: float | None
+) -> float | None:
+    """Most fibre of the runs that a bound holds for, mm; None where there is no bound."""
+    equal = [run for run in runs if run.tested is not None and not off_length(run, wanted)]
+    pressing = any(isinstance(each, PressingSupport) for each in solved.field.problem.supports)
+    flat = all(layer.flat is not None for layer in part.layers)
+    if solved.tests is None or not equal or pressing or not flat:
+        return None
+    return max(float(run.toolpaths.lengths.sum()) for run in equal)

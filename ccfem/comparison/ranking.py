@@ -11,6 +11,7 @@ from ccfem.virtual_testing.stiffer import FIRST, RESOLUTION, SAME, UNDECIDED, st
 
 __all__ = [
     "best_values",
+    "merit",
     "off_length",
     "order_of",
     "ranking",
@@ -33,7 +34,8 @@ _STIFFNESSES = (
 def ranking(runs: Sequence[Run], wanted: Wanted) -> tuple[Run, ...]:
     """Return the runs from the best to the worst, failed ones last.
 
-    By the predicted stiffness with fibres that carry tension only; those without a virtual test
+    By the predicted stiffness with fibres that carry tension only, with several load cases that of
+    the case which is farthest below its bound; those without a virtual test
     come after, by efficiency. Runs that cannot be printed as they are stand below all that can,
     and among these a run that lays more or less than the wanted fibre below all that lay it.
 
@@ -45,7 +47,7 @@ def ranking(runs: Sequence[Run], wanted: Wanted) -> tuple[Run, ...]:
     """
 
     def score(run: Run) -> tuple[bool, bool, bool, bool, float, float]:
-        ratio, efficiency = stiffness_ratio(run), headline_values(run).get("efficiency", np.nan)
+        ratio, efficiency = merit(run), headline_values(run).get("efficiency", np.nan)
         return (
             run.evaluation is None,
             not run.printable,
@@ -117,6 +119,13 @@ def stiffness_ratio(run: Run, mode: str = "tension") -> float:
     return headline_values(run).get(f"stiffness_ratio_{mode}", np.nan)
 
 
+def merit(run: Run, mode: str = "tension") -> float:
+    """Return what runs are ranked by: the ratio, or `TestedCases.merit` of several load cases."""
+    if run.tested is not None and run.tested.cases is not None:
+        return run.tested.cases.merit(mode)
+    return stiffness_ratio(run, mode)
+
+
 def stiffness_ratios(one: Run, other: Run) -> tuple[float, float]:
     """Stiffness of one run over that of another, tension only and bonded; NaN where untested."""
     return (
@@ -137,6 +146,8 @@ def order_of(better: Run, other: Run) -> str:
     """
     if better.tested is None or other.tested is None:
         return SAME
+    if better.tested.cases is not None and other.tested.cases is not None:
+        return _order_in_cases(better, other)
     found = stiffer(better.tested.bracket, other.tested.bracket)
     again = (better.tested.alternative, other.tested.alternative)
     if again[0] is not None and again[1] is not None:
@@ -146,3 +157,12 @@ def order_of(better: Run, other: Run) -> str:
     if found == FIRST and stiffness_ratios(better, other)[0] <= 1.0 + RESOLUTION:
         return UNDECIDED
     return found if found in (FIRST, SAME) else UNDECIDED
+
+
+def _order_in_cases(better: Run, other: Run) -> str:
+    """Order by the worst of several load cases, as `order_of`."""
+    gains = [merit(better, mode) / merit(other, mode) - 1.0 for mode in ("tension", "bonded")]
+    ahead, behind = gains[0] > RESOLUTION, min(gains) < -RESOLUTION
+    if behind or (max(gains) > RESOLUTION and not ahead):
+        return UNDECIDED
+    return FIRST if ahead else SAME

@@ -48,6 +48,8 @@ def results_rows(comparison: Comparison) -> list[dict[str, Any]]:
         tested = (column.name for column in TEST_COLUMNS)
         rows[-1] |= {name: extra[name] for name in tested if name in extra}
         rows[-1]["fails_in"] = run.fails_in
+        if run.tested is not None and run.tested.cases is not None:
+            rows[-1] |= run.tested.cases.values()
     return rows
 
 
@@ -130,6 +132,7 @@ def record(comparison: Comparison, command: str, seconds: Mapping[str, float]) -
             "strain_energy": stress.strain_energy,
             "fibre_per_layer": comparison.fibre_per_layer,
             "upper_bound": None if comparison.bound is None else comparison.bound.ratio,
+            "load_cases": None if comparison.cases is None else _load_cases(comparison),
             "curve": None
             if comparison.curve is None
             else comparison.curve.frame.to_dict(orient="records"),
@@ -137,6 +140,14 @@ def record(comparison: Comparison, command: str, seconds: Mapping[str, float]) -
             "strategies": [_run_record(run) for run in comparison.runs],
         }
     )
+
+
+def _load_cases(comparison: Comparison) -> dict[str, Any]:
+    """Say what each load case counts, and what no paths exceed."""
+    cases, bound = comparison.cases, comparison.cases_bound
+    assert cases is not None
+    weights = dict(zip(cases.names, cases.weights.tolist(), strict=True))
+    return {"weights": weights, "bound": None if bound is None else vars(bound)}
 
 
 def _load(stress: StressField) -> list[float] | None:
@@ -161,6 +172,7 @@ def _run_record(run: Run) -> dict[str, Any]:
         "seconds": run.seconds,
         "untested": run.untested,
         "total": headline_values(run),
+        "load_cases": run.tested.cases.values() if run.tested and run.tested.cases else None,
         "first_failure": vars(run.tested.failure) if run.tested and run.tested.failure else None,
         "first_failure_alternative": _alternative_failure(run),
     }

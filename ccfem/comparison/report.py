@@ -14,6 +14,7 @@ from ccfem.comparison.report_tables import (
     all_indices,
     curve_table,
     headline_table,
+    load_cases_table,
     stage_seconds,
 )
 from ccfem.comparison.result import Comparison
@@ -89,6 +90,7 @@ def report_html(
         "curve_said": _about_curve(comparison),
         "curve_table": curve_table(curve),
         "against": against_each_other(comparison),
+        "load_cases": load_cases_table(comparison),
         "indices": all_indices(comparison),
         "parameters": _parameters(comparison),
         "machine": _machine(comparison),
@@ -120,8 +122,10 @@ def _facts(comparison: Comparison | SlicingComparison, record: Mapping[str, Any]
         amount = "each strategy lays its own amount of fibre"
         if comparison.fibre_per_layer is not None:
             amount = f"{comparison.fibre_per_layer:.0f} mm of fibre per layer"
+    several = comparison.cases if isinstance(comparison, Comparison) else None
     return [
-        f"load case “{about['load_case']}”{_load_text(record)}",
+        f"load case “{about['load_case']}”{_load_text(record)}"
+        + ("" if several is None else f", and {len(several) - 1} more at once"),
         f"{about['cells']:,} tetrahedra of order {about['order']}",
         *stacks,
         amount,

@@ -17,6 +17,7 @@ from ccfem.comparison.headline import (
 from ccfem.comparison.ranking import best_values, stiffness_ratios
 from ccfem.comparison.result import Comparison
 from ccfem.comparison.runs import Run, Wanted
+from ccfem.comparison.said_of_cases import cases_rows
 from ccfem.comparison.slicings import SlicingComparison
 from ccfem.evaluation import COLUMNS
 
@@ -28,6 +29,7 @@ __all__ = [
     "all_indices",
     "curve_table",
     "headline_table",
+    "load_cases_table",
     "stage_seconds",
 ]
 
@@ -131,6 +133,15 @@ def against_each_other(comparison: Shown) -> Table | None:
             cells.append(Cell(text, value=float(tension)))
         rows.append((run.name, tuple(cells), ""))
     return Table(tuple(Head(f"over {run.name}") for run in runs), tuple(rows))
+
+
+def load_cases_table(comparison: Shown) -> Table | None:
+    """Table of every load case; None where paths are planned for one."""
+    if isinstance(comparison, SlicingComparison) or comparison.cases is None:
+        return None
+    heads, rows = cases_rows(comparison.ranking)
+    cells = tuple((name, tuple(map(Cell, texts)), "") for name, texts in rows)
+    return Table(tuple(map(Head, heads)), cells) if rows else None
 
 
 def all_indices(comparison: Shown) -> Table:

@@ -12,12 +12,15 @@ from ccfem.comparison.curve import Curve
 from ccfem.comparison.ranking import ranking
 from ccfem.comparison.remarks import remarks
 from ccfem.comparison.runs import Run
+from ccfem.comparison.said_of_cases import cases_remarks, cases_verdict
 from ccfem.comparison.summary import summary_html, summary_text
 from ccfem.comparison.table import frame
 from ccfem.comparison.verdict import verdict
 from ccfem.comparison.views import front_picture, layer_view, shown_layer, told
 from ccfem.elasticity.part_stress import GivenStress, PartStress
 from ccfem.elasticity.stress_field import StressField
+from ccfem.elasticity.weighted_cases import WeightedCases
+from ccfem.fibre_aware.cases_bound import CasesBound
 from ccfem.fibre_aware.upper_bound import UpperBound
 from ccfem.layers import Layer
 from ccfem.plot.scenes import View, show
@@ -50,6 +53,11 @@ class Comparison:
         Stress of another program, where paths are planned and evaluated on that.
     bound : UpperBound or None
         Stiffness that no paths exceed at the largest length of any run; None without virtual tests.
+    cases : WeightedCases, optional
+        Where paths are planned for several load cases: `stress` is that of the first of the largest
+        weight.
+    cases_bound : CasesBound, optional
+        What no paths exceed in all load cases together.
     curve : Curve, optional
         The strategies at several lengths of fibre, where that was asked for or one cannot lay the
         length of the others.
@@ -64,6 +72,8 @@ class Comparison:
     bound: UpperBound | None = None
     given: GivenStress | None = None
     curve: Curve | None = None
+    cases: WeightedCases | None = None
+    cases_bound: CasesBound | None = None
 
     @property
     def planned_on(self) -> PartStress:
@@ -140,6 +150,8 @@ class Comparison:
     @property
     def verdict(self) -> str:
         """One sentence on which strategy is best; empty where there is none to compare."""
+        if self.cases is not None:
+            return cases_verdict(self.runs, self.fibre_per_layer, self.cases_bound)
         return verdict(self.runs, self.fibre_per_layer)
 
     @property
@@ -154,6 +166,10 @@ class Comparison:
         found = remarks(self.runs, self.fibre_per_layer, self.bound)
         if self.case.fibre is not None:
             found.insert(0, f"fibre on {len(self.layers)} layers: {self.case.fibre.about()}")
+        if self.cases is not None:
+            about, case = (self.runs, self.fibre_per_layer, self.cases), self.stress.case
+            others = bool(self.case.alternative_supports)
+            found += cases_remarks(*about, case, self.cases_bound, others)
         if self.given is not None:
             found.append("paths are planned and evaluated on the stress of another program")
         return found

@@ -7,6 +7,7 @@ from html import escape
 from typing import Any
 
 from ccfem.arrays import freeze, in_brief
+from ccfem.comparison.tested_cases import TestedCases
 from ccfem.evaluation import Evaluation
 from ccfem.planning.strategy import Strategy
 from ccfem.printing.print_plan import PrintPlan
@@ -51,6 +52,8 @@ class Tested:
         The same under the alternative supports of the case, where it has some.
     most : float
         Stiffness ratio that no paths of the compared length exceed; NaN where there is no bound.
+    cases : TestedCases, optional
+        The tests under all load cases, where the paths are planned for several.
     """
 
     bracket: Bracket
@@ -59,6 +62,7 @@ class Tested:
     matrix_before: float = float("nan")
     alternative: "Tested | None" = None
     most: float = float("nan")
+    cases: TestedCases | None = None
 
     __repr__ = in_brief
 

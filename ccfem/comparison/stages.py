@@ -8,11 +8,14 @@ from itertools import count
 from typing import Any
 
 from ccfem.comparison.runs import Run, Tested
+from ccfem.comparison.tested_cases import in_all_cases
 from ccfem.elasticity.part_stress import PartStress
 from ccfem.elasticity.stress_field import StressField
+from ccfem.elasticity.weighted_cases import WeightedCases
 from ccfem.errors import InputError, SolveError
 from ccfem.evaluation import evaluate
 from ccfem.evaluation.printable import why_not
+from ccfem.fibre_aware.plan_cases import plan_cases
 from ccfem.layers import Layer
 from ccfem.machine.machine import Machine
 from ccfem.planning.equal_fibre import (
@@ -76,13 +79,17 @@ def counted(progress: Progress, first: float, steps: int) -> Tell:
 
 @dataclass(frozen=True)
 class Part:
-    """What all runs share: stress that counts, layers, machine, strand and build direction."""
+    """What all runs share: stress that counts, layers, machine, strand and build direction.
+
+    With `cases` paths are planned for and tested under all of them; the stress is that of one.
+    """
 
     stress: PartStress
     layers: tuple[Layer, ...]
     machine: Machine
     strand: Strand | None = None
     build: tuple[float, float, float] | None = None
+    cases: WeightedCases | None = None
 
 
 def planned(
@@ -99,6 +106,8 @@ def planned(
             paths = run.strategy.toolpaths
             laid = length_per_layer(paths, layers)
             found = Planned(run.strategy, paths, laid, _as_given(laid, wanted))
+        elif part.cases is not None:
+            found = plan_cases(run.strategy, layers, part.cases, machine, wanted, part.strand)
         elif wanted is None:
             paths = plan(run.strategy, layers, stress, machine)
             found = Planned(run.strategy, paths, length_per_layer(paths, layers))
@@ -336,7 +345,11 @@ def _tested(run: Run, tests: Tests, part: Part, tell: Tell, span: Sequence[float
         mesh = tests.models[0][0].unreinforced.mesh
         strands = cut_strands(run.toolpaths, mesh, machine=part.machine)
         found = [_test(strands, *model, tests.strand, part, span) for model in tests.models]
-        return replace(run, tested=replace(found[0], alternative=[*found[1:], None][0]))
+        tested = replace(found[0], alternative=[*found[1:], None][0])
+        if part.cases is not None:
+            every = in_all_cases(strands, part.cases, tests.strand, part.layers)
+            tested = replace(tested, cases=every)
+        return replace(run, tested=tested)
 
     return _stage(run, "virtual test", work, reason="untested")
 

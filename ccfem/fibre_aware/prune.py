@@ -22,7 +22,7 @@ from ccfem.virtual_testing.specimen import Specimen
 from ccfem.virtual_testing.strand import Strand
 from ccfem.virtual_testing.strands import Strands, cut_strands
 
-__all__ = ["Profile", "least_price", "profiles", "prune", "shorten"]
+__all__ = ["Profile", "fibre_length", "least_price", "profiles", "prune", "shorten"]
 
 _STATION = 1.0
 """Length of path, mm, that is kept or taken off as a whole."""
@@ -87,7 +87,7 @@ def prune(
     """
     check_number("length of fibre", length, above=0.0, unit="mm")
     check_number("rounds", rounds, at_least=1)
-    laid = _fibre_length(toolpaths)
+    laid = fibre_length(toolpaths)
     if laid <= length:
         return toolpaths
     specimen = Specimen.of(part) if isinstance(part, StressField) else part
@@ -101,13 +101,14 @@ def prune(
         wanted = length if k == rounds - 1 else length + 0.5 * (laid - length)
         along = profiles(toolpaths, strands, value)
         toolpaths = shorten(toolpaths, along, wanted, machine.minimum_length)
-        laid = _fibre_length(toolpaths)
+        laid = fibre_length(toolpaths)
         if laid <= length:
             break
     return toolpaths
 
 
-def _fibre_length(toolpaths: Toolpaths) -> float:
+def fibre_length(toolpaths: Toolpaths) -> float:
+    """Length of all fibre, mm."""
     return float(toolpaths.lengths[toolpaths.kind == FIBRE].sum())
 
 

@@ -5,7 +5,7 @@ energy ``EA V m eps^2 / 2``, eps being the strain along t. Fibre lies in the pla
 so its stiffness acts on the three strains in the plane only.
 """
 
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass, replace
 from functools import cached_property
 from typing import Any
@@ -18,11 +18,11 @@ from ccfem.elasticity.assembly import cell_gradients
 from ccfem.elasticity.solve import solve
 from ccfem.elasticity.solvers import preconditioned_cg
 from ccfem.elasticity.stress_field import StressField
-from ccfem.errors import SolveError
+from ccfem.errors import InputError, SolveError
 from ccfem.mesh.tet_mesh import TetMesh
 from ccfem.virtual_testing.specimen import Specimen
 
-__all__ = ["SmearedPart", "SmearedSolution", "on_linear_cells"]
+__all__ = ["SmearedPart", "SmearedSolution", "on_linear_cells", "smeared_cases"]
 
 _UPDATES = 40
 """Updates of the displacement after which to give up."""
@@ -103,10 +103,9 @@ class SmearedPart:
             installed: paths do not depend on what else is.
         """
         if backend is None:
-            small = 3 * len(stress.mesh.points) <= _DIRECT_UNKNOWNS
-            backend = "superlu" if small else "amg"
+            backend = _backend(stress)
         known = stress.__dict__.setdefault("smeared", {})
-        key = backend, np.asarray(frame, dtype=np.float64).tobytes()
+        key = _key(backend, frame)
         if key not in known:
             linear = on_linear_cells(stress, backend)
             known[key] = cls(Specimen.of(linear, backend), read_only(frame))
@@ -247,6 +246,48 @@ class _Operator:
         held = self.part.specimen.held
         fibre = self.part._force(self.packed, self.expand(x))
         return np.asarray(self.part._reduced @ x) + held.project(fibre)
+
+
+def smeared_cases(fields: Sequence[StressField], frame: FloatArray) -> tuple[SmearedPart, ...]:
+    """Parts of several load cases; those of one problem share one factorisation.
+
+    Parameters
+    ----------
+    fields : sequence of StressField
+        Of one mesh.
+    frame : (3, 3) array
+        Of the layers.
+
+    Raises
+    ------
+    InputError
+        When a case moves supports.
+    """
+    leaders: dict[int, SmearedPart] = {}
+    for field in fields:
+        backend, leader = _backend(field), leaders.get(id(field.problem))
+        known = field.__dict__.setdefault("smeared", {})
+        if leader is not None and _key(backend, frame) not in known:
+            linear = on_linear_cells(field, backend)
+            specimen = leader.specimen.under(linear)
+            known[_key(backend, frame)] = SmearedPart(specimen, read_only(frame))
+        part = SmearedPart.of(field, frame, backend)
+        if not part.forced:
+            raise InputError(
+                f"load case '{field.case}' moves supports; several cases are planned for under "
+                "forces: leave it out, or plan for it alone"
+            )
+        leaders.setdefault(id(field.problem), part)
+    return tuple(SmearedPart.of(field, frame) for field in fields)
+
+
+def _backend(stress: StressField) -> str:
+    """Preconditioner by the size of the part."""
+    return "superlu" if 3 * len(stress.mesh.points) <= _DIRECT_UNKNOWNS else "amg"
+
+
+def _key(backend: str, frame: FloatArray) -> tuple[str, bytes]:
+    return backend, np.asarray(frame, dtype=np.float64).tobytes()
 
 
 def on_linear_cells(stress: StressField, backend: str = "auto") -> StressField:

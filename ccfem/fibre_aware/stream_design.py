@@ -8,7 +8,7 @@ and the gradient of the compliance; L-BFGS does the rest.
 
 from dataclasses import dataclass
 from functools import cached_property
-from typing import Any
+from typing import Any, Protocol
 
 import numpy as np
 import scipy.sparse as sp
@@ -19,12 +19,21 @@ from ccfem.arrays import FloatArray, IntArray
 from ccfem.fibre_aware.smeared import SmearedPart, SmearedSolution
 from ccfem.fibre_aware.spline_grid import SplineGrid
 
-__all__ = ["DENSEST", "Objective", "StreamDesign", "StreamProblem", "design"]
+__all__ = [
+    "DENSEST",
+    "OVER_BUDGET",
+    "Laid",
+    "Objective",
+    "StreamDesign",
+    "StreamProblem",
+    "design",
+    "improved",
+]
 
 DENSEST = 0.975
 """Strands a width that should not be exceeded."""
 
-_OVER_BUDGET = 20.0
+OVER_BUDGET = 20.0
 _STEEP = 100.0
 _ROUGH = 1e-3
 """Weights of the three penalties."""
@@ -66,6 +75,34 @@ class Objective:
     ratio: float
     length: float
     solution: SmearedSolution
+
+
+@dataclass(frozen=True)
+class Laid:
+    """The fibre that one field lays in the cells.
+
+    Attributes
+    ----------
+    gx, gy : (m,) array
+        Gradient of the field, strands a width.
+    size : (m,) array
+        Its size, rounded off at zero.
+    along : (m, 3) array
+        What takes strains 11, 22 and 12 in the plane to that along the fibre, times ``|g|^2``.
+    outer : (m, 3, 3) array, MPa
+        Stiffness of the fibre.
+    """
+
+    gx: FloatArray
+    gy: FloatArray
+    size: FloatArray
+    along: FloatArray
+    outer: FloatArray
+
+    def stiffness(self, strain: FloatArray) -> FloatArray:
+        """Stiffness (m, 3, 3), MPa, at strains (m, 3): next to none of shortened fibre."""
+        stretched = np.einsum("ci,ci->c", self.along, strain) > 0.0
+        return np.where(stretched, 1.0, _SLACK)[:, None, None] * self.outer
 
 
 @dataclass(frozen=True)
@@ -150,50 +187,86 @@ class StreamProblem:
         tolerance : float
             Relative residual of the solve.
         """
+        laid = self.laid(field)
+        solution = self.part.solve(laid.stiffness, start, tolerance)
+        ratio = self.part.ratio(solution.work)
+        length = self.length(laid)
+        over, bend = max(length / self.budget - 1.0, 0.0), self.laplacian @ field
+        steep, rough = self.penalties(laid, bend)
+        value = -np.log(ratio) + OVER_BUDGET * over**2 + steep
+        value += rough
+        gradient = self.gradient(laid, bend, self.pull(laid, solution), over)
+        return Objective(float(value), gradient, ratio, length, solution)
+
+    def penalties(self, laid: Laid, bend: FloatArray) -> tuple[float, float]:
+        """Penalties of too dense fibre, and of a Laplacian (c,) of the field."""
+        excess = np.maximum(laid.size - DENSEST, 0.0)
+        return _STEEP * float(self.mean @ excess**2), _ROUGH * float(bend @ bend) / len(bend)
+
+    def gradient(
+        self, laid: Laid, bend: FloatArray, pull: tuple[FloatArray, FloatArray], over: float
+    ) -> FloatArray:
+        """Gradient (c,) by the coefficients, penalties included.
+
+        Parameters
+        ----------
+        laid : Laid
+        bend : (c,) array
+            Laplacian of the field.
+        pull : two (m,) arrays
+            Derivatives by the components of g of all that are no penalties.
+        over : float
+            Share of the budget by which the length exceeds it.
+        """
+        excess = np.maximum(laid.size - DENSEST, 0.0)
+        push = 2.0 * (OVER_BUDGET * over / self.budget * self.room + _STEEP * self.mean * excess)
+        x, y = self._transposed
+        gradient = x @ (pull[0] + push * laid.gx / laid.size)
+        gradient = gradient + y @ (pull[1] + push * laid.gy / laid.size)
+        gradient += 2.0 * _ROUGH / len(bend) * (self.laplacian @ bend)
+        return np.asarray(gradient)
+
+    def signed(self, field: FloatArray, group: int) -> FloatArray:
+        """Coefficients (k,) of one group, with the sign that does not depend on the axes."""
+        count = len(self.grid)
+        field = field[group * count : (group + 1) * count]
+        inside = self.group == group
+        values = self.grid.values(self.centres[inside]) @ field
+        weight = self.part.mesh.volumes[inside]
+        values = values - weight @ values / weight.sum()
+        return field if weight @ values**3 >= 0.0 else -field
+
+    def length(self, laid: Laid) -> float:
+        """Length of fibre, mm."""
+        return float(self.room @ (laid.size - _SMALLEST))
+
+    @cached_property
+    def mean(self) -> FloatArray:
+        """Share of each cell in the volume, (m,)."""
+        return self.part.mesh.volumes / self.part.mesh.volumes.sum()
+
+    def laid(self, field: FloatArray) -> Laid:
+        """Fibre that a field (c,) lays."""
         gx, gy = (slope @ field for slope in self.slopes)
         size = np.sqrt(gx * gx + gy * gy + _SMALLEST**2)
-        solution, stretch = self._solve(gx, gy, size, start, tolerance)
-        ratio = self.part.ratio(solution.work)
+        along = np.stack([gy * gy, gx * gx, -gx * gy], axis=1)
+        strength = self.axial_stiffness * self.capacity / size**3
+        return Laid(
+            gx, gy, size, along, strength[:, None, None] * along[:, :, None] * along[:, None, :]
+        )
+
+    def pull(self, laid: Laid, solution: SmearedSolution) -> tuple[FloatArray, FloatArray]:
+        """Return the derivatives (m,) of -log(stiffness) by the components of g."""
+        stretch = np.einsum("ci,ci->c", laid.along, solution.strain)
         share = np.where(stretch > 0.0, 1.0, _SLACK)
         e1, e2, e12 = solution.strain.T
-        # Of -log(stiffness): fibre energy is stretch^2 / size^3 a cell.
+        gx, gy, size = laid.gx, laid.gy, laid.size
+        # Fibre energy is stretch^2 / size^3 a cell.
         factor = -self.axial_stiffness * self.room * share * stretch / (solution.work * size**3)
         fall = 3.0 * stretch / size**2
         dx = factor * (2.0 * (2.0 * gx * e2 - gy * e12) - fall * gx)
         dy = factor * (2.0 * (2.0 * gy * e1 - gx * e12) - fall * gy)
-
-        length = float(self.room @ (size - _SMALLEST))
-        over = max(length / self.budget - 1.0, 0.0)
-        excess = np.maximum(size - DENSEST, 0.0)
-        mean = self.part.mesh.volumes / self.part.mesh.volumes.sum()
-        bend = self.laplacian @ field
-        value = -np.log(ratio) + _OVER_BUDGET * over**2 + _STEEP * float(mean @ excess**2)
-        value += _ROUGH * float(bend @ bend) / len(field)
-        push = 2.0 * (_OVER_BUDGET * over / self.budget * self.room + _STEEP * mean * excess)
-        x, y = self._transposed
-        gradient = x @ (dx + push * gx / size) + y @ (dy + push * gy / size)
-        gradient += 2.0 * _ROUGH / len(field) * (self.laplacian @ bend)
-        return Objective(float(value), gradient, ratio, length, solution)
-
-    def _solve(
-        self,
-        gx: FloatArray,
-        gy: FloatArray,
-        size: FloatArray,
-        start: SmearedSolution | None,
-        tolerance: float,
-    ) -> tuple[SmearedSolution, FloatArray]:
-        """Equilibrium, and the strain along the fibre times |g|^2 of each cell."""
-        along = np.stack([gy * gy, gx * gx, -gx * gy], axis=1)
-        strength = self.axial_stiffness * self.capacity / size**3
-        outer = strength[:, None, None] * along[:, :, None] * along[:, None, :]
-
-        def stiffness(strain: FloatArray) -> FloatArray:
-            stretched = np.einsum("ci,ci->c", along, strain) > 0.0
-            return np.where(stretched, 1.0, _SLACK)[:, None, None] * outer
-
-        solution = self.part.solve(stiffness, start, tolerance)
-        return solution, np.einsum("ci,ci->c", along, solution.strain)
+        return dx, dy
 
 
 @dataclass(frozen=True)
@@ -233,10 +306,26 @@ def design(problem: StreamProblem, start: FloatArray, evaluations: int = 50) -> 
     StreamDesign
         The best of all evaluations.
     """
+    return StreamDesign(*improved(problem, start, evaluations))
+
+
+class _Evaluated(Protocol):
+    """An objective that `improved` can make smaller."""
+
+    @property
+    def laplacian(self) -> Any: ...
+
+    def evaluate(self, field: FloatArray, start: Any, tolerance: float) -> Any: ...
+
+
+def improved(
+    problem: _Evaluated, start: FloatArray, evaluations: int
+) -> tuple[FloatArray, Any, tuple[Any, ...]]:
+    """Coefficients, objective there, and stiffness ratios at every evaluation of `design`."""
     smoother = (sp.eye_array(len(start)) + _REACH**2 * problem.laplacian).tocsc()
     factor = splu(smoother)
-    tried: list[tuple[FloatArray, Objective]] = []
-    ratios: list[float] = []
+    tried: list[tuple[FloatArray, Any]] = []
+    ratios: list[Any] = []
 
     def objective(x: FloatArray) -> tuple[float, FloatArray]:
         field = factor.solve(x)
@@ -252,4 +341,4 @@ def design(problem: StreamProblem, start: FloatArray, evaluations: int = 50) -> 
     options = {"maxfun": evaluations, "maxiter": evaluations, "maxcor": _MEMORY, "ftol": 1e-9}
     minimize(objective, smoother @ start, jac=True, method="L-BFGS-B", options=options)
     field, found = min(tried, key=lambda one: one[1].value)
-    return StreamDesign(field, found, tuple(ratios))
+    return field, found, tuple(ratios)

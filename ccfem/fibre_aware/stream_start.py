@@ -16,8 +16,9 @@ from ccfem.fields.orientation import orient
 from ccfem.fields.tensile import Tension
 from ccfem.layers.layer import Layer
 from ccfem.layers.layer_stress import stress_on
+from ccfem.tensor import largest_in_plane
 
-__all__ = ["plane_axes", "start_field"]
+__all__ = ["field_along", "mixed_tension", "plane_axes", "start_field"]
 
 _SPACING_WEIGHT = 0.1
 """Weight of the wanted density against the direction, as in `fields.scalar.fit_weighted`."""
@@ -78,7 +79,13 @@ def start_field(
     (c,) array
         Coefficients; zero for a group without tension.
     """
-    tensions = [layer_tension(stress_on(layer, stress)) for layer in layers]
+    return field_along(problem, layers, [layer_tension(stress_on(k, stress)) for k in layers], cap)
+
+
+def field_along(
+    problem: StreamProblem, layers: Sequence[Layer], tensions: Sequence[Tension], cap: float
+) -> FloatArray:
+    """Fields (c,) that follow given tensions of one layer for each group; cap as `start_field`."""
     values = np.concatenate([np.where(t.defined, t.stress, 0.0) for t in tensions])
     weight = np.concatenate([layer.areas for layer in layers])
     order = np.argsort(values, kind="stable")
@@ -92,6 +99,25 @@ def start_field(
         ]
     )
     return _to_budget(problem, field)
+
+
+def mixed_tension(tensions: Sequence[Tension], factors: FloatArray) -> Tension:
+    """Tension of ``sum of factor s t t^T`` over the tensions s along t of several load cases.
+
+    Parameters
+    ----------
+    tensions : sequence of Tension
+        In the plane of one layer.
+    factors : (n,) array
+        Not negative.
+    """
+    total = np.zeros((len(tensions[0].stress), 3))
+    for factor, one in zip(factors, tensions, strict=True):
+        x, y = one.direction.T
+        size = factor * np.where(one.defined, one.stress, 0.0)
+        total += size[:, None] * np.stack([x * x, y * y, x * y], axis=1)
+    largest, _, angle = largest_in_plane(total)
+    return Tension(np.stack([np.cos(angle), np.sin(angle)], axis=1), largest, largest > 0.0)
 
 
 def _fit(problem: StreamProblem, layer: Layer, tension: Tension, top: float) -> FloatArray:

@@ -28,7 +28,7 @@ from ccfem.tensor import largest_in_plane
 from ccfem.virtual_testing.equilibrium import MODES, TENSION
 from ccfem.virtual_testing.strand import Strand
 
-__all__ = ["UpperBound", "certificate", "upper_bound"]
+__all__ = ["UpperBound", "certificate", "criterion_step", "upper_bound"]
 
 _ANGLES = 12
 _LEAST_PROGRESS = 2e-4
@@ -145,7 +145,7 @@ def upper_bound(
             break
         strain = solution.strain @ along.T
         stretch = np.maximum(strain, 0.0) if mode == TENSION else np.abs(strain)
-        density = _criterion(density, stretch, volume, most, length)
+        density = criterion_step(density, stretch, volume, most, length)
     return UpperBound(min(bounds), reached, best, angles, tuple(bounds))
 
 
@@ -190,10 +190,20 @@ def certificate(
     return before * energy / float(specimen.forces.reshape(-1) @ u) ** 2
 
 
-def _criterion(
+def criterion_step(
     density: FloatArray, stretch: FloatArray, volume: FloatArray, most: FloatArray, length: float
 ) -> FloatArray:
-    """Densities (m, k) after one step of the optimality criterion."""
+    """Densities (m, k) after one step of the optimality criterion.
+
+    Parameters
+    ----------
+    density : (m, k) array, mm/mm^3
+    stretch : (m, k) array
+        Strain along each direction, not negative.
+    volume : (m,) array, mm^3
+    most : (m,) array, mm/mm^3
+    length : float, mm
+    """
     weight = density * (stretch / (float(stretch.max()) or 1.0)) ** 2
     total = weight.sum(axis=1)
     low, high = 1e-12, 1e12

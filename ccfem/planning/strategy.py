@@ -5,6 +5,7 @@ from dataclasses import dataclass
 from typing import ClassVar, Protocol, runtime_checkable
 
 from ccfem.elasticity.part_stress import PartStress
+from ccfem.elasticity.weighted_cases import WeightedCases
 from ccfem.layers.layer import Layer
 from ccfem.layers.layer_stress import LayerStress
 from ccfem.machine.machine import Machine
@@ -12,6 +13,7 @@ from ccfem.toolpaths import Toolpaths
 
 __all__ = [
     "Amount",
+    "CasesStrategy",
     "LayerPlanner",
     "LayerStrategy",
     "LengthStrategy",
@@ -68,6 +70,8 @@ class LayerStrategy(Protocol):
         point in them is the origin, about which the laws turn their part.
     direction : str, optional
         The parameter, in degrees, that gives a strategy a direction of its own.
+    ignores_stress : bool, default False
+        Whether it lays the same under any load.
     crosses : bool, default False
         Whether strands cross each other by intention.
     on_axes : bool, default False
@@ -118,6 +122,21 @@ class LengthStrategy(PartStrategy, Protocol):
             For each length the strategy that lays it, and what plans the layers. None lays more
             than asked; where even the whole plan is too short, all of it.
         """
+        ...
+
+
+@runtime_checkable
+class CasesStrategy(LengthStrategy, Protocol):
+    """A `LengthStrategy` that plans for several load cases at once."""
+
+    def for_cases(
+        self,
+        cases: WeightedCases,
+        layers: Sequence[Layer],
+        machine: Machine,
+        lengths: Sequence[float],
+    ) -> "Sequence[tuple[Strategy, LayerPlanner]]":
+        """Plan for all cases; lengths and what is returned as in `to_lengths`."""
         ...
 
 

@@ -62,6 +62,7 @@ class Concentric(Infill):
     minimum_length: float | None = None
     mode: Literal["polyline", "raster"] = "polyline"
 
+    ignores_stress: ClassVar[bool] = True
     variants: ClassVar[Mapping[str, Mapping[str, Any]]] = {
         "single": {"joined": False, "rings": 3},
         "start": {"start": (0.0, 0.0)},

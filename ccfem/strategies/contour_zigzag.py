@@ -46,6 +46,7 @@ class ContourZigzag:
     joined: bool = True
 
     amount: ClassVar[Amount] = SPACING
+    ignores_stress: ClassVar[bool] = True
     in_plane: ClassVar[bool] = True
     direction: ClassVar[str] = "angle"
     variants: ClassVar[Mapping[str, Mapping[str, Any]]] = {"single": {"joined": False}}

@@ -68,6 +68,7 @@ class Grid(Infill):
     mode: Literal["polyline", "raster"] = "polyline"
 
     amount: ClassVar[Amount] = replace(SPACING, beyond=(("shells", 60),))
+    ignores_stress: ClassVar[bool] = True
     direction: ClassVar[str] = "angle"
     variants: ClassVar[Mapping[str, Mapping[str, Any]]] = {
         "both": {"families": "both"},

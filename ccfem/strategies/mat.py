@@ -51,6 +51,7 @@ class Mat(Infill):
     minimum_length: float | None = None
     mode: Literal["polyline", "raster"] = "polyline"
 
+    ignores_stress: ClassVar[bool] = True
     variants: ClassVar[Mapping[str, Mapping[str, Any]]] = {"raster": {"mode": "raster"}}
 
     def __post_init__(self) -> None:

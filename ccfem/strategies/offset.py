@@ -46,6 +46,7 @@ class Offset:
     minimum_length: float | None = None
 
     amount: ClassVar[Amount] = SPACING
+    ignores_stress: ClassVar[bool] = True
     in_plane: ClassVar[bool] = True
 
     def __post_init__(self) -> None:

@@ -12,14 +12,19 @@ from ccfem.arrays import freeze
 from ccfem.checks import check_fields
 from ccfem.elasticity.part_stress import PartStress
 from ccfem.elasticity.stress_field import solved
+from ccfem.elasticity.weighted_cases import WeightedCases
 from ccfem.errors import InputError
+from ccfem.fibre_aware.cases_bound import single_bounds
+from ccfem.fibre_aware.plan_cases import plan_by_layers
 from ccfem.fibre_aware.prune import prune
+from ccfem.fibre_aware.prune_cases import prune_cases
 from ccfem.layers.layer import Layer
 from ccfem.machine.machine import Machine
 from ccfem.planning.equal_fibre import plan_to_length
 from ccfem.planning.strategy import Amount, LayerPlanner, Strategy
 from ccfem.planning.whole_part import WholePart, full_length
 from ccfem.strategies import create
+from ccfem.virtual_testing.several_cases import specimens
 from ccfem.virtual_testing.specimen import Specimen
 from ccfem.virtual_testing.strand import RHO, Strand
 
@@ -127,6 +132,42 @@ class Pruned:
             if len(paths):
                 part, strand = Specimen.of(solved(stress, "pruned")), Strand(self.rho)
                 kept = prune(paths, part, length * len(layers), machine, strand, self.rounds)
+            coverage = length / full
+            overfill = max(planned / full / coverage, 1.0)
+            found.append((replace(self, coverage=coverage, overfill=overfill), WholePart(kept)))
+        return found
+
+    def for_cases(
+        self,
+        cases: WeightedCases,
+        layers: Sequence[Layer],
+        machine: Machine,
+        lengths: Sequence[float],
+    ) -> list[tuple["Pruned", LayerPlanner]]:
+        """Plan each layer for one load case, and prune by tests of all.
+
+        Lengths as in `to_lengths`; the worst case counts (`ccfem.fibre_aware.prune_cases`).
+
+        Raises
+        ------
+        InputError
+            Whatever the strategy that plans raises.
+        """
+        if len(cases) == 1:
+            return self.to_lengths(cases.fields[0], layers, machine, lengths)
+        full, strand = full_length(layers, machine), Strand(self.rho)
+        most = max(self.amount.most, self.coverage) * full
+        lengths = [min(length, most) for length in lengths]
+        planned = self.overfill * max(lengths)
+        paths = plan_by_layers(self._planner(), layers, cases, machine, planned)
+        bounds = single_bounds(cases, layers, max(lengths) * len(layers), machine, strand)
+        parts, rounds = specimens(cases), max(self.rounds, 3)
+        found: list[tuple[Pruned, LayerPlanner]] = []
+        for length in lengths:
+            wanted = length * len(layers)
+            kept = prune_cases(
+                paths, parts, cases.weights, bounds, wanted, machine, strand, rounds=rounds
+            )
             coverage = length / full
             overfill = max(planned / full / coverage, 1.0)
             found.append((replace(self, coverage=coverage, overfill=overfill), WholePart(kept)))

@@ -5,63 +5,53 @@ field, as in `isocurve`, but the field is not fitted to the stress of the part w
 optimised for the compliance of the part with the fibre that its isocurves lay.
 """
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, replace
-from typing import Any, ClassVar
+from typing import Any, ClassVar, Literal
 
 import numpy as np
-import shapely
 
 from ccfem.arrays import FloatArray, IntArray
-from ccfem.checks import check_fields
+from ccfem.checks import check_choices, check_fields
 from ccfem.elasticity.part_stress import PartStress
 from ccfem.elasticity.stress_field import StressField, solved
+from ccfem.elasticity.weighted_cases import WeightedCases
 from ccfem.errors import InputError
+from ccfem.fibre_aware.cases_bound import single_bounds
+from ccfem.fibre_aware.cases_design import (
+    CasesDesign,
+    CasesProblem,
+    design_cases,
+    start_fields,
+)
 from ccfem.fibre_aware.heights import (
     alike_share,
     fibre_capacity,
     group_layers,
     nearest_layer,
 )
-from ccfem.fibre_aware.prune import Profile, least_price, profiles, shorten
-from ccfem.fibre_aware.smeared import SmearedPart
+from ccfem.fibre_aware.layer_shares import layer_counts, layers_by_case
+from ccfem.fibre_aware.prune_cases import case_counts, prune_cases
+from ccfem.fibre_aware.smeared import SmearedPart, smeared_cases
 from ccfem.fibre_aware.spline_grid import SplineGrid
 from ccfem.fibre_aware.stream_design import DENSEST, StreamDesign, StreamProblem, design
+from ccfem.fibre_aware.stream_paths import Extraction, middle, refined
 from ccfem.fibre_aware.stream_start import plane_axes, start_field
 from ccfem.fields.layer_tension import layer_tension
-from ccfem.geometry.isocontours import isocontours, triangle_edges
 from ccfem.layers.layer import Layer
 from ccfem.layers.layer_stress import stress_on
-from ccfem.linking.clearance import trim_to_clearance
-from ccfem.linking.finishing import keep_off_border, linked_paths
 from ccfem.machine.machine import Machine
 from ccfem.planning.strategy import Amount, LayerPlanner
 from ccfem.planning.whole_part import WholePart, full_length
 from ccfem.toolpaths import Toolpaths
-from ccfem.virtual_testing.bars import bars
-from ccfem.virtual_testing.strand import RHO
-from ccfem.virtual_testing.strands import cut_strands
+from ccfem.virtual_testing.strand import RHO, Strand
 
 __all__ = ["StreamFunction"]
-
-_CLEARANCE = 0.95
-"""Least distance of strands in widths: they are designed to be 1 / 0.975 apart, and what is cut for
-a hundredth of a width would be lost."""
-
-_SHORTEST = 5.0
-"""Length, in strand widths, of the shortest pieces that are kept for linking."""
-
-_CUT_COST = 20.0
-"""Length, mm, of the least valuable fibre that another cut has to save."""
 
 _ALIKE = 0.8
 """Share of the stress that all heights have in common, above which all layers get one field."""
 
 _MOST_GROUPS = 6
-
-_SAME = 0.5
-"""Distance, in strand widths, up to which the borders of two sections count as the same: the levels
-that are best for one layer are then taken for the other."""
 
 _ENOUGH = 0.99
 """Share of a wanted length below which the design is made once more."""
@@ -109,6 +99,12 @@ class StreamFunction:
         Least distance of strands from the boundary, in strand widths. 0.5 keeps them in, and their
         ends still meet the links along the boundary; at 0 they may run along it with half of their
         width outside.
+    objective : {"worst", "sum"}
+        What counts of several load cases: the one that is farthest from the stiffest that it could
+        be made alone, or the weighted mean over the cases.
+    tilt : float, default 0.75
+        Weight of a layer's own case in the field that its design starts with, in (0, 1], where
+        there are several; the others share the rest.
     """
 
     coverage: float = 0.45
@@ -121,6 +117,8 @@ class StreamFunction:
     phases: int = 5
     link_limit: float = 10.0
     inset: float = 0.5
+    objective: Literal["worst", "sum"] = "worst"
+    tilt: float = 0.75
 
     amount: ClassVar[Amount] = Amount("coverage", most=0.85, least=0.1)
     flat_layers_only: ClassVar[bool] = True
@@ -136,6 +134,8 @@ class StreamFunction:
         check_fields(self, "grid", above=0.0, unit="fibre widths")
         check_fields(self, "cap", above=0.0, at_most=100.0)
         check_fields(self, "groups", "link_limit", "inset", at_least=0)
+        check_fields(self, "tilt", above=0.0, at_most=1.0)
+        check_choices(self)
 
     def natural_length(self, layers: Sequence[Layer], machine: Machine) -> float:
         """Length that the coverage asks for, mm per layer."""
@@ -175,30 +175,40 @@ class StreamFunction:
         InputError
             As `for_part`.
         """
-        full = full_length(layers, machine)
-        most = max(self.amount.most, self.coverage) * full
-        lengths = [min(length, most) for length in lengths]
-        longest = max(lengths)
-        short = [k for k, length in enumerate(lengths) if length < _NEAR * longest]
-        if short:
-            anew = self.to_lengths(stress, layers, machine, [lengths[k] for k in short])
-            near = [length for length in lengths if length >= _NEAR * longest]
-            cut = iter(self.to_lengths(stress, layers, machine, near))
-            of = dict(zip(short, anew, strict=True))
-            return [of[k] if k in of else next(cut) for k in range(len(lengths))]
-        told = replace(self, coverage=longest / full)
-        found = told._cut(stress, layers, machine, lengths)
-        laid = max(float(paths.lengths.sum()) for paths in found) / len(layers)
-        if 0.0 < laid < _ENOUGH * longest and self.overfill * told.coverage < DENSEST:
-            more = replace(told, overfill=min(_MORE * longest / laid, 2.0) * self.overfill)
-            again = more._cut(stress, layers, machine, lengths)
-            if max(float(paths.lengths.sum()) for paths in again) > laid * len(layers):
-                told, found = more, again
-        designed = told.overfill * told.coverage
-        return [
-            (_designed_for(told, length / full, designed), WholePart(paths))
-            for length, paths in zip(lengths, found, strict=True)
-        ]
+        return _to_lengths(
+            self,
+            layers,
+            machine,
+            lengths,
+            lambda one, some: one._cut(stress, layers, machine, some),
+        )
+
+    def for_cases(
+        self,
+        cases: WeightedCases,
+        layers: Sequence[Layer],
+        machine: Machine,
+        lengths: Sequence[float],
+    ) -> list[tuple["StreamFunction", LayerPlanner]]:
+        """Design a field for each load case, all together, and cut their paths by tests of all.
+
+        Each layer follows the field of one case; those of a case are as many as its weight asks
+        for, spread evenly over the height. One case alone is planned as by `to_lengths`.
+
+        Raises
+        ------
+        InputError
+            When no layer has a tensile direction in any case, or a case moves supports.
+        """
+        if len(cases) == 1:
+            return self.to_lengths(cases.fields[0], layers, machine, lengths)
+        return _to_lengths(
+            self,
+            layers,
+            machine,
+            lengths,
+            lambda one, some: one._cut_cases(cases, layers, machine, some),
+        )
 
     def _cut(
         self,
@@ -208,36 +218,74 @@ class StreamFunction:
         lengths: Sequence[float],
     ) -> list[Toolpaths]:
         """Design for this coverage, and cut the paths to each of some lengths, mm per layer."""
-        if not any(layer_tension(stress_on(layer, stress)).defined.any() for layer in layers):
-            largest = float(np.linalg.eigvalsh(stress.stress).max())
-            raise InputError(
-                "expected tension that fibre can carry; the largest tensile stress found is "
-                f"{largest:.3g} MPa, outweighed by compression: turn the load round"
-            )
+        _check_tension((stress,), layers)
         field = solved(stress, "stream_function")
         problem, group, found = self.designed(field, layers, machine)
-        extraction = _Extraction(self, problem, found, field, machine)
+        strained = ((1.0, found.objective.solution.displacement),)
+        extraction = self._extraction(problem, (found.field,), strained, machine)
         return extraction.plan(layers, group, [length * len(layers) for length in lengths])
+
+    def _extraction(
+        self,
+        problem: StreamProblem,
+        fields: Sequence[FloatArray],
+        strains_of: Sequence[tuple[float, FloatArray]],
+        machine: Machine,
+    ) -> Extraction:
+        """Paths along fields, each with a block of coefficients for every group."""
+        blocks = [
+            problem.signed(field, group) for field in fields for group in range(problem.groups)
+        ]
+        mesh, widths = problem.part.mesh, (self.inset, self.link_limit)
+        return Extraction(
+            tuple(blocks), problem.grid, mesh, strains_of, machine, self.phases, *widths
+        )
 
     def designed(
         self, stress: StressField, layers: Sequence[Layer], machine: Machine
     ) -> tuple[StreamProblem, IntArray, StreamDesign]:
         """Design the fields: the problem, the group of each layer, and the design."""
         part = SmearedPart.of(stress, layers[0].plane.frame)
-        linear = part.specimen.unreinforced
-        mesh = part.mesh
+        problem, group = self._problem((part,), layers, machine)
+        start = start_field(problem, stress, _middle_layers(layers, group), self.cap)
+        return problem, group, design(problem, start, self.evaluations)
+
+    def designed_for_cases(
+        self, cases: WeightedCases, layers: Sequence[Layer], machine: Machine, bounds: FloatArray
+    ) -> tuple[CasesProblem, IntArray, CasesDesign]:
+        """Design the fields of several cases: the problem, the group of each layer, the design.
+
+        `bounds` (n,) are the stiffness ratios that no paths exceed in each case alone.
+        """
+        parts = smeared_cases(cases.fields, layers[0].plane.frame)
+        alone, group = self._problem(parts, layers, machine)
+        shares = layer_counts(cases.weights, len(layers)) / len(layers)
+        problem = CasesProblem(alone, parts, cases.weights, bounds, shares)
+        chosen = _middle_layers(layers, group)
+        start = start_fields(problem, cases.fields, chosen, self.cap, self.tilt)
+        return problem, group, design_cases(problem, start, self.evaluations)
+
+    def _problem(
+        self, parts: Sequence[SmearedPart], layers: Sequence[Layer], machine: Machine
+    ) -> tuple[StreamProblem, IntArray]:
+        """Return the problem of one field on the part of the first case, and each layer's group."""
+        part, mesh = parts[0], parts[0].mesh
         centres = part.centroids @ part.frame[:2].T
         size = max(self.grid * machine.fibre_width, float(np.cbrt(6.0 * mesh.volumes.mean())))
+        stresses = [each.specimen.unreinforced.stress for each in parts]
         groups = self.groups
         if not groups:
-            alike = alike_share(part, linear.stress, size)
+            alike = min(alike_share(part, each, size) for each in stresses)
             groups = 1 if alike > _ALIKE else _MOST_GROUPS
         group = group_layers(layers, groups)
         corners = mesh.points[np.unique(mesh.corners)] @ part.frame[:2].T
         points = [corners, centres]
         for layer in layers:
-            points += [_refined(layer)[0], layer.plane.points[layer.triangles].mean(axis=1)]
-        energy = mesh.volumes * np.einsum("cij,cij->c", linear.stress, linear.stress)
+            points += [refined(layer)[0], layer.plane.points[layer.triangles].mean(axis=1)]
+        energies = [mesh.volumes * np.einsum("cij,cij->c", each, each) for each in stresses]
+        energy = energies[0]
+        if len(parts) > 1:
+            energy = np.sum([each / each.sum() for each in energies], axis=0)
         grid = SplineGrid.over(np.concatenate(points), *plane_axes(part, energy), size)
         capacity = fibre_capacity(part, layers, machine)
         problem = StreamProblem(
@@ -250,142 +298,92 @@ class StreamFunction:
             axial_stiffness=self.rho * part.modulus,
             budget=self.overfill * self.coverage * float(mesh.volumes @ capacity),
         )
-        chosen = [layers[_middle(np.flatnonzero(group == k))] for k in range(group.max() + 1)]
-        start = start_field(problem, stress, chosen, self.cap)
-        return problem, group, design(problem, start, self.evaluations)
+        return problem, group
+
+    def _cut_cases(
+        self,
+        cases: WeightedCases,
+        layers: Sequence[Layer],
+        machine: Machine,
+        lengths: Sequence[float],
+    ) -> list[Toolpaths]:
+        """Design for this coverage, and cut by tests of all cases to some lengths, mm per layer."""
+        _check_tension(cases.fields, layers)
+        in_all, strand = [length * len(layers) for length in lengths], Strand(self.rho)
+        bounds = single_bounds(cases, layers, max(in_all), machine, strand)
+        problem, group, found = self.designed_for_cases(cases, layers, machine, bounds)
+        counts = case_counts(cases.weights, bounds, found.objective.ratio, self.objective)
+        strained = [
+            (float(share) / one.work, one.displacement)
+            for share, one in zip(counts, found.objective.solution, strict=True)
+        ]
+        extraction = self._extraction(problem.problem, tuple(found.fields), strained, machine)
+        field = layers_by_case(cases.weights, layers) * problem.problem.groups + group
+        specimens = [part.specimen for part in problem.parts]
+        return [
+            prune_cases(
+                whole, specimens, cases.weights, bounds, length, machine, strand, self.objective
+            )
+            for (whole, _), length in zip(
+                extraction.whole(layers, field, in_all), in_all, strict=True
+            )
+        ]
+
+
+def _to_lengths(
+    strategy: StreamFunction,
+    layers: Sequence[Layer],
+    machine: Machine,
+    lengths: Sequence[float],
+    cut: Callable[[StreamFunction, Sequence[float]], list[Toolpaths]],
+) -> list[tuple[StreamFunction, LayerPlanner]]:
+    """Design for the largest of some lengths, and once more where that lays too little.
+
+    `cut` designs for the coverage of a strategy and cuts to each length, mm per layer.
+    """
+    full = full_length(layers, machine)
+    most = max(strategy.amount.most, strategy.coverage) * full
+    lengths = [min(length, most) for length in lengths]
+    longest = max(lengths)
+    short = [k for k, length in enumerate(lengths) if length < _NEAR * longest]
+    if short:
+        anew = _to_lengths(strategy, layers, machine, [lengths[k] for k in short], cut)
+        near = [length for length in lengths if length >= _NEAR * longest]
+        rest = iter(_to_lengths(strategy, layers, machine, near, cut))
+        of = dict(zip(short, anew, strict=True))
+        return [of[k] if k in of else next(rest) for k in range(len(lengths))]
+    told = replace(strategy, coverage=longest / full)
+    found = cut(told, lengths)
+    laid = max(float(paths.lengths.sum()) for paths in found) / len(layers)
+    if 0.0 < laid < _ENOUGH * longest and strategy.overfill * told.coverage < DENSEST:
+        more = replace(told, overfill=min(_MORE * longest / laid, 2.0) * strategy.overfill)
+        again = cut(more, lengths)
+        if max(float(paths.lengths.sum()) for paths in again) > laid * len(layers):
+            told, found = more, again
+    designed = told.overfill * told.coverage
+    return [
+        (_designed_for(told, length / full, designed), WholePart(paths))
+        for length, paths in zip(lengths, found, strict=True)
+    ]
+
+
+def _check_tension(stresses: Sequence[PartStress], layers: Sequence[Layer]) -> None:
+    """Refuse a part that is under tension nowhere, in no load case."""
+    for stress in stresses:
+        if any(layer_tension(stress_on(layer, stress)).defined.any() for layer in layers):
+            return
+    largest = max(float(np.linalg.eigvalsh(stress.stress).max()) for stress in stresses)
+    raise InputError(
+        "expected tension that fibre can carry; the largest tensile stress found is "
+        f"{largest:.3g} MPa, outweighed by compression: turn the load round"
+    )
+
+
+def _middle_layers(layers: Sequence[Layer], group: IntArray) -> list[Layer]:
+    """Return the middle layer of each group."""
+    return [layers[middle(np.flatnonzero(group == k))] for k in range(group.max() + 1)]
 
 
 def _designed_for(strategy: StreamFunction, coverage: float, designed: float) -> StreamFunction:
     """Strategy that lays a coverage of what is designed for another, overfill included."""
     return replace(strategy, coverage=coverage, overfill=max(designed / coverage, 1.0))
-
-
-def _middle(numbers: IntArray) -> int:
-    return int(numbers[len(numbers) // 2])
-
-
-@dataclass(frozen=True)
-class _Extraction:
-    """Paths from designed fields."""
-
-    strategy: StreamFunction
-    problem: StreamProblem
-    design: StreamDesign
-    stress: StressField
-    machine: Machine
-
-    def plan(
-        self, layers: Sequence[Layer], group: IntArray, lengths: Sequence[float]
-    ) -> list[Toolpaths]:
-        """Paths of all layers, cut to each of some lengths, mm in all."""
-        alike = _alike(layers, group, self.problem.width)
-        fields = [self.field(k) for k in range(self.problem.groups)]
-        drawn: dict[tuple[int, int], Toolpaths] = {}
-
-        def paths(number: int, phase: int) -> Toolpaths:
-            if (number, phase) not in drawn:
-                shift = (phase + 0.5) / self.strategy.phases
-                field = fields[group[number]]
-                drawn[number, phase] = self.layer_paths(layers[number], field, shift)
-            return drawn[number, phase]
-
-        tried = [
-            [self.profiles(paths(_middle(numbers), phase)) for phase in range(self.strategy.phases)]
-            for numbers in alike
-        ]
-        counts = [len(numbers) for numbers in alike]
-        chosen = [self.phases(tried, counts, length) for length in lengths]
-        planned: dict[tuple[int, ...], tuple[Toolpaths, list[Profile]]] = {}
-        for phases in chosen:
-            if phases not in planned:
-                of = {k: p for some, p in zip(alike, phases, strict=True) for k in some.tolist()}
-                whole = Toolpaths.concatenate([paths(k, of[k]) for k in range(len(layers))])
-                planned[phases] = whole, self.profiles(whole)
-        least = self.machine.minimum_length
-        return [
-            shorten(*planned[phases], length, least, _CUT_COST)
-            for phases, length in zip(chosen, lengths, strict=True)
-        ]
-
-    def phases(
-        self, tried: list[list[list[Profile]]], counts: Sequence[int], length: float
-    ) -> tuple[int, ...]:
-        """For each kind of layers the position of the levels that is worth most.
-
-        Parameters
-        ----------
-        tried : list of list of list of Profile
-            Of one layer of each kind at each position of the levels.
-        counts : sequence of int
-            Layers of each kind.
-        length : float, mm
-            Of all layers together.
-        """
-        minimum = self.machine.minimum_length
-        middle = [one[self.strategy.phases // 2] for one in tried]
-        along = [p for one, count in zip(middle, counts, strict=True) for p in count * one]
-        price = least_price(along, length, minimum, _CUT_COST) if along else 0.0
-
-        def gain(along: list[Profile]) -> float:
-            return sum(one.kept(price, minimum, _CUT_COST)[1] for one in along)
-
-        return tuple(int(np.argmax([gain(along) for along in one])) for one in tried)
-
-    def field(self, group: int) -> FloatArray:
-        """Coefficients of one field, with the sign that does not depend on the axes."""
-        count = len(self.problem.grid)
-        field = self.design.field[group * count : (group + 1) * count]
-        inside = self.problem.group == group
-        values = self.problem.grid.values(self.problem.centres[inside]) @ field
-        weight = self.problem.part.mesh.volumes[inside]
-        values = values - weight @ values / weight.sum()
-        return field if weight @ values**3 >= 0.0 else -field
-
-    def layer_paths(self, layer: Layer, field: FloatArray, shift: float) -> Toolpaths:
-        """Paths of one layer along unit levels, the first one `shift` above the lowest value."""
-        width, section = self.problem.width, layer.plane.polygon
-        points, triangles = _refined(layer)
-        values = self.problem.grid.values(points) @ field
-        curves = isocontours(points, triangles, values, float(values.min()) + shift, 1.0)
-        lines = keep_off_border(curves.lines(), section, self.strategy.inset * width)
-        lines = trim_to_clearance(lines, _CLEARANCE * width, _SHORTEST * width)
-        limit, least = self.strategy.link_limit * width, self.machine.minimum_length
-        radius = self.machine.minimum_radius
-        found = linked_paths(lines, section, width, limit, least, radius=radius)
-        return Toolpaths.from_plane(found.lines, layer, link=found.link)
-
-    def profiles(self, toolpaths: Toolpaths) -> list[Profile]:
-        """Value of the paths at the strains of the designed part."""
-        if not len(toolpaths):
-            return []
-        mesh = self.problem.part.mesh
-        strands = cut_strands(toolpaths, mesh)
-        displacement = self.design.objective.solution.displacement
-        strain = bars(strands, mesh).strain(displacement)
-        return profiles(toolpaths, strands, np.maximum(strain, 0.0) ** 2)
-
-
-def _alike(layers: Sequence[Layer], group: IntArray, width: float) -> list[IntArray]:
-    """Numbers of the layers of each kind: of one field, and of about the same section."""
-    kinds: list[list[int]] = []
-    borders = [shapely.boundary(layer.plane.polygon) for layer in layers]
-    for k, border in enumerate(borders):
-        for kind in kinds:
-            same = group[kind[0]] == group[k]
-            if same and shapely.hausdorff_distance(borders[kind[0]], border) < _SAME * width:
-                kind.append(k)
-                break
-        else:
-            kinds.append([k])
-    return [np.array(kind) for kind in kinds]
-
-
-def _refined(layer: Layer) -> tuple[FloatArray, IntArray]:
-    """Points (n, 2) and triangles (t, 3) of a layer, each triangle cut in four."""
-    points, corners = layer.plane.points, layer.triangles
-    edges, opposite = triangle_edges(corners)
-    a, b, c = corners.T
-    x, y, z = opposite.T + len(points)
-    four = [np.stack(three, axis=1) for three in ((a, z, y), (z, b, x), (y, x, c), (x, y, z))]
-    middle = 0.5 * (points[edges[:, 0]] + points[edges[:, 1]])
-    return np.concatenate([points, middle]), np.concatenate(four)

@@ -40,6 +40,7 @@ class Zigzag:
     turn: float = 90.0
 
     amount: ClassVar[Amount] = SPACING
+    ignores_stress: ClassVar[bool] = True
     in_plane: ClassVar[bool] = True
     direction: ClassVar[str] = "angle"
 

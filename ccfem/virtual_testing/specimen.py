@@ -66,24 +66,33 @@ class Specimen:
     @classmethod
     def _made(cls, unreinforced: StressField, backend: str) -> "Specimen":
         system = prepare(unreinforced.problem)
-        case = unreinforced.case
-        if system.held_in(case).value.any() and system.forces_in(case).any():
-            raise InputError(
-                f"load case '{case}' has forces and moving supports; a virtual test needs one or "
-                "the other: split it"
-            )
-        if any(isinstance(load, Temperature) for load in system.problem.loads_of(case)):
-            raise InputError(
-                f"load case '{case}' heats the part; a virtual test needs forces or moving "
-                "supports: leave the heat out"
-            )
-        held = system.held_in(case)
-        if not held.value.any() and not np.any(held.restrict(system.forces_in(case))):
-            raise InputError(
-                f"load case '{case}' acts on nodes only that the supports hold, so "
-                "nothing moves and no stiffness can be told: load another patch"
-            )
+        _check_case(system, unreinforced.case)
         return cls(unreinforced, system, system.assemble(), backend)
+
+    def under(self, other: StressField) -> "Specimen":
+        """Return the same part under another load case, with one factorisation.
+
+        Parameters
+        ----------
+        other : StressField
+            Without fibres, of the same mesh, material and supports.
+
+        Raises
+        ------
+        InputError
+            As `of`.
+        """
+        known = other.__dict__.setdefault("specimens", {})
+        if self.backend not in known:
+            same = other.problem is self.system.problem
+            system = self.system if same else prepare(other.problem)
+            _check_case(system, other.case)
+            made = Specimen(other, system, self.matrix, self.backend)
+            if np.array_equal(made.held.free, self.held.free):
+                made.__dict__["solver"] = self.solver
+            known[self.backend] = made
+        found: Specimen = known[self.backend]
+        return found
 
     @cached_property
     def solver(self) -> Solver:
@@ -143,3 +152,23 @@ class Specimen:
         """Displacement (n, 3), mm, that the supports ask for; zero elsewhere."""
         held = self.held
         return held.value if held.ties is None else held.ties.expand(held.value)
+
+
+def _check_case(system: System, case: str) -> None:
+    """Refuse a load case that no stiffness follows from."""
+    if system.held_in(case).value.any() and system.forces_in(case).any():
+        raise InputError(
+            f"load case '{case}' has forces and moving supports; a virtual test needs one or "
+            "the other: split it"
+        )
+    if any(isinstance(load, Temperature) for load in system.problem.loads_of(case)):
+        raise InputError(
+            f"load case '{case}' heats the part; a virtual test needs forces or moving "
+            "supports: leave the heat out"
+        )
+    held = system.held_in(case)
+    if not held.value.any() and not np.any(held.restrict(system.forces_in(case))):
+        raise InputError(
+            f"load case '{case}' acts on nodes only that the supports hold, so "
+            "nothing moves and no stiffness can be told: load another patch"
+        )

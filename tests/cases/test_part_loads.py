@@ -11,6 +11,7 @@ from ccfem.cases.before_meshing import check_before_meshing
 from ccfem.cases.part_file import read_part
 from ccfem.cases.part_loads import LOADS, SUPPORTS
 from ccfem.cases.part_regions import REGIONS
+from ccfem.cases.part_writing import part_text
 from ccfem.elasticity import (
     Bearing,
     BodyForce,
@@ -197,6 +198,13 @@ def test_loads_stretch_a_bar_as_they_should(folder):
     assert tip["both"] == pytest.approx(2 * tip["weight"] + 1.5 * tip["heat"])
 
 
+def test_weights_are_of_load_cases_and_combinations(folder):
+    path = folder / "weighted.toml"
+    path.write_text(PART + HELD + VOLUME + "[weights]\npush = 1.0\nboth = 0.5\n")
+    assert dict(read_part(path).weights) == {"push": 1.0, "both": 0.5}
+    assert "[weights]" in part_text(read_part(path), "body.npz")
+
+
 def test_regions_are_of_another_material(folder):
     """Two bars end to end: F L / E A of each."""
     regions = """
@@ -279,6 +287,10 @@ ALL = BOX.replace("9", "20")
             HELD + VOLUME + "[combinations.none]\n",
             "combinations.none must be a table of load cases",
         ),
+        (HELD + PULLED + "[weights]\npush = 1\n", "weights names no load case 'push'; there are"),
+        (HELD + PULLED + "[weights]\npull = -1\n", "weights.pull must be .*above 0; got -1"),
+        (HELD + PULLED + "[weights]\npull = nan\n", "weights.pull must be a finite number"),
+        (HELD + PULLED + "[weights]\npull = '1'\n", "weights.pull must be a finite number"),
         (HELD + PULLED + "[regions.a]\nrule = 'ball'\n", "regions.a must be a table with rule one"),
         (HELD + PULLED + BOX.replace('material = "pla"', ""), "regions.a needs the key 'material'"),
         (HELD + PULLED + BOX.replace('"pla"', '"pls"'), "no material named 'pls'"),

@@ -397,7 +397,7 @@ def test_bad_parts_end_in_one_line(ccfem, folder, text, message):
         (["gone.toml"], "part file gone.toml does not exist: check its name and folder"),
         (["lop"], "no case named 'lop'; there are: arm_bracket, bar, bracket, bridge, cantilever"),
         (["part.toml", "--strategies", "zigzag,spiral"], "no strategy named 'spiral'; there are:"),
-        (["lop"], r"twist_bar: did you mean 'loop'\? \(or name a part file"),
+        (["lop"], r"two_pull_loop: did you mean 'loop'\? \(or name a part file"),
         (["part.toml", "--strategies", "isocurv"], "zigzag: did you mean 'isocurve'"),
         (["part.toml", "--set", "zigzag.spacin=2"], "turn: did you mean 'spacing'"),
         (["part.toml", "--set", "zigzga.turn=2"], "contour_zigzag: did you mean 'zigzag'"),

@@ -5,6 +5,7 @@ import pytest
 
 from ccfem.elasticity.problem import Force, Problem, Support, Traction
 from ccfem.elasticity.solve import solve
+from ccfem.elasticity.weighted_cases import WeightedCases
 from ccfem.layers.slicing.planar import Planar
 from ccfem.materials import isotropic
 from ccfem.mesh.box import box_mesh
@@ -32,3 +33,26 @@ def bent_beam():
 @pytest.fixture
 def rng():
     return np.random.default_rng(7)
+
+
+@pytest.fixture(scope="session")
+def two_pulls():
+    """A square plate, 24 x 24 x 4 mm, without Poisson effect, pulled along x or along y."""
+    mesh = box_mesh((24.0, 24.0, 4.0), (8, 8, 2))
+    supports = (Support("x_min", "x"), Support("y_min", "y"), Support("z_min", "z"))
+    loads = {
+        "along_x": (Traction("x_max", (5.0, 0.0, 0.0)),),
+        "along_y": (Traction("y_max", (0.0, 2.0, 0.0)),),
+    }
+    problem = Problem(mesh, isotropic(3500.0, 0.0), supports, loads, order=1)
+    return WeightedCases.of(solve(problem, tolerance=1e-10)), Planar(count=4).cut(mesh)
+
+
+@pytest.fixture(scope="session")
+def two_bends():
+    """A beam, 60 x 24 x 4 mm, clamped at one end, its tip pushed sideways or pulled at a slant."""
+    mesh = box_mesh((60.0, 24.0, 4.0), (20, 8, 2))
+    loads = {"tip": (Force("x_max", (0, 50, 0)),), "slant": (Force("x_max", (300, -40, 0)),)}
+    problem = Problem(mesh, isotropic(3500.0, 0.35), (Support("x_min"),), loads, order=1)
+    fields = solve(problem, tolerance=1e-10)
+    return WeightedCases.of(fields, {"tip": 2.0, "slant": 1.0}), Planar(count=4).cut(mesh)

@@ -1,0 +1,100 @@
+"""Fibre for several load cases at once: three parts, each planned alone and together.
+
+    python -m benchmarks.studies.several_loads [PART ...] [--pictures DIR]
+
+Each part is planned by `stream_function` for every load case alone and for all at once, at equal
+length, and tested under every case. The share of the best single plan, worst case, is held against
+that of isocurves with layers by case and the same cut, and against the bound that no paths exceed.
+"""
+
+import sys
+import time
+from collections.abc import Mapping
+from pathlib import Path
+
+import numpy as np
+
+from ccfem.cases.named import create_case
+from ccfem.elasticity.solve import solve
+from ccfem.elasticity.weighted_cases import WeightedCases
+from ccfem.fibre_aware.cases_bound import cases_bound
+from ccfem.fibre_aware.plan_cases import plan_cases
+from ccfem.planning.equal_fibre import plan_to_length
+from ccfem.planning.whole_part import full_length
+from ccfem.strategies.isocurve import Isocurve
+from ccfem.strategies.stream_function import StreamFunction
+from ccfem.virtual_testing.several_cases import virtual_tests
+
+__all__ = ["PARTS", "compared"]
+
+COVERAGE = 0.45
+PARTS = {
+    "two_load_plate": ("two_load_plate", {}),
+    "two_load_plate, 3 cases": ("two_load_plate", {"both_ways": True}),
+    "two_pull_loop": ("two_pull_loop", {}),
+    "two_angle_bracket": ("two_angle_bracket", {}),
+}
+"""Cases with their parameters."""
+
+
+def compared(name: str, parameters: Mapping[str, object], pictures: Path | None) -> list[str]:
+    """Rows of the table for one part."""
+    case = create_case(name, **parameters)
+    cases = WeightedCases.of(solve(case.problem))
+    if len(cases) > 2:
+        name = f"{name}, {len(cases)} cases"
+    layers, machine = case.slicing(cases.fields[0], case.build, case.machine), case.machine
+    wanted = COVERAGE * full_length(layers, machine)
+    strategy = StreamFunction()
+    tested, spent = {}, {}
+    for field in cases.fields:
+        started = time.process_time()
+        planned = plan_to_length(strategy, layers, field, machine, wanted)
+        spent[f"for {field.case}"] = time.process_time() - started
+        tested[f"for {field.case}"] = virtual_tests(planned.toolpaths, cases, machine=machine)
+    best = np.array([found.ratios[k] for k, found in enumerate(tested.values())])
+    for what, one in {"isocurve": Isocurve(), "stream_function": strategy}.items():
+        started = time.process_time()
+        planned = plan_cases(one, layers, cases, machine, wanted)
+        spent[f"for all, {what}"] = time.process_time() - started
+        tested[f"for all, {what}"] = virtual_tests(planned.toolpaths, cases, machine=machine)
+        if pictures is not None:
+            for layer in range(2):
+                figure = planned.toolpaths.plot(layer=layer)
+                figure.savefig(pictures / f"{name}-{what}-{layer}.png", dpi=100)
+    bound = cases_bound(cases, layers, wanted * len(layers), machine)
+    alone = np.mean([spent[f"for {field.case}"] for field in cases.fields])
+    rows = []
+    for what, found in tested.items():
+        ratios = found.ratios
+        rows.append(
+            f"| {name} | {what} | {' / '.join(f'{r:.3f}' for r in ratios)} | "
+            f"{(ratios / best).min():.3f} | {bound.shares(ratios).min():.3f} | "
+            f"{bound.gap(ratios):.1%} | {spent[what] / alone:.1f} |"
+        )
+    singles = " / ".join(f"{r:.3f}" for r in bound.singles)
+    most = (bound.singles / best).min() / bound.least
+    rows.append(
+        f"| {name} | bound | {singles} | {most:.3f} at most | {1.0 / bound.least:.3f} at most "
+        f"| {bound.reached / bound.least - 1.0:.1%} of the density found | |"
+    )
+    return rows
+
+
+def main(arguments: list[str]) -> None:
+    """Print the table."""
+    pictures = None
+    if "--pictures" in arguments:
+        at = arguments.index("--pictures")
+        pictures = Path(arguments[at + 1])
+        pictures.mkdir(parents=True, exist_ok=True)
+        arguments = arguments[:at] + arguments[at + 2 :]
+    heads = "stiffness × by case | worst of best single | worst of bound | gap | time"
+    print(f"| part | planned | {heads} |")
+    print("|---|---|---|---|---|---|---|")
+    for name in arguments or PARTS:
+        print("\n".join(compared(*PARTS[name], pictures)), flush=True)
+
+
+if __name__ == "__main__":
+    main(sys.argv[1:])

@@ -1,0 +1,43 @@
+"""The load cases that a part is planned for at once, solved and weighted."""
+
+from collections.abc import Mapping
+
+from ccfem.cases.case import Case
+from ccfem.elasticity.stress_field import StressField
+from ccfem.elasticity.weighted_cases import WeightedCases
+from ccfem.errors import InputError
+
+__all__ = ["ALL_CASES", "asks_for_all", "weighted_cases"]
+
+ALL_CASES = "all"
+"""What asks for all load cases in place of the name of one."""
+
+
+def asks_for_all(case: Case, load_case: str | None) -> bool:
+    """Whether all load cases are asked for; a case of that name goes before."""
+    return load_case == ALL_CASES and ALL_CASES not in case.problem.cases
+
+
+def weighted_cases(case: Case, fields: Mapping[str, StressField]) -> WeightedCases:
+    """Cases that `Case.weights` names, with these weights; without, all but combinations alike.
+
+    Parameters
+    ----------
+    case : Case
+    fields : mapping of name to StressField
+        Of all its load cases.
+
+    Raises
+    ------
+    InputError
+        When there is only one.
+    """
+    weights = dict(case.weights) or dict.fromkeys(case.problem.loads, 1.0)
+    if len(weights) < 2:
+        known = ", ".join(weights) or "none"
+        what = "weights name" if case.weights else "it has"
+        raise InputError(
+            f"all load cases of '{case.name}' were asked for and {what} one ({known}): leave out "
+            "--load-case all, or give it another load case"
+        )
+    return WeightedCases.of(fields, weights)

@@ -1,0 +1,134 @@
+"""What is said of a comparison over several load cases: its verdict, its remarks, its table."""
+
+from collections.abc import Sequence
+
+import numpy as np
+
+from ccfem.comparison.ranking import merit, off_length, order_of, ranking
+from ccfem.comparison.runs import Run, Wanted
+from ccfem.elasticity.weighted_cases import WeightedCases
+from ccfem.fibre_aware.cases_bound import CasesBound
+from ccfem.virtual_testing.stiffer import FIRST, RESOLUTION, SAME
+
+__all__ = ["cases_remarks", "cases_rows", "cases_verdict"]
+
+
+def cases_verdict(runs: Sequence[Run], wanted: Wanted, bound: CasesBound | None) -> str:
+    """Say in one sentence which strategy serves all load cases best; empty for fewer than two.
+
+    Parameters
+    ----------
+    runs : sequence of Run
+    wanted : float, mm, InAll or None
+        Length of fibre that all were held to.
+    bound : CasesBound, optional
+    """
+    order = [
+        run
+        for run in ranking(runs, wanted)
+        if run.printable and not off_length(run, wanted) and np.isfinite(merit(run))
+    ]
+    if len(order) < 2:
+        return ""
+    first, found = order[0], [order_of(order[0], other) for other in order[1:]]
+    of = "of what any paths could make of that case alone" if bound is not None else "the stiffness"
+    reached = f"{merit(first):.0%} {of}" if bound is not None else f"{merit(first):.2f} times {of}"
+    if all(each == FIRST for each in found):
+        return (
+            f"{first.name} serves all load cases best: the worst of them reaches {reached}, "
+            f"{merit(first) / merit(order[1]):.2f} times {order[1].name} (predicted, fibres "
+            "carrying tension only; no other is better with bonded fibres)."
+        )
+    like = [run.name for run, each in zip(order[1:], found, strict=True) if each != FIRST]
+    if all(each in (FIRST, SAME) for each in found):
+        return (
+            f"No difference between {first.name} and {', '.join(like)} over all load cases: less "
+            f"than {RESOLUTION:.0%}, the resolution of the test."
+        )
+    return (
+        f"Undecided between {first.name} and {', '.join(like)} over all load cases: tension-only "
+        "and bonded fibres do not agree on an order."
+    )
+
+
+def cases_remarks(
+    runs: Sequence[Run],
+    wanted: Wanted,
+    cases: WeightedCases,
+    reference: str,
+    bound: CasesBound | None,
+    others: bool = False,
+) -> list[str]:
+    """Say which cases count how much, which one the other tables speak of, and what is possible.
+
+    Parameters
+    ----------
+    runs : sequence of Run
+    wanted : float, mm, InAll or None
+    cases : WeightedCases
+    reference : str
+        Name of the case that the other tables speak of.
+    bound : CasesBound, optional
+    others : bool
+        Whether the part has alternative supports.
+    """
+    said = ", ".join(f"{n} {w:.2g}" for n, w in zip(cases.names, cases.weights, strict=True))
+    found = [
+        f"planned for {len(cases)} load cases, by weight: {said}; stiffness, first failure and "
+        f"indices of stress in the first table are those of '{reference}'"
+    ]
+    if others:
+        found.append("alternative supports are not tested with several load cases")
+    tested = [
+        run
+        for run in ranking(runs, wanted)
+        if run.tested is not None and not off_length(run, wanted)
+    ]
+    if bound is None or not tested or tested[0].tested is None or tested[0].tested.cases is None:
+        return found
+    ratios = tested[0].tested.cases.tension.ratios
+    return [
+        *found,
+        f"no paths of this length bring the worst case above {1.0 / bound.least:.0%} of what is "
+        f"possible for it alone: {tested[0].name} reaches {bound.shares(ratios).min():.0%}, "
+        f"{bound.gap(ratios):.1%} from that bound (fibres carrying tension only)",
+    ]
+
+
+def cases_rows(runs: Sequence[Run]) -> tuple[list[str], list[tuple[str, list[str]]]]:
+    """Heads and rows of the table of load cases: every tested run, in the order given.
+
+    Returns
+    -------
+    list of str
+    list of (str, list of str)
+        Name of the run, and its cells.
+    """
+    tested = [
+        (run.name, run.tested.cases)
+        for run in runs
+        if run.tested is not None and run.tested.cases is not None
+    ]
+    if not tested:
+        return [], []
+    names = tested[0][1].names
+    heads = [f"stiffness × (of its bound), {name}" for name in names]
+    heads += ["worst of its bound", "above the bound of all", "first failure × load"]
+    rows = []
+    for name, found in tested:
+        values = found.values()
+        cells = []
+        for case in names:
+            share = values.get(f"share_of_bound[{case}]", np.nan)
+            own = f" ({share:.0%})" if np.isfinite(share) else ""
+            cells.append(f"{values[f'stiffness_ratio_tension[{case}]']:.2f}{own}")
+        cells.append(_percent(values.get("worst_share_of_bound", np.nan), 0))
+        cells.append(_percent(values.get("above_bound", np.nan), 1))
+        failure = found.failure
+        cells.append("–" if failure is None else f"{failure.factor:.2f} ({failure.case})")
+        rows.append((name, cells))
+    return heads, rows
+
+
+def _percent(value: float, digits: int) -> str:
+    return f"{value:.{digits}%}" if np.isfinite(value) else "–"

@@ -1,0 +1,97 @@
+"""One strategy's paths under all load cases: what the tests found, and how good that is."""
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+
+from ccfem.arrays import FloatArray, in_brief
+from ccfem.elasticity.weighted_cases import WeightedCases
+from ccfem.errors import InputError
+from ccfem.fibre_aware.cases_bound import CasesBound
+from ccfem.layers import Layer
+from ccfem.virtual_testing.equilibrium import BONDED
+from ccfem.virtual_testing.several_cases import (
+    CasesFailure,
+    CasesTest,
+    cases_failure,
+    specimens,
+    virtual_tests,
+)
+from ccfem.virtual_testing.strand import Strand
+from ccfem.virtual_testing.strands import Strands
+
+__all__ = ["TestedCases", "in_all_cases"]
+
+_TOLERANCE = 1e-6
+"""Relative residual of the tests: the error of the stiffness is of its square."""
+
+
+@dataclass(frozen=True)
+class TestedCases:
+    """Virtual tests of one strategy's paths under several load cases.
+
+    Attributes
+    ----------
+    tension, bonded : CasesTest
+        Fibres that carry tension only, and bonded fibres.
+    failure : CasesFailure or None
+        Of the tests in tension; None where a strength is unknown.
+    bound : CasesBound, optional
+        What no paths of the compared length exceed; None where there is no bound.
+    """
+
+    tension: CasesTest
+    bonded: CasesTest
+    failure: CasesFailure | None
+    bound: CasesBound | None = None
+
+    __repr__ = in_brief
+
+    @property
+    def names(self) -> tuple[str, ...]:
+        """Names of the cases."""
+        return self.tension.names
+
+    def shares(self, mode: str = "tension") -> FloatArray:
+        """Stiffness ratio of each case over its own bound, (n,); over 1 where there is none."""
+        ratios = (self.tension if mode == "tension" else self.bonded).ratios
+        return ratios if self.bound is None else self.bound.shares(ratios)
+
+    def merit(self, mode: str = "tension") -> float:
+        """Least share of all cases: what runs are ranked by."""
+        return float(self.shares(mode).min())
+
+    def values(self) -> dict[str, float]:
+        """Every value by its column; those of a case have its name in brackets."""
+        found: dict[str, float] = {}
+        for k, name in enumerate(self.names):
+            found[f"stiffness_ratio_tension[{name}]"] = float(self.tension.ratios[k])
+            found[f"stiffness_ratio_bonded[{name}]"] = float(self.bonded.ratios[k])
+            if self.bound is not None:
+                found[f"share_of_bound[{name}]"] = float(self.shares()[k])
+            if self.failure is not None:
+                found[f"first_failure_load[{name}]"] = self.failure.each[k].load
+                found[f"first_failure_factor[{name}]"] = self.failure.factors[k]
+        if self.bound is not None:
+            found["worst_share_of_bound"] = self.merit()
+            found["above_bound"] = self.bound.gap(self.tension.ratios)
+        if self.failure is not None:
+            found["first_failure_factor"] = self.failure.factor
+        return found
+
+
+def in_all_cases(
+    strands: Strands,
+    cases: WeightedCases,
+    strand: Strand,
+    layers: Sequence[Layer],
+) -> TestedCases:
+    """Test strands under all cases, in tension only and bonded."""
+    parts = specimens(cases)
+    tension = virtual_tests(strands, parts, strand, tolerance=_TOLERANCE)
+    near = [one.solution.displacement for one in tension.tests]
+    bonded = virtual_tests(strands, parts, strand, BONDED, known=near, tolerance=_TOLERANCE)
+    try:
+        failure = cases_failure(tension, strand, layers=layers)
+    except InputError:  # the strength of matrix or strand is unknown: `Tested.note` says so
+        failure = None
+    return TestedCases(tension, bonded, failure)

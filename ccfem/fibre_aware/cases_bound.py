@@ -1,0 +1,285 @@
+"""The stiffness that no fibre paths can exceed under several load cases at once.
+
+As `ccfem.fibre_aware.upper_bound`, for the compliances C_i of n cases with factors v_i. For any
+displacements u_i,
+
+    sum v_i C_i >= (sum v_i f_i.u_i)^2 / (sum v_i u_i.K u_i + EA S),
+
+where S is the most that fibre of that length can gather: the cells of the largest
+``max_t sum v_i max(t.eps_i t, 0)^2``, filled until the length is used. No principal direction is
+known for several strains: 360 angles are tried, with a margin for those between.
+
+What counts of a case is C_i over the least that any paths could make of it alone. The factors that
+raise the bound of the largest of these are found by growing those of the cases that are worst off;
+whatever they are, the bound holds.
+"""
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+
+import numpy as np
+from numba import njit
+from numpy.typing import ArrayLike
+
+from ccfem.arrays import FloatArray, freeze, in_brief
+from ccfem.checks import check_known, check_number
+from ccfem.elasticity.weighted_cases import WeightedCases
+from ccfem.fibre_aware.heights import fibre_capacity
+from ccfem.fibre_aware.smeared import SmearedPart, SmearedSolution, smeared_cases
+from ccfem.fibre_aware.upper_bound import criterion_step, upper_bound
+from ccfem.layers.layer import Layer
+from ccfem.machine.machine import Machine
+from ccfem.virtual_testing.strand import Strand
+
+__all__ = [
+    "OBJECTIVES",
+    "SUM",
+    "WORST",
+    "CasesBound",
+    "cases_bound",
+    "cases_certificate",
+    "largest_gathered",
+    "objective_value",
+    "single_bounds",
+]
+
+WORST, SUM = OBJECTIVES = ("worst", "sum")
+"""What is made small: the largest of ``bound_i / ratio_i``, or their weighted mean."""
+
+_SINGLE_ITERATIONS = 30
+"""Of the bounds of each case alone, at most."""
+_ANGLES = 12
+_CERTIFIED_ANGLES = 360
+_FULL_STEPS = 10
+"""Iterations after which the steps of the factors shrink."""
+_LEAST_PROGRESS = 2e-4
+_PATIENCE = 12
+"""The iterations stop when this many of them have not raised the bound by this share."""
+
+
+@dataclass(frozen=True)
+class CasesBound:
+    """How stiff a part can get under several load cases with fibre of some length.
+
+    Attributes
+    ----------
+    objective : str
+        "worst": the largest of ``singles / ratios``; "sum": their weighted mean.
+    singles : (n,) array
+        For each case alone the stiffness ratio that no paths exceed.
+    case_weights : (n,) array
+        Weights of the cases; their sum is 1.
+    least : float
+        Certified: no paths bring the objective below it.
+    reached : float
+        Objective of the best density found: the sharpest bound lies between the two.
+    factors : (n,) array
+        Of the cases that certify; their sum is 1.
+    """
+
+    objective: str
+    singles: FloatArray
+    case_weights: FloatArray
+    least: float
+    reached: float
+    factors: FloatArray
+
+    __repr__ = in_brief
+
+    def __post_init__(self) -> None:
+        freeze(self, singles=float, case_weights=float, factors=float)
+
+    def value(self, ratios: ArrayLike) -> float:
+        """Objective of a design with these stiffness ratios (n,)."""
+        return objective_value(self.singles / np.asarray(ratios), self.case_weights, self.objective)
+
+    def gap(self, ratios: ArrayLike) -> float:
+        """How far the objective of a design lies above what is certified; 0 is the best."""
+        return self.value(ratios) / self.least - 1.0
+
+    def shares(self, ratios: ArrayLike) -> FloatArray:
+        """Stiffness ratio of each case over its own bound."""
+        return np.asarray(ratios) / self.singles
+
+
+def objective_value(terms: FloatArray, weights: FloatArray, objective: str) -> float:
+    """Largest of the terms of the cases, or their weighted mean."""
+    return float(terms.max()) if objective == WORST else float(weights @ terms)
+
+
+def cases_bound(
+    cases: WeightedCases,
+    layers: Sequence[Layer],
+    length: float,
+    machine: Machine,
+    strand: Strand | None = None,
+    objective: str = WORST,
+    iterations: int = 60,
+) -> CasesBound:
+    """Bound the stiffness of a part with fibre under several load cases, in tension only.
+
+    Parameters
+    ----------
+    cases : WeightedCases
+    layers : sequence of Layer
+        All flat layers of the part; each carries at most one strand a width.
+    length : float, mm
+        Total length of fibre.
+    machine : Machine
+        Its strand width.
+    strand : Strand, optional
+        Stiffness of a strand; default rho = EA/E = 4 mm^2.
+    objective : {"worst", "sum"}
+    iterations : int, default 60
+        Maximum number, a solve a case each; at least 1. They stop where the bound no longer rises.
+
+    Raises
+    ------
+    InputError
+        As `upper_bound`, and for an unknown objective.
+    """
+    check_known("objective", objective, OBJECTIVES)
+    check_number("iterations", iterations, at_least=1)
+    check_number("number of layers", len(layers), at_least=1)
+    parts = smeared_cases(cases.fields, layers[0].plane.frame)
+    singles = single_bounds(cases, layers, length, machine, strand, _SINGLE_ITERATIONS)
+    axial = (Strand() if strand is None else strand).stiffness(parts[0].modulus)
+    most = fibre_capacity(parts[0], layers, machine)
+    volume = parts[0].mesh.volumes
+    length = min(length, float(volume @ most))
+    scale = singles / np.array([part.unreinforced.work for part in parts])
+
+    angles = np.pi * np.arange(_ANGLES) / _ANGLES
+    cosine, sine = np.cos(angles), np.sin(angles)
+    along = np.stack([cosine**2, sine**2, cosine * sine], axis=1)
+    outer = (along[:, :, None] * along[:, None, :]).reshape(_ANGLES, 9)
+    density = np.repeat((length / float(volume @ most) * most / _ANGLES)[:, None], _ANGLES, axis=1)
+    solutions: list[SmearedSolution | None] = [None] * len(cases)
+    factors, best = cases.weights, cases.weights
+    reached, bounds = np.inf, [0.0]
+    for k in range(iterations):
+
+        def fibre(strain: FloatArray, density: FloatArray = density) -> FloatArray:
+            carried = np.where(strain @ along.T > 0.0, density, 0.0)
+            return axial * (carried @ outer).reshape(-1, 3, 3)
+
+        found = [
+            part.solve(fibre, start, 1e-3) for part, start in zip(parts, solutions, strict=True)
+        ]
+        solutions = list(found)
+        terms = scale * np.array([one.work for one in found])
+        reached = min(reached, objective_value(terms, cases.weights, objective))
+        bounds.append(cases_certificate(parts, found, factors * scale, axial, most, length))
+        if bounds[-1] >= max(bounds):
+            best = factors
+        if max(bounds[-_PATIENCE:]) < (1.0 + _LEAST_PROGRESS) * max(bounds[:-_PATIENCE], default=0):
+            break
+        if objective == WORST:
+            factors = factors * (terms / terms.max()) ** min(1.0, _FULL_STEPS / (k + 1))
+            factors = factors / factors.sum()
+        stretch = np.sqrt(
+            sum(
+                v * np.maximum(one.strain @ along.T, 0.0) ** 2
+                for v, one in zip(factors * scale, found, strict=True)
+            )
+        )
+        density = criterion_step(density, stretch, volume, most, length)
+    return CasesBound(objective, singles, cases.weights, max(bounds), reached, best)
+
+
+def single_bounds(
+    cases: WeightedCases,
+    layers: Sequence[Layer],
+    length: float,
+    machine: Machine,
+    strand: Strand | None = None,
+    iterations: int = 7,
+) -> FloatArray:
+    """Stiffness ratio (n,) of each case alone that no paths exceed; parameters as `upper_bound`."""
+    smeared_cases(cases.fields, layers[0].plane.frame)  # one factorisation for all
+    found = (
+        upper_bound(field, layers, length, machine, strand, iterations=iterations)
+        for field in cases.fields
+    )
+    return np.array([one.ratio for one in found])
+
+
+def cases_certificate(
+    parts: Sequence[SmearedPart],
+    solutions: Sequence[SmearedSolution],
+    factors: FloatArray,
+    axial_stiffness: float,
+    most: FloatArray,
+    length: float,
+) -> float:
+    """Least ``sum of factor * compliance`` that displacements prove, whatever they are, N mm.
+
+    Parameters
+    ----------
+    parts : sequence of SmearedPart
+        One for each case; forces load them.
+    solutions : sequence of SmearedSolution
+        Any displacements that respect the supports, with their strains in the plane.
+    factors : (n,) array
+        Not negative.
+    axial_stiffness : float, N
+        EA of a strand.
+    most : (m,) array, mm/mm^3
+        Largest density of fibre in each cell.
+    length : float, mm
+        Of fibre.
+    """
+    strains = np.stack([one.strain for one in solutions])
+    square = largest_gathered(strains, np.asarray(factors, dtype=np.float64))
+    order = np.argsort(-square, kind="stable")
+    room = (parts[0].mesh.volumes * most)[order]
+    used = np.minimum(room, np.maximum(length - (np.cumsum(room) - room), 0.0))
+    energy, work = axial_stiffness * float(used @ square[order]), 0.0
+    for factor, part, one in zip(factors, parts, solutions, strict=True):
+        u, specimen = one.displacement.reshape(-1), part.specimen
+        energy += factor * float(u @ (specimen.matrix @ u))
+        work += factor * float(specimen.forces.reshape(-1) @ u)
+    return work**2 / energy
+
+
+def largest_gathered(strains: FloatArray, factors: FloatArray) -> FloatArray:
+    """Bound from above ``max over t of sum of factor * max(t.eps t, 0)^2`` in each cell, (m,).
+
+    Between two of the angles that are tried the sum, whose slope is zero where it is largest,
+    cannot rise by more than half its largest curvature times the square of half their distance.
+
+    Parameters
+    ----------
+    strains : (n, m, 3) array
+        Strains 11, 22 and 12 (engineering shear) in the plane, of each case.
+    factors : (n,) array
+        Not negative.
+    """
+    angles = np.pi * np.arange(_CERTIFIED_ANGLES) / _CERTIFIED_ANGLES
+    cosine, sine = np.cos(angles), np.sin(angles)
+    along = np.stack([cosine**2, sine**2, cosine * sine], axis=1)
+    half = 0.5 * np.pi / _CERTIFIED_ANGLES
+    result = np.empty(strains.shape[1])
+    _gathered(np.ascontiguousarray(strains), factors, along, 0.5 * half**2, result)
+    return result
+
+
+# The strain along t is a + b cos(2 angle - phase): its square bends down by at most 8 b (a + b).
+@njit(cache=True)
+def _gathered(strains, factors, along, margin, result):  # type: ignore[no-untyped-def]  # pragma: no cover
+    for c in range(strains.shape[1]):
+        bend = 0.0
+        for i in range(len(factors)):
+            e1, e2, e12 = strains[i, c, 0], strains[i, c, 1], strains[i, c, 2]
+            b = 0.5 * ((e1 - e2) ** 2 + e12 * e12) ** 0.5
+            bend += factors[i] * 8.0 * b * max(0.5 * (e1 + e2) + b, 0.0)
+        largest = 0.0
+        for k in range(len(along)):
+            total = 0.0
+            for i in range(len(factors)):
+                e = strains[i, c, 0] * along[k, 0] + strains[i, c, 1] * along[k, 1]
+                e += strains[i, c, 2] * along[k, 2]
+                if e > 0.0:
+                    total += factors[i] * e * e
+            largest = max(largest, total)
+        result[c] = largest + margin * bend

@@ -1,0 +1,193 @@
+"""Design of stream functions for several load cases: one field a case, all designed together.
+
+Field k is laid in a share of the layers, evenly over the height, so that every cell has the fibre
+of all fields. What each case makes of that fibre is one solve; L-BFGS moves all fields at once.
+"""
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+from functools import cached_property
+from typing import Any
+
+import numpy as np
+import scipy.sparse as sp
+
+from ccfem.arrays import FloatArray, freeze
+from ccfem.fibre_aware.smeared import SmearedPart, SmearedSolution
+from ccfem.fibre_aware.stream_design import OVER_BUDGET, StreamProblem, improved
+from ccfem.fibre_aware.stream_start import field_along, mixed_tension
+from ccfem.fields.layer_tension import layer_tension
+from ccfem.layers.layer import Layer
+from ccfem.layers.layer_stress import stress_on
+
+__all__ = ["CasesDesign", "CasesObjective", "CasesProblem", "design_cases", "start_fields"]
+
+
+@dataclass(frozen=True)
+class CasesObjective:
+    """The objective of several cases at some fields.
+
+    Attributes
+    ----------
+    value : float
+    gradient : (n * c,) array
+        With respect to the coefficients, field after field.
+    ratio : (n,) array
+        Stiffness of each case over that of the part without fibre.
+    length : float, mm
+        Of fibre.
+    solution : tuple of SmearedSolution
+        Of each case.
+    """
+
+    value: float
+    gradient: FloatArray
+    ratio: FloatArray
+    length: float
+    solution: tuple[SmearedSolution, ...]
+
+
+@dataclass(frozen=True)
+class CasesProblem:
+    """What fields for several cases are designed for.
+
+    Minimised is ``log(sum of w_i bound_i / ratio_i)`` plus the penalties of `StreamProblem`, those
+    of each field weighted by its share of the layers.
+
+    Attributes
+    ----------
+    problem : StreamProblem
+        Of each field alone; its part is that of the first case.
+    parts : tuple of SmearedPart
+        One for each case.
+    weights : (n,) array
+        Of the cases; their sum is 1.
+    bounds : (n,) array
+        Stiffness ratio of each case that no paths exceed.
+    shares : (n,) array
+        Of the layers, of each field; their sum is 1.
+    """
+
+    problem: StreamProblem
+    parts: tuple[SmearedPart, ...]
+    weights: FloatArray
+    bounds: FloatArray
+    shares: FloatArray
+
+    def __post_init__(self) -> None:
+        freeze(self, weights=float, bounds=float, shares=float)
+
+    @cached_property
+    def laplacian(self) -> Any:
+        """Graph Laplacian of all fields."""
+        return sp.block_diag(len(self.shares) * [self.problem.laplacian], format="csr")
+
+    def evaluate(
+        self,
+        field: FloatArray,
+        start: tuple[SmearedSolution, ...] | None = None,
+        tolerance: float = 1e-5,
+    ) -> CasesObjective:
+        """Evaluate the objective and its gradient.
+
+        Parameters
+        ----------
+        field : (n * c,) array
+            Coefficients, field after field.
+        start : tuple of SmearedSolution, optional
+            Where the solves start.
+        tolerance : float
+            Relative residual of the solves.
+        """
+        problem, fields = self.problem, field.reshape(len(self.shares), -1)
+        laid = [problem.laid(one) for one in fields]
+
+        def stiffness(strain: FloatArray) -> FloatArray:
+            parts = (
+                share * one.stiffness(strain) for share, one in zip(self.shares, laid, strict=True)
+            )
+            return sum(parts, np.zeros((len(strain), 3, 3)))
+
+        starts = start if start is not None else (None,) * len(self.parts)
+        found = tuple(
+            part.solve(stiffness, one, tolerance)
+            for part, one in zip(self.parts, starts, strict=True)
+        )
+        ratio = np.array(
+            [part.ratio(one.work) for part, one in zip(self.parts, found, strict=True)]
+        )
+        terms = self.weights * self.bounds / ratio
+        counts = terms / terms.sum()
+        length = sum(
+            share * problem.length(one) for share, one in zip(self.shares, laid, strict=True)
+        )
+        over = max(length / problem.budget - 1.0, 0.0)
+        value, gradient = float(np.log(terms.sum())) + OVER_BUDGET * over**2, []
+        for share, one, own in zip(self.shares, laid, fields, strict=True):
+            bend = problem.laplacian @ own
+            value += share * sum(problem.penalties(one, bend))
+            pulls = [problem.pull(one, solution) for solution in found]
+            pull = tuple(
+                np.einsum("i,im->m", counts, np.stack([each[axis] for each in pulls]))
+                for axis in (0, 1)
+            )
+            gradient.append(share * problem.gradient(one, bend, (pull[0], pull[1]), over))
+        return CasesObjective(value, np.concatenate(gradient), ratio, float(length), found)
+
+
+@dataclass(frozen=True)
+class CasesDesign:
+    """Designed fields of several cases.
+
+    Attributes
+    ----------
+    fields : (n, c) array
+        Coefficients of each field.
+    objective : CasesObjective
+        At these fields.
+    ratios : tuple of (n,) arrays
+        Stiffness ratios of the cases at every evaluation.
+    """
+
+    fields: FloatArray
+    objective: CasesObjective
+    ratios: tuple[FloatArray, ...]
+
+
+def design_cases(problem: CasesProblem, start: FloatArray, evaluations: int = 50) -> CasesDesign:
+    """Improve fields (n * c,) of several cases as `stream_design.design` does those of one."""
+    field, found, ratios = improved(problem, start, evaluations)
+    return CasesDesign(field.reshape(len(problem.shares), -1), found, ratios)
+
+
+def start_fields(
+    problem: CasesProblem, fields: Sequence[Any], layers: Sequence[Layer], cap: float, tilt: float
+) -> FloatArray:
+    """Fields (n * c,) to start with: each follows the tension of its own case most.
+
+    Field k follows ``sum over i of v_i s_i t_i t_i^T / sqrt(C_i)``, s_i the tension along t_i and
+    C_i the compliance without fibre, v_i the tilt for its own case and equal for the others.
+
+    Parameters
+    ----------
+    problem : CasesProblem
+    fields : sequence of StressField
+        Of the part without fibre, one for each case.
+    layers : sequence of Layer
+        One for each group of layers.
+    cap : float
+        As in `start_field`.
+    tilt : float in (0, 1]
+        Weight of a field's own case. At 1 the fields do not know of each other at the start; at
+        1 / n they start alike, and stay so.
+    """
+    count = len(fields)
+    tensions = [[layer_tension(stress_on(layer, field)) for field in fields] for layer in layers]
+    size = np.sqrt([part.unreinforced.work for part in problem.parts])
+    found = []
+    for k in range(count):
+        factors = np.full(count, (1.0 - tilt) / max(count - 1, 1))
+        factors[k] = tilt
+        own = [mixed_tension(each, factors / size) for each in tensions]
+        found.append(field_along(problem.problem, layers, own, cap))
+    return np.concatenate(found)

@@ -1,0 +1,137 @@
+"""Planning a part by any strategy for several load cases at once.
+
+A strategy that plans for all cases does so itself (`CasesStrategy`). Of any other that follows the
+stress, each layer is planned for one case, the layers of a case spread evenly over the height; more
+is planned than wanted, and tests under all cases say what to take off. What does not follow the
+stress is planned as it is.
+"""
+
+from collections.abc import Sequence
+
+import numpy as np
+
+from ccfem.elasticity.weighted_cases import WeightedCases
+from ccfem.errors import InputError
+from ccfem.fibre_aware.cases_bound import WORST, single_bounds
+from ccfem.fibre_aware.layer_shares import layers_by_case
+from ccfem.fibre_aware.prune_cases import prune_cases
+from ccfem.layers.layer import Layer
+from ccfem.machine.machine import Machine
+from ccfem.planning.equal_fibre import TOLERANCE, length_per_layer, plan_to_length
+from ccfem.planning.plan import check_layers, plan, plan_layers
+from ccfem.planning.planned import Planned
+from ccfem.planning.strategy import CasesStrategy, LengthStrategy, Strategy
+from ccfem.toolpaths import Toolpaths
+from ccfem.virtual_testing.several_cases import specimens
+from ccfem.virtual_testing.strand import Strand
+
+__all__ = ["plan_by_layers", "plan_cases"]
+
+_TOO_MUCH = 1.15
+"""Length that is planned over that kept."""
+
+_SLACK = 0.05
+"""Share by which less may be planned: it is found in fewer steps."""
+
+
+def plan_cases(
+    strategy: Strategy,
+    layers: Sequence[Layer],
+    cases: WeightedCases,
+    machine: Machine,
+    wanted: float | None = None,
+    strand: Strand | None = None,
+    objective: str = WORST,
+) -> Planned:
+    """Plan a part for several load cases.
+
+    Parameters
+    ----------
+    strategy : Strategy
+    layers : sequence of Layer
+        All flat layers of the part.
+    cases : WeightedCases
+    machine : Machine
+    wanted : float, mm, optional
+        Fibre per layer, mean over the stack; default what the strategy lays by itself, of which
+        nothing is taken off.
+    strand : Strand, optional
+        Of the tests; default rho = EA/E = 4 mm^2.
+    objective : {"worst", "sum"}
+        What the fibre is cut for, by strategies that do not say it themselves.
+
+    Raises
+    ------
+    InputError
+        Whatever the strategy raises; for curved layers.
+    """
+    check_layers(strategy, layers, machine)
+    if wanted is None and isinstance(strategy, LengthStrategy):
+        wanted = strategy.natural_length(layers, machine)
+    if isinstance(strategy, CasesStrategy) and wanted is not None:
+        told, planner = strategy.for_cases(cases, layers, machine, (wanted,))[0]
+        paths = plan_layers(planner, layers, layers, cases.fields[0], machine)
+        return _told(told, paths, layers, wanted)
+    if len(cases) == 1 or getattr(strategy, "ignores_stress", False):
+        field = cases.fields[int(np.argmax(cases.weights))]
+        if wanted is not None:
+            return plan_to_length(strategy, layers, field, machine, wanted)
+        paths = plan(strategy, layers, field, machine)
+        return Planned(strategy, paths, length_per_layer(paths, layers))
+    curved = [layer.index for layer in layers if layer.flat is None]
+    if curved:
+        raise InputError(
+            f"several load cases are planned for on flat layers only; layer {curved[0]} is curved: "
+            "choose a planar slicing, or one load case"
+        )
+    if wanted is None:
+        return _told(strategy, plan_by_layers(strategy, layers, cases, machine), layers)
+    too_much = plan_by_layers(strategy, layers, cases, machine, _TOO_MUCH * wanted)
+    in_all = wanted * len(layers)
+    bounds = single_bounds(cases, layers, in_all, machine, strand)
+    parts = specimens(cases)
+    paths = prune_cases(too_much, parts, cases.weights, bounds, in_all, machine, strand, objective)
+    return _told(strategy, paths, layers, wanted)
+
+
+def plan_by_layers(
+    strategy: Strategy,
+    layers: Sequence[Layer],
+    cases: WeightedCases,
+    machine: Machine,
+    length: float | None = None,
+) -> Toolpaths:
+    """Plan each layer for one case, by their weights, the cases taking turns over the height.
+
+    Parameters
+    ----------
+    strategy : Strategy
+    layers : sequence of Layer
+    cases : WeightedCases
+    machine : Machine
+    length : float, mm, optional
+        Per layer, met within 5 %; default the strategy's own.
+    """
+    case = layers_by_case(cases.weights, layers)
+    found = []
+    for k, field in enumerate(cases.fields):
+        own = [layer for layer, each in zip(layers, case, strict=True) if each == k]
+        if own and length is None:
+            found.append(plan(strategy, own, field, machine))
+        elif own and length is not None:
+            wanted = (1.0 + _SLACK) * length
+            planned = plan_to_length(strategy, own, field, machine, wanted, tolerance=_SLACK)
+            found.append(planned.toolpaths)
+    whole = Toolpaths.concatenate(found)
+    return Toolpaths.concatenate(whole.on_layer(layer.index) for layer in layers)
+
+
+def _told(
+    strategy: Strategy, toolpaths: Toolpaths, layers: Sequence[Layer], wanted: float | None = None
+) -> Planned:
+    """Plan with what has to be said of its length."""
+    length = length_per_layer(toolpaths, layers)
+    if wanted is None or length >= (1.0 - TOLERANCE) * wanted:
+        return Planned(strategy, toolpaths, length)
+    note = f"lays {length:.0f} of {wanted:.0f} mm per layer: its most for all load cases"
+    return Planned(strategy, toolpaths, length, note, reached=False)

@@ -1,0 +1,120 @@
+"""Taking fibre off where it carries least in all of several load cases.
+
+As `ccfem.fibre_aware.prune`: the paths are tested under every case, and what a piece is worth is
+the sum over the cases of ``s_i eps_i^2 / C_i``, the first-order change of the objective. How much a
+case counts, s_i, grows with its compliance over the least that any paths could make of it alone:
+where the worst case matters, with the twentieth power.
+"""
+
+from collections.abc import Sequence
+
+import numpy as np
+
+from ccfem.arrays import FloatArray
+from ccfem.checks import check_known, check_number
+from ccfem.fibre_aware.cases_bound import OBJECTIVES, WORST
+from ccfem.fibre_aware.prune import fibre_length, profiles, shorten
+from ccfem.machine.machine import Machine
+from ccfem.toolpaths import Toolpaths
+from ccfem.virtual_testing.equilibrium import equilibrium
+from ccfem.virtual_testing.specimen import Specimen
+from ccfem.virtual_testing.strand import Strand
+from ccfem.virtual_testing.strands import cut_strands
+
+__all__ = ["case_counts", "prune_cases"]
+
+_POWERS = {WORST: 20.0, "sum": 1.0}
+_TOLERANCE = 1e-5
+
+
+def case_counts(
+    weights: FloatArray, bounds: FloatArray, ratios: FloatArray, objective: str
+) -> FloatArray:
+    """How much each case counts, (n,): the sum is 1.
+
+    Parameters
+    ----------
+    weights : (n,) array
+        Of the cases.
+    bounds, ratios : (n,) array
+        Stiffness ratio that no paths exceed in each case alone, and that of the paths.
+    objective : {"worst", "sum"}
+    """
+    terms = np.asarray(bounds) / np.asarray(ratios)
+    counts = weights * (terms / terms.max()) ** _POWERS[objective]
+    return np.asarray(counts / counts.sum())
+
+
+def prune_cases(
+    toolpaths: Toolpaths,
+    parts: Sequence[Specimen],
+    weights: FloatArray,
+    bounds: FloatArray,
+    length: float,
+    machine: Machine,
+    strand: Strand | None = None,
+    objective: str = WORST,
+    rounds: int = 3,
+) -> Toolpaths:
+    """Take off the fibre that is least worth in all load cases, until a wanted length is left.
+
+    Each round tests the part under every case, with fibres that carry tension only, and takes off
+    an equal part of the excess.
+
+    Parameters
+    ----------
+    toolpaths : Toolpaths
+    parts : sequence of Specimen
+        The part without fibre under each case.
+    weights : (n,) array
+        Of the cases.
+    bounds : (n,) array
+        Stiffness ratio of each case that no paths exceed.
+    length : float, mm
+        Largest total length of fibre that remains.
+    machine, strand
+        As in `prune`.
+    objective : {"worst", "sum"}
+    rounds : int, default 3
+        Tests under every case, at least 1.
+
+    Returns
+    -------
+    Toolpaths
+        The given ones where they are short enough.
+
+    Raises
+    ------
+    InputError
+        When the length is not positive, `rounds` is below 1, or for an unknown objective.
+    """
+    check_number("length of fibre", length, above=0.0, unit="mm")
+    check_number("rounds", rounds, at_least=1)
+    check_known("objective", objective, OBJECTIVES)
+    excess = fibre_length(toolpaths) - length
+    if excess <= 0.0:
+        return toolpaths
+    axial = (Strand() if strand is None else strand).stiffness(parts[0].modulus)
+    known: list[tuple[FloatArray, ...]] = [()] * len(parts)
+    for k in range(rounds):
+        strands = cut_strands(toolpaths, parts[0].unreinforced.mesh)
+        found = [
+            equilibrium(part, strands, axial, known=near, tolerance=_TOLERANCE)
+            for part, near in zip(parts, known, strict=True)
+        ]
+        known = [(one.displacement,) for one in found]
+        work = np.array(
+            [
+                float(np.vdot(part.forces, one.displacement))
+                for part, one in zip(parts, found, strict=True)
+            ]
+        )
+        before = np.array([2.0 * part.unreinforced.strain_energy for part in parts])
+        counts = case_counts(weights, bounds, before / work, objective)
+        value = np.zeros(len(strands.length))
+        for share, one in zip(counts / work, found, strict=True):
+            value += share * np.where(one.carries, one.strain, 0.0) ** 2
+        wanted = length + excess * (1.0 - (k + 1) / rounds)
+        along = profiles(toolpaths, strands, value)
+        toolpaths = shorten(toolpaths, along, wanted, machine.minimum_length)
+    return toolpaths

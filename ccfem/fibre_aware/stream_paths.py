@@ -1,0 +1,192 @@
+"""Paths along the levels of designed fields, the stretches worth most kept."""
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+
+import numpy as np
+import shapely
+
+from ccfem.arrays import FloatArray, IntArray
+from ccfem.fibre_aware.prune import Profile, least_price, profiles, shorten
+from ccfem.fibre_aware.spline_grid import SplineGrid
+from ccfem.geometry.isocontours import isocontours, triangle_edges
+from ccfem.layers.layer import Layer
+from ccfem.linking.clearance import trim_to_clearance
+from ccfem.linking.finishing import keep_off_border, linked_paths
+from ccfem.machine.machine import Machine
+from ccfem.mesh.tet_mesh import TetMesh
+from ccfem.toolpaths import Toolpaths
+from ccfem.virtual_testing.bars import bars
+from ccfem.virtual_testing.strands import cut_strands
+
+__all__ = ["Extraction", "middle", "refined"]
+
+_CLEARANCE = 0.95
+"""Least distance of strands in widths: they are designed to be 1 / 0.975 apart, and what is cut for
+a hundredth of a width would be lost."""
+
+_SHORTEST = 5.0
+"""Length, in strand widths, of the shortest pieces that are kept for linking."""
+
+_CUT_COST = 20.0
+"""Length, mm, of the least valuable fibre that another cut has to save."""
+
+_SAME = 0.5
+"""Distance, in strand widths, up to which the borders of two sections count as the same: the levels
+that are best for one layer are then taken for the other."""
+
+
+def middle(numbers: IntArray) -> int:
+    """Return the middle one of some numbers."""
+    return int(numbers[len(numbers) // 2])
+
+
+@dataclass(frozen=True)
+class Extraction:
+    """Paths from designed fields.
+
+    Attributes
+    ----------
+    fields : tuple of (c,) arrays
+        Coefficients of the fields on the grid; unit levels are paths.
+    grid : SplineGrid
+    mesh : TetMesh
+        Of linear cells.
+    strains_of : sequence of (float, (n, 3) array)
+        What a squared strain is worth, and the displacement, mm, that strains the paths; one for
+        each load case.
+    machine : Machine
+    phases : int
+        Positions of the levels of which the best is taken, for all layers of the same section.
+    inset, link_limit : float
+        Least distance from the boundary, and of ends that are linked, in strand widths.
+    """
+
+    fields: tuple[FloatArray, ...]
+    grid: SplineGrid
+    mesh: TetMesh
+    strains_of: Sequence[tuple[float, FloatArray]]
+    machine: Machine
+    phases: int
+    inset: float
+    link_limit: float
+
+    def plan(
+        self, layers: Sequence[Layer], group: IntArray, lengths: Sequence[float]
+    ) -> list[Toolpaths]:
+        """Paths of all layers, cut to each of some lengths, mm in all.
+
+        Parameters
+        ----------
+        layers : sequence of Layer
+        group : (layers,) int array
+            Number of the field of each layer.
+        lengths : sequence of float, mm
+        """
+        least = self.machine.minimum_length
+        return [
+            shorten(*whole, length, least, _CUT_COST)
+            for whole, length in zip(self.whole(layers, group, lengths), lengths, strict=True)
+        ]
+
+    def whole(
+        self, layers: Sequence[Layer], group: IntArray, lengths: Sequence[float]
+    ) -> list[tuple[Toolpaths, list[Profile]]]:
+        """Paths of all layers with their profiles, at the levels that are best for each length."""
+        alike = _alike(layers, group, self.machine.fibre_width)
+        drawn: dict[tuple[int, int], Toolpaths] = {}
+
+        def paths(number: int, phase: int) -> Toolpaths:
+            if (number, phase) not in drawn:
+                shift = (phase + 0.5) / self.phases
+                field = self.fields[group[number]]
+                drawn[number, phase] = self.layer_paths(layers[number], field, shift)
+            return drawn[number, phase]
+
+        tried = [
+            [self.profiles(paths(middle(numbers), phase)) for phase in range(self.phases)]
+            for numbers in alike
+        ]
+        counts = [len(numbers) for numbers in alike]
+        chosen = [self.best_phases(tried, counts, length) for length in lengths]
+        planned: dict[tuple[int, ...], tuple[Toolpaths, list[Profile]]] = {}
+        for phases in chosen:
+            if phases not in planned:
+                of = {k: p for some, p in zip(alike, phases, strict=True) for k in some.tolist()}
+                whole = Toolpaths.concatenate([paths(k, of[k]) for k in range(len(layers))])
+                planned[phases] = whole, self.profiles(whole)
+        return [planned[phases] for phases in chosen]
+
+    def best_phases(
+        self, tried: list[list[list[Profile]]], counts: Sequence[int], length: float
+    ) -> tuple[int, ...]:
+        """For each kind of layers the position of the levels that is worth most.
+
+        Parameters
+        ----------
+        tried : list of list of list of Profile
+            Of one layer of each kind at each position of the levels.
+        counts : sequence of int
+            Layers of each kind.
+        length : float, mm
+            Of all layers together.
+        """
+        minimum = self.machine.minimum_length
+        central = [one[self.phases // 2] for one in tried]
+        along = [p for one, count in zip(central, counts, strict=True) for p in count * one]
+        price = least_price(along, length, minimum, _CUT_COST) if along else 0.0
+
+        def gain(along: list[Profile]) -> float:
+            return sum(one.kept(price, minimum, _CUT_COST)[1] for one in along)
+
+        return tuple(int(np.argmax([gain(along) for along in one])) for one in tried)
+
+    def layer_paths(self, layer: Layer, field: FloatArray, shift: float) -> Toolpaths:
+        """Paths of one layer along unit levels, the first one `shift` above the lowest value."""
+        width, section = self.machine.fibre_width, layer.plane.polygon
+        points, triangles = refined(layer)
+        values = self.grid.values(points) @ field
+        curves = isocontours(points, triangles, values, float(values.min()) + shift, 1.0)
+        lines = keep_off_border(curves.lines(), section, self.inset * width)
+        lines = trim_to_clearance(lines, _CLEARANCE * width, _SHORTEST * width)
+        limit, least = self.link_limit * width, self.machine.minimum_length
+        radius = self.machine.minimum_radius
+        found = linked_paths(lines, section, width, limit, least, radius=radius)
+        return Toolpaths.from_plane(found.lines, layer, link=found.link)
+
+    def profiles(self, toolpaths: Toolpaths) -> list[Profile]:
+        """Value of the paths at the strains of the designed part."""
+        if not len(toolpaths):
+            return []
+        strands = cut_strands(toolpaths, self.mesh)
+        pieces = bars(strands, self.mesh)
+        value = np.zeros(len(strands.length))
+        for worth, displacement in self.strains_of:
+            value += worth * np.maximum(pieces.strain(displacement), 0.0) ** 2
+        return profiles(toolpaths, strands, value)
+
+
+def _alike(layers: Sequence[Layer], group: IntArray, width: float) -> list[IntArray]:
+    """Numbers of the layers of each kind: of one field, and of about the same section."""
+    kinds: list[list[int]] = []
+    borders = [shapely.boundary(layer.plane.polygon) for layer in layers]
+    for k, border in enumerate(borders):
+        for kind in kinds:
+            same = group[kind[0]] == group[k]
+            if same and shapely.hausdorff_distance(borders[kind[0]], border) < _SAME * width:
+                kind.append(k)
+                break
+        else:
+            kinds.append([k])
+    return [np.array(kind) for kind in kinds]
+
+
+def refined(layer: Layer) -> tuple[FloatArray, IntArray]:
+    """Points (n, 2) and triangles (t, 3) of a layer, each triangle cut in four."""
+    points, corners = layer.plane.points, layer.triangles
+    edges, opposite = triangle_edges(corners)
+    a, b, c = corners.T
+    x, y, z = opposite.T + len(points)
+    four = [np.stack(three, axis=1) for three in ((a, z, y), (z, b, x), (y, x, c), (x, y, z))]
+    middle = 0.5 * (points[edges[:, 0]] + points[edges[:, 1]])
+    return np.concatenate([points, middle]), np.concatenate(four)

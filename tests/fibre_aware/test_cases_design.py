@@ -1,0 +1,109 @@
+import numpy as np
+import pytest
+
+from ccfem.fibre_aware.cases_design import CasesProblem, design_cases, start_fields
+from ccfem.fibre_aware.heights import fibre_capacity
+from ccfem.fibre_aware.layer_shares import layer_counts, layers_by_case
+from ccfem.fibre_aware.smeared import smeared_cases
+from ccfem.fibre_aware.spline_grid import SplineGrid
+from ccfem.fibre_aware.stream_design import StreamProblem
+from ccfem.fibre_aware.stream_start import mixed_tension
+from ccfem.fields.tensile import Tension
+from ccfem.layers.slicing.planar import Planar
+from ccfem.machine import Machine
+from ccfem.mesh.box import box_mesh
+
+MACHINE = Machine()
+
+
+def problem_of(cases, layers, shares, size=3.0, coverage=0.4):
+    parts = smeared_cases(cases.fields, layers[0].plane.frame)
+    centres = parts[0].centroids @ parts[0].frame[:2].T
+    capacity = fibre_capacity(parts[0], layers, MACHINE)
+    alone = StreamProblem(
+        part=parts[0],
+        grid=SplineGrid.over(centres, centres.mean(axis=0), np.eye(2), size),
+        group=np.zeros(len(centres), dtype=np.int64),
+        centres=centres,
+        capacity=capacity,
+        width=MACHINE.fibre_width,
+        axial_stiffness=4.0 * parts[0].modulus,
+        budget=coverage * float(parts[0].mesh.volumes @ capacity),
+    )
+    return CasesProblem(alone, parts, cases.weights, np.array([2.0, 3.0]), np.array(shares))
+
+
+@pytest.mark.parametrize("scale", [0.7, 1.6])
+def test_gradient_agrees_with_finite_differences(two_bends, rng, scale):
+    # Scale 1.6: over budget and steeper than allowed, so that every penalty takes part.
+    cases, layers = two_bends
+    problem = problem_of(cases, layers, [0.25, 0.75])
+    field = scale * start_fields(problem, cases.fields, layers[:1], 90.0, 0.75)
+    found = problem.evaluate(field, tolerance=1e-12)
+    smooth = np.linalg.inv(np.eye(len(field)) + 4.0 * problem.laplacian.toarray())
+    direction = smooth @ rng.standard_normal(len(field))
+    step = 1e-4
+    ends = [
+        problem.evaluate(field + sign * step * direction, found.solution, 1e-12).value
+        for sign in (1.0, -1.0)
+    ]
+    assert found.gradient @ direction == pytest.approx((ends[0] - ends[1]) / (2.0 * step), rel=1e-5)
+
+
+def test_fields_of_their_own_case_stiffen_a_plate_by_their_share(two_pulls):
+    # Strands 2 mm apart along x in one half of the layers and along y in the other, no Poisson
+    # effect: each case gains rho / (2 * 2 mm * thickness).
+    cases, layers = two_pulls
+    problem = problem_of(cases, layers, [0.5, 0.5])
+    values = problem.problem.grid.values(problem.problem.centres).toarray()
+    centres = problem.problem.centres
+    fields = [np.linalg.lstsq(values, 0.5 * centres[:, k], rcond=None)[0] for k in (1, 0)]
+    found = problem.evaluate(np.concatenate(fields), tolerance=1e-9)
+    exact = 1.0 + 4.0 * 0.5 * 0.5 / layers[0].thickness
+    np.testing.assert_allclose(found.ratio, exact, rtol=2e-3)
+    assert found.length == pytest.approx(0.5 * 24.0 * 24.0 * len(layers), rel=0.04)
+
+
+def test_design_helps_both_cases(two_bends):
+    cases, layers = two_bends
+    problem = problem_of(cases, layers, [0.5, 0.5])
+    start = start_fields(problem, cases.fields, layers[:1], 90.0, 0.75)
+    before = problem.evaluate(start)
+    found = design_cases(problem, start, evaluations=12)
+    assert found.objective.value < before.value - 0.01
+    assert (found.objective.ratio > 1.1).all()
+    assert found.fields.shape == (2, len(problem.problem.grid))
+
+
+def test_mixed_tension_of_two_cases_at_right_angles():
+    # 3 along x and 1 along y: along x with 3; equal ones at 45 degrees to each other: between them.
+    x = Tension(np.array([[1.0, 0.0]] * 2), np.array([3.0, 1.0]), np.array([True, True]))
+    y = Tension(np.array([[0.0, 1.0], [0.0, 1.0]]), np.array([1.0, 1.0]), np.array([True, False]))
+    slant = Tension(np.sqrt(0.5) * np.ones((2, 2)), np.ones(2), np.ones(2, dtype=bool))
+    found = mixed_tension([x, y], np.array([1.0, 1.0]))
+    np.testing.assert_allclose(np.abs(found.direction[:, 0]), 1.0)
+    np.testing.assert_allclose(found.stress, [3.0, 1.0])
+    between = mixed_tension([x, slant], np.array([0.5, 0.5])).direction[1]
+    assert np.degrees(np.arctan2(between[1], between[0])) % 180.0 == pytest.approx(22.5)
+
+
+@pytest.mark.parametrize(
+    ("weights", "count", "expected"),
+    [
+        ([1.0, 1.0], 8, [4, 4]),
+        ([1.0, 1.0, 1.0], 8, [3, 3, 2]),
+        ([1.0, 0.5], 12, [8, 4]),
+        ([5.0, 3.0, 1.0], 10, [6, 3, 1]),
+        ([1.0, 1.0], 1, [1, 0]),
+    ],
+)
+def test_layers_by_largest_remainder(weights, count, expected):
+    np.testing.assert_array_equal(layer_counts(np.array(weights), count), expected)
+
+
+def test_layers_take_turns_over_the_height():
+    layers = Planar(count=12).cut(box_mesh((8.0, 8.0, 12.0), (2, 2, 2)))
+    assert "".join("ab"[k] for k in layers_by_case(np.array([1.0, 1.0]), layers)) == "ab" * 6
+    assert "".join("ab"[k] for k in layers_by_case(np.array([2.0, 1.0]), layers)) == "aba" * 4
+    turned = layers_by_case(np.array([1.0, 1.0]), layers[::-1])
+    assert "".join("ab"[k] for k in turned) == "ba" * 6
