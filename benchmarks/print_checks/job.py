@@ -36,6 +36,8 @@ class Job:
         What was planned, on the bed; Z is the middle of the fibre layer.
     section : callable
         Section of the part on the bed at a height over it, a shapely geometry.
+    area : callable
+        Its area, mm^2.
     volume : float, mm^3
         Of the part.
     bent : float
@@ -49,6 +51,7 @@ class Job:
     text: str
     strands: list[np.ndarray]
     section: Callable[[float], Any]
+    area: Callable[[float], float]
     volume: float
     bent: float = 1.01
     done: Run = field(init=False)
@@ -70,6 +73,13 @@ class Job:
 
 class Lines:
     """Steps of a run as arrays, those of them that lay something in `lays`."""
+
+    @classmethod
+    def of(cls, run: Run) -> "Lines":
+        """Those of a run, made once."""
+        if run.lines is None:
+            run.lines = cls(run.steps)
+        return run.lines
 
     def __init__(self, steps: list[Step]) -> None:
         self.start = np.array([step.start for step in steps]).reshape(-1, 3)

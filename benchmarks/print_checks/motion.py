@@ -73,7 +73,7 @@ def speeds(job: Job, run: Run) -> list[str]:
 def travel(job: Job, run: Run) -> list[str]:
     """Above all that is laid, this layer's lines included, and never with fibre that is not cut."""
     wrong, lift = [], job.machine.gcode.lift
-    lines, area = Lines(run.steps), HeightMap(job.machine.gcode.bed)
+    lines, area = Lines.of(run), HeightMap(job.machine.gcode.bed)
     across = np.abs(lines.end - lines.start)[:, :2].max(axis=1) > 0.0
     moved = lines.rapid & across
     moved[:2] = False
@@ -106,7 +106,7 @@ def travel(job: Job, run: Run) -> list[str]:
 
 def free_fibre(job: Job, run: Run) -> tuple[float, list[tuple[float, float]]]:
     """Share of the fibre with nothing below it; length and turn, degrees, of each run of it."""
-    lines = Lines(run.steps)
+    lines = Lines.of(run)
     layer, area = job.machine.strand_height, HeightMap(job.machine.gcode.bed)
     fibre = lines.lays & (lines.tool == 1)
     height = lines.end[:, 2].round(3)
@@ -157,7 +157,7 @@ def support(job: Job, run: Run) -> list[str]:
 
 def bed(job: Job, run: Run) -> list[str]:
     """Both nozzles over the bed wherever either of them works."""
-    lines, profile = Lines(run.steps), job.machine.gcode
+    lines, profile = Lines.of(run), job.machine.gcode
     low, high = lines.end[2:].min(axis=0), lines.end[2:].max(axis=0)
     fibre = lines.end[lines.tool == 1] - [*profile.offset[:2], 0.0]
     if len(fibre):

@@ -1,14 +1,13 @@
 """Parts that are printed on paper: three cases and a plate from a part file."""
 
 import time
-from collections.abc import Callable, Sequence
+from collections.abc import Sequence
 from dataclasses import dataclass
 
 import numpy as np
-import shapely
 
 from benchmarks.print_checks.job import Job
-from benchmarks.print_checks.sections import section_of
+from benchmarks.print_checks.sections import Sections
 from ccfem.cases import Case, create_case
 from ccfem.cases.part_file import read_part
 from ccfem.elasticity import solve
@@ -17,7 +16,6 @@ from ccfem.export.gcode import gcode
 from ccfem.inspection.beginning import examples
 from ccfem.layers.layer import Layer
 from ccfem.layers.plane import plane_frame
-from ccfem.layers.slicing.planar import Planar
 from ccfem.machine import machine_table, updated
 from ccfem.mesh.tet_mesh import TetMesh
 from ccfem.planning import plan
@@ -25,14 +23,12 @@ from ccfem.printing.print_plan import plan_print
 from ccfem.strategies import create
 from ccfem.toolpaths import Toolpaths
 
-__all__ = ["PARTS", "Part", "job_of", "section_on_bed"]
+__all__ = ["PARTS", "Part", "job_of", "on_bed"]
 
 PARTS = {"loop": "isocurve", "bridge": "svt", "bracket": "svt", "plate": "svt"}
 """Strategy for each part."""
-LAYERS = {("bridge", "aura_like"): 1}
-"""Fewer layers than the case has: 1 mm has no room for two of strands .2 mm high that cross."""
 
-_BENT = 1.1
+_BENT = 1.01
 """How much faster a strand may be in a turn than the check's own radius allows (`Job.bent`)."""
 
 
@@ -51,11 +47,9 @@ class Part:
         stress = solve(case.problem)
         return cls(case, name, stress[case.problem.cases[0]])
 
-    def layers(self, machine: str) -> Sequence[Layer]:
-        """Layers of the case, or as many as a machine has room for."""
-        count = LAYERS.get((self.name, machine))
-        slicer = self.case.slicing if count is None else Planar(count=count)
-        return slicer(self.stress, self.case.build, self.case.machine)
+    def layers(self) -> Sequence[Layer]:
+        """Layers of the case."""
+        return self.case.fibre_layers(self.stress)
 
 
 def _plate() -> Case:
@@ -72,7 +66,7 @@ def job_of(part: Part, machine_name: str) -> tuple[Job, dict[str, float]]:
     """Plan a part for a machine, write its file and follow it; seconds of each."""
     case = part.case
     machine, mesh = updated(case.machine, machine_table(machine_name)), case.problem.mesh
-    chosen, layers = PARTS[part.name], part.layers(machine_name)
+    chosen, layers = PARTS[part.name], part.layers()
     began = time.process_time()
     strategy = create(chosen, dict(case.parameters.get(chosen, {})))
     paths = plan(strategy, layers, part.stress, machine)
@@ -80,30 +74,29 @@ def job_of(part: Part, machine_name: str) -> tuple[Job, dict[str, float]]:
     printed = plan_print(paths, layers, mesh, machine)
     text = gcode(printed, machine)
     written = time.process_time()
-    strands, section = section_on_bed(paths, mesh, case.build, machine.gcode.bed)
+    strands, sections = on_bed(paths, mesh, case.build, machine.gcode.bed)
     job = Job(
-        machine_name, machine, printed, text, strands, section, float(mesh.volumes.sum()), _BENT
+        machine_name,
+        machine,
+        printed,
+        text,
+        strands,
+        sections.region,
+        sections.area,
+        float(mesh.volumes.sum()),
+        _BENT,
     )
     followed = time.process_time()
     spent = {"plan": planned - began, "write": written - planned, "follow": followed - written}
     return job, spent
 
 
-def section_on_bed(
+def on_bed(
     paths: Toolpaths, mesh: TetMesh, build: Sequence[float], bed: Sequence[float]
-) -> tuple[list[np.ndarray], Callable[[float], shapely.Geometry]]:
+) -> tuple[list[np.ndarray], Sections]:
     """Strands on the bed, the part in its middle; and sections of the part there by height."""
     frame = plane_frame(tuple(build))
     corners = mesh.points[np.unique(mesh.corners)] @ frame.T
     low, high = corners.min(axis=0), corners.max(axis=0)
     shift = np.append(0.5 * (low + high)[:2] - 0.5 * np.array(bed[:2]), low[2])
-    known: dict[float, shapely.Geometry] = {}
-
-    def section(height: float) -> shapely.Geometry:
-        at = round(height, 4)
-        if at not in known:
-            found = section_of(mesh, frame, at + low[2])
-            known[at] = shapely.transform(found, lambda points: points - shift[:2])
-        return known[at]
-
-    return [line @ frame.T - shift for line in paths], section
+    return [line @ frame.T - shift for line in paths], Sections(mesh, frame, shift)

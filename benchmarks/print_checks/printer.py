@@ -29,12 +29,15 @@ COLD = 170.0
 """EXTRUDE_MINTEMP of Marlin."""
 
 
-@dataclass
+Place = tuple[float, float, float]
+
+
+@dataclass(slots=True)
 class Step:
     """A move of the nozzle, or of filament alone."""
 
-    start: np.ndarray
-    end: np.ndarray
+    start: Place
+    end: Place
     fed: float
     beside: float
     speed: float
@@ -51,7 +54,7 @@ class Step:
     lays: bool = field(init=False)
 
     def __post_init__(self) -> None:
-        self.length = math.dist(self.start.tolist(), self.end.tolist())
+        self.length = math.dist(self.start, self.end)
         self.lays = not self.rapid and self.length > 0.0
 
 
@@ -77,6 +80,7 @@ class Run:
     wrong: list = field(default_factory=list)
     waited: float = 0.0
     head: dict = field(default_factory=dict)
+    lines: object = None
 
     def strands(self) -> dict[str, list]:
         """List the steps of each strand by its name; those beside the part come last."""
@@ -87,11 +91,26 @@ class Run:
         return found
 
 
+def _values(words: list[str]) -> dict[str, float]:
+    """Numbers of a line by their letters; other words are left out."""
+    try:
+        return {word[0]: float(word[1:]) for word in words[1:]}
+    except ValueError:
+        return {word[0]: float(word[1:]) for word in words[1:] if _VALUE.fullmatch(word)}
+
+
+def _moved(place: Place, shift: Place) -> Place:
+    return (place[0] + shift[0], place[1] + shift[1], place[2] + shift[2])
+
+
 def follow(text: str, machine: str, offset=(0.0, 0.0, 0.0)) -> Run:
     """Follow a file to its end; the offset is one that the firmware does not know of."""
     run, known = Run(), KNOWN[machine]
     feeds = {0: "E", 1: "U" if machine == "aura_like" else "E"}
-    place, tool, speed, kind, strand = np.zeros(3), -1, 0.0, "", ""
+    place, tool, speed, kind, strand = (0.0, 0.0, 0.0), -1, 0.0, "", ""
+    shift = tuple(float(one) for one in offset)
+    longest = LONGEST.get(machine, 200.0)
+    letters = set("XYZFEUV" if machine == "aura_like" else "XYZFE")
     highest, changed, cut, ends = 0.0, -1, False, 0
     active, standby, heat, waited = {}, {}, {0: 20.0, 1: 20.0}, {0: False, 1: False}
     for raw in text.splitlines():
@@ -111,16 +130,19 @@ def follow(text: str, machine: str, offset=(0.0, 0.0, 0.0)) -> Run:
         if word not in known:
             run.wrong.append(f"no {machine} knows {raw}")
             continue
-        given = {w[0]: float(w[1:]) for w in words[1:] if _VALUE.fullmatch(w)}
+        given = _values(words)
         if word in ("G0", "G1"):
-            if set(given) - set("XYZFE") - (set("UV") if machine == "aura_like" else set()):
+            if not letters.issuperset(given):
                 run.wrong.append(f"no {machine} knows {raw}")
             speed = given.get("F", 60.0 * speed) / 60.0
-            end = np.array([given.get(axis, at) for axis, at in zip("XYZ", place, strict=True)])
-            off = np.array(offset) * (tool == 1)
+            x, y, z = place
+            end = (given.get("X", x), given.get("Y", y), given.get("Z", z))
+            start, stop = place, end
+            if tool == 1 and any(shift):
+                start, stop = _moved(place, shift), _moved(end, shift)
             step = Step(
-                start=place + off,
-                end=end + off,
+                start=start,
+                end=stop,
                 fed=given.get(feeds.get(tool, "E"), 0.0),
                 beside=given.get("V", 0.0),
                 speed=speed,
@@ -134,20 +156,19 @@ def follow(text: str, machine: str, offset=(0.0, 0.0, 0.0)) -> Run:
                 changed=changed,
                 cut=cut,
             )
-            longest = LONGEST.get(machine, 200.0)
             if not step.length and abs(step.fed) > longest:
                 run.wrong.append(f"{machine} refuses more than {longest:g} mm alone: {raw}")
             run.steps.append(step)
             place = end
             if step.lays:
-                highest = max(highest, float(step.end[2]))
+                highest = max(highest, step.end[2])
             if step.rapid:
                 strand, cut = "", False
                 ends += 1
         elif word == "G4":
             run.waited += given["P"] / 1000.0
         elif word == "G28" and "X" not in words:
-            place = np.zeros(3)
+            place = (0.0, 0.0, 0.0)
         elif word in ("T0", "T1"):
             new = int(word[1])
             if tool >= 0 and machine == "reprap_duet":

@@ -8,14 +8,17 @@ from typing import Any
 from ccfem.arrays import freeze
 from ccfem.checks import check_known, check_number
 from ccfem.display import Shown
+from ccfem.elasticity.part_stress import PartStress
 from ccfem.elasticity.problem import Force, Order, Problem, Support
 from ccfem.elasticity.support_kinds import AnySupport
 from ccfem.errors import Mistakes, shown
+from ccfem.layers.layer import Layer
 from ccfem.layers.slicer import Slicer
 from ccfem.layers.slicing.planar import Planar
 from ccfem.machine.machine import Machine
 from ccfem.materials import printed_pla
 from ccfem.mesh.tet_mesh import TetMesh
+from ccfem.placement.fibre_places import FibrePlaces
 
 __all__ = ["Case", "check_name", "pulled"]
 
@@ -51,6 +54,8 @@ class Case(Shown):
         Another model of how the part is held, such as bolts that only press in place of walls that
         are held. Where there are some, strategies are tested under both, and no order is told that
         the two do not agree on.
+    fibre : FibrePlaces, optional
+        Which of the layers, and which regions of them, get fibre; by default all.
     weights : mapping of load case to float
         Of the load cases, combinations among them, that are planned for when all are asked for;
         those that are not named do not count. Default: all but combinations, alike.
@@ -68,6 +73,7 @@ class Case(Shown):
     source: str = ""
     findings: tuple[str, ...] = ()
     alternative_supports: tuple[AnySupport, ...] = ()
+    fibre: FibrePlaces | None = None
     weights: Mapping[str, float] = field(default_factory=dict)
 
     def __repr__(self) -> str:
@@ -79,6 +85,14 @@ class Case(Shown):
             check_known("load case", name, self.problem.cases)
             check_number(f"weight of load case '{name}'", weight, above=0.0)
         check_name(self.name, self.title)
+
+    def fibre_layers(self, stress: PartStress, slicer: Slicer | None = None) -> tuple[Layer, ...]:
+        """Cut the part into the layers that get fibre, by its own slicer or another."""
+        chosen = self.slicing if slicer is None else slicer
+        layers = chosen(stress, self.build, self.machine)
+        if self.fibre is None:
+            return layers
+        return self.fibre.on(layers, stress.mesh, self.machine)
 
 
 def check_name(name: str, title: str) -> None:

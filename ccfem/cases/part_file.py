@@ -50,6 +50,20 @@ them with a minus ("-z"), or three numbers.
     method = "planar"                 # and its parameters; default: 12 flat layers
     thickness = 0.4
 
+    [fibre]                           # which layers get fibre, for every strategy; default all
+    layers = "3:20:2"                 # first, end (not included), step, or a list; the lowest is 0
+    from = 0.4                        # mm over the lowest point of the part; or to
+    every = 2                         # every how many of these layers
+    between = 1                       # least number of matrix layers between two of fibre
+    covered = true                    # none where matrix would not hold it (process.cover)
+
+    [[fibre.regions]]                 # where on these layers
+    rule = "patch"                    # or "box", "cylinder" as below, "body" with file = "a.stl"
+    patch = "pin"
+    within = 6.0                      # mm
+    mode = "only"                     # fibre in such regions alone, or "exclude": none in it
+    priority = 1                      # where regions overlap the lowest number counts
+
     # Patches: boundary facets chosen by a rule (ccfem.mesh.patches). Groups of a mesh file
     # are patches already.
     [patches.foot]
@@ -219,6 +233,7 @@ from typing import Any
 from ccfem.arrays import FloatArray
 from ccfem.cases.before_meshing import check_before_meshing
 from ccfem.cases.case import Case, check_name
+from ccfem.cases.part_fibre import fibre_of, patches_of_fibre
 from ccfem.cases.part_keys import Part
 from ccfem.cases.part_loads import (
     alternative_supports_of,
@@ -228,22 +243,22 @@ from ccfem.cases.part_loads import (
     weights_of,
 )
 from ccfem.cases.part_regions import region_rules_of, regions_of
-from ccfem.cases.part_tables import check_strategies, material_of, named_table, rules_of
+from ccfem.cases.part_slicing import slicing_of
+from ccfem.cases.part_tables import check_strategies, material_of, rules_of
 from ccfem.elasticity.load_kinds import patches_in_use
 from ccfem.elasticity.problem import Problem
 from ccfem.errors import InputError, Mistakes
 from ccfem.io.surface import Surface
 from ccfem.io.toml import from_table
 from ccfem.io.whole import existing_file
-from ccfem.layers import slicing as slicers
 from ccfem.layers.slicer import Slicer
-from ccfem.layers.slicing.planar import Planar
 from ccfem.machine.machine import Machine
 from ccfem.machine.named_machines import machine_from
 from ccfem.materials import Material
 from ccfem.mesh.face_rules import without_faces
 from ccfem.mesh.patch_findings import about_patches
 from ccfem.mesh.patches import patches_from_rules, unit_vector
+from ccfem.placement.fibre_places import FibrePlaces
 
 __all__ = ["read_part"]
 
@@ -290,12 +305,15 @@ def _case(content: Mapping[str, Any], path: Path) -> Case:
     with found.noted():
         given.build = unit_vector(part.build, "build")
     with found.noted():
-        given.slicing = _slicing(part)
+        given.slicing = slicing_of(part)
     with found.noted():
         given.machine = machine_from(part.machine)
     if "material" not in unread:
         with found.noted():
             given.material = material_of(part.material)
+    if part.fibre is not None:
+        with found.noted():
+            given.fibre = fibre_of(part.fibre, path.parent)
     check_strategies(part.strategies, found)
     rules = rules_of(part.patches, found)
     supports = supports_of(part.supports, found) if "supports" not in unread else ()
@@ -318,7 +336,10 @@ def _case(content: Mapping[str, Any], path: Path) -> Case:
             mesh = patches_from_rules(mesh, {each: rule})
     found.complain()
     findings = (*findings, *about_patches(mesh, rules))
-    mesh = without_faces(mesh, (*rules, *patches_in_use((*supports, *others), loads)))
+    near = patches_of_fibre(given.fibre)
+    for each in near:
+        mesh.patch(each)
+    mesh = without_faces(mesh, (*rules, *near, *patches_in_use((*supports, *others), loads)))
     build, slicing, machine, material = given.whole()
     return Case(
         name=name,
@@ -339,6 +360,7 @@ def _case(content: Mapping[str, Any], path: Path) -> Case:
         source=part.source,
         findings=findings,
         alternative_supports=others,
+        fibre=given.fibre,
         weights=weights,
     )
 
@@ -351,6 +373,7 @@ class _Values:
     slicing: Slicer | None = None
     machine: Machine | None = None
     material: Material | None = None
+    fibre: FibrePlaces | None = None
 
     def whole(self) -> tuple[FloatArray, Slicer, Machine, Material]:
         """All of them; none is missing where there was no mistake."""
@@ -367,16 +390,3 @@ def _readable(content: Mapping[str, Any], found: Mistakes) -> tuple[Part, set[st
             from_table(Part, {key: value}, "the part file")
             good[key] = value
     return from_table(Part, good, "the part file"), set(content) - set(good)
-
-
-def _slicing(part: Part) -> Slicer:
-    """Slicer of a part file: of its number of layers, their heights, or the table slicing."""
-    given = [key for key in ("layers", "heights", "slicing") if getattr(part, key) is not None]
-    if len(given) > 1:
-        raise InputError(
-            f"a part needs one of layers, heights and slicing; got {' and '.join(given)}: choose "
-            "one"
-        )
-    if part.slicing is not None:
-        return slicers.create(*named_table(part.slicing, "method", slicers.named(), "slicing"))
-    return Planar(count=part.layers, heights=part.heights)

@@ -46,6 +46,8 @@ class Part(Body):
     slicing : table
         A slicer with its parameters, in place of layers and heights; without any of the three,
         12 flat layers.
+    fibre : table
+        Which of the layers, and which regions of them, get fibre; by default all.
     patches : dict
         Patches of the boundary, each by a rule. Groups of a mesh file are patches already.
     machine : table
@@ -68,6 +70,7 @@ class Part(Body):
     layers: int | None = None
     heights: tuple[float, ...] | None = None
     slicing: dict[str, Any] | None = None
+    fibre: dict[str, Any] | None = None
     patches: dict[str, Any] = field(default_factory=dict)
     machine: dict[str, Any] = field(default_factory=dict)
     strategies: dict[str, Any] = field(default_factory=dict)

@@ -8,6 +8,7 @@ from typing import Any
 import numpy as np
 
 from ccfem.cases.case import Case
+from ccfem.cases.part_fibre import fibre_table
 from ccfem.cases.part_loads import LOADS, SUPPORTS
 from ccfem.checks import member_name
 from ccfem.errors import InputError
@@ -49,6 +50,7 @@ def part_text(case: Case, mesh: str, comment: str = "") -> str:
         "build": case.build,
         "material": _material(problem.material),
         "slicing": {"method": member_name(case.slicing), **_changed(case.slicing, Planar())},
+        "fibre": fibre_table(case.fibre),
         "supports": [_kind(each, SUPPORTS) for each in problem.supports],
         "alternative_supports": [_kind(each, SUPPORTS) for each in case.alternative_supports],
         "loads": {

@@ -8,6 +8,7 @@ from ccfem.errors import InputError
 from ccfem.inspection import check
 from ccfem.io.whole import check_writable, whole_file
 from ccfem.machine.machine import Machine
+from ccfem.placement.fibre_places import FibrePlaces
 from ccfem.plot.canvas import check_picture, save
 from ccfem.plot.part_picture import part_page, part_picture
 
@@ -19,6 +20,7 @@ def check_part(
     set_case: list[str] | None,
     picture: Path | None,
     machine: Callable[[Machine], Machine] | None = None,
+    fibre: Callable[[FibrePlaces | None], FibrePlaces] | None = None,
 ) -> int:
     """Print a check; write its picture, and beside it the page that turns.
 
@@ -32,6 +34,8 @@ def check_part(
         .png, .pdf or .svg; default the part's name and ``-check.png``.
     machine : callable, optional
         What it makes of the part's machine (`ccfem.cli.machines.machine_choice`).
+    fibre : callable, optional
+        What it makes of the layers that get fibre (`ccfem.cli.fibre_choice.fibre_choice`).
 
     Returns
     -------
@@ -41,7 +45,7 @@ def check_part(
     if picture is not None:
         check_picture(picture)
     try:
-        checked = check(load(part, set_case, machine=machine))
+        checked = check(load(part, set_case, machine=machine, fibre=fibre))
     except InputError as error:
         if len(error.mistakes) < 2:
             raise

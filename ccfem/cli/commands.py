@@ -12,6 +12,7 @@ import typer
 
 from ccfem.cli.arguments import drawings_of, names_of, parameters_by_strategy, path_of
 from ccfem.cli.fibre_amounts import front
+from ccfem.cli.fibre_choice import SetFibre, fibre_choice
 from ccfem.cli.in_python import say_in_python
 from ccfem.cli.machines import MachineName, SetMachine, machine_choice, machines
 from ccfem.cli.optimising import optimise
@@ -146,6 +147,7 @@ def check(
     set_case: SetCase = None,
     machine: MachineName = None,
     set_machine: SetMachine = None,
+    set_fibre: SetFibre = None,
     out: Annotated[
         Path | None,
         typer.Option(
@@ -159,7 +161,9 @@ def check(
     """Say and draw all that is known of a part before it is solved; all mistakes at once."""
     from ccfem.cli.check_part import check_part
 
-    code = check_part(case, set_case, out, machine_choice(machine, set_machine))
+    code = check_part(
+        case, set_case, out, machine_choice(machine, set_machine), fibre_choice(set_fibre)
+    )
     if code:
         raise typer.Exit(code)
 
@@ -218,6 +222,7 @@ def compare(
     calibration: Calibration = None,
     machine: MachineName = None,
     set_machine: SetMachine = None,
+    set_fibre: SetFibre = None,
     backend: Backend = "auto",
     stress: StressFile = None,
     stress_unit: StressUnit = None,
@@ -252,6 +257,7 @@ def compare(
         pictures=pictures,
         drawings=drawings_of(drawings),
         machine=machine_choice(machine, set_machine),
+        fibre=fibre_choice(set_fibre),
     )
 
 
@@ -275,6 +281,7 @@ def plan(
     calibration: Calibration = None,
     machine: MachineName = None,
     set_machine: SetMachine = None,
+    set_fibre: SetFibre = None,
     backend: Backend = "auto",
     gcode: Annotated[
         bool,
@@ -312,35 +319,8 @@ def plan(
         pictures=pictures,
         drawings=drawings_of(drawings),
         machine=machine_choice(machine, set_machine),
+        fibre=fibre_choice(set_fibre),
     )
-
-
-@app.command()
-def solve(
-    case: CasePath,
-    out: Annotated[
-        Path,
-        typer.Option(
-            "-o", "--out", metavar="RESULT.vtu", parser=path_of, help="File that is written."
-        ),
-    ],
-    set_case: SetCase = None,
-    load_case: Annotated[
-        str | None,
-        typer.Option(
-            "--load-case",
-            metavar="NAME",
-            help="Only this one; default all, the name of each behind that of the file where "
-            "there are several.",
-        ),
-    ] = None,
-    backend: Backend = "auto",
-    refine: Refine = False,
-) -> None:
-    """Solve a part and write displacement, strain, stress, reactions and error for ParaView."""
-    from ccfem.cli.solving import solve_part
-
-    solve_part(load(case, set_case, refine), out, load_case, backend)
 
 
 @app.command()
@@ -366,6 +346,7 @@ def calibrate(
     load_case: LoadCase = None,
     machine: MachineName = None,
     set_machine: SetMachine = None,
+    set_fibre: SetFibre = None,
     out: Annotated[
         Path,
         typer.Option(
@@ -384,10 +365,10 @@ def calibrate(
     options = options_of(layers, fibre_per_layer, False, load_case, "auto")
     options["natural"] = fibre_per_layer is None
 
-    chosen = machine_choice(machine, set_machine)
+    chosen, placed = machine_choice(machine, set_machine), fibre_choice(set_fibre)
 
     def read() -> Any:
-        return load(case, set_case, machine=chosen)
+        return load(case, set_case, machine=chosen, fibre=placed)
 
     fit_material(read, unreinforced, reinforced, strategy, parameters, options, out)
 

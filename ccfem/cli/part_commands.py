@@ -1,4 +1,4 @@
-"""Commands that begin a part and end a paper: ``mesh``, ``new``, ``example``, ``cite``."""
+"""Commands round a part: ``mesh``, ``new``, ``example``, ``cite``, ``solve``."""
 
 from collections.abc import Callable
 from pathlib import Path
@@ -7,6 +7,7 @@ from typing import Annotated
 import typer
 
 from ccfem.cli.arguments import path_of
+from ccfem.cli.options import Backend, CasePath, Refine, SetCase
 
 __all__ = ["add_part_commands"]
 
@@ -91,11 +92,40 @@ def _mesh(
     mesh_file(body, size, out, scale, mesher)
 
 
+def _solve(
+    case: CasePath,
+    out: Annotated[
+        Path,
+        typer.Option(
+            "-o", "--out", metavar="RESULT.vtu", parser=path_of, help="File that is written."
+        ),
+    ],
+    set_case: SetCase = None,
+    load_case: Annotated[
+        str | None,
+        typer.Option(
+            "--load-case",
+            metavar="NAME",
+            help="Only this one; default all, the name of each behind that of the file where "
+            "there are several.",
+        ),
+    ] = None,
+    backend: Backend = "auto",
+    refine: Refine = False,
+) -> None:
+    """Solve a part and write displacement, strain, stress, reactions and error for ParaView."""
+    from ccfem.cli.run import load
+    from ccfem.cli.solving import solve_part
+
+    solve_part(load(case, set_case, refine), out, load_case, backend)
+
+
 _COMMANDS: dict[str, Callable[..., None]] = {
     "mesh": _mesh,
     "new": _new,
     "example": _example,
     "cite": _cite,
+    "solve": _solve,
 }
 
 

@@ -22,6 +22,7 @@ if TYPE_CHECKING:
     from ccfem.comparison.result import Comparison
     from ccfem.comparison.slicings import SlicingComparison
     from ccfem.machine.machine import Machine
+    from ccfem.placement.fibre_places import FibrePlaces
 
 __all__ = [
     "foreign_stress",
@@ -46,10 +47,11 @@ def load(
     set_case: Sequence[str] | None,
     refine: bool = False,
     machine: "Callable[[Machine], Machine] | None" = None,
+    fibre: "Callable[[FibrePlaces | None], FibrePlaces] | None" = None,
 ) -> "Case":
     """Read a part file, or make a case from its name and parameters.
 
-    Its cells are refined if wanted; `machine` changes its machine.
+    Its cells are refined if wanted; `machine` changes its machine, `fibre` which layers get fibre.
     """
     from ccfem.cases.reading import read
 
@@ -62,6 +64,8 @@ def load(
     case = read(name, **parameters)
     if machine is not None:
         case = replace(case, machine=machine(case.machine))
+    if fibre is not None:
+        case = replace(case, fibre=fibre(case.fibre))
     return _refined(case) if refine else case
 
 
@@ -158,6 +162,7 @@ def run(
     pictures: bool = False,
     drawings: Sequence[str] = (),
     machine: "Callable[[Machine], Machine] | None" = None,
+    fibre: "Callable[[FibrePlaces | None], FibrePlaces] | None" = None,
 ) -> None:
     """Compare strategies, write the results and print the table; a failure leaves nothing behind.
 
@@ -191,6 +196,8 @@ def run(
         Also draw every flat layer of every strategy to scale.
     machine : callable, optional
         What it makes of the part's machine (`ccfem.cli.machines.machine_choice`).
+    fibre : callable, optional
+        What it makes of the layers that get fibre (`ccfem.cli.fibre_choice.fibre_choice`).
     """
     if refine and options.get("stress") is not None:
         raise InputError("--refine changes the mesh that the file of --stress is on: drop one")
@@ -204,7 +211,7 @@ def run(
     imported = time.perf_counter()
     if drawings and options.get("slicings") is not None:
         raise InputError("--drawings are of one slicing; got --slicings: drop one")
-    case = load(name, set_case, refine, machine)
+    case = load(name, set_case, refine, machine, fibre)
     seconds = {"start": imported - _STARTED, "mesh": time.perf_counter() - imported}
     if calibration is not None:
         case, options = _calibrated(case, options, calibration)

@@ -151,8 +151,8 @@ def solve_and_slice(
     """
     stress, read, seconds = _stress_of(case, load_case, backend, given)
     with timed(seconds, "slice"):
-        slicer = case.slicing if layers is None else as_slicer(layers)
-        stack = slicer(stress if read is None else read, case.build, case.machine)
+        slicer = None if layers is None else as_slicer(layers)
+        stack = case.fibre_layers(stress if read is None else read, slicer)
     return stress, read, stack, seconds
 
 
@@ -321,7 +321,7 @@ def compare(
         layers = tuple(foreign[0].heights(plane_frame(case.build)[2]).tolist())
     solved, seconds = _solved(case, strand, load_case, backend, stress, progress)
     with timed(seconds, "slice"):
-        slicer = case.slicing if layers is None else as_slicer(layers)
+        slicer = None if layers is None else as_slicer(layers)
         stack, below = solved.cut(slicer, support)
     part = solved.part(stack, below)
     tell = counted(progress, 0.1, (5 if print_plans else 4) * len(strategies) + 1)

@@ -232,8 +232,7 @@ def fibre_front(
     strand = Strand() if strand is None else strand
     solved = Solved(case, stress, None, Tests.of(stress, None, strand, backend))
     slices = {
-        count: Planar(count=count)(stress, case.build, case.machine)
-        for count in sorted(set(counts))
+        count: case.fibre_layers(stress, Planar(count=count)) for count in sorted(set(counts))
     }
     parts = {count: solved.part(layers) for count, layers in slices.items()}
     most = max(count * full_length(part.layers, case.machine) for count, part in parts.items())

@@ -65,21 +65,23 @@ class Solved:
         return self.field if self.given is None else self.given
 
     def cut(
-        self, slicer: Slicer, support: bool = False
+        self, slicer: Slicer | None = None, support: bool = False
     ) -> tuple[tuple[Layer, ...], SupportLayers | None]:
-        """Layers, and if wanted those of their support.
+        """Layers that get fibre by the part's own slicer or another, and if wanted their support.
 
         Raises
         ------
         InputError
             Where the part cannot be cut, or support is wanted below flat layers.
         """
-        stress, build, machine = self.planned_on, self.case.build, self.case.machine
-        below = None
-        if support and hasattr(slicer, "slice"):
-            stack, below = slice_with_support(slicer, stress, build, machine)
+        case, stress, below = self.case, self.planned_on, None
+        chosen = case.slicing if slicer is None else slicer
+        if support and hasattr(chosen, "slice"):
+            stack, below = slice_with_support(chosen, stress, case.build, case.machine)
+            if case.fibre is not None:
+                stack = case.fibre.on(stack, stress.mesh, case.machine)
         else:
-            stack = slicer(stress, build, machine)
+            stack = case.fibre_layers(stress, chosen)
         if support and all(layer.flat is not None for layer in stack):
             raise InputError(
                 "support is printed below curved layers alone; these are flat: leave out support, "

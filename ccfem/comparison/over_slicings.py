@@ -146,7 +146,7 @@ def _stacks(
     refused: dict[str, str] = {}
     for name, slicer in slicers.items():
         try:
-            stacks[name] = slicer(solved.planned_on, case.build, case.machine)
+            stacks[name] = case.fibre_layers(solved.planned_on, slicer)
         except InputError as error:
             refused[name] = str(error)
     if not any(stacks.values()):

@@ -165,6 +165,8 @@ class Comparison:
         """What has to stand next to the numbers, a line each."""
         found = remarks(self.runs, self.fibre_per_layer, self.bound)
         found += open_remarks(self.succeeded, self.layers, self.case.machine.fibre_width)
+        if self.case.fibre is not None:
+            found.insert(0, f"fibre on {len(self.layers)} layers: {self.case.fibre.about()}")
         if self.cases is not None:
             about, case = (self.runs, self.fibre_per_layer, self.cases), self.stress.case
             others = bool(self.case.alternative_supports)

@@ -135,6 +135,9 @@ class SlicingComparison:
         """What has to stand next to the numbers, a line each."""
         found = [f"{name}: cannot cut the part: {why}" for name, why in self.refused.items()]
         thick = ", ".join(f"{name} {_stack(each)}" for name, each in self.slicings.items())
+        chosen = next(iter(self.slicings.values())).case.fibre
+        if chosen is not None:
+            found.append(f"fibre: {chosen.about()}")
         return [*found, f"layers: {thick}", *remarks(self.runs, self.wanted)]
 
     @property

@@ -169,7 +169,9 @@ class _Lines:
         }
         self.lines: list[str] = []
         self._said = ("", "", "")
-        self._rate = ""
+        self._line: tuple[int, float, float] | None = None
+        self._letters = "".join(("X", "Y", "Z", *machine.kinematics.letters))
+        self._rate, self._speed = "", -1.0
         by_file = self.profile.offset_by == "gcode"
         self._offset = self.profile.offset if by_file else (0.0, 0.0, 0.0)
 
@@ -180,6 +182,9 @@ class _Lines:
 
     def say(self, role: int, width: float, height: float) -> None:
         """Comments for viewers, where they change."""
+        if (role, width, height) == self._line:
+            return
+        self._line = (role, width, height)
         kind = TYPES[self.profile.comments].get(ROLES[role])
         if kind is None:
             return
@@ -199,11 +204,13 @@ class _Lines:
         first: bool,
     ) -> None:
         """Add a move; the first one goes up before it goes sideways."""
-        off = (*(self._offset if tool == 1 else (0.0, 0.0, 0.0)), 0.0, 0.0)
-        letters = "".join(("X", "Y", "Z", *self.machine.kinematics.letters))
+        if tool == 1 and any(self._offset):
+            places = [at - by for at, by in zip(new, (*self._offset, 0.0, 0.0), strict=False)]
+        else:
+            places = new
         words = [
-            f"{axis}{at - by:.{COORDINATE_DIGITS}f}"
-            for axis, was, at, by in zip(letters, old, new, off, strict=False)
+            f"{axis}{place:.{COORDINATE_DIGITS}f}"
+            for axis, was, at, place in zip(self._letters, old, new, places, strict=False)
             if first or at != was
         ]
         if first:
@@ -225,8 +232,10 @@ class _Lines:
 
     def _at(self, speed: float) -> str:
         """Feed rate of a move, where it differs from that of the move before."""
+        if speed == self._speed and self._rate:
+            return ""
         rate = f" F{60.0 * speed:.6g}"
-        said, self._rate = self._rate, rate
+        said, self._rate, self._speed = self._rate, rate, speed
         return "" if rate == said else rate
 
     def happen(self, event: int, tool: int, value: float, strand: int) -> None:
@@ -259,5 +268,5 @@ class _Lines:
             f";HEIGHT:{thickness:.4f}",
             f";LAYER:{number}",
         ]
-        self._said = ("", "", "")
+        self._said, self._line = ("", "", ""), None
         self.fill("layer", layer=number)

@@ -5,7 +5,7 @@ from importlib.metadata import version
 import numpy as np
 
 from ccfem.machine.machine import Machine
-from ccfem.printing.duration import durations
+from ccfem.printing.duration import durations, waits
 from ccfem.printing.moves import LAY, Moves
 from ccfem.printing.print_plan import PrintPlan
 from ccfem.toolpaths import FIBRE
@@ -24,8 +24,9 @@ def gcode_head(moves: Moves, plan: PrintPlan, machine: Machine, title: str) -> l
     title : str
         Case, strategy and machine; left out where empty.
     """
-    seconds = float(durations(moves, machine).sum())
-    heating = seconds - float(durations(moves, machine, heating=False).sum())
+    moving = durations(moves, machine, heating=False)
+    heating = float(waits(moving, moves, machine).sum())
+    seconds = float(moving.sum()) + heating
     fibre_fed = float(moves.feed[moves.tool == 1].sum())
     matrix_fed = float(moves.feed[moves.tool == 0].sum() + moves.beside.sum())
     area = 0.25 * np.pi * machine.matrix_diameter**2

@@ -18,6 +18,8 @@ from ccfem.errors import Mistakes
 from ccfem.inspection.cost import solve_costs
 from ccfem.inspection.load_row import LoadRow, kind_of, load_row
 from ccfem.inspection.patch_row import PatchRow, patch_rows
+from ccfem.layers.layer import Layer
+from ccfem.layers.slicing.planar import Planar
 from ccfem.mesh.check import about_slivers
 from ccfem.mesh.facets import are_among
 from ccfem.mesh.measures import connected
@@ -44,6 +46,9 @@ class Check(Shown):
     loads : tuple of LoadRow
     warnings : tuple of str
         What may not be meant, each with its cure.
+    fibre : tuple of Layer
+        Layers that get fibre, where the part says which (`Case.fibre`) and they do not follow from
+        the stress.
     mistakes : tuple of str
         What keeps the part from being solved.
     """
@@ -54,6 +59,7 @@ class Check(Shown):
     loads: tuple[LoadRow, ...]
     warnings: tuple[str, ...]
     mistakes: tuple[str, ...]
+    fibre: tuple[Layer, ...] = ()
 
     def __str__(self) -> str:
         lines = [self.case.title, *(f"  {fact}" for fact in self.facts), ""]
@@ -152,13 +158,17 @@ def check(part: str | os.PathLike[str] | Case, **parameters: Any) -> Check:
     ]
     if not problem.loads:
         found.lines.append("the part has no load case: give at least one load")
+    fibre: tuple[Layer, ...] = ()
+    with found.noted():
+        fibre = _fibre_layers(case)
     return Check(
         case,
-        _facts(case),
+        (*_facts(case), *_about_fibre(case, fibre)),
         patch_rows(problem.mesh, _carried(case)),
         tuple(rows),
         tuple(_warnings(case, rows)),
         tuple(dict.fromkeys(found.lines)),
+        fibre,
     )
 
 
@@ -180,6 +190,30 @@ def _facts(case: Case) -> tuple[str, ...]:
         f"middle, {mesh.aspects.max():.3g} at most",
         *told,
         f"solve of a load case, {costs}",
+    )
+
+
+def _fibre_layers(case: Case) -> tuple[Layer, ...]:
+    """Layers that get fibre, where the part says which; none where they follow from the stress."""
+    if case.fibre is None or not isinstance(case.slicing, Planar):
+        return ()
+    mesh = case.problem.mesh
+    return case.fibre.on(case.slicing.cut(mesh, case.build), mesh, case.machine)
+
+
+def _about_fibre(case: Case, layers: Sequence[Layer]) -> tuple[str, ...]:
+    """Say which layers get fibre, where the part says so."""
+    if case.fibre is None:
+        return ()
+    if not layers:
+        return (f"fibre: {case.fibre.about()}",)
+    numbers = ", ".join(str(layer.index) for layer in layers)
+    shortened = numbers if len(numbers) <= 60 else f"{numbers[:40].rpartition(',')[0]}, ..."
+    area = np.mean([layer.areas.sum() for layer in layers])
+    return (
+        f"fibre on {len(layers)} layer{'s' * (len(layers) > 1)} ({shortened}), {area:.4g} mm^2 "
+        "each in the mean: "
+        f"{case.fibre.about()}",
     )
 
 

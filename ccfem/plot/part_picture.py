@@ -16,7 +16,14 @@ from ccfem.plot.part_views import Arrow, Label, part_figure
 if TYPE_CHECKING:
     from matplotlib.figure import Figure
 
-__all__ = ["coloured", "load_arrows", "part_page", "part_picture", "support_marks"]
+__all__ = [
+    "coloured",
+    "fibre_outlines",
+    "load_arrows",
+    "part_page",
+    "part_picture",
+    "support_marks",
+]
 
 _COLOURS = ("#56b4e9", "#e69f00", "#009e73", "#cc79a7", "#8c7a00", "#d9a58c", "#9ec1e3", "#b9dccb")
 _LOAD = "#b3261e"
@@ -28,7 +35,7 @@ def part_picture(checked: Check) -> "Figure":
     """Draw a part from two sides: patches coloured and named, loads as arrows, supports marked.
 
     The arrows are the resultants of the loads, at their points of attack; a load without one has
-    none. Triangles mark what is held.
+    none. Triangles mark what is held, green lines where the part says that fibre lies.
     """
     mesh = checked.case.problem.mesh
     colours, labels = coloured(checked)
@@ -41,7 +48,15 @@ def part_picture(checked: Check) -> "Figure":
         load_arrows(checked),
         title,
         support_marks(checked),
+        fibre_outlines(checked),
     )
+
+
+def fibre_outlines(checked: Check) -> list[FloatArray]:
+    """Borders of the layers and regions that get fibre, closed, where the part says which."""
+    return [
+        layer.points[np.append(loop, loop[0])] for layer in checked.fibre for loop in layer.loops
+    ]
 
 
 def coloured(checked: Check) -> tuple[list[str], list[Label]]:
@@ -113,6 +128,7 @@ def part_page(checked: Check) -> str:
         "colour": [known.index(name) for name in colours],
         "labels": [[label.text, label.place.round(3).tolist()] for label in labels],
         "marks": support_marks(checked).round(3).tolist(),
+        "lines": [line.round(3).tolist() for line in fibre_outlines(checked)],
         "arrows": [
             [
                 arrow.text,
@@ -157,6 +173,8 @@ f[0]*g[1]-f[1]*g[0]],w=0.5+0.5*Math.abs(n[2])/(Math.hypot(...n)||1);
 pen.fillStyle=pen.strokeStyle="rgb("+data.colours[data.colour[k]].map(v=>Math.round(v*w))+")";
 pen.beginPath();pen.moveTo(a[0],a[1]);pen.lineTo(b[0],b[1]);pen.lineTo(c[0],c[1]);
 pen.closePath();pen.fill();pen.stroke();}
+pen.strokeStyle="#2a7a2a";for(const line of data.lines){pen.beginPath();
+for(const p of line){const [x,y]=at(p);pen.lineTo(x,y);}pen.stroke();}
 pen.fillStyle="#fff";pen.strokeStyle="#1d2430";
 for(const m of data.marks){const [x,y]=at(m);pen.beginPath();pen.moveTo(x,y-5);
 pen.lineTo(x-5,y+4);pen.lineTo(x+5,y+4);pen.closePath();pen.fill();pen.stroke();}

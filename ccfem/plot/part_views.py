@@ -20,6 +20,8 @@ _VIEWS = ((-60.0, 28.0), (120.0, -28.0))
 """Azimuth and elevation of the two views, degrees."""
 _SIZE = 6.0
 """Width and height of a view, inches."""
+_FIBRE = "#2a7a2a"
+"""Borders of the layers that get fibre."""
 _SHADE = 0.45
 """How much darker a facet is that faces away from the light."""
 
@@ -64,6 +66,7 @@ def part_figure(
     arrows: Sequence[Arrow] = (),
     title: str = "",
     marks: FloatArray | None = None,
+    outlines: Sequence[FloatArray] = (),
 ) -> "Figure":
     """Draw a closed surface from two opposite sides, without perspective.
 
@@ -81,6 +84,8 @@ def part_figure(
     title : str, optional
     marks : (k, 3) array, mm, optional
         Places of a support: small triangles.
+    outlines : sequence of (n, 3) arrays, mm, optional
+        Lines that are seen through the part.
     """
     from matplotlib.backends.backend_agg import FigureCanvasAgg
     from matplotlib.collections import PolyCollection
@@ -117,6 +122,8 @@ def part_figure(
                 "linewidths": 1.0,
             }
             axes.scatter(marks @ right, marks @ up, zorder=3, **style)
+        for line in outlines:
+            axes.plot(line @ right, line @ up, color=_FIBRE, linewidth=0.9, zorder=2)
         for arrow in arrows:
             along = arrow.direction / max(float(np.linalg.norm(arrow.direction)), 1e-300)
             tail = arrow.place - along * size / 6.0

@@ -8,7 +8,7 @@ from ccfem.arrays import FloatArray, IntArray
 from ccfem.machine.machine import Machine
 from ccfem.printing.moves import CUT, FEED, LAY, PREHEAT, STANDBY, TRAVEL, WAIT, WORK, Moves
 
-__all__ = ["durations"]
+__all__ = ["durations", "waits"]
 
 
 def durations(moves: Moves, machine: Machine, heating: bool = True) -> FloatArray:
@@ -40,9 +40,14 @@ def durations(moves: Moves, machine: Machine, heating: bool = True) -> FloatArra
     moving = moving[1:]
     halt = np.cumsum(np.isin(moves.event, [FEED, CUT, WAIT, WORK]).astype(np.int64))
     seconds[moving] = _motion(moves, moving, halt[moving], machine)
-    if heating:
-        _add_heating(seconds, moves, machine)
-    return seconds
+    return seconds + waits(seconds, moves, machine) if heating else seconds
+
+
+def waits(seconds: FloatArray, moves: Moves, machine: Machine) -> FloatArray:
+    """Seconds that each row waits for its tool, where all rows take some seconds without."""
+    found = np.array(seconds)
+    _add_heating(found, moves, machine)
+    return found - seconds
 
 
 def _motion(moves: Moves, moving: IntArray, stops: IntArray, machine: Machine) -> FloatArray:
@@ -60,10 +65,21 @@ def _motion(moves: Moves, moving: IntArray, stops: IntArray, machine: Machine) -
     # Squares of the speeds between the moves: what can be reached, and stopped from.
     square = np.concatenate([[0.0], corner, [0.0]]).tolist()
     gain = (2.0 * most * length).tolist()
-    for k, more in enumerate(gain):
-        square[k + 1] = min(square[k + 1], square[k] + more)
+    # Comparisons in place of min(): there are hundreds of thousands of moves.
+    before = 0.0
+    for k, more in enumerate(gain, start=1):
+        before += more
+        if square[k] < before:
+            before = square[k]
+        else:
+            square[k] = before
+    behind = 0.0
     for k in range(len(gain) - 1, -1, -1):
-        square[k] = min(square[k], square[k + 1] + gain[k])
+        behind += gain[k]
+        if square[k] < behind:
+            behind = square[k]
+        else:
+            square[k] = behind
     first, last = np.sqrt(square[:-1]), np.sqrt(square[1:])
     peak = np.minimum(speed, np.sqrt(0.5 * (first**2 + last**2) + most * length))
     ramps = (peak - first) / most + (peak - last) / most

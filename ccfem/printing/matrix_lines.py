@@ -10,12 +10,13 @@ from ccfem.arrays import FloatArray
 from ccfem.geometry.hatch import zigzag
 from ccfem.geometry.offsets import offset_rings
 from ccfem.geometry.shapes import Region
-from ccfem.layers.plane import Plane
+from ccfem.layers.layer import Layer
 from ccfem.layers.slicing.planar import Planar
 from ccfem.machine.machine import Machine
 from ccfem.mesh.tet_mesh import TetMesh
 from ccfem.printing.gap_lines import gap_lines
 from ccfem.printing.slabs import Slab
+from ccfem.threads import in_threads
 
 __all__ = ["MatrixFill", "matrix_fills"]
 
@@ -69,7 +70,8 @@ def matrix_fills(
     for k in of_matrix:
         found[k] = MatrixFill()
     middles = tuple(0.5 * (slabs[k].lower + slabs[k].upper) for k in of_matrix)
-    for layer in Planar(heights=middles).cut(mesh, frame[2]) if middles else ():
+
+    def filled(layer: Layer) -> MatrixFill:
         plane = layer.plane
         angle = np.radians(profile.matrix_angle + profile.matrix_turn * layer.index)
         contours = offset_rings(plane.polygon, 0.5 * width, width, width, 1)
@@ -77,12 +79,16 @@ def matrix_fills(
         lines = [ring for level in contours for ring in level] + inside
         gaps, widths = gap_lines(plane.polygon, lines, width)
 
-        def on_bed(points: FloatArray, plane: Plane = plane) -> FloatArray:
+        def on_bed(points: FloatArray) -> FloatArray:
             return plane.to_space(points) @ frame[:2].T - origin
 
-        found[of_matrix[layer.index]] = MatrixFill(
+        return MatrixFill(
             shapely.transform(plane.polygon, on_bed),
             [on_bed(line) for line in lines + gaps],
             [width] * len(lines) + widths,
         )
+
+    layers = Planar(heights=middles).cut(mesh, frame[2]) if middles else ()
+    for layer, fill in zip(layers, in_threads(filled, layers), strict=True):
+        found[of_matrix[layer.index]] = fill
     return found

@@ -12,6 +12,7 @@ from ccfem.geometry.polylines import line_length, starts_segment
 from ccfem.geometry.shapes import Region
 from ccfem.layers import Layer
 from ccfem.layers.plane import Plane
+from ccfem.layers.slicing.planar import Planar
 from ccfem.machine.machine import Machine
 from ccfem.mesh.tet_mesh import TetMesh
 from ccfem.printing.laid_layer import (
@@ -159,7 +160,7 @@ def plan_print(
     lowest, highest = corners.min(axis=0), corners.max(axis=0)
     used = [layer for layer in layers if layer.index in fibre.layer]
     origin = 0.5 * (lowest[:2] + highest[:2] - machine.gcode.bed[:2])
-    borders = _borders(used, frame, origin)
+    borders = _borders(used, mesh, frame, origin)
     kept, crossings, dropped = _turned(fibre, borders, frame, origin, machine)
     over = {index: height_over(kept[index], borders[index], machine) for index in kept}
     slabs = slabs_of(used, float(lowest[2]), float(highest[2]), machine, over)
@@ -294,18 +295,24 @@ def _check_fibre(fibre: Toolpaths, layers: Sequence[Layer], machine: Machine) ->
         )
 
 
-def _borders(layers: Sequence[Layer], frame: FloatArray, origin: FloatArray) -> dict[int, Region]:
-    """Sections of layers on the bed, by their index."""
+def _borders(
+    layers: Sequence[Layer], mesh: TetMesh, frame: FloatArray, origin: FloatArray
+) -> dict[int, Region]:
+    """Sections of the part on the bed, by the index of the layer: all of it, not its regions."""
 
     def on_bed(points: FloatArray, plane: Plane) -> FloatArray:
         return plane.to_space(points) @ frame[:2].T - origin
 
-    return {
-        layer.index: shapely.transform(
-            layer.plane.polygon, lambda points, plane=layer.plane: on_bed(points, plane)
+    if not layers:
+        return {}
+    ordered = sorted(layers, key=lambda one: one.plane.height)
+    sections = Planar(heights=tuple(one.plane.height for one in ordered)).cut(mesh, frame[2])
+    found = {}
+    for layer, whole in zip(ordered, sections, strict=True):
+        found[layer.index] = shapely.transform(
+            whole.plane.polygon, lambda points, plane=whole.plane: on_bed(points, plane)
         )
-        for layer in layers
-    }
+    return found
 
 
 def _check_bed(plan: PrintPlan, machine: Machine) -> None:

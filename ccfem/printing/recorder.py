@@ -23,6 +23,7 @@ class Recorder:
     def __init__(self, machine: Machine) -> None:
         self.machine = machine
         self.rows: list[tuple[float, ...]] = []
+        self.blocks: list[FloatArray] = []
         self.place: FloatArray | None = None
         self.normal = np.array([0.0, 0.0, 1.0])
         self.tool = -1
@@ -124,18 +125,18 @@ class Recorder:
         with_it = np.zeros(len(fed)) if beside is None else beside[index] * steps
         with_it = np.diff(np.append(0.0, np.cumsum(with_it)).round(_FEED_DIGITS))
         number = role(what)
-        for k, at in enumerate(index.tolist()):
-            if steps[k] > 0.0:
-                self.place, self.normal = line[k + 1], normals[k + 1]
-                self._row(
-                    LAY,
-                    feed=fed[k],
-                    beside=with_it[k],
-                    speed=speeds[at],
-                    width=width,
-                    height=heights[at],
-                    what=number,
-                )
+        moved = np.flatnonzero(steps > 0.0)
+        if len(moved):
+            ends, at = moved + 1, index[moved]
+            same = np.broadcast_to([self.layer, self.strand], (len(moved), 2))
+            one = np.ones(len(moved))
+            values = (self.tool * one, fed[moved], with_it[moved], speeds[at], width * one)
+            rest = (heights[at], 0.0 * one, number * one)
+            self._flush()
+            self.blocks.append(
+                np.column_stack([LAY * one, line[ends], normals[ends], *values, *rest, same])
+            )
+            self.place, self.normal = line[ends[-1]], normals[ends[-1]]
         self.top = max(self.top, float(line[:, 2].max()))
 
     def _to(self, place: FloatArray, normal: FloatArray, across: bool = False) -> None:
@@ -166,9 +167,15 @@ class Recorder:
         lines = (number, feed, beside, speed, width, height, value, what)
         self.rows.append((event, *place, *self.normal, *lines, *state))
 
+    def _flush(self) -> None:
+        if self.rows:
+            self.blocks.append(np.array(self.rows))
+            self.rows = []
+
     def moves(self) -> Moves:
         """All that was noted."""
-        table = np.array(self.rows).reshape(-1, 17)
+        self._flush()
+        table = np.concatenate([np.zeros((0, 17)), *self.blocks])
         names = ["tool", "feed", "beside", "speed", "width", "height", "amount", "role", "layer"]
         columns = dict(zip([*names, "strand"], table[:, 7:].T, strict=True))
         return Moves(event=table[:, 0], place=table[:, 1:4], normal=table[:, 4:7], **columns)

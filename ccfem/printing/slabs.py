@@ -111,7 +111,8 @@ def check_cover(slabs: Sequence[Slab], machine: Machine) -> list[str]:
         if height < least - _SAME:
             raise InputError(
                 f"{height:.3g} mm of matrix {side} fibre layer do not hold it; at least "
-                f"{least:g} mm do: move the layer with --heights, or set process.cover"
+                f"{least:g} mm do: leave it without fibre (--set-fibre covered=true), move it with "
+                "--heights, or set process.cover"
             )
         if len(those) == 1:
             found.append(

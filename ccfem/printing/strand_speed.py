@@ -3,7 +3,7 @@
 import numpy as np
 
 from ccfem.arrays import BoolArray, FloatArray
-from ccfem.geometry.polylines import along_line, turning_angles
+from ccfem.geometry.polylines import along_line, points_along, turning_angles
 from ccfem.machine.machine import Machine
 from ccfem.machine.speeds import step_curvatures, table_speeds
 
@@ -14,7 +14,9 @@ _REACH = 2.0
 _PIECES = 5
 """Pieces of the ramp from the start speed to the normal one."""
 _SAME = 1e-3
-"""Points of a strand are not nearer than this to each other, mm."""
+_NEAR = 0.02
+"""Places where the speed changes are moved to points of the strand that are nearer than this, mm:
+rounded to 0.001 mm, a shorter step would turn anywhere."""
 
 
 def strand_speeds(line: FloatArray, machine: Machine) -> tuple[FloatArray, FloatArray, float]:
@@ -46,13 +48,17 @@ def strand_speeds(line: FloatArray, machine: Machine) -> tuple[FloatArray, Float
     middle = 0.5 * (positions[1:] + positions[:-1])
     step = np.clip(np.searchsorted(along, middle) - 1, 0, len(normal) - 1)
     speeds = np.minimum(normal[step], machine.process.speed_limit or np.inf)
+    if machine.speeds is None:
+        bend = _bend_at(line, along, middle, _REACH * machine.fibre_width)
+        speeds = np.minimum(speeds, _speed_of(bend, machine))
     slow = np.minimum(process.start_speed, speeds)
     if process.start_length > 0.0:
         behind = positions[:-1] - process.start_length
         share = np.clip(behind / max(process.ramp_length, _SAME), 0.0, 1.0)
         speeds = slow + np.where(behind < -_SAME, 0.0, share) * (speeds - slow)
     for corner in along[corners].tolist():
-        near = np.abs(middle - corner) < process.corner_length
+        reach = process.corner_length - _SAME
+        near = (positions[:-1] < corner + reach) & (positions[1:] > corner - reach)
         speeds[near] = slow[near]
     tail = middle > cut
     speeds[tail] = np.minimum(speeds[tail], process.finish_speed)
@@ -67,8 +73,13 @@ def _normal_speeds(line: FloatArray, machine: Machine) -> tuple[FloatArray, Bool
     reach = _REACH * machine.fibre_width
     if machine.speeds is not None:
         return table_speeds(line, ends, machine.speeds, reach)[:-1], corner
+    return _speed_of(step_curvatures(line, ends, corner, reach), machine), corner
+
+
+def _speed_of(bend: FloatArray, machine: Machine) -> FloatArray:
+    """Speed by curvature, 1/mm, where there is no table."""
+    process = machine.process
     slow, fast = min(process.start_speed, machine.fibre_speed), machine.fibre_speed
-    bend = step_curvatures(line, ends, corner, reach)
     with np.errstate(divide="ignore"):
         radius = 1.0 / bend
     least, most = machine.minimum_radius, process.bend_radius
@@ -76,16 +87,28 @@ def _normal_speeds(line: FloatArray, machine: Machine) -> tuple[FloatArray, Bool
         share = (radius >= least).astype(np.float64)
     else:
         share = np.clip((np.minimum(radius, most) - least) / (most - least), 0.0, 1.0)
-    return slow + share * (fast - slow), corner
+    return np.asarray(slow + share * (fast - slow))
+
+
+def _bend_at(line: FloatArray, along: FloatArray, at: FloatArray, reach: float) -> FloatArray:
+    """Curvature of the circle through places on a line and those a reach before and behind."""
+    a, b, c = (
+        points_along(line, along, np.clip(at + off, 0.0, along[-1])) for off in (-reach, 0.0, reach)
+    )
+    u, v = b - a, c - b
+    sizes = [np.linalg.norm(one, axis=1) for one in (u, v, c - a)]
+    dot = np.einsum("ij,ij->i", u, v)
+    across = np.sqrt(np.maximum((sizes[0] * sizes[1]) ** 2 - dot**2, 0.0))
+    return np.asarray(2.0 * across / np.maximum(sizes[0] * sizes[1] * sizes[2], 1e-12))
 
 
 def _joined(along: FloatArray, breaks: FloatArray) -> FloatArray:
-    """Positions of points and breaks, none nearer to the one before than 0.001 mm."""
+    """Positions of points and breaks, none nearer to another than 0.02 mm."""
     total = along[-1]
     inner = breaks[(breaks > _SAME) & (breaks < total - _SAME)]
     near = np.searchsorted(along, inner)
     gap = np.minimum(inner - along[near - 1], along[np.minimum(near, len(along) - 1)] - inner)
-    inner = np.sort(inner[gap > _SAME])
+    inner = np.sort(inner[gap > _NEAR])
     if len(inner):
-        inner = inner[np.append(True, np.diff(inner) > _SAME)]
+        inner = inner[np.append(True, np.diff(inner) > _NEAR)]
     return np.sort(np.concatenate([along, inner]))

@@ -115,7 +115,10 @@ def jobs_of(study: Study, progress: Progress = silent) -> Jobs:
         parts.append(part)
         strategies = _strategies(study, case)
         about = fingerprint(
-            whole, case.problem, case.build, case.machine, case.alternative_supports
+            whole,
+            *(case.problem, case.build, case.machine, case.alternative_supports),
+            # Only where there is one, so that runs from before it was known stay known.
+            *([] if case.fibre is None else [case.fibre]),
         )
         named = {"part": label, **_dotted("part", variant)}
         for (cut, slicer), load_case, (strategy, values), length in itertools.product(

@@ -101,7 +101,7 @@ class _Bench:
         key, case = fingerprint(load_case, slicer), solved.case
         if key not in self.stacks:
             with timed(self.seconds, "slice"):
-                self.stacks[key] = slicer(solved.planned_on, case.build, case.machine)
+                self.stacks[key] = case.fibre_layers(solved.planned_on, slicer)
         return self.stacks[key]
 
 

@@ -5,12 +5,14 @@ import textwrap
 from keys import keys, kinds
 
 from ccfem.cases import part_file as reader
+from ccfem.cases.part_fibre import FIBRE_REGIONS
 from ccfem.cases.part_keys import Part
 from ccfem.cases.part_loads import LOADS, SUPPORTS
 from ccfem.cases.part_regions import REGIONS
 from ccfem.cases.part_tables import RULES
 from ccfem.machine import GcodeProfile, Kinematics, Limits, Machine, Process, SpeedTable
 from ccfem.materials import isotropic, material_names, transversely_isotropic
+from ccfem.placement import FibrePlaces, FibreRegion
 
 __all__ = ["part_file_page"]
 
@@ -29,6 +31,7 @@ def part_file_page() -> str:
         f"## Supports `[[supports]]`\n\n{kinds('kind', SUPPORTS)}",
         f"## Loads `[[loads.CASE]]`\n\n{kinds('kind', LOADS)}",
         f"## Regions `[regions.NAME]`\n\n{kinds('rule', REGIONS)}",
+        f"## Fibre `[fibre]`\n\n{_fibre()}",
         f"## Machine `[machine]`\n\n{keys(Machine)}",
         f"### Limits `[machine.limits]`\n\n{keys(Limits)}",
         f"### Speeds `[machine.speeds]`\n\n{keys(SpeedTable)}",
@@ -41,3 +44,22 @@ def part_file_page() -> str:
         f"## All of it in one example\n\n```toml\n{textwrap.dedent(example).strip()}\n```\n",
     )
     return "".join(parts)
+
+
+def _fibre() -> str:
+    """Write the tables of which layers and regions get fibre; `from` and `to` are their keys."""
+    own, rules = (
+        "".join(
+            line
+            for line in keys(make).splitlines(keepends=True)
+            if not line.startswith(("| `regions`", "| `shape`"))
+        )
+        for make in (FibrePlaces, FibreRegion)
+    )
+    own = own.replace("from_height", "from").replace("to_height", "to")
+    shapes = "".join(
+        f'#### `rule = "{name}"` {{ #fibre-rule-{name} }}\n\n'
+        + ("`file`, a closed surface.\n\n" if name == "body" else keys(make))
+        for name, make in FIBRE_REGIONS.items()
+    )
+    return f"{own}### Regions `[[fibre.regions]]`\n\n{rules}{shapes}"

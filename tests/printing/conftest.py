@@ -48,7 +48,9 @@ class SmallPart(Job):
         strands = [line + np.append(self.corner, 0.0) for line in paths]
         text = gcode(plan, machine)
         volume = float(self.size.prod())
-        super().__init__(name, machine, plan, text, strands, lambda _: self.whole, volume)
+        area = self.whole.area
+        sections = (lambda _: self.whole, lambda _: area)
+        super().__init__(name, machine, plan, text, strands, *sections, volume)
 
 
 @pytest.fixture(scope="session")

@@ -27,7 +27,7 @@ def seconds(run, most, deviation):
         for k, step in enumerate(chain):
             count = int(np.ceil(step.length / CELL)) + 1
             if k:
-                ways = [(s.end - s.start) / s.length for s in (chain[k - 1], step)]
+                ways = [np.subtract(s.end, s.start) / s.length for s in (chain[k - 1], step)]
                 half = 0.5 * np.arccos(np.clip(ways[0] @ ways[1], -1.0, 1.0))
                 radius = deviation / max(1.0 / max(np.cos(half), 1e-9) - 1.0, 1e-12)
                 square[-1] = min(square[-1], step.speed**2, most * radius)
