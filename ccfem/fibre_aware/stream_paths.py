@@ -7,7 +7,7 @@ import numpy as np
 import shapely
 
 from ccfem.arrays import FloatArray, IntArray
-from ccfem.fibre_aware.prune import Profile, least_price, profiles, shorten
+from ccfem.fibre_aware.prune import Profile, least_price, profiles
 from ccfem.fibre_aware.spline_grid import SplineGrid
 from ccfem.geometry.isocontours import isocontours, triangle_edges
 from ccfem.layers.layer import Layer
@@ -71,10 +71,10 @@ class Extraction:
     inset: float
     link_limit: float
 
-    def plan(
+    def whole(
         self, layers: Sequence[Layer], group: IntArray, lengths: Sequence[float]
     ) -> list[Toolpaths]:
-        """Paths of all layers, cut to each of some lengths, mm in all.
+        """Paths of all layers, uncut, at the levels that are best for each length.
 
         Parameters
         ----------
@@ -82,17 +82,8 @@ class Extraction:
         group : (layers,) int array
             Number of the field of each layer.
         lengths : sequence of float, mm
+            In all layers.
         """
-        least = self.machine.minimum_length
-        return [
-            shorten(*whole, length, least, _CUT_COST)
-            for whole, length in zip(self.whole(layers, group, lengths), lengths, strict=True)
-        ]
-
-    def whole(
-        self, layers: Sequence[Layer], group: IntArray, lengths: Sequence[float]
-    ) -> list[tuple[Toolpaths, list[Profile]]]:
-        """Paths of all layers with their profiles, at the levels that are best for each length."""
         alike = _alike(layers, group, self.machine.fibre_width)
         drawn: dict[tuple[int, int], Toolpaths] = {}
 
@@ -109,12 +100,13 @@ class Extraction:
         ]
         counts = [len(numbers) for numbers in alike]
         chosen = [self.best_phases(tried, counts, length) for length in lengths]
-        planned: dict[tuple[int, ...], tuple[Toolpaths, list[Profile]]] = {}
+        planned: dict[tuple[int, ...], Toolpaths] = {}
         for phases in chosen:
             if phases not in planned:
                 of = {k: p for some, p in zip(alike, phases, strict=True) for k in some.tolist()}
-                whole = Toolpaths.concatenate([paths(k, of[k]) for k in range(len(layers))])
-                planned[phases] = whole, self.profiles(whole)
+                planned[phases] = Toolpaths.concatenate(
+                    [paths(k, of[k]) for k in range(len(layers))]
+                )
         return [planned[phases] for phases in chosen]
 
     def best_phases(

@@ -31,6 +31,7 @@ from ccfem.fibre_aware.heights import (
     nearest_layer,
 )
 from ccfem.fibre_aware.layer_shares import layer_counts, layers_by_case
+from ccfem.fibre_aware.prune import prune
 from ccfem.fibre_aware.prune_cases import case_counts, prune_cases
 from ccfem.fibre_aware.smeared import SmearedPart, smeared_cases
 from ccfem.fibre_aware.spline_grid import SplineGrid
@@ -59,6 +60,9 @@ _ENOUGH = 0.99
 _NEAR = 0.95
 """Share of the largest length above which shorter ones are cut from its design."""
 
+_ROUNDS = 3
+"""Virtual tests that say what to cut."""
+
 _MORE = 1.03
 """By how much more it then asks for than by proportion."""
 
@@ -76,7 +80,7 @@ class StreamFunction:
     ----------
     coverage : float, default 0.45
         Fibre length times strand width over area of the layers, in (0, 1].
-    overfill : float, default 1.15
+    overfill : float, default 1.1
         Fibre length of the design over that kept, at least 1.
     rho : float, mm^2, default 4
         Axial stiffness of a strand over Young's modulus of the matrix.
@@ -108,7 +112,7 @@ class StreamFunction:
     """
 
     coverage: float = 0.45
-    overfill: float = 1.15
+    overfill: float = 1.1
     rho: float = RHO
     evaluations: int = 50
     groups: int = 0
@@ -217,13 +221,17 @@ class StreamFunction:
         machine: Machine,
         lengths: Sequence[float],
     ) -> list[Toolpaths]:
-        """Design for this coverage, and cut the paths to each of some lengths, mm per layer."""
+        """Design for this coverage, and cut by tests to each of some lengths, mm per layer."""
         _check_tension((stress,), layers)
         field = solved(stress, "stream_function")
         problem, group, found = self.designed(field, layers, machine)
         strained = ((1.0, found.objective.solution.displacement),)
         extraction = self._extraction(problem, (found.field,), strained, machine)
-        return extraction.plan(layers, group, [length * len(layers) for length in lengths])
+        in_all, strand = [length * len(layers) for length in lengths], Strand(self.rho)
+        return [
+            prune(whole, problem.part.specimen, length, machine, strand, _ROUNDS)
+            for whole, length in zip(extraction.whole(layers, group, in_all), in_all, strict=True)
+        ]
 
     def _extraction(
         self,
@@ -324,9 +332,7 @@ class StreamFunction:
             prune_cases(
                 whole, specimens, cases.weights, bounds, length, machine, strand, self.objective
             )
-            for (whole, _), length in zip(
-                extraction.whole(layers, field, in_all), in_all, strict=True
-            )
+            for whole, length in zip(extraction.whole(layers, field, in_all), in_all, strict=True)
         ]
 
 
