@@ -21,6 +21,7 @@ CALLS = {
     "new": "ccfem.inspection.new_part(BODY)",
     "example": "ccfem.inspection.write_example(NAME)",
     "cite": "ccfem.comparison.bibtex(ccfem.comparison.cited([METHOD]))",
+    "front": "ccfem.comparison.fibre_front(CASE, STRESS, NAME, STRATEGY, COUNTS)",
     "study": "ccfem.study(FILE, workers=N)",
     "support": "ccfem.support.slice_with_support(SLICER, STRESS, BUILD)",
 }

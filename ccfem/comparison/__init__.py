@@ -2,8 +2,18 @@
 
 from ccfem.comparison.citations import bibtex, cited
 from ccfem.comparison.compare import compare
+from ccfem.comparison.fibre_front import FibreFront, fibre_front
 from ccfem.comparison.result import Comparison
 from ccfem.comparison.runs import Run
 from ccfem.comparison.saving import save
 
-__all__ = ["Comparison", "Run", "bibtex", "cited", "compare", "save"]
+__all__ = [
+    "Comparison",
+    "FibreFront",
+    "Run",
+    "bibtex",
+    "cited",
+    "compare",
+    "fibre_front",
+    "save",
+]

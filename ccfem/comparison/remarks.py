@@ -169,7 +169,7 @@ def open_remarks(runs: Sequence[Run], layers: Sequence[Layer], width: float) -> 
 def _filling(run: Run) -> bool:
     """Whether a run is meant to fill the section: with strands that cross, as many as it can."""
     amount = getattr(run.strategy, "amount", None)
-    if amount is None or not getattr(run.strategy, "crosses", False):
+    if amount is None or not amount.parameter or not getattr(run.strategy, "crosses", False):
         return False
     return bool(getattr(run.strategy, amount.parameter) == amount.most)
 

@@ -26,9 +26,6 @@ _LEAST = 0.03
 """As `least` of `streamlines`: where the stress is weaker, rounding decides where a line goes."""
 _SLACK = 1e-3
 """Share of the separation by which a new line may be too near: rounding and finite steps."""
-_ALIKE = 5
-"""Points along a line, half a separation, within which what begins beside it is about one line:
-where that is too short, the others are not tried."""
 _MOST_POINTS = 20_000_000
 
 
@@ -148,19 +145,14 @@ def _lay(field, grid, laid, seeds, homes, apart, test, step, least):  # type: ig
     # Literals as arguments would be signatures of their own, compiled beside those of numbers.
     lines, count, no_line = np.int64(0), np.int64(0), np.int64(-1)
     looked = tried = 0
-    short = np.full(2, -_ALIKE)  # the last point beside which a line was too short, by side
     while looked < 2 * count or tried < len(seeds):
-        beside = looked < 2 * count
-        p, hand = looked // 2, looked % 2
-        if beside:
+        if looked < 2 * count:
             # Beside the points of lines, to both sides.
-            looked += 1
-            if p - short[hand] < _ALIKE and laid.line[p] == laid.line[short[hand]]:
-                continue
-            side = 1.0 - 2.0 * hand
+            p, side = looked // 2, 1.0 - 2.0 * (looked % 2)
             x = laid.spot[p, 0] - side * apart * laid.way[p, 1]
             y = laid.spot[p, 1] + side * apart * laid.way[p, 0]
             home = laid.home[p]
+            looked += 1
         else:
             x, y = seeds[tried, 0], seeds[tried, 1]
             home = homes[tried]
@@ -172,8 +164,6 @@ def _lay(field, grid, laid, seeds, homes, apart, test, step, least):  # type: ig
         turn, end, ring = _trace(field, grid, laid, count, lines, x, y, home, test, step)
         if (end - count) * step < least:
             _take_back(laid, count, end)
-            if beside:
-                short[hand] = p
             continue
         spans[lines, 0], spans[lines, 1], spans[lines, 2] = count, turn, end
         closed[lines] = ring

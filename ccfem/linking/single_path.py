@@ -39,6 +39,10 @@ _ROUNDS = 15
 _WEIGHTS = (16.0, 4.0, 0.0)
 """Extra cost of each mm of a link inside the section, over its holes, where nothing holds the
 fibre, and outside."""
+_AVOIDED = 100.0
+"""Extra cost, mm, of a link that would be left out, when the order is looked for again."""
+_TRIES = 3
+"""Orders that are looked for while there are such links."""
 _STEP = 0.5
 """Longest distance, mm, between neighbouring points of a link."""
 _ON_BORDER = 1e-3
@@ -70,15 +74,7 @@ class LinkedPath:
 
         The path falls into one more piece than there are such links.
         """
-        stretches = runs(self.link)
-        steps = np.flatnonzero(self.link)
-        cut = cut_at_section(self.points[steps], self.points[steps + 1], section, tolerance=0.0)
-        size = np.linalg.norm(self.points[steps + 1] - self.points[steps], axis=1)[cut.step]
-        owner = np.repeat(np.arange(len(stretches)), np.diff(stretches)[:, 0])[cut.step]
-        left_out = np.zeros(len(stretches), dtype=bool)
-        for place, longest in ((INSIDE, inside), (VOID, over_void)):
-            there = size * (cut.end - cut.begin) * (cut.place == place)
-            left_out |= np.bincount(owner, there, len(stretches)) > longest + _ON_BORDER
+        stretches, left_out = runs(self.link), self.long_links(section, inside, over_void)
         starts = [0, *stretches[left_out, 1]]
         ends = [*stretches[left_out, 0], len(self.points) - 1]
         found = []
@@ -88,9 +84,27 @@ class LinkedPath:
             found.append(LinkedPath(self.points[a : b + 1], link))
         return found
 
+    def long_links(self, section: Region, inside: float, over_void: float) -> BoolArray:
+        """Whether each link has more than a length, mm, inside a section or over its voids."""
+        stretches = runs(self.link)
+        steps = np.flatnonzero(self.link)
+        cut = cut_at_section(self.points[steps], self.points[steps + 1], section, tolerance=0.0)
+        size = np.linalg.norm(self.points[steps + 1] - self.points[steps], axis=1)[cut.step]
+        owner = np.repeat(np.arange(len(stretches)), np.diff(stretches)[:, 0])[cut.step]
+        left_out = np.zeros(len(stretches), dtype=bool)
+        for place, longest in ((INSIDE, inside), (VOID, over_void)):
+            there = size * (cut.end - cut.begin) * (cut.place == place)
+            left_out |= np.bincount(owner, there, len(stretches)) > longest + _ON_BORDER
+        return left_out
+
 
 def link_tracks(
-    groups: Sequence[Sequence[FloatArray]], section: Region, radius: float, width: float
+    groups: Sequence[Sequence[FloatArray]],
+    section: Region,
+    radius: float,
+    width: float,
+    inside: float = np.inf,
+    over_void: float = np.inf,
 ) -> LinkedPath:
     """Join the tracks of all groups to one path.
 
@@ -116,6 +130,9 @@ def link_tracks(
         Tightest turn of a link.
     width : float, mm
         Spacing of neighbouring tracks.
+    inside, over_void : float, mm
+        As of `LinkedPath.without_long_links`: of a few orders the one whose path falls into the
+        fewest pieces there.
 
     Returns
     -------
@@ -143,7 +160,19 @@ def link_tracks(
     tracks = [track for group in opened for track in group]
     network = _Network.between(tracks, np.array(closed), section, radius)
     offsets = np.concatenate([[0], np.cumsum([2 * len(group) for group in opened])])
-    return _assembled(tracks, _order(network.cost, offsets), network)
+    cost, found = network.cost, []
+    for _ in range(_TRIES):
+        visits = _order(cost, offsets)
+        path = _assembled(tracks, visits, network)
+        long = np.flatnonzero(path.long_links(section, inside, over_void))
+        found.append((len(long), path))
+        if not len(long):
+            break
+        cost = cost.copy()
+        left, entered = visits[long, 1], visits[long + 1, 0]
+        cost[left, entered] += _AVOIDED
+        cost[entered, left] += _AVOIDED
+    return min(found, key=lambda each: each[0])[1]
 
 
 def _clean(track: FloatArray) -> FloatArray:

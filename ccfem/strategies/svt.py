@@ -188,9 +188,10 @@ class Svt:
         if self.links == "none":
             return _unlinked([line for group in groups for line in group])
         width = self.spacing * machine.fibre_width
-        path = link_tracks(groups, piece, machine.minimum_radius, width)
         over_void = np.inf if self.longest_over_void is None else self.longest_over_void
-        parts = path.without_long_links(piece, self.longest_inside, over_void)
+        longest = self.longest_inside, over_void
+        path = link_tracks(groups, piece, machine.minimum_radius, width, *longest)
+        parts = path.without_long_links(piece, *longest)
         return [(part.points, part.link) for part in parts]
 
     def _rings(self, piece: Region, machine: Machine) -> list[FloatArray]:

@@ -7,14 +7,17 @@ import pytest
 from scipy.spatial import cKDTree
 from scipy.spatial.transform import Rotation
 
+from ccfem.cases.case import Case
 from ccfem.comparison.compare import compare
 from ccfem.comparison.judging import Solved
+from ccfem.elasticity import Problem
 from ccfem.errors import InputError
 from ccfem.export.gcode import gcode
 from ccfem.layers.level_surfaces import level_surfaces
 from ccfem.layers.slicing import Planar
 from ccfem.layers.standing import standing
 from ccfem.machine import Kinematics, Machine, Process
+from ccfem.materials import isotropic
 from ccfem.mesh.box import box_mesh
 from ccfem.printing.curved_plan import curved_plan
 from ccfem.support import support_layers
@@ -121,8 +124,9 @@ def test_support_is_printed_below_the_part_and_before_it(part, kind):
 
 
 def test_flat_layers_are_not_propped_in_the_file(part):
-    case = SimpleNamespace(build=(0.0, 0.0, 1.0), machine=Machine())
-    solved = Solved(case, SimpleNamespace(mesh=part[0]))
+    mesh = part[0]
+    problem = Problem(mesh, isotropic(1.0, 0.3), (), {})
+    solved = Solved(Case("flat", "", problem), SimpleNamespace(mesh=mesh))
 
     def flat(stress, build, machine):
         return Planar(count=2).cut(stress.mesh, build)
