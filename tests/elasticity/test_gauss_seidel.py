@@ -63,7 +63,7 @@ def test_conjugate_gradients_end_after_as_many_steps_as_unknowns(nodes, seed):
     error = np.linalg.norm(x - np.linalg.solve(dense, rhs))
     assert error <= 1.01e-10 * np.linalg.norm(rhs) / values[0]
     assert iterations <= 3 * nodes
-    assert lowest == pytest.approx(values[0], rel=1e-4)
+    assert lowest == pytest.approx(values[0], rel=0.01)
 
 
 def test_conjugate_gradients_stop_at_an_indefinite_matrix():
