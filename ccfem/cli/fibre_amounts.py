@@ -49,7 +49,7 @@ def front(
     from ccfem.checks import check_known
     from ccfem.cli.run import load
     from ccfem.comparison.compare import create_all
-    from ccfem.comparison.fibre_front import fibre_front, layer_counts
+    from ccfem.comparison.fibre_front import counts_to_try, fibre_front
     from ccfem.elasticity.solve import solve
     from ccfem.errors import InputError
     from ccfem.io.result_folder import whole_folder
@@ -68,7 +68,7 @@ def front(
     with whole_folder(where, force) as folder, progress_bar(lines=True) as progress:
         progress(f"solving {part.name}", 0.0)
         stress = solve(part.problem, backend=backend)[load_case or names[0]]
-        several = layer_counts(part, stress) if counts is None else [int(each) for each in counts]
+        several = counts_to_try(part, stress) if counts is None else [int(each) for each in counts]
         found = fibre_front(
             part, stress, strategy, chosen, several, points, backend=backend, progress=progress
         )

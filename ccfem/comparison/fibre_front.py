@@ -38,7 +38,7 @@ if TYPE_CHECKING:
     import pandas as pd
     from matplotlib.figure import Figure
 
-__all__ = ["FibreFront", "FrontPoint", "fibre_front", "layer_counts"]
+__all__ = ["FibreFront", "FrontPoint", "counts_to_try", "fibre_front"]
 
 _STIFFNESS, _FAILURE = "times unreinforced stiffness", "first failure, N"
 
@@ -169,7 +169,7 @@ class FibreFront:
         return pd.DataFrame(rows)
 
 
-def layer_counts(case: Case, stress: StressField) -> tuple[int, ...]:
+def counts_to_try(case: Case, stress: StressField) -> tuple[int, ...]:
     """Numbers of flat layers worth trying: the part's own, and twice as many where they have room.
 
     A layer has to be as high as a strand is (`Machine.strand_height`).

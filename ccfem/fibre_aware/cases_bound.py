@@ -26,7 +26,7 @@ from ccfem.checks import check_known, check_number
 from ccfem.elasticity.weighted_cases import WeightedCases
 from ccfem.fibre_aware.heights import fibre_capacity
 from ccfem.fibre_aware.smeared import SmearedPart, SmearedSolution, smeared_cases
-from ccfem.fibre_aware.upper_bound import criterion_step, upper_bound
+from ccfem.fibre_aware.upper_bound import criterion_step, directions, upper_bound
 from ccfem.layers.layer import Layer
 from ccfem.machine.machine import Machine
 from ccfem.virtual_testing.strand import Strand
@@ -149,9 +149,7 @@ def cases_bound(
     length = min(length, float(volume @ most))
     scale = singles / np.array([part.unreinforced.work for part in parts])
 
-    angles = np.pi * np.arange(_ANGLES) / _ANGLES
-    cosine, sine = np.cos(angles), np.sin(angles)
-    along = np.stack([cosine**2, sine**2, cosine * sine], axis=1)
+    _, along = directions(_ANGLES)
     outer = (along[:, :, None] * along[:, None, :]).reshape(_ANGLES, 9)
     density = np.repeat((length / float(volume @ most) * most / _ANGLES)[:, None], _ANGLES, axis=1)
     solutions: list[SmearedSolution | None] = [None] * len(cases)
@@ -255,9 +253,7 @@ def largest_gathered(strains: FloatArray, factors: FloatArray) -> FloatArray:
     factors : (n,) array
         Not negative.
     """
-    angles = np.pi * np.arange(_CERTIFIED_ANGLES) / _CERTIFIED_ANGLES
-    cosine, sine = np.cos(angles), np.sin(angles)
-    along = np.stack([cosine**2, sine**2, cosine * sine], axis=1)
+    _, along = directions(_CERTIFIED_ANGLES)
     half = 0.5 * np.pi / _CERTIFIED_ANGLES
     result = np.empty(strains.shape[1])
     _gathered(np.ascontiguousarray(strains), factors, along, 0.5 * half**2, result)

@@ -28,7 +28,7 @@ from ccfem.tensor import largest_in_plane
 from ccfem.virtual_testing.equilibrium import MODES, TENSION
 from ccfem.virtual_testing.strand import Strand
 
-__all__ = ["UpperBound", "certificate", "criterion_step", "upper_bound"]
+__all__ = ["UpperBound", "certificate", "criterion_step", "directions", "upper_bound"]
 
 _ANGLES = 12
 _LEAST_PROGRESS = 2e-4
@@ -117,9 +117,7 @@ def upper_bound(
     volume = part.mesh.volumes
     length = min(length, float(volume @ most))
 
-    angles = np.pi * np.arange(_ANGLES) / _ANGLES
-    cosine, sine = np.cos(angles), np.sin(angles)
-    along = np.stack([cosine**2, sine**2, cosine * sine], axis=1)
+    angles, along = directions(_ANGLES)
     outer = (along[:, :, None] * along[:, None, :]).reshape(_ANGLES, 9)
     share = length / float(volume @ most)
     density = np.repeat((share * most / _ANGLES)[:, None], _ANGLES, axis=1)
@@ -147,6 +145,16 @@ def upper_bound(
         stretch = np.maximum(strain, 0.0) if mode == TENSION else np.abs(strain)
         density = criterion_step(density, stretch, volume, most, length)
     return UpperBound(min(bounds), reached, best, angles, tuple(bounds))
+
+
+def directions(count: int) -> tuple[FloatArray, FloatArray]:
+    """Angles (k,), radians, evenly over half a turn, and what strains along them are made of.
+
+    The second (k, 3) times the strains 11, 22 and 12 (engineering shear) is the strain along each.
+    """
+    angles = np.pi * np.arange(count) / count
+    cosine, sine = np.cos(angles), np.sin(angles)
+    return angles, np.stack([cosine**2, sine**2, cosine * sine], axis=1)
 
 
 def certificate(

@@ -14,7 +14,7 @@ from ccfem.errors import InputError
 from ccfem.mesh.patches import Vector, unit_vector
 from ccfem.mesh.tet_mesh import TetMesh
 
-__all__ = ["CellBox", "CellCylinder", "CellRule"]
+__all__ = ["CellBox", "CellCylinder", "CellRule", "check_box"]
 
 
 class CellRule(Protocol):
@@ -39,10 +39,7 @@ class CellBox:
     upper: Vector
 
     def __post_init__(self) -> None:
-        if not (np.asarray(self.lower) < np.asarray(self.upper)).all():
-            raise InputError(
-                f"box lower must lie below upper; got {self.lower} and {self.upper}: swap them"
-            )
+        check_box(self.lower, self.upper)
 
     def __call__(self, mesh: TetMesh) -> IntArray:
         """Cells (k,) in the box."""
@@ -80,6 +77,17 @@ class CellCylinder:
         label = f"cylinder round {self.point} along {self.axis}, radius {self.radius:g} mm"
         inside: BoolArray = away <= self.radius
         return _chosen(inside, label, mesh)
+
+
+def check_box(lower: Vector, upper: Vector) -> None:
+    """Refuse opposite corners of a box, mm, of which the first does not lie below the second.
+
+    Raises
+    ------
+    InputError
+    """
+    if not (np.asarray(lower) < np.asarray(upper)).all():
+        raise InputError(f"box lower must lie below upper; got {lower} and {upper}: swap them")
 
 
 def _centres(mesh: TetMesh) -> FloatArray:

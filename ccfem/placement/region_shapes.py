@@ -8,10 +8,10 @@ import shapely
 
 from ccfem.arrays import FloatArray
 from ccfem.checks import check_fields
-from ccfem.errors import InputError
 from ccfem.geometry.shapes import Region
 from ccfem.io.surface import Surface
 from ccfem.layers.plane import Plane
+from ccfem.mesh.cell_rules import check_box
 from ccfem.mesh.patches import Vector, unit_vector
 from ccfem.mesh.tet_mesh import TetMesh
 
@@ -49,10 +49,7 @@ class InBox:
     upper: Vector
 
     def __post_init__(self) -> None:
-        if not (np.asarray(self.lower) < np.asarray(self.upper)).all():
-            raise InputError(
-                f"box lower must lie below upper; got {self.lower} and {self.upper}: swap them"
-            )
+        check_box(self.lower, self.upper)
 
     def section(self, plane: Plane, mesh: TetMesh, reach: float) -> Region:
         """Section with a plane, in its coordinates."""

@@ -7,7 +7,7 @@ import numpy as np
 import pytest
 
 from ccfem.cases.case import Case
-from ccfem.comparison.fibre_front import FibreFront, FrontPoint, fibre_front, layer_counts
+from ccfem.comparison.fibre_front import FibreFront, FrontPoint, counts_to_try, fibre_front
 from ccfem.elasticity import Force, Problem, Support, solve
 from ccfem.errors import InputError
 from ccfem.layers.slicing.planar import Planar
@@ -95,9 +95,9 @@ def test_table_and_picture_show_every_plan(front, tmp_path):
 
 def test_twice_as_many_layers_where_strands_have_room(bar):
     case, stress = bar
-    assert layer_counts(case, stress) == (2, 4)
+    assert counts_to_try(case, stress) == (2, 4)
     thick = Machine(filament_area=1.2)  # 1.2 mm high: no room in layers of 1 mm
-    assert layer_counts(
+    assert counts_to_try(
         Case("bar", "", case.problem, slicing=Planar(count=2), machine=thick), stress
     ) == (2,)
 
