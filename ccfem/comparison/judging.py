@@ -244,7 +244,9 @@ def _longest_bounded(
 ) -> float | None:
     """Most fibre of the runs that a bound holds for, mm; None where there is no bound."""
     equal = [run for run in runs if run.tested is not None and not off_length(run, wanted)]
-    pressing = any(isinstance(each, PressingSupport) for each in solved.field.problem.supports)
+    fields = (solved.field,) if solved.cases is None else solved.cases.fields
+    supports = [support for field in fields for support in field.problem.supports]
+    pressing = any(isinstance(each, PressingSupport) for each in supports)
     flat = all(layer.flat is not None for layer in part.layers)
     if solved.tests is None or not equal or pressing or not flat:
         return None
