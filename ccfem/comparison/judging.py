@@ -32,9 +32,6 @@ from ccfem.support import SupportLayers, slice_with_support
 
 __all__ = ["Solved", "judged"]
 
-_BOUND_ITERATIONS = 7
-"""The bound holds after any number of iterations; more than these lower it by half a per cent."""
-
 
 @dataclass(frozen=True)
 class Solved:
@@ -214,11 +211,8 @@ def _bound(
     if longest is None or solved.tests is None:
         return None
     tell("bounding what any paths could reach")
-    strand, iterations = solved.tests.strand, _BOUND_ITERATIONS
     with timed(seconds, "bound"):
-        return upper_bound(
-            solved.field, part.layers, longest, part.machine, strand, iterations=iterations
-        )
+        return upper_bound(solved.field, part.layers, longest, part.machine, solved.tests.strand)
 
 
 def _bound_of_cases(
