@@ -7,7 +7,8 @@ displacements u_i,
 
 where S is the most that fibre of that length can gather: the cells of the largest
 ``max_t sum v_i max(t.eps_i t, 0)^2``, filled until the length is used. No principal direction is
-known for several strains: 360 angles are tried, with a margin for those between.
+known for several strains: 360 angles are tried, with a margin for those between. A case that moves
+supports in place of forces has a compliance too: see `SmearedPart.pull`.
 
 What counts of a case is C_i over the least that any paths could make of it alone. The factors that
 raise the bound of the largest of these are found by growing those of the cases that are worst off;
@@ -173,7 +174,8 @@ def cases_bound(
             part.solve(fibre, start, 1e-3) for part, start in zip(parts, solutions, strict=True)
         ]
         solutions = list(found)
-        terms = scale * np.array([one.work for one in found])
+        compliances = [part.compliance(one.work) for part, one in zip(parts, found, strict=True)]
+        terms = scale * np.array(compliances)
         reached = min(reached, objective_value(terms, cases.weights, objective))
         bounds.append(cases_certificate(parts, found, factors * scale, axial, most, length))
         if bounds[-1] >= max(bounds):
@@ -186,8 +188,8 @@ def cases_bound(
             factors = factors / factors.sum()
         stretch = np.sqrt(
             sum(
-                v * np.maximum(one.strain @ along.T, 0.0) ** 2
-                for v, one in zip(factors * scale, found, strict=True)
+                v * (part.pull(one)[0] * np.maximum(one.strain @ along.T, 0.0)) ** 2
+                for v, part, one in zip(factors * scale, parts, found, strict=True)
             )
         )
         ascent = ascent.step(stretch, merit)
@@ -224,9 +226,10 @@ def cases_certificate(
     Parameters
     ----------
     parts : sequence of SmearedPart
-        One for each case; forces load them.
+        One for each case.
     solutions : sequence of SmearedSolution
-        Any displacements that respect the supports, with their strains in the plane.
+        Any displacements that respect the supports, with their strains in the plane; where
+        supports move also the work.
     factors : (n,) array
         Not negative.
     axial_stiffness : float, N
@@ -236,16 +239,17 @@ def cases_certificate(
     length : float, mm
         Of fibre.
     """
-    strains = np.stack([one.strain for one in solutions])
+    pulls = [part.pull(one) for part, one in zip(parts, solutions, strict=True)]
+    strains = np.stack([s * one.strain for (s, _), one in zip(pulls, solutions, strict=True)])
     square = largest_gathered(strains, np.asarray(factors, dtype=np.float64))
     order = np.argsort(-square, kind="stable")
     room = (parts[0].mesh.volumes * most)[order]
     used = np.minimum(room, np.maximum(length - (np.cumsum(room) - room), 0.0))
     energy, work = axial_stiffness * float(used @ square[order]), 0.0
-    for factor, part, one in zip(factors, parts, solutions, strict=True):
-        u, specimen = one.displacement.reshape(-1), part.specimen
-        energy += factor * float(u @ (specimen.matrix @ u))
-        work += factor * float(specimen.forces.reshape(-1) @ u)
+    for factor, part, one, (s, own) in zip(factors, parts, solutions, pulls, strict=True):
+        u = s * one.displacement.reshape(-1)
+        energy += factor * float(u @ (part.specimen.matrix @ u))
+        work += factor * own
     return work**2 / energy
 
 
