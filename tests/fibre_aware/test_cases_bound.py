@@ -3,7 +3,7 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from ccfem.elasticity.problem import Force, Problem, Support, Traction
+from ccfem.elasticity.problem import Force, Support
 from ccfem.elasticity.solve import solve
 from ccfem.elasticity.weighted_cases import WeightedCases
 from ccfem.errors import InputError
@@ -18,10 +18,7 @@ from ccfem.fibre_aware.heights import fibre_capacity
 from ccfem.fibre_aware.prune_cases import prune_cases
 from ccfem.fibre_aware.smeared import SmearedPart, SmearedSolution, smeared_cases
 from ccfem.fibre_aware.upper_bound import certificate
-from ccfem.layers.slicing.planar import Planar
 from ccfem.machine import Machine
-from ccfem.materials import isotropic
-from ccfem.mesh.box import box_mesh
 from ccfem.toolpaths import Toolpaths
 from ccfem.virtual_testing.several_cases import specimens, virtual_tests
 
@@ -157,22 +154,6 @@ def test_what_makes_no_sense_is_refused(two_bends):
         WeightedCases((cases.fields[0],) * 2, np.ones(2))
     with pytest.raises(InputError, match="worst, sum"):
         cases_bound(cases, layers, 100.0, MACHINE, objective="best")
-
-
-@pytest.fixture(scope="module")
-def pulled_and_moved():
-    """The plate of `two_pulls`; along y it is stretched by moving a support, not by a force."""
-    mesh = box_mesh((24.0, 24.0, 4.0), (8, 8, 2))
-    supports = (Support("x_min", "x"), Support("y_min", "y"), Support("z_min", "z"))
-    problem = Problem(
-        mesh,
-        isotropic(3500.0, 0.0),
-        supports,
-        {"along_x": (Traction("x_max", (5.0, 0.0, 0.0)),), "along_y": ()},
-        order=1,
-        case_supports={"along_y": (Support("y_max", "y", (0.0, 0.1, 0.0)),)},
-    )
-    return WeightedCases.of(solve(problem, tolerance=1e-10)), Planar(count=4).cut(mesh)
 
 
 @pytest.mark.parametrize("objective", [WORST, SUM])
