@@ -7,7 +7,8 @@ import numpy as np
 import pytest
 
 from ccfem.cases.case import Case
-from ccfem.comparison.fibre_front import FibreFront, FrontPoint, counts_to_try, fibre_front
+from ccfem.comparison.fibre_front import counts_to_try, fibre_front
+from ccfem.comparison.front_points import FibreFront, FrontPoint
 from ccfem.elasticity import Force, Problem, Support, solve
 from ccfem.errors import InputError
 from ccfem.layers.slicing.planar import Planar
