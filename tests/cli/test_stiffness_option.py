@@ -28,11 +28,26 @@ def test_the_options_ask_for_the_fibre_that_reaches_a_stiffness_in_newtons_per_m
     assert 1.15 * bare <= tested.stiffness <= 1.16 * bare
 
 
+def test_the_number_of_layers_is_chosen_and_said(capsys):
+    case, strategy = read("bar", element_size=4.0), create("zigzag", {})
+    asked = {**options_of(None, None, True, None, "auto"), "stiffness": "3"}
+    found = least_fibre_options(case, strategy, asked)
+    said = capsys.readouterr().out
+    count = found["layers"] or 10
+    assert f"on {count} layers" in said
+    assert said.startswith("3 times the stiffness without fibre takes")
+    stress, _, layers, _ = solve_and_slice(case, count)
+    paths = plan_to_length(strategy, layers, stress, case.machine, found["fibre_per_layer"])
+    assert virtual_test(paths.toolpaths, Specimen.of(stress), span=()).ratio >= 3.0
+
+
 @pytest.mark.parametrize(
     ("words", "answer"),
     [
         (["--stiffness", "stiff"], "expects a ratio as 2.5, or N/mm"),
         (["--stiffness", "1N/mm"], "no more than"),
+        (["--stiffness", "nan"], "must be a finite number"),
+        (["--stiffness", "1e9N/mm"], "no paths on 2 layers exceed"),
         (["--stiffness", "9"], "9 times the stiffness without fibre was asked for"),
         (["--stiffness", "1.2", "--fibre-per-layer", "500"], "drop --fibre-per-layer"),
         (["--stiffness", "1.2", "--no-virtual-test"], "drop --no-virtual-test"),
