@@ -22,6 +22,10 @@ __all__ = ["FibreFront", "FrontPoint"]
 _STIFFNESS, _FAILURE = "times unreinforced stiffness", "first failure, kN"
 
 
+def _layers(count: int) -> str:
+    return f"{count} layers" if count > 1 else "1 layer"
+
+
 @dataclass(frozen=True)
 class FrontPoint:
     """One plan.
@@ -63,7 +67,7 @@ class FrontPoint:
     @property
     def kind(self) -> str:
         """Name of the curve that it belongs to."""
-        name = f"{self.layers} layers" if self.layers > 1 else "1 layer"
+        name = _layers(self.layers)
         return f"{name}, strength {self.strength:g}" if self.strength else name
 
 
@@ -151,14 +155,17 @@ class FibreFront:
             raise InputError(
                 "a trade needs plans of one length for several strengths; got none: give --strength"
             )
+        counts = {each.layers for some in several for each in some}
+        alike = len(counts) == 1
+        on = f", {_layers(*counts)}" if alike else ""
         named = {
-            f"{1e-3 * some[0].length:.3g} m on {some[0].kind}": [
+            f"{1e-3 * some[0].length:.3g} m" + ("" if alike else f", {_layers(some[0].layers)}"): [
                 TradePoint(each.ratio, 1e-3 * each.failure, each.strength, not each.why_not)
                 for each in some
             ]
             for some in several
         }
-        return trade_curves(named, f"{self.case}, {self.strategy}")
+        return trade_curves(named, f"{self.case}, {self.strategy}{on}: what strength costs")
 
     def to_frame(self) -> "pd.DataFrame":
         """One row a plan."""

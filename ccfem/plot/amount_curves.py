@@ -3,13 +3,19 @@
 from collections.abc import Mapping, Sequence
 from typing import TYPE_CHECKING, Any, NamedTuple
 
+import numpy as np
+
 from ccfem.plot.colours import INK, OUTLINE, palette
-from ccfem.plot.curves import axes_below, legend_below, style_axes
+from ccfem.plot.curves import style_axes
 
 if TYPE_CHECKING:
     from matplotlib.figure import Figure
 
 __all__ = ["AmountPoint", "TradePoint", "amount_curves", "trade_curves"]
+
+
+_APART = 0.04
+"""Least distance, in sizes of the axes, of points whose strengths are written beside them."""
 
 
 class AmountPoint(NamedTuple):
@@ -116,7 +122,15 @@ def trade_curves(curves: Mapping[str, Sequence[TradePoint]], heading: str = "") 
         Plans with as much fibre, by how much strength counts.
     heading : str
     """
-    figure, axes = axes_below(heading, "times unreinforced stiffness", "first failure, kN")
+    from matplotlib.backends.backend_agg import FigureCanvasAgg
+    from matplotlib.figure import Figure
+    from matplotlib.lines import Line2D
+
+    figure = Figure(figsize=(5.6, 4.0), dpi=150.0, facecolor="white")
+    FigureCanvasAgg(figure)
+    axes = figure.add_axes((0.09, 0.23, 0.88, 0.68))
+    figure.text(0.02, 0.945, heading, size=10, weight="bold", color=INK)
+    style_axes(axes, "times unreinforced stiffness", "first failure, kN")
     colours = palette(curves)
     for name, points in curves.items():
         across, up = [p.stiffness for p in points], [p.failure for p in points]
@@ -124,18 +138,41 @@ def trade_curves(curves: Mapping[str, Sequence[TradePoint]], heading: str = "") 
         for p in points:
             face = colours[name] if p.printable else "white"
             axes.plot([p.stiffness], [p.failure], "o", ms=5.0, color=colours[name], mfc=face)
-            axes.annotate(
-                f"{p.strength:g}",
-                (p.stiffness, p.failure),
-                (4.0, 4.0),
-                textcoords="offset points",
-                size=7,
-                color=INK,
-            )
-    axes.autoscale(axis="y")
-    axes.margins(0.1)
-    legend_below(axes, colours, list(curves))
+    axes.margins(0.08)
+    _name_points(axes, [p for points in curves.values() for p in points])
+    marks = [Line2D([], [], color=colours[name], lw=1.6, label=name) for name in curves]
+    columns = 4 if max(len(name) for name in curves) <= 10 else 2
+    figure.legend(
+        handles=marks,
+        loc="lower center",
+        ncols=min(len(marks), columns),
+        frameon=False,
+        fontsize=7.5,
+        labelcolor=INK,
+    )
     return figure
+
+
+def _name_points(axes: Any, points: Sequence[TradePoint]) -> None:
+    """Write how much strength counts beside each point that is not too near to a named one."""
+    across, up = np.ptp(axes.get_xlim()), np.ptp(axes.get_ylim())
+    named: list[TradePoint] = []
+    for p in points:
+        near = (
+            np.hypot((p.stiffness - q.stiffness) / across, (p.failure - q.failure) / up)
+            for q in named
+        )
+        if not min(near, default=1.0) > _APART:
+            continue
+        named.append(p)
+        axes.annotate(
+            f"{p.strength:g}",
+            (p.stiffness, p.failure),
+            (4.0, 4.0),
+            textcoords="offset points",
+            size=7,
+            color=INK,
+        )
 
 
 def _draw(axes: Any, points: Sequence[AmountPoint], colour: str, begin: float) -> None:
