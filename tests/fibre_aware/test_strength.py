@@ -16,6 +16,9 @@ from ccfem.fibre_aware.stream_start import start_field
 from ccfem.fibre_aware.strength_design import StrengthProblem, design_for_strength
 from ccfem.fibre_aware.strength_value import Worth, raised
 from ccfem.machine import Machine
+from ccfem.planning.plan import plan_layers
+from ccfem.strategies.pruned import Pruned
+from ccfem.strategies.stream_function import StreamFunction
 from ccfem.toolpaths import Toolpaths
 from ccfem.virtual_testing.bars import bars
 from ccfem.virtual_testing.equilibrium import equilibrium
@@ -166,3 +169,28 @@ def test_a_design_for_strength_takes_the_part_farther_from_failure(problem):
     before, after = (judged.evaluate(one.field).value for one in (first, second))
     assert after < before - 0.01
     assert second.objective.ratio > 1.0
+
+
+@pytest.mark.parametrize("strategy", [StreamFunction, Pruned])
+def test_strategies_take_strength_under_one_load_case(two_bends, strategy):
+    with pytest.raises(InputError, match="strength must be at least 0 and at most 1"):
+        strategy(strength=2.0)
+    cases, layers = two_bends
+    with pytest.raises(InputError, match="plans for strength under one load case"):
+        strategy(strength=0.5).for_cases(cases, layers, SHORT, (100.0,))
+
+
+def test_a_plan_for_strength_keeps_its_length_and_says_what_it_overfilled(strong_beam):
+    stress, layers = strong_beam
+    strategy = StreamFunction(strength=0.5, evaluations=2, phases=1)
+    told, planner = strategy.to_lengths(stress, layers, SHORT, (200.0,))[0]
+    assert told.strength == 0.5
+    assert told.overfill >= 1.25
+    laid = plan_layers(planner, layers, layers, stress, SHORT).lengths.sum()
+    assert 0.9 * 800.0 < laid <= 800.0
+
+
+def test_the_strength_of_the_matrix_has_to_be_known(bent_beam):
+    stress, layers = bent_beam
+    with pytest.raises(InputError, match="needs the strength of the matrix, MPa"):
+        StreamFunction(strength=0.5, evaluations=1).to_lengths(stress, layers, SHORT, (200.0,))
