@@ -33,7 +33,10 @@ from ccfem.virtual_testing.near_failure import (
 from ccfem.virtual_testing.strand import Strand
 from ccfem.virtual_testing.strengths import Limits
 
-__all__ = ["StrengthProblem", "design_for_strength"]
+__all__ = ["LEAST_OVERFILL", "StrengthProblem", "design_for_strength"]
+
+LEAST_OVERFILL = 1.25
+"""Length that is designed over that kept, at least: the cut has to have a choice."""
 
 _TOLERANCE = 1e-3
 """Relative residual of the adjoint solve."""
@@ -172,8 +175,9 @@ def design_for_strength(
     problem : StreamProblem
     first : StreamDesign
         For stiffness alone.
-    strength : float in (0, 1]
-        How much a share of the load at first failure counts; one of stiffness counts the rest.
+    strength : float in [0, 1]
+        How much a share of the load at first failure counts; one of stiffness counts the rest. At 0
+        the design stays as it is.
     evaluations : int, default 50
         Of stiffness and strength, at least 1.
 
@@ -182,6 +186,8 @@ def design_for_strength(
     InputError
         When the strength of the matrix is not known, or no fibre is stretched.
     """
+    if not strength:
+        return first
     limits = Limits.of(problem.part.specimen.system.problem.material, Strand())
     start = first.field
     whole = StrengthProblem.at(problem, limits, strength, start, first.objective.solution)

@@ -38,7 +38,7 @@ from ccfem.fibre_aware.spline_grid import SplineGrid
 from ccfem.fibre_aware.stream_design import DENSEST, StreamDesign, StreamProblem, design
 from ccfem.fibre_aware.stream_paths import Extraction, refined
 from ccfem.fibre_aware.stream_start import plane_axes, start_field
-from ccfem.fibre_aware.strength_design import design_for_strength
+from ccfem.fibre_aware.strength_design import LEAST_OVERFILL, design_for_strength
 from ccfem.fibre_aware.strength_value import refuse_strength
 from ccfem.fibre_aware.tension_check import check_tension
 from ccfem.layers.layer import Layer
@@ -66,9 +66,6 @@ _ROUNDS = 3
 
 _CASES_OVERFILL = 1.15
 """Least overfill for several load cases: tests of all of them have more to choose between."""
-
-_STRENGTH_OVERFILL = 1.25
-"""Least overfill where strength counts."""
 
 _MORE = 1.03
 """By how much more it then asks for than by proportion."""
@@ -230,8 +227,7 @@ class StreamFunction:
 
     def _filled(self) -> "StreamFunction":
         """Return the strategy with as much overfill as strength asks for."""
-        least = _STRENGTH_OVERFILL if self.strength else 1.0
-        return replace(self, overfill=max(self.overfill, least))
+        return replace(self, overfill=max(self.overfill, LEAST_OVERFILL if self.strength else 1.0))
 
     def _cut(
         self,
@@ -276,9 +272,7 @@ class StreamFunction:
         problem, group = self._problem((part,), layers, machine)
         start = start_field(problem, stress, middle_layers(layers, group), self.cap)
         found = design(problem, start, self.evaluations)
-        if self.strength:
-            found = design_for_strength(problem, found, self.strength, self.evaluations)
-        return problem, group, found
+        return problem, group, design_for_strength(problem, found, self.strength, self.evaluations)
 
     def designed_for_cases(
         self, cases: WeightedCases, layers: Sequence[Layer], machine: Machine, bounds: FloatArray
