@@ -1,4 +1,4 @@
-"""Draw the pictures of the documentation: every case, and every strategy on the loop.
+"""Draw the pictures of the documentation: every case, every strategy on the loop, and a trade.
 
 Run ``python -m benchmarks.gallery`` whenever a case or a strategy changes; it takes minutes. Names
 after it draw only those: ``python -m benchmarks.gallery loop isocurve``.
@@ -12,6 +12,7 @@ from PIL import Image
 
 import ccfem
 from ccfem.cases import named_cases
+from ccfem.comparison.fibre_front import fibre_front
 from ccfem.errors import InputError
 from ccfem.layers.layer_stress import stress_on
 from ccfem.layers.slicing.planar import Planar
@@ -60,6 +61,24 @@ def draw_strategies(chosen: set[str]) -> None:
         write(figure, PICTURES / "strategies" / f"{name}.png")
 
 
+def draw_trade(chosen: set[str]) -> None:
+    """Draw what strength costs in stiffness on the loop; takes longest of all."""
+    if chosen and "trade" not in chosen:
+        return
+    case = ccfem.read("loop")
+    front = fibre_front(
+        case,
+        ccfem.solve(case.problem)["pull"],
+        "stream_function",
+        create("stream_function"),
+        (12,),
+        points=4,
+        strengths=(0.0, 0.2, 0.4, 0.6),
+    )
+    write(front.plot_trade(), PICTURES / "trade.png")
+
+
 if __name__ == "__main__":
     draw_cases(set(sys.argv[1:]))
     draw_strategies(set(sys.argv[1:]))
+    draw_trade(set(sys.argv[1:]))

@@ -264,7 +264,9 @@ def compare(
 @app.command()
 def plan(
     case: CasePath,
-    strategy: Annotated[str, typer.Option(metavar="S", help="See ccfem strategies.")],
+    strategy: Annotated[
+        str, typer.Option(metavar="S", help="See ccfem strategies.")
+    ] = "stream_function",
     set_: Annotated[
         list[str] | None,
         typer.Option("--set", metavar="NAME=VALUE", help="Set a parameter; repeatable."),

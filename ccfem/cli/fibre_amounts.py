@@ -8,11 +8,12 @@ from typing import TYPE_CHECKING, Annotated
 import typer
 
 from ccfem.cli.arguments import numbers_of, parameters_by_strategy
+from ccfem.cli.fibre_choice import SetFibre, fibre_choice
 from ccfem.cli.machines import MachineName, SetMachine, machine_choice
 from ccfem.cli.options import Backend, CasePath, Force, LoadCase, Out, SetCase
 
 if TYPE_CHECKING:
-    from ccfem.comparison.fibre_front import FibreFront
+    from ccfem.comparison.front_points import FibreFront
 
 __all__ = ["front"]
 
@@ -38,14 +39,24 @@ def front(
     points: Annotated[
         int, typer.Option(metavar="N", help="Lengths of fibre, up to what fills most layers.")
     ] = 5,
+    strength: Annotated[
+        str | None,
+        typer.Option(
+            metavar="W,W,..",
+            help="Also plan for the load at first failure, which counts so much of 1 beside the "
+            "stiffness, as 0,0.25,0.5; trade.png shows what one costs in the other.",
+        ),
+    ] = None,
     load_case: LoadCase = None,
     machine: MachineName = None,
     set_machine: SetMachine = None,
+    set_fibre: SetFibre = None,
     backend: Backend = "auto",
     out: Out = None,
     force: Force = False,
 ) -> None:
     """Show how stiff and strong a part gets with how much fibre, beside what no paths exceed."""
+    from ccfem.cases.load_cases import asks_for_all
     from ccfem.checks import check_known
     from ccfem.cli.run import load
     from ccfem.comparison.compare import create_all
@@ -59,9 +70,15 @@ def front(
     counts = None if layers is None else numbers_of(layers)
     if counts is not None and any(count != int(count) for count in counts):
         raise InputError(f"--layers expects whole numbers as 6,12; got '{layers}'")
-    part = load(case, set_case, machine=machine_choice(machine, set_machine))
+    strengths = () if strength is None else numbers_of(strength)
+    if strength is not None and not strengths:
+        raise InputError(f"--strength expects numbers from 0 to 1 as 0,0.25,0.5; got '{strength}'")
+    chosen_machine, fibre = machine_choice(machine, set_machine), fibre_choice(set_fibre)
+    part = load(case, set_case, machine=chosen_machine, fibre=fibre)
     chosen = create_all(part, (strategy,), parameters)[strategy]
     names = part.problem.cases
+    if asks_for_all(part, load_case):
+        raise InputError("a front is of one load case: name it in place of all")
     if load_case is not None:
         check_known("load case", load_case, names)
     where = out if out is not None else Path("results") / f"{part.name}-front"
@@ -70,25 +87,40 @@ def front(
         stress = solve(part.problem, backend=backend)[load_case or names[0]]
         several = counts_to_try(part, stress) if counts is None else [int(each) for each in counts]
         found = fibre_front(
-            part, stress, strategy, chosen, several, points, backend=backend, progress=progress
+            part,
+            stress,
+            strategy,
+            chosen,
+            several,
+            points,
+            backend=backend,
+            strengths=strengths,
+            progress=progress,
         )
         found.to_frame().to_csv(folder / "front.csv", index=False)
         found.plot().savefig(folder / "front.png")
+        if len(strengths) > 1:
+            found.plot_trade().savefig(folder / "trade.png")
         command = shlex.join(["ccfem", *sys.argv[1:]])
         (folder / "command.txt").write_text(command + "\n", encoding="utf-8")
     _say(found)
-    print(f"\n{where}: front.png, front.csv")
+    trade = "trade.png, " if len(strengths) > 1 else ""
+    print(f"\n{where}: front.png, {trade}front.csv")
 
 
 def _say(found: "FibreFront") -> None:
     """Print the plans as a table; marked are those that none with as little fibre exceeds."""
-    print(f"{'layers':>6}{'fibre, m':>10}{'stiffness':>11}{'bound':>8}{'first failure':>17}")
+    print(
+        f"{'layers':>6}{'strength':>10}{'fibre, m':>10}{'stiffness':>11}"
+        f"{'bound':>8}{'first failure':>17}"
+    )
     rows = zip(found.points, found.stiffest.tolist(), found.strongest.tolist(), strict=True)
     for each, stiffest, strongest in rows:
         failure = f"{each.failure:.0f} N" if each.failure == each.failure else "not known"
         print(
-            f"{each.layers:>6}{1e-3 * each.length:>10.2f}{each.ratio:>10.3f}{'*' * stiffest:<1}"
-            f"{each.bound:>8.3f}{failure:>15}{'*' * strongest:<2}"
+            f"{each.layers:>6}{each.strength:>10g}{1e-3 * each.length:>10.2f}"
+            f"{each.ratio:>10.3f}{'*' * stiffest:<1}{each.bound:>8.3f}"
+            f"{failure:>15}{'*' * strongest:<2}"
             + (f" not printable: {each.why_not}" if each.why_not else "")
         )
     for count, reason in found.refused.items():
@@ -99,7 +131,8 @@ def _say(found: "FibreFront") -> None:
         key=lambda each: each.ratio,
         default=found.points[-1],
     )
+    weight = f" --set strength={best.strength:g}" if best.strength else ""
     print(
         f"ccfem plan ... --strategy {found.strategy} --layers {best.layers} "
-        f"--fibre-per-layer {best.asked:.0f}"
+        f"--fibre-per-layer {best.asked:.0f}{weight}"
     )

@@ -2,7 +2,8 @@
 
 from ccfem.comparison.citations import bibtex, cited
 from ccfem.comparison.compare import compare
-from ccfem.comparison.fibre_front import FibreFront, fibre_front
+from ccfem.comparison.fibre_front import fibre_front
+from ccfem.comparison.front_points import FibreFront
 from ccfem.comparison.result import Comparison
 from ccfem.comparison.runs import Run
 from ccfem.comparison.saving import save

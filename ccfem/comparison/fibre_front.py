@@ -1,15 +1,15 @@
-"""How stiff and how strong a part gets with how much fibre on how many layers, beside the bound."""
+"""Planning a part with how much fibre on how many layers: what stiffness and strength follow."""
 
+import itertools
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass
-from typing import TYPE_CHECKING
+from dataclasses import replace
+from typing import Any
 
 import numpy as np
 
-from ccfem.arrays import BoolArray, freeze
 from ccfem.cases.case import Case
 from ccfem.checks import check_number
-from ccfem.comparison.front import on_front
+from ccfem.comparison.front_points import FibreFront, FrontPoint
 from ccfem.comparison.judging import Solved
 from ccfem.comparison.runs import Run
 from ccfem.comparison.stages import (
@@ -26,147 +26,25 @@ from ccfem.elasticity.stress_field import StressField
 from ccfem.errors import InputError
 from ccfem.fibre_aware.upper_bound import upper_bound
 from ccfem.layers.slicing.planar import Planar
-from ccfem.planning.equal_fibre import TOLERANCE, plan_to_lengths
+from ccfem.planning.equal_fibre import plan_to_lengths
 from ccfem.planning.strategy import Strategy
 from ccfem.planning.whole_part import full_length
-from ccfem.plot.amount_curves import AmountPoint, amount_curves
 from ccfem.progress import Progress, silent
 from ccfem.toolpaths import Toolpaths
+from ccfem.virtual_testing.specimen import Specimen
 from ccfem.virtual_testing.strand import Strand
+from ccfem.virtual_testing.strength import matrix_peak
 
-if TYPE_CHECKING:
-    import pandas as pd
-    from matplotlib.figure import Figure
-
-__all__ = ["FibreFront", "FrontPoint", "counts_to_try", "fibre_front"]
-
-_STIFFNESS, _FAILURE = "times unreinforced stiffness", "first failure, N"
+__all__ = ["counts_to_try", "fibre_front"]
 
 _ALIKE = 0.005
 """Share by which two lengths differ at least to be two points."""
 
+_LEAST = 1.0 / 16.0
+"""Least length over the largest: twice as much fibre says the same at every length."""
 
-@dataclass(frozen=True)
-class FrontPoint:
-    """One plan.
-
-    Attributes
-    ----------
-    layers : int
-        Number of layers.
-    asked : float, mm
-        Length per layer that the strategy was asked for: asked again, it lays the same.
-    length : float, mm
-        Of fibre in all layers.
-    ratio : float
-        Stiffness over that of the part without fibre, fibres in tension only.
-    failure : float, N
-        Load at which something fails first; NaN where that is not known.
-    fails_in : str
-        "matrix", "fibre" or "interlayer"; empty where that is not known.
-    bound : float
-        Ratio that no paths of this length exceed, on the largest number of layers of the front.
-    why_not : str
-        What keeps the paths from being printed as they are; empty where they can be.
-    toolpaths : Toolpaths
-    """
-
-    layers: int
-    asked: float
-    length: float
-    ratio: float
-    failure: float
-    fails_in: str
-    bound: float
-    why_not: str
-    toolpaths: Toolpaths
-
-
-@dataclass(frozen=True)
-class FibreFront:
-    """Stiffness and first failure over the length of fibre.
-
-    Attributes
-    ----------
-    case : str
-        Name of the part.
-    strategy : str
-    points : tuple of FrontPoint
-        By number of layers, then by length.
-    refused : mapping of int to str
-        Numbers of layers on which the strategy found no plan, with the reason.
-    """
-
-    case: str
-    strategy: str
-    points: tuple[FrontPoint, ...]
-    refused: Mapping[int, str]
-
-    def __post_init__(self) -> None:
-        freeze(self, refused=dict)
-
-    def __repr__(self) -> str:
-        best = max(self.points, key=lambda each: each.ratio)
-        return (
-            f"FibreFront of '{self.case}' by {self.strategy}: {len(self.points)} plans, up to "
-            f"{best.ratio:.3g} times as stiff with {best.length / 1000.0:.4g} m on {best.layers} "
-            "layers"
-        )
-
-    @property
-    def stiffest(self) -> BoolArray:
-        """Printable plans that none with as little fibre exceeds in stiffness."""
-        return self._front([each.ratio for each in self.points])
-
-    @property
-    def strongest(self) -> BoolArray:
-        """Printable plans that none with as little fibre exceeds in first-failure load."""
-        return self._front([each.failure for each in self.points])
-
-    def _front(self, values: Sequence[float]) -> BoolArray:
-        # Plans to one length differ by what the shortest strand leaves: these count as equal.
-        laid = np.array([each.length for each in self.points])
-        asked = np.array([each.asked * each.layers for each in self.points])
-        lengths = np.where(np.abs(laid - asked) <= TOLERANCE * asked, asked, laid)
-        printable = np.array([not each.why_not for each in self.points])
-        return on_front(np.where(printable, lengths, np.nan), np.array(values))
-
-    def plot(self) -> "Figure":
-        """Draw stiffness and first-failure load over the length of fibre, with the bound."""
-        panels: dict[str, dict[str, list[AmountPoint]]] = {_STIFFNESS: {}, _FAILURE: {}}
-        rows = zip(self.points, self.stiffest.tolist(), self.strongest.tolist(), strict=True)
-        for each, stiffest, strongest in rows:
-            name, length, printable = f"{each.layers} layers", 1e-3 * each.length, not each.why_not
-            found = (each.ratio, stiffest), (each.failure, strongest)
-            for curves, (value, best) in zip(panels.values(), found, strict=True):
-                curves.setdefault(name, []).append(AmountPoint(length, value, best, printable))
-        bound = [(0.0, 1.0), *((1e-3 * each.length, each.bound) for each in self.points)]
-        return amount_curves(panels, bound, f"{self.case}, {self.strategy}")
-
-    def to_frame(self) -> "pd.DataFrame":
-        """One row a plan."""
-        import pandas as pd
-
-        rows = [
-            {
-                "layers": each.layers,
-                "fibre": each.length,
-                "fibre_per_layer": each.asked,
-                "stiffness_ratio_tension": each.ratio,
-                "bound": each.bound,
-                "share_of_gain": (each.ratio - 1.0) / (each.bound - 1.0),
-                "first_failure_load": each.failure,
-                "fails_in": each.fails_in,
-                "printable": not each.why_not,
-                "why_not": each.why_not,
-                "stiffest": stiffest,
-                "strongest": strongest,
-            }
-            for each, stiffest, strongest in zip(
-                self.points, self.stiffest.tolist(), self.strongest.tolist(), strict=True
-            )
-        ]
-        return pd.DataFrame(rows)
+_SAME_BOUND = 1.002
+"""Largest length over the shortest for which one bound is taken, that of the largest."""
 
 
 def counts_to_try(case: Case, stress: StressField) -> tuple[int, ...]:
@@ -193,13 +71,14 @@ def fibre_front(
     points: int = 5,
     strand: Strand | None = None,
     backend: str = "auto",
+    strengths: Sequence[float] = (),
     progress: Progress = silent,
 ) -> FibreFront:
     """Plan a part to several lengths of fibre on several numbers of layers, and test every plan.
 
-    Lengths are evenly spaced up to what fills the largest number of layers. Fewer layers carry as
-    much on each at the same length, and reach less at their most: a plan that lays its most is one
-    point, however much more was asked for.
+    The largest length fills the largest number of layers; the others follow by one factor down to
+    a sixteenth of it. Fewer layers carry more on each at the same length, and reach less at their
+    most: a plan that lays its most is one point, however much more was asked for.
 
     Parameters
     ----------
@@ -217,12 +96,16 @@ def fibre_front(
         Stiffness and strength of a strand; default rho = EA/E = 4 mm^2.
     backend : str, default "auto"
         As in `solve`.
+    strengths : sequence of float in [0, 1], optional
+        Plan every length with each of these shares of the load at first failure in what is planned
+        for, too; default the strategy as it is.
     progress : callable
 
     Raises
     ------
     InputError
-        When a number makes no sense, or the strategy finds no plan on any number of layers.
+        When a number makes no sense, or the strategy does not plan for strength or finds no plan
+        on any number of layers.
     """
     check_number("points", points, at_least=2)
     if not counts:
@@ -236,33 +119,77 @@ def fibre_front(
     }
     parts = {count: solved.part(layers) for count, layers in slices.items()}
     most = max(count * full_length(part.layers, case.machine) for count, part in parts.items())
-    lengths = most * np.arange(1, points + 1) / points
-    tell = counted(progress, 0.1, (2 + 2 * points) * len(parts) + points)
-    runs: list[tuple[int, float, Run]] = []
+    lengths = np.geomspace(_LEAST * most, most, points)
+    kinds = _kinds(name, strategy, strengths)
+    tell = counted(progress, 0.1, (1 + 2 * points) * len(parts) * len(kinds) + 2 * points)
+    runs: list[tuple[int, float, float, Run]] = []
     refused: dict[int, str] = {}
     for count, part in parts.items():
-        bare = Run(name, strategy, Toolpaths.empty(), None)
-        tell(f"planning {name} on {count} layers")
-        planned = _planned(bare, part, (lengths / count).tolist())
-        tested = all_tested(
-            [evaluated(run, part, tell) for _, run in planned], _of(solved), part, tell, ()
-        )
-        kept = [
-            (count, asked, run)
-            for (asked, _), run in zip(planned, tested, strict=True)
-            if run.tested
-        ]
-        if not kept:
-            refused[count] = next(
-                (said for run in tested for said in (run.failure, run.untested) if said), "no fibre"
+        for strength, kind in kinds.items():
+            tell(f"planning {name} on {count} layers")
+            bare = Run(name, kind, Toolpaths.empty(), None)
+            planned = _planned(bare, part, (lengths / count).tolist())
+            tested = all_tested(
+                [evaluated(run, part, tell) for _, run in planned], _of(solved), part, tell, ()
             )
-        runs += kept
+            kept = [
+                (count, strength, asked, run)
+                for (asked, _), run in zip(planned, tested, strict=True)
+                if run.tested
+            ]
+            if not kept:
+                refused[count] = next(
+                    (said for run in tested for said in (run.failure, run.untested) if said),
+                    "no fibre",
+                )
+            runs += kept
     if not runs:
         why = "; ".join(f"{count} layers: {reason}" for count, reason in refused.items())
         raise InputError(f"{name} finds no plan of '{case.name}': {why}")
-    finest = parts[max(parts)]
-    found = [_point(count, asked, run, stress, finest, tell) for count, asked, run in runs]
-    return FibreFront(case.name, name, tuple(found), refused)
+    bounds = _bounds([run.length for *_, run in runs], stress, parts[max(parts)], tell)
+    found = [_point(*one, bounds) for one in runs]
+    return FibreFront(
+        case.name, name, tuple(found), refused, _bare(stress), tuple(sorted(bounds.items()))
+    )
+
+
+def _kinds(name: str, strategy: Strategy, strengths: Sequence[float]) -> dict[float, Strategy]:
+    """Strategies by how much strength counts in what they plan for."""
+    own = getattr(strategy, "strength", None)
+    if own is None and strengths:
+        raise InputError(
+            f"'{name}' does not plan for strength; stream_function and pruned do: choose one of "
+            "them, or leave strengths out"
+        )
+    if not strengths:
+        return {0.0 if own is None else own: strategy}
+    changed: Any = strategy
+    return {each: replace(changed, strength=each) for each in sorted(set(strengths))}
+
+
+def _bounds(
+    lengths: Sequence[float], stress: StressField, finest: Part, tell: Tell
+) -> dict[float, float]:
+    """Ratios that no paths exceed by length, mm: of every plan, and between them for the curve."""
+    taken: list[float] = []
+    for length in sorted(lengths, reverse=True):
+        if not taken or _SAME_BOUND * length < taken[-1]:
+            taken.append(length)
+    between = [0.5 * (a + b) for a, b in itertools.pairwise([*taken, 0.0])]
+    found = {}
+    for length in sorted([*taken, *between]):
+        tell(f"bounding {length / 1000.0:.3g} m")
+        bound = upper_bound(stress, finest.layers, length, finest.machine, finest.strand)
+        found[length] = bound.ratio
+    return found
+
+
+def _bare(stress: StressField) -> float:
+    """Load at which the part without fibre fails in the matrix, N; NaN where it is not known."""
+    strength = stress.problem.material.tensile_strength
+    if strength is None:
+        return float("nan")
+    return Specimen.of(stress).force(stress.reactions) * strength / matrix_peak(stress)[0]
 
 
 def _of(solved: Solved) -> Tests:
@@ -292,12 +219,10 @@ def _planned(bare: Run, part: Part, lengths: Sequence[float]) -> list[tuple[floa
 
 
 def _point(
-    count: int, asked: float, run: Run, stress: StressField, finest: Part, tell: Tell
+    count: int, strength: float, asked: float, run: Run, bounds: Mapping[float, float]
 ) -> FrontPoint:
-    """Bound the length of a run, and keep what the front shows of it."""
+    """Keep what the front shows of a run."""
     assert run.tested is not None
-    tell(f"bounding {run.length / 1000.0:.3g} m")
-    bound = upper_bound(stress, finest.layers, run.length, finest.machine, finest.strand)
     failure = run.tested.failure
     return FrontPoint(
         layers=count,
@@ -306,7 +231,8 @@ def _point(
         ratio=run.tested.bracket.tension.ratio,
         failure=float("nan") if failure is None else failure.load,
         fails_in=run.fails_in,
-        bound=bound.ratio,
+        bound=bounds[min(length for length in bounds if length >= run.length)],
         why_not=run.why_not,
         toolpaths=run.toolpaths,
+        strength=strength,
     )

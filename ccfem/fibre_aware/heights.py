@@ -10,7 +10,7 @@ from ccfem.layers.layer import Layer
 from ccfem.machine.machine import Machine
 from ccfem.tensor import in_plane
 
-__all__ = ["alike_share", "fibre_capacity", "group_layers", "nearest_layer"]
+__all__ = ["alike_share", "fibre_capacity", "group_layers", "middle_layers", "nearest_layer"]
 
 
 def nearest_layer(part: SmearedPart, layers: Sequence[Layer]) -> IntArray:
@@ -66,3 +66,9 @@ def alike_share(part: SmearedPart, stress: FloatArray, size: float) -> float:
     mean = np.stack([np.bincount(column, volume * s) / total for s in plane.T], axis=1)
     whole = float(volume @ (plane**2).sum(axis=1))
     return float(total @ (mean**2).sum(axis=1)) / whole if whole > 0.0 else 1.0
+
+
+def middle_layers(layers: Sequence[Layer], group: IntArray) -> list[Layer]:
+    """Return the middle layer of each group, from the group (layers,) of every layer."""
+    numbers = [np.flatnonzero(group == k) for k in range(int(group.max()) + 1)]
+    return [layers[int(own[len(own) // 2])] for own in numbers]

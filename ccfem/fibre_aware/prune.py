@@ -14,6 +14,7 @@ from numba import njit
 from ccfem.arrays import BoolArray, FloatArray, IntArray
 from ccfem.checks import check_number
 from ccfem.elasticity.stress_field import StressField
+from ccfem.fibre_aware.strength_value import Worth, layer_normal, raised
 from ccfem.geometry.polylines import along_line, points_along, runs
 from ccfem.machine.machine import Machine
 from ccfem.toolpaths import FIBRE, Toolpaths
@@ -42,6 +43,9 @@ proportion: of equally good pieces the last go first, whatever rounding makes of
 _EQUAL = 1e-12
 """Share of the largest gain of a piece by which one choice has to be better than another."""
 
+_ENOUGH = 0.95
+"""Share of the wanted length below which fibre that is worth less than nothing is kept, too."""
+
 _LOWER_PRICES = (0.999, 0.99, 0.97, 0.93, 0.85)
 """Shares of the price at which room that is left is used: a path may be worth all or nothing."""
 
@@ -53,6 +57,7 @@ def prune(
     machine: Machine,
     strand: Strand | None = None,
     rounds: int = 2,
+    strength: float = 0.0,
 ) -> Toolpaths:
     """Take the least valuable fibre off until no more than a wanted length is left.
 
@@ -74,6 +79,9 @@ def prune(
         Stiffness of a strand; default rho = EA/E = 4 mm^2.
     rounds : int, default 2
         Virtual tests, at least 1.
+    strength : float in [0, 1], default 0
+        How much the load at first failure counts beside the stiffness
+        (`ccfem.fibre_aware.strength_value`).
 
     Returns
     -------
@@ -83,7 +91,8 @@ def prune(
     Raises
     ------
     InputError
-        When the length is not positive, `rounds` is below 1, or there is no fibre.
+        When the length is not positive, `rounds` is below 1, there is no fibre, or strength
+        counts and that of matrix or fibre is not known.
     """
     check_number("length of fibre", length, above=0.0, unit="mm")
     check_number("rounds", rounds, at_least=1)
@@ -92,15 +101,20 @@ def prune(
         return toolpaths
     specimen = Specimen.of(part) if isinstance(part, StressField) else part
     axial = (Strand() if strand is None else strand).stiffness(specimen.modulus)
+    worth = Worth.of(specimen, strand, strength) if strength else None
     known: tuple[FloatArray, ...] = ()
     for k in range(rounds):
         strands = cut_strands(toolpaths, specimen.unreinforced.mesh)
         found = equilibrium(specimen, strands, axial, known=known, tolerance=1e-5)
         known = (found.displacement,)
         value = np.where(found.carries, found.strain, 0.0) ** 2
+        if worth is not None:
+            value = worth(strands, found, layer_normal(toolpaths))
         wanted = length if k == rounds - 1 else length + 0.5 * (laid - length)
-        along = profiles(toolpaths, strands, value)
-        toolpaths = shorten(toolpaths, along, wanted, machine.minimum_length)
+        before, least = toolpaths, machine.minimum_length
+        toolpaths = shorten(before, profiles(before, strands, value), wanted, least)
+        if worth is not None and fibre_length(toolpaths) < _ENOUGH * wanted:
+            toolpaths = shorten(before, profiles(before, strands, raised(value)), wanted, least)
         laid = fibre_length(toolpaths)
         if laid <= length:
             break

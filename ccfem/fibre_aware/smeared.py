@@ -247,6 +247,18 @@ class SmearedPart:
             f"fibre in tension, above the tolerance {tolerance:.1e}"
         )
 
+    def respond(
+        self, stiffness: FloatArray, forces: FloatArray, tolerance: float = 1e-3
+    ) -> FloatArray:
+        """Strains (m, 3) under forces (n, 3), N, of the part with fibre of a stiffness (m, 3, 3).
+
+        Supports stay where they are: this is the adjoint solve, to a relative residual.
+        """
+        operator = _Operator(self, self.pack(stiffness))
+        held, solver = self.specimen.held, self.specimen.solver
+        found = preconditioned_cg(operator, held.project(forces), solver, tolerance=tolerance)
+        return self.strain(operator.expand(found.values))
+
     @cached_property
     def _load_size(self) -> float:
         held = self.specimen.held

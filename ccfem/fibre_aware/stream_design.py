@@ -22,6 +22,7 @@ from ccfem.fibre_aware.spline_grid import SplineGrid
 __all__ = [
     "DENSEST",
     "OVER_BUDGET",
+    "SLACK",
     "Laid",
     "Objective",
     "StreamDesign",
@@ -41,7 +42,7 @@ _ROUGH = 1e-3
 _SMALLEST = 0.02
 """Strands a width below which |g| is rounded off, so that it has a gradient everywhere."""
 
-_SLACK = 1e-3
+SLACK = 1e-3
 """Share of their stiffness that shortened fibres keep."""
 
 _MEMORY = 20
@@ -102,7 +103,7 @@ class Laid:
     def stiffness(self, strain: FloatArray) -> FloatArray:
         """Stiffness (m, 3, 3), MPa, at strains (m, 3): next to none of shortened fibre."""
         stretched = np.einsum("ci,ci->c", self.along, strain) > 0.0
-        return np.where(stretched, 1.0, _SLACK)[:, None, None] * self.outer
+        return np.where(stretched, 1.0, SLACK)[:, None, None] * self.outer
 
 
 @dataclass(frozen=True)
@@ -258,7 +259,7 @@ class StreamProblem:
     def pull(self, laid: Laid, solution: SmearedSolution) -> tuple[FloatArray, FloatArray]:
         """Return the derivatives (m,) of -log(stiffness) by the components of g."""
         stretch = np.einsum("ci,ci->c", laid.along, solution.strain)
-        share = np.where(stretch > 0.0, 1.0, _SLACK)
+        share = np.where(stretch > 0.0, 1.0, SLACK)
         e1, e2, e12 = solution.strain.T
         gx, gy, size = laid.gx, laid.gy, laid.size
         # Fibre energy is stretch^2 / size^3 a cell.

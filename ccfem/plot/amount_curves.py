@@ -3,13 +3,19 @@
 from collections.abc import Mapping, Sequence
 from typing import TYPE_CHECKING, Any, NamedTuple
 
+import numpy as np
+
 from ccfem.plot.colours import INK, OUTLINE, palette
 from ccfem.plot.curves import style_axes
 
 if TYPE_CHECKING:
     from matplotlib.figure import Figure
 
-__all__ = ["AmountPoint", "amount_curves"]
+__all__ = ["AmountPoint", "TradePoint", "amount_curves", "trade_curves"]
+
+
+_APART = 0.04
+"""Least distance, in sizes of the axes, of points whose strengths are written beside them."""
 
 
 class AmountPoint(NamedTuple):
@@ -33,9 +39,29 @@ class AmountPoint(NamedTuple):
     printable: bool
 
 
+class TradePoint(NamedTuple):
+    """One of several plans with as much fibre.
+
+    Attributes
+    ----------
+    stiffness, failure : float
+        NaN where it is not known.
+    strength : float
+        How much strength counted: written beside it.
+    printable : bool
+        Others are drawn hollow.
+    """
+
+    stiffness: float
+    failure: float
+    strength: float
+    printable: bool
+
+
 def amount_curves(
     panels: Mapping[str, Mapping[str, Sequence[AmountPoint]]],
     bound: Sequence[tuple[float, float]],
+    bare: Sequence[float] = (),
     heading: str = "",
 ) -> "Figure":
     """Draw values over the length of fibre, a panel each.
@@ -46,6 +72,8 @@ def amount_curves(
         Points by length.
     bound : sequence of (float, float)
         Lengths, m, and what no paths exceed, drawn into the first panel.
+    bare : sequence of float, optional
+        Value without fibre, for each panel: where its curves begin; NaN where it is not known.
     heading : str
     """
     from matplotlib.backends.backend_agg import FigureCanvasAgg
@@ -61,10 +89,12 @@ def amount_curves(
     names = list(dict.fromkeys(name for curves in panels.values() for name in curves))
     colours = palette(names)
     all_axes = [figure.add_subplot(1, len(panels), k + 1) for k in range(len(panels))]
-    for axes, (label, curves) in zip(all_axes, panels.items(), strict=True):
+    for k, (axes, (label, curves)) in enumerate(zip(all_axes, panels.items(), strict=True)):
         style_axes(axes, "fibre, m", label)
+        begin = bare[k] if bare else float("nan")
         for name, points in curves.items():
-            _draw(axes, points, colours[name])
+            _draw(axes, points, colours[name], begin)
+        axes.plot([0.0], [begin], "x", ms=5.0, color=OUTLINE, clip_on=False, zorder=3.0)
         axes.set_xlim(left=0.0)
     above = sorted(bound)
     all_axes[0].plot(*zip(*above, strict=True), color=OUTLINE, lw=1.0, ls=(0, (4, 3)), zorder=1.0)
@@ -83,8 +113,72 @@ def amount_curves(
     return figure
 
 
-def _draw(axes: Any, points: Sequence[AmountPoint], colour: str) -> None:
+def trade_curves(curves: Mapping[str, Sequence[TradePoint]], heading: str = "") -> "Figure":
+    """Draw first failure over stiffness: what one costs in the other.
+
+    Parameters
+    ----------
+    curves : mapping of name to sequence of TradePoint
+        Plans with as much fibre, by how much strength counts.
+    heading : str
+    """
+    from matplotlib.backends.backend_agg import FigureCanvasAgg
+    from matplotlib.figure import Figure
+    from matplotlib.lines import Line2D
+
+    figure = Figure(figsize=(5.6, 4.0), dpi=150.0, facecolor="white")
+    FigureCanvasAgg(figure)
+    axes = figure.add_axes((0.09, 0.23, 0.88, 0.68))
+    figure.text(0.02, 0.945, heading, size=10, weight="bold", color=INK)
+    style_axes(axes, "times unreinforced stiffness", "first failure, kN")
+    colours = palette(curves)
+    for name, points in curves.items():
+        across, up = [p.stiffness for p in points], [p.failure for p in points]
+        axes.plot(across, up, color=colours[name], lw=1.2)
+        for p in points:
+            face = colours[name] if p.printable else "white"
+            axes.plot([p.stiffness], [p.failure], "o", ms=5.0, color=colours[name], mfc=face)
+    axes.margins(0.08)
+    _name_points(axes, [p for points in curves.values() for p in points])
+    marks = [Line2D([], [], color=colours[name], lw=1.6, label=name) for name in curves]
+    columns = 4 if max(len(name) for name in curves) <= 10 else 2
+    figure.legend(
+        handles=marks,
+        loc="lower center",
+        ncols=min(len(marks), columns),
+        frameon=False,
+        fontsize=7.5,
+        labelcolor=INK,
+    )
+    return figure
+
+
+def _name_points(axes: Any, points: Sequence[TradePoint]) -> None:
+    """Write how much strength counts beside each point that is not too near to a named one."""
+    across, up = np.ptp(axes.get_xlim()), np.ptp(axes.get_ylim())
+    named: list[TradePoint] = []
+    for p in points:
+        near = (
+            np.hypot((p.stiffness - q.stiffness) / across, (p.failure - q.failure) / up)
+            for q in named
+        )
+        if not min(near, default=1.0) > _APART:
+            continue
+        named.append(p)
+        axes.annotate(
+            f"{p.strength:g}",
+            (p.stiffness, p.failure),
+            (4.0, 4.0),
+            textcoords="offset points",
+            size=7,
+            color=INK,
+        )
+
+
+def _draw(axes: Any, points: Sequence[AmountPoint], colour: str, begin: float) -> None:
     """One curve: plans on the front large, those that cannot be printed hollow."""
+    first = points[0]
+    axes.plot([0.0, first.length], [begin, first.value], color=colour, lw=0.8, alpha=0.5)
     axes.plot([p.length for p in points], [p.value for p in points], color=colour, lw=1.2)
     for p in points:
         face = colour if p.printable else "white"

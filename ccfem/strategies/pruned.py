@@ -18,6 +18,7 @@ from ccfem.fibre_aware.cases_bound import single_bounds
 from ccfem.fibre_aware.plan_cases import plan_by_layers
 from ccfem.fibre_aware.prune import prune
 from ccfem.fibre_aware.prune_cases import prune_cases
+from ccfem.fibre_aware.strength_value import refuse_strength
 from ccfem.layers.layer import Layer
 from ccfem.machine.machine import Machine
 from ccfem.planning.equal_fibre import plan_to_length
@@ -59,6 +60,9 @@ class Pruned:
         Virtual tests; each takes off half of the excess, the last one all of it.
     rho : float, mm^2, default 4
         Axial stiffness of a strand over Young's modulus of the matrix.
+    strength : float, default 0
+        How much the load at first failure counts, in [0, 1]; the stiffness counts the rest. Of one
+        load case only.
     """
 
     of: str = "isocurve"
@@ -67,6 +71,7 @@ class Pruned:
     overfill: float = 1.25
     rounds: int = 2
     rho: float = RHO
+    strength: float = 0.0
 
     amount: ClassVar[Amount] = Amount("coverage", most=0.9, least=0.1)
     flat_layers_only: ClassVar[bool] = True
@@ -80,6 +85,7 @@ class Pruned:
         check_fields(self, "coverage", above=0.0, at_most=1.0)
         check_fields(self, "overfill", "rounds", at_least=1)
         check_fields(self, "rho", above=0.0, unit="mm^2")
+        check_fields(self, "strength", at_least=0.0, at_most=1.0)
 
     def _planner(self) -> Strategy:
         """Strategy that plans, with its parameters."""
@@ -131,7 +137,8 @@ class Pruned:
             kept = paths
             if len(paths):
                 part, strand = Specimen.of(solved(stress, "pruned")), Strand(self.rho)
-                kept = prune(paths, part, length * len(layers), machine, strand, self.rounds)
+                wanted = length * len(layers)
+                kept = prune(paths, part, wanted, machine, strand, self.rounds, self.strength)
             coverage = length / full
             overfill = max(planned / full / coverage, 1.0)
             found.append((replace(self, coverage=coverage, overfill=overfill), WholePart(kept)))
@@ -155,6 +162,7 @@ class Pruned:
         """
         if len(cases) == 1:
             return self.to_lengths(cases.fields[0], layers, machine, lengths)
+        refuse_strength("pruned", self.strength)
         full, strand = full_length(layers, machine), Strand(self.rho)
         most = max(self.amount.most, self.coverage) * full
         lengths = [min(length, most) for length in lengths]

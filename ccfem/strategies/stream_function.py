@@ -16,7 +16,6 @@ from ccfem.checks import check_choices, check_fields
 from ccfem.elasticity.part_stress import PartStress
 from ccfem.elasticity.stress_field import StressField, solved
 from ccfem.elasticity.weighted_cases import WeightedCases
-from ccfem.errors import InputError
 from ccfem.fibre_aware.cases_bound import single_bounds
 from ccfem.fibre_aware.cases_design import (
     CasesDesign,
@@ -28,6 +27,7 @@ from ccfem.fibre_aware.heights import (
     alike_share,
     fibre_capacity,
     group_layers,
+    middle_layers,
     nearest_layer,
 )
 from ccfem.fibre_aware.layer_shares import layer_counts, layers_by_case
@@ -36,11 +36,12 @@ from ccfem.fibre_aware.prune_cases import case_counts, prune_cases
 from ccfem.fibre_aware.smeared import SmearedPart, smeared_cases
 from ccfem.fibre_aware.spline_grid import SplineGrid
 from ccfem.fibre_aware.stream_design import DENSEST, StreamDesign, StreamProblem, design
-from ccfem.fibre_aware.stream_paths import Extraction, middle, refined
+from ccfem.fibre_aware.stream_paths import Extraction, refined
 from ccfem.fibre_aware.stream_start import plane_axes, start_field
-from ccfem.fields.layer_tension import layer_tension
+from ccfem.fibre_aware.strength_design import LEAST_OVERFILL, design_for_strength
+from ccfem.fibre_aware.strength_value import refuse_strength
+from ccfem.fibre_aware.tension_check import check_tension
 from ccfem.layers.layer import Layer
-from ccfem.layers.layer_stress import stress_on
 from ccfem.machine.machine import Machine
 from ccfem.planning.strategy import Amount, LayerPlanner
 from ccfem.planning.whole_part import WholePart, full_length
@@ -85,7 +86,7 @@ class StreamFunction:
         Fibre length times strand width over area of the layers, in (0, 1].
     overfill : float, default 1.1
         Fibre length of the design over that kept, at least 1; with several load cases no less than
-        1.15.
+        1.15, with strength no less than 1.25.
     rho : float, mm^2, default 4
         Axial stiffness of a strand over Young's modulus of the matrix.
     evaluations : int, default 50
@@ -113,6 +114,9 @@ class StreamFunction:
     tilt : float, default 0.75
         Weight of a layer's own case in the field that its design starts with, in (0, 1], where
         there are several; the others share the rest.
+    strength : float, default 0
+        How much the load at first failure counts, in [0, 1]; the stiffness counts the rest. A
+        share of the one is then worth as much as one of the other. Of one load case only.
     """
 
     coverage: float = 0.45
@@ -127,6 +131,7 @@ class StreamFunction:
     inset: float = 0.5
     objective: Literal["worst", "sum"] = "worst"
     tilt: float = 0.75
+    strength: float = 0.0
 
     amount: ClassVar[Amount] = Amount("coverage", most=0.85, least=0.1)
     flat_layers_only: ClassVar[bool] = True
@@ -143,6 +148,7 @@ class StreamFunction:
         check_fields(self, "cap", above=0.0, at_most=100.0)
         check_fields(self, "groups", "link_limit", "inset", at_least=0)
         check_fields(self, "tilt", above=0.0, at_most=1.0)
+        check_fields(self, "strength", at_least=0.0, at_most=1.0)
         check_choices(self)
 
     def natural_length(self, layers: Sequence[Layer], machine: Machine) -> float:
@@ -162,7 +168,7 @@ class StreamFunction:
             When no layer has a tensile direction.
         """
         length = self.natural_length(layers, machine)
-        return WholePart(self._cut(stress, layers, machine, (length,))[0])
+        return WholePart(self._filled()._cut(stress, layers, machine, (length,))[0])
 
     def to_lengths(
         self,
@@ -184,7 +190,7 @@ class StreamFunction:
             As `for_part`.
         """
         return _to_lengths(
-            self,
+            self._filled(),
             layers,
             machine,
             lengths,
@@ -210,6 +216,7 @@ class StreamFunction:
         """
         if len(cases) == 1:
             return self.to_lengths(cases.fields[0], layers, machine, lengths)
+        refuse_strength("stream_function", self.strength)
         return _to_lengths(
             replace(self, overfill=max(self.overfill, _CASES_OVERFILL)),
             layers,
@@ -217,6 +224,10 @@ class StreamFunction:
             lengths,
             lambda one, some: one._cut_cases(cases, layers, machine, some),
         )
+
+    def _filled(self) -> "StreamFunction":
+        """Return the strategy with as much overfill as strength asks for."""
+        return replace(self, overfill=max(self.overfill, LEAST_OVERFILL if self.strength else 1.0))
 
     def _cut(
         self,
@@ -226,14 +237,14 @@ class StreamFunction:
         lengths: Sequence[float],
     ) -> list[Toolpaths]:
         """Design for this coverage, and cut by tests to each of some lengths, mm per layer."""
-        _check_tension((stress,), layers)
+        check_tension((stress,), layers)
         field = solved(stress, "stream_function")
         problem, group, found = self.designed(field, layers, machine)
         strained = ((1.0, found.objective.solution.displacement),)
         extraction = self._extraction(problem, (found.field,), strained, machine)
         in_all, strand = [length * len(layers) for length in lengths], Strand(self.rho)
         return [
-            prune(whole, problem.part.specimen, length, machine, strand, _ROUNDS)
+            prune(whole, problem.part.specimen, length, machine, strand, _ROUNDS, self.strength)
             for whole, length in zip(extraction.whole(layers, group, in_all), in_all, strict=True)
         ]
 
@@ -259,8 +270,9 @@ class StreamFunction:
         """Design the fields: the problem, the group of each layer, and the design."""
         part = SmearedPart.of(stress, layers[0].plane.frame)
         problem, group = self._problem((part,), layers, machine)
-        start = start_field(problem, stress, _middle_layers(layers, group), self.cap)
-        return problem, group, design(problem, start, self.evaluations)
+        start = start_field(problem, stress, middle_layers(layers, group), self.cap)
+        found = design(problem, start, self.evaluations)
+        return problem, group, design_for_strength(problem, found, self.strength, self.evaluations)
 
     def designed_for_cases(
         self, cases: WeightedCases, layers: Sequence[Layer], machine: Machine, bounds: FloatArray
@@ -273,7 +285,7 @@ class StreamFunction:
         alone, group = self._problem(parts, layers, machine)
         shares = layer_counts(cases.weights, len(layers)) / len(layers)
         problem = CasesProblem(alone, parts, cases.weights, bounds, shares)
-        chosen = _middle_layers(layers, group)
+        chosen = middle_layers(layers, group)
         start = start_fields(problem, cases.fields, chosen, self.cap, self.tilt)
         return problem, group, design_cases(problem, start, self.evaluations)
 
@@ -320,7 +332,7 @@ class StreamFunction:
         lengths: Sequence[float],
     ) -> list[Toolpaths]:
         """Design for this coverage, and cut by tests of all cases to some lengths, mm per layer."""
-        _check_tension(cases.fields, layers)
+        check_tension(cases.fields, layers)
         in_all, strand = [length * len(layers) for length in lengths], Strand(self.rho)
         bounds = single_bounds(cases, layers, max(in_all), machine, strand)
         problem, group, found = self.designed_for_cases(cases, layers, machine, bounds)
@@ -375,23 +387,6 @@ def _to_lengths(
         (_designed_for(told, length / full, designed), WholePart(paths))
         for length, paths in zip(lengths, found, strict=True)
     ]
-
-
-def _check_tension(stresses: Sequence[PartStress], layers: Sequence[Layer]) -> None:
-    """Refuse a part that is under tension nowhere, in no load case."""
-    for stress in stresses:
-        if any(layer_tension(stress_on(layer, stress)).defined.any() for layer in layers):
-            return
-    largest = max(float(np.linalg.eigvalsh(stress.stress).max()) for stress in stresses)
-    raise InputError(
-        "expected tension that fibre can carry; the largest tensile stress found is "
-        f"{largest:.3g} MPa, outweighed by compression: turn the load round"
-    )
-
-
-def _middle_layers(layers: Sequence[Layer], group: IntArray) -> list[Layer]:
-    """Return the middle layer of each group."""
-    return [layers[middle(np.flatnonzero(group == k))] for k in range(group.max() + 1)]
 
 
 def _designed_for(strategy: StreamFunction, coverage: float, designed: float) -> StreamFunction:

@@ -18,6 +18,7 @@ from ccfem.tensor import von_mises
 from ccfem.virtual_testing.ball import BALL, ball_averages
 from ccfem.virtual_testing.interlayer import Interlayer, interlayer
 from ccfem.virtual_testing.strand import Strand
+from ccfem.virtual_testing.strengths import Limits
 from ccfem.virtual_testing.virtual_test import VirtualTest
 from ccfem.virtual_testing.zone import ZONE, distance_from_patches
 
@@ -108,24 +109,11 @@ def first_failure(
     InputError
         When the strength of matrix or fibre is missing.
     """
-    strength = (Strand() if strand is None else strand).strength
-    if strength is None:
-        raise InputError(
-            "first-failure load needs the strength of a strand, N; the fibre material has none: "
-            "give tensile_strength (MPa), or Strand(strength=...)"
-        )
-    if matrix_strength is None:
-        matrix_strength = test.solution.problem.material.tensile_strength
-    if matrix_strength is None:
-        raise InputError(
-            "first-failure load needs the strength of the matrix, MPa; material "
-            f"'{test.solution.problem.material.name}' has none: give tensile_strength, or "
-            "calibrate it on a test of the unreinforced part"
-        )
+    limits = Limits.of(test.solution.problem.material, strand, matrix_strength)
     matrix_index, matrix_at = matrix_peak(test.solution)
     fibre_index, fibre_at = fibre_peak(test)
-    matrix_load = test.force * matrix_strength / matrix_index
-    fibre_load = test.force * strength / fibre_index if fibre_index > 0.0 else np.inf
+    matrix_load = test.force * limits.matrix / matrix_index
+    fibre_load = test.force * limits.fibre / fibre_index if fibre_index > 0.0 else np.inf
     found = _between(test.solution, layers)
     zones: tuple[float, ...] = ()
     if isinstance(found, Interlayer):

@@ -2,10 +2,16 @@
 
 import pytest
 
+from ccfem.cases.case import Case
 from ccfem.cases.reading import read
 from ccfem.cli.run import options_of
 from ccfem.cli.wanted_stiffness import least_fibre_options
 from ccfem.comparison.compare import solve_and_slice
+from ccfem.elasticity.problem import Force, Problem, Support
+from ccfem.layers.slicing.planar import Planar
+from ccfem.machine.machine import Machine
+from ccfem.materials import isotropic
+from ccfem.mesh.box import box_mesh
 from ccfem.planning.equal_fibre import plan_to_length
 from ccfem.strategies import create
 from ccfem.virtual_testing.specimen import Specimen
@@ -28,11 +34,30 @@ def test_the_options_ask_for_the_fibre_that_reaches_a_stiffness_in_newtons_per_m
     assert 1.15 * bare <= tested.stiffness <= 1.16 * bare
 
 
+def test_the_number_of_layers_is_chosen_and_said(capsys):
+    mesh, pull = box_mesh((60.0, 8.0, 2.0), (10, 3, 2)), (Force("x_max", (100.0, 0.0, 0.0)),)
+    problem = Problem(mesh, isotropic(3500.0, 0.0), (Support("x_min"),), {"pull": pull}, order=1)
+    case = Case("bar", "", problem, slicing=Planar(count=1), machine=Machine())
+    strategy = create("zigzag", {"angle": 0.0, "turn": 0.0})
+    asked = {**options_of(None, None, True, None, "auto"), "stiffness": "2.5"}
+    found = least_fibre_options(case, strategy, asked)
+    assert found["layers"] in (None, 2)
+    count = found["layers"] or 1
+    said = capsys.readouterr().out
+    assert f" on {count} layers, " in said
+    assert said.startswith("2.5 times the stiffness without fibre takes")
+    stress, _, layers, _ = solve_and_slice(case, count)
+    paths = plan_to_length(strategy, layers, stress, case.machine, found["fibre_per_layer"])
+    assert virtual_test(paths.toolpaths, Specimen.of(stress), span=()).ratio >= 2.5
+
+
 @pytest.mark.parametrize(
     ("words", "answer"),
     [
         (["--stiffness", "stiff"], "expects a ratio as 2.5, or N/mm"),
         (["--stiffness", "1N/mm"], "no more than"),
+        (["--stiffness", "nan"], "must be a finite number"),
+        (["--stiffness", "1e9N/mm"], "no paths on 2 layers exceed"),
         (["--stiffness", "9"], "9 times the stiffness without fibre was asked for"),
         (["--stiffness", "1.2", "--fibre-per-layer", "500"], "drop --fibre-per-layer"),
         (["--stiffness", "1.2", "--no-virtual-test"], "drop --no-virtual-test"),

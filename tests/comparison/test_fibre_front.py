@@ -7,7 +7,8 @@ import numpy as np
 import pytest
 
 from ccfem.cases.case import Case
-from ccfem.comparison.fibre_front import FibreFront, FrontPoint, counts_to_try, fibre_front
+from ccfem.comparison.fibre_front import counts_to_try, fibre_front
+from ccfem.comparison.front_points import FibreFront, FrontPoint
 from ccfem.elasticity import Force, Problem, Support, solve
 from ccfem.errors import InputError
 from ccfem.layers.slicing.planar import Planar
@@ -100,6 +101,34 @@ def test_twice_as_many_layers_where_strands_have_room(bar):
     assert counts_to_try(
         Case("bar", "", case.problem, slicing=Planar(count=2), machine=thick), stress
     ) == (2,)
+
+
+def test_front_begins_with_the_part_without_fibre_and_bounds_lie_above_all_between(front):
+    # Far from its clamp the bar has the stress F / A: it fails at X A.
+    assert front.bare == pytest.approx(50.0 * 8.0 * 4.0, rel=0.05)
+    lengths, bounds = np.array(front.bounds).T
+    for each in front.points:
+        assert each.ratio <= np.interp(each.length, lengths, bounds) * (1.0 + 1e-3)
+    # The bound is concave in the length, and reaches 1 without fibre.
+    slopes = np.diff(np.concatenate([[1.0], bounds])) / np.diff(np.concatenate([[0.0], lengths]))
+    assert (np.diff(slopes) < 0.02 * slopes[0]).all()
+
+
+def test_trade_has_a_curve_for_each_length_with_several_strengths():
+    weak = point(2, 250.0, 500.0, 2.5, 8000.0)
+    strong = replace(weak, ratio=2.4, failure=9000.0, strength=0.5)
+    other = point(2, 450.0, 900.0, 3.5, 9900.0)
+    axes = FibreFront("bar", "pruned", (weak, strong, other), {}).plot_trade().axes[0]
+    lines = [line for line in axes.lines if line.get_marker() == "None"]
+    assert [line.get_xydata().tolist() for line in lines] == [[[2.5, 8.0], [2.4, 9.0]]]
+    assert [text.get_text() for text in axes.texts] == ["0", "0.5"]
+    with pytest.raises(InputError, match="several strengths"):
+        FibreFront("bar", "pruned", (weak, other), {}).plot_trade()
+
+
+def test_strategies_that_know_no_strength_are_refused(bar):
+    with pytest.raises(InputError, match="'zigzag' does not plan for strength"):
+        fibre_front(*bar, "zigzag", create("zigzag", ALONG), (2,), strengths=(0.5,))
 
 
 def test_refused(bar):

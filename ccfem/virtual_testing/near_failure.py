@@ -1,0 +1,242 @@
+"""How near a part is to its first failure, by smooth indices with their derivatives.
+
+First failure (`ccfem.virtual_testing.strength`) hangs on peaks: of the force in the fibre, of the
+stress in the matrix, of the traction between layers. Beside each peak stands a p-norm over the
+part, whose relative change is taken for that of the peak; the peaks themselves say how much each
+counts (Le, Norato, Bruns, Ha and Tortorelli, Structural and Multidisciplinary Optimization 41,
+2010, 605-620: the p-norm, and its factor that follows the true peak).
+"""
+
+from collections.abc import Mapping
+from dataclasses import dataclass
+from functools import cached_property
+
+import numpy as np
+from scipy.spatial import cKDTree
+
+from ccfem.arrays import FloatArray, IntArray, in_brief
+from ccfem.elasticity.recovery import cell_strain, times
+from ccfem.elasticity.stress_field import StressField
+from ccfem.elasticity.volume_loads import strain_forces
+from ccfem.errors import InputError
+from ccfem.tensor import from_voigt, to_voigt, von_mises
+from ccfem.virtual_testing.ball import BALL, ball_averages
+from ccfem.virtual_testing.strength import FIBRE_SHARE
+from ccfem.virtual_testing.strengths import Limits
+from ccfem.virtual_testing.zone import ZONE, distance_from_patches
+
+__all__ = ["POWER", "MatrixPeaks", "Peak", "nearness", "stretched_index"]
+
+POWER = 16.0
+"""Of the norm over cells or pieces of fibre."""
+
+_BETWEEN = 8.0
+"""Power with which the largest of the indices counts."""
+
+_HOT = 1e-9
+"""Share of the largest weight below which a cell does not count in a derivative."""
+
+_ENGINEERING = np.array([1.0, 1.0, 1.0, 2.0, 2.0, 2.0])
+
+
+@dataclass(frozen=True)
+class Peak:
+    """One index.
+
+    Attributes
+    ----------
+    index : float
+        Its peak: 1 at failure.
+    norm : float
+        Its p-norm, in a scale of its own.
+    by_displacement : (n, 3) array, 1/mm
+        Derivative of the logarithm of the norm.
+    """
+
+    index: float
+    norm: float
+    by_displacement: FloatArray
+
+    __repr__ = in_brief
+
+
+def nearness(
+    peaks: Mapping[str, Peak], factors: Mapping[str, float]
+) -> tuple[float, dict[str, float]]:
+    """Logarithm of about the largest index, and how much each counts in it: the sum is 1.
+
+    Parameters
+    ----------
+    peaks : mapping of str to Peak
+    factors : mapping of str to float
+        Index over norm, where it was taken last.
+    """
+    logs = {name: float(np.log(factors[name] * one.norm)) for name, one in peaks.items()}
+    largest = max(logs.values())
+    terms = {name: float(np.exp(_BETWEEN * (log - largest))) for name, log in logs.items()}
+    whole = sum(terms.values())
+    counts = {name: term / whole for name, term in terms.items()}
+    return largest + float(np.log(whole)) / _BETWEEN, counts
+
+
+def stretched_index(
+    strain: FloatArray, length: FloatArray, limit: float
+) -> tuple[float, float, FloatArray]:
+    """Index of the fibre, its norm, and how much each piece counts in that: the sum is 1.
+
+    The most stretched hundredth of the length counts in neither, as in `fibre_peak`.
+
+    Parameters
+    ----------
+    strain : (s,) array
+        Along pieces of fibre; those that are not stretched do not count.
+    length : (s,) array, mm
+        Of fibre that each stands for.
+    limit : float
+        Strain at which a strand breaks.
+
+    Raises
+    ------
+    InputError
+        Where no fibre is stretched.
+    """
+    order = np.argsort(strain, kind="stable")
+    reached = np.cumsum(length[order])
+    last = min(int(np.searchsorted(reached, FIBRE_SHARE * reached[-1])), len(order) - 1)
+    kept = order[: last + 1]
+    most = float(strain[kept[-1]])
+    if not most > 0.0:
+        raise InputError(
+            "strength is planned for where fibre is stretched; it is so next to nowhere: turn the "
+            "load round, or plan with strength = 0"
+        )
+    power = np.zeros(len(strain))
+    power[kept] = length[kept] * (np.maximum(strain[kept], 0.0) / most) ** POWER
+    whole = float(power.sum())
+    return most / limit, most * whole ** (1.0 / POWER) / limit, power / whole
+
+
+@dataclass(frozen=True)
+class MatrixPeaks:
+    """The cells of a part in which the matrix is judged, for any number of displacements.
+
+    Attributes
+    ----------
+    part : StressField
+        Without fibre: its problem says what holds and loads the part, and the material.
+    """
+
+    part: StressField
+
+    __repr__ = in_brief
+
+    @cached_property
+    def _centroids(self) -> FloatArray:
+        mesh = self.part.mesh
+        return np.asarray(mesh.points[mesh.corners].mean(axis=1))
+
+    @cached_property
+    def judged(self) -> IntArray:
+        """Cells outside the zone round loads and supports, as in `matrix_peak`."""
+        outside = np.isinf(distance_from_patches(self.part, self._centroids, ZONE))
+        return np.flatnonzero(outside)
+
+    @cached_property
+    def _stiffness(self) -> FloatArray:
+        problem = self.part.problem
+        stiffness = problem.cell_stiffness
+        return stiffness if problem.density is None else problem.density[:, None, None] * stiffness
+
+    @cached_property
+    def _tree(self) -> cKDTree:
+        return cKDTree(self._centroids)
+
+    def _averages(self, values: FloatArray) -> FloatArray:
+        """Averages (k, c) of the values (m, c) of all cells over a ball round each judged cell."""
+        volumes = self.part.mesh.volumes
+        return ball_averages(self._centroids, values, volumes, self.judged, BALL)
+
+    def _back(self, slopes: FloatArray) -> FloatArray:
+        """Transpose of `_averages`: (m, c) of derivatives (k, c) by the averages."""
+        size = np.abs(slopes).max(axis=1)
+        hot = np.flatnonzero(size > _HOT * size.max())
+        near = self._tree.query_ball_point(self._centroids[self.judged[hot]], BALL)
+        count = np.array([len(cells) for cells in near])
+        row, cell = np.repeat(np.arange(len(hot)), count), np.concatenate(near).astype(np.int64)
+        volume = self.part.mesh.volumes[cell]
+        share = volume / np.bincount(row, volume)[row]
+        columns = slopes[hot][row] * share[:, None]
+        m = len(self._centroids)
+        return np.stack([np.bincount(cell, column, m) for column in columns.T], axis=1)
+
+    def _norm(self, index: FloatArray) -> tuple[float, float, FloatArray]:
+        """Peak and norm of an index (k,), and the derivative of the norm's logarithm by it."""
+        peak = float(index.max())
+        weight = self.part.mesh.volumes[self.judged] * (index / peak) ** POWER
+        whole = float(weight.sum())
+        slope = np.where(index > 0.0, weight / (whole * np.where(index > 0.0, index, 1.0)), 0.0)
+        return peak, peak * whole ** (1.0 / POWER), slope
+
+    def _forces(self, by_stress: FloatArray) -> FloatArray:
+        """Turn a derivative by the stress (m, 6) of each cell into one by the displacement."""
+        mesh, stiffness = self.part.mesh, self._stiffness
+        turned = np.swapaxes(stiffness, -1, -2)
+        return strain_forces(mesh, times(turned, by_stress) / mesh.volumes[:, None])
+
+    def matrix(self, displacement: FloatArray, strength: float) -> Peak:
+        """Von Mises stress of the matrix, averaged over a ball, over its strength, MPa.
+
+        `displacement` is that (n, 3), mm, of the part with its fibre.
+        """
+        stress = self._stress(displacement)
+        mises = von_mises(stress)
+        average = self._averages(mises[:, None])[:, 0]
+        peak, norm, slope = self._norm(average / strength)
+        by_mises = self._back(slope[:, None] / strength)
+        deviator = stress - np.trace(stress, axis1=1, axis2=2)[:, None, None] / 3.0 * np.eye(3)
+        size = np.where(mises > 0.0, mises, 1.0)
+        by_stress = to_voigt(1.5 * deviator) * _ENGINEERING * (by_mises / size[:, None])
+        return Peak(peak, norm, self._forces(by_stress))
+
+    def bond(
+        self, displacement: FloatArray, normal: FloatArray, strength: tuple[float, float]
+    ) -> Peak | None:
+        """Traction on layers of one normal (3,), as in `interlayer`; None where there is none."""
+        tensile, shear = strength
+        stress = self._stress(displacement)
+        traction = self._averages(to_voigt(stress))
+        traction = from_voigt(traction) @ normal
+        opening = traction @ normal
+        sliding = traction - opening[:, None] * normal
+        opening = np.maximum(opening, 0.0)
+        index = np.hypot(opening / tensile, np.linalg.norm(sliding, axis=1) / shear)
+        if not index.max() > 0.0:
+            return None
+        peak, norm, slope = self._norm(index)
+        by_traction = opening[:, None] / tensile**2 * normal + sliding / shear**2
+        by_traction *= (slope / np.where(index > 0.0, index, 1.0))[:, None]
+        tensor = 0.5 * (by_traction[:, :, None] * normal + normal[:, None] * by_traction[:, None])
+        return Peak(peak, norm, self._forces(self._back(to_voigt(tensor) * _ENGINEERING)))
+
+    def peaks(
+        self, displacement: FloatArray, fibre: Peak, limits: Limits, normal: FloatArray | None
+    ) -> dict[str, Peak]:
+        """All indices: that of the fibre, of the matrix, and where it can be judged of the bond.
+
+        Parameters
+        ----------
+        displacement : (n, 3) array, mm
+        fibre : Peak
+        limits : Limits
+        normal : (3,) array, optional
+            Of all layers.
+        """
+        found = {"fibre": fibre, "matrix": self.matrix(displacement, limits.matrix)}
+        if limits.bond is not None and normal is not None:
+            bond = self.bond(displacement, normal, limits.bond)
+            found |= {} if bond is None else {"interlayer": bond}
+        return found
+
+    def _stress(self, displacement: FloatArray) -> FloatArray:
+        strain = cell_strain(self.part.mesh, displacement)
+        return from_voigt(times(self._stiffness, strain))

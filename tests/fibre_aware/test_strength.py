@@ -1,0 +1,196 @@
+"""Planning for the load at first failure: what fibre is worth for it, and its design."""
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+
+from ccfem.elasticity.solve import solve
+from ccfem.errors import InputError
+from ccfem.fibre_aware.heights import fibre_capacity
+from ccfem.fibre_aware.prune import prune
+from ccfem.fibre_aware.smeared import SmearedPart
+from ccfem.fibre_aware.spline_grid import SplineGrid
+from ccfem.fibre_aware.stream_design import StreamProblem, design
+from ccfem.fibre_aware.stream_start import start_field
+from ccfem.fibre_aware.strength_design import StrengthProblem, design_for_strength
+from ccfem.fibre_aware.strength_value import Worth, raised
+from ccfem.machine import Machine
+from ccfem.planning.plan import plan_layers
+from ccfem.strategies.pruned import Pruned
+from ccfem.strategies.stream_function import StreamFunction
+from ccfem.toolpaths import Toolpaths
+from ccfem.virtual_testing.bars import bars
+from ccfem.virtual_testing.equilibrium import equilibrium
+from ccfem.virtual_testing.near_failure import nearness
+from ccfem.virtual_testing.specimen import Specimen
+from ccfem.virtual_testing.strand import Strand
+from ccfem.virtual_testing.strands import cut_strands
+from ccfem.virtual_testing.strength import first_failure
+from ccfem.virtual_testing.strengths import Limits
+from ccfem.virtual_testing.virtual_test import virtual_test
+
+SHORT = Machine(minimum_length=10.0)
+
+
+@pytest.fixture(scope="module")
+def strong_beam(bent_beam):
+    """The bent beam of a material whose strengths are known."""
+    stress, layers = bent_beam
+    material = replace(stress.problem.material, tensile_strength=50.0, interlayer_tensile=18.0)
+    return solve(replace(stress.problem, material=material), tolerance=1e-10)["tip"], layers
+
+
+@pytest.fixture(scope="module")
+def lines(bent_beam):
+    """Strands along the beam, nearer to each other where it is pulled."""
+    layers = bent_beam[1]
+    heights = (2.0, 3.5, 5.0, 8.0, 12.0, 16.0, 20.5)
+    each = [np.array([[2.0, y], [58.0, y]]) for y in heights]
+    return Toolpaths.concatenate(Toolpaths.from_plane(each, layer) for layer in layers)
+
+
+def near_of(worth, strands, found, factors=None):
+    """Nearness to failure in a solution, with the factors of the first, and these."""
+    from ccfem.fibre_aware.strength_value import _fibre
+
+    pieces = bars(strands, worth.specimen.system.problem.mesh)
+    limit = worth.limits.fibre / worth.strand.stiffness(worth.specimen.modulus)
+    fibre, _ = _fibre(pieces, strands.length * strands.share, found.displacement, limit)
+    peaks = worth.judge.peaks(found.displacement, fibre, worth.limits, np.array([0.0, 0.0, 1.0]))
+    factors = factors or {name: one.index / one.norm for name, one in peaks.items()}
+    return nearness(peaks, factors)[0], factors
+
+
+@pytest.mark.parametrize("limits", [(86.0, 50.0), (1.0, 1e4), (1e4, 1.0)])
+def test_value_agrees_with_finite_differences(strong_beam, lines, limits):
+    """More fibre in some pieces, solved anew: both logarithms change as the values say."""
+    specimen = Specimen.of(strong_beam[0])
+    strands = cut_strands(lines, specimen.unreinforced.mesh)
+    worth = Worth.of(specimen, Strand(), 1.0)
+    worth = replace(worth, limits=Limits(*limits, (18.0, 18.0)))
+    axial = Strand().stiffness(specimen.modulus)
+    found = equilibrium(specimen, strands, axial, tolerance=1e-12)
+    factors = near_of(worth, strands, found)[1]
+    chosen = np.random.default_rng(2).random(len(strands)) * (found.strain > 1e-6)
+
+    def changed(step):
+        other = replace(strands, share=1.0 + step * chosen)
+        after = equilibrium(specimen, other, axial, known=(found.displacement,), tolerance=1e-12)
+        work = float(np.vdot(specimen.forces, after.displacement))
+        return -near_of(worth, other, after, factors)[0], -np.log(work)
+
+    up, down = changed(1e-4), changed(-1e-4)
+    strong, stiff = ((a - b) / 2e-4 for a, b in zip(up, down, strict=True))
+    weight, normal = chosen * strands.length, np.array([0.0, 0.0, 1.0])
+    assert weight @ worth(strands, found, normal) == pytest.approx(strong, rel=1e-3)
+    for share in (0.0, 0.3):
+        mixed = replace(worth, strength=share)(strands, found, normal)
+        assert weight @ mixed == pytest.approx((1.0 - share) * stiff + share * strong, rel=1e-3)
+
+
+def test_cut_for_strength_leaves_a_stronger_and_softer_part(strong_beam, lines):
+    stress, layers = strong_beam
+    pulled = lines.select(lines.points[lines.offsets[:-1], 1] < 10.0)
+    length = 0.93 * float(pulled.lengths.sum())
+    found = []
+    for strength in (0.0, 0.5):
+        kept = prune(pulled, stress, length, SHORT, strength=strength)
+        # As long as asked for, whatever fibre would be better away.
+        assert 0.95 * length < kept.lengths.sum() <= length
+        test = virtual_test(kept, stress, span=())
+        found.append((first_failure(test, layers=layers).load, test.ratio))
+    assert found[1][0] > 1.05 * found[0][0]
+    assert found[1][1] < found[0][1]
+
+
+def test_values_below_zero_are_raised_and_keep_their_order():
+    value = np.array([-2.0, 3.0, 0.0, 1.0, -1.0])
+    above = raised(value)
+    assert above.min() == 0.0
+    np.testing.assert_array_equal(np.argsort(above), np.argsort(value))
+    np.testing.assert_allclose(above[[1, 3]], [3.0, 1.0], rtol=0.01)
+    np.testing.assert_array_equal(raised(value[1:4]), value[1:4])
+
+
+def test_without_strength_values_are_those_of_the_strain_energy(strong_beam, lines):
+    stress, _ = strong_beam
+    length = 0.6 * float(lines.lengths.sum())
+    one, other = (prune(lines, stress, length, SHORT, **k) for k in ({}, {"strength": 0.0}))
+    np.testing.assert_array_equal(one.points, other.points)
+
+
+@pytest.mark.parametrize("strength", [-0.1, 1.1, float("nan")])
+def test_shares_outside_zero_to_one_are_refused(strong_beam, strength):
+    with pytest.raises(InputError, match="strength must be"):
+        Worth.of(Specimen.of(strong_beam[0]), None, strength)
+
+
+@pytest.fixture(scope="module")
+def problem(strong_beam):
+    stress, layers = strong_beam
+    part = SmearedPart.of(stress, layers[0].plane.frame)
+    centres = part.centroids @ part.frame[:2].T
+    capacity = fibre_capacity(part, layers, SHORT)
+    found = StreamProblem(
+        part=part,
+        grid=SplineGrid.over(centres, centres.mean(axis=0), np.eye(2), 2.5),
+        group=np.zeros(len(centres), dtype=int),
+        centres=centres,
+        capacity=capacity,
+        width=SHORT.fibre_width,
+        axial_stiffness=4.0 * part.modulus,
+        budget=0.4 * float(part.mesh.volumes @ capacity),
+    )
+    return found, start_field(found, stress, layers[:1], cap=90.0)
+
+
+@pytest.mark.parametrize("limits", [(86.0, 50.0), (1.0, 1e4), (1e4, 1.0)])
+def test_gradient_agrees_with_finite_differences(problem, rng, limits, monkeypatch):
+    alone, field = problem
+    monkeypatch.setattr("ccfem.fibre_aware.strength_design._TOLERANCE", 1e-10)
+    solution = alone.evaluate(field, tolerance=1e-12).solution
+    whole = StrengthProblem.at(alone, Limits(*limits, (18.0, 18.0)), 0.7, field, solution)
+    found = whole.evaluate(field, solution, 1e-12)
+    smooth = np.linalg.inv(np.eye(len(field)) + 4.0 * whole.laplacian.toarray())
+    direction = smooth @ rng.standard_normal(len(field))
+    ends = [
+        whole.evaluate(field + step * direction, solution, 1e-12).value for step in (1e-5, -1e-5)
+    ]
+    assert found.gradient @ direction == pytest.approx((ends[0] - ends[1]) / 2e-5, rel=1e-3)
+
+
+def test_a_design_for_strength_takes_the_part_farther_from_failure(problem):
+    alone, start = problem
+    first = design(alone, start, 6)
+    second = design_for_strength(alone, first, 0.8, 8)
+    limits = Limits.of(alone.part.specimen.system.problem.material)
+    judged = StrengthProblem.at(alone, limits, 1.0, first.field, first.objective.solution)
+    before, after = (judged.evaluate(one.field).value for one in (first, second))
+    assert after < before - 0.01
+    assert second.objective.ratio > 1.0
+
+
+@pytest.mark.parametrize("strategy", [StreamFunction, Pruned])
+def test_strategies_take_strength_under_one_load_case(two_bends, strategy):
+    with pytest.raises(InputError, match="strength must be at least 0 and at most 1"):
+        strategy(strength=2.0)
+    cases, layers = two_bends
+    with pytest.raises(InputError, match="plans for strength under one load case"):
+        strategy(strength=0.5).for_cases(cases, layers, SHORT, (100.0,))
+
+
+def test_a_plan_for_strength_keeps_its_length_and_says_what_it_overfilled(strong_beam):
+    stress, layers = strong_beam
+    strategy = StreamFunction(strength=0.5, evaluations=2, phases=1)
+    told, planner = strategy.to_lengths(stress, layers, SHORT, (200.0,))[0]
+    assert told.strength == 0.5
+    assert told.overfill >= 1.25
+    laid = plan_layers(planner, layers, layers, stress, SHORT).lengths.sum()
+    assert 0.9 * 800.0 < laid <= 800.0
+
+
+def test_the_strength_of_the_matrix_has_to_be_known(bent_beam):
+    stress, layers = bent_beam
+    with pytest.raises(InputError, match="needs the strength of the matrix, MPa"):
+        StreamFunction(strength=0.5, evaluations=1).to_lengths(stress, layers, SHORT, (200.0,))

@@ -1,0 +1,110 @@
+"""Smooth indices of first failure, and their derivatives."""
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+
+from ccfem.elasticity import Force, Problem, Support, solve
+from ccfem.errors import InputError
+from ccfem.layers.slicing.planar import Planar
+from ccfem.materials import isotropic
+from ccfem.mesh.box import box_mesh
+from ccfem.virtual_testing.interlayer import interlayer
+from ccfem.virtual_testing.near_failure import MatrixPeaks, Peak, nearness, stretched_index
+from ccfem.virtual_testing.strand import Strand
+from ccfem.virtual_testing.strength import matrix_peak
+from ccfem.virtual_testing.strengths import Limits
+
+NORMAL = np.array([0.0, 0.0, 1.0])
+
+
+@pytest.fixture(scope="module")
+def beam():
+    """A beam, 24 x 10 x 4 mm, clamped at one end, its tip pushed at a slant."""
+    mesh = box_mesh((24.0, 10.0, 4.0), (9, 4, 2))
+    material = replace(
+        isotropic(3500.0, 0.35), tensile_strength=50.0, interlayer_tensile=18.0, interlayer_shear=14
+    )
+    loads = {"tip": (Force("x_max", (10.0, 20.0, 30.0)),)}
+    return solve(Problem(mesh, material, (Support("x_min"),), loads, order=1))["tip"]
+
+
+def judged(beam, what, displacement):
+    judge = MatrixPeaks(beam)
+    if what == "matrix":
+        return judge.matrix(displacement, 50.0)
+    return judge.bond(displacement, NORMAL, (18.0, 14.0))
+
+
+@pytest.mark.parametrize("what", ["matrix", "bond"])
+def test_derivative_agrees_with_finite_differences(beam, what):
+    u, rng = beam.displacement, np.random.default_rng(3)
+    found = judged(beam, what, u)
+    direction = rng.normal(size=u.shape) * np.abs(u).max() * 0.01
+    ends = [np.log(judged(beam, what, u + h * direction).norm) for h in (1e-4, -1e-4)]
+    slope = float(np.vdot(found.by_displacement, direction))
+    assert slope == pytest.approx((ends[0] - ends[1]) / 2e-4, rel=1e-5)
+    # Indices grow with the load: the derivative along the displacement itself is that of a power.
+    assert np.vdot(found.by_displacement, u) == pytest.approx(1.0, rel=1e-7)
+
+
+def test_peaks_are_those_of_first_failure(beam):
+    assert judged(beam, "matrix", beam.displacement).index == pytest.approx(
+        matrix_peak(beam)[0] / 50.0, rel=1e-12
+    )
+    bond = interlayer(beam, Planar(count=2).cut(beam.mesh)).index
+    assert judged(beam, "bond", beam.displacement).index == pytest.approx(bond, rel=1e-12)
+
+
+def test_derivative_on_cells_with_midside_nodes(beam):
+    problem = replace(beam.problem, mesh=beam.mesh.quadratic(), order=2)
+    fine = solve(problem)["tip"]
+    u, rng = fine.displacement, np.random.default_rng(4)
+    direction = rng.normal(size=u.shape) * np.abs(u).max() * 0.01
+    slope = float(np.vdot(judged(fine, "matrix", u).by_displacement, direction))
+    ends = [np.log(judged(fine, "matrix", u + h * direction).norm) for h in (1e-4, -1e-4)]
+    assert slope == pytest.approx((ends[0] - ends[1]) / 2e-4, rel=1e-5)
+
+
+def test_fibre_index_is_the_strain_that_all_but_a_hundredth_stays_below():
+    strain = np.array([0.001, 0.002, 0.004, -0.01])
+    length = np.array([60.0, 39.5, 0.4, 0.1])
+    index, norm, counted = stretched_index(strain, length, 0.004)
+    assert index == pytest.approx(0.5)
+    assert counted.sum() == pytest.approx(1.0)
+    assert counted[2] == counted[3] == 0.0  # beyond the hundredth, and shortened
+    whole = 60.0 * 0.5**16 + 39.5
+    assert norm == pytest.approx(0.5 * whole ** (1.0 / 16.0), rel=1e-12)
+    # The norm of one strain alone is that strain, times its length to the power 1/16.
+    alone = stretched_index(strain[:1], length[:1], 0.004)
+    assert alone[1] == pytest.approx(0.25 * 60.0 ** (1.0 / 16.0), rel=1e-12)
+
+
+def test_unstretched_fibre_has_no_index():
+    with pytest.raises(InputError, match="stretched"):
+        stretched_index(np.array([-1e-3]), np.array([5.0]), 0.006)
+
+
+def test_the_largest_index_counts_most_and_equal_ones_alike():
+    zero = np.zeros((1, 3))
+    factors = {"fibre": 2.0, "matrix": 1.0}
+    alike = {"fibre": Peak(0.4, 0.2, zero), "matrix": Peak(0.4, 0.4, zero)}
+    near, counts = nearness(alike, factors)
+    assert counts == pytest.approx({"fibre": 0.5, "matrix": 0.5})
+    assert np.exp(near) == pytest.approx(0.4 * 2.0 ** (1.0 / 8.0))
+    near, counts = nearness({**alike, "matrix": Peak(0.1, 0.1, zero)}, factors)
+    assert counts["fibre"] > 0.9999
+    assert np.exp(near) == pytest.approx(0.4, rel=1e-4)
+
+
+@pytest.mark.parametrize(
+    ("strand", "material", "message"),
+    [
+        (Strand(strength=None), {"tensile_strength": 50.0}, "strength of a strand, N"),
+        (Strand(), {}, "strength of the matrix, MPa"),
+    ],
+)
+def test_missing_strengths_are_asked_for(strand, material, message):
+    with pytest.raises(InputError, match=message):
+        Limits.of(replace(isotropic(3500.0, 0.35), **material), strand)
