@@ -1,3 +1,5 @@
+import gc
+
 import numpy as np
 import pytest
 
@@ -45,6 +47,12 @@ def box():
 @pytest.fixture(scope="session")
 def build_box():
     return make_box
+
+
+def pytest_collection_finish():
+    """Keep what is imported out of every later search for garbage: it stays to the end."""
+    gc.collect()
+    gc.freeze()
 
 
 @pytest.fixture(scope="session", autouse=True)

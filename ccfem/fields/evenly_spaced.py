@@ -88,6 +88,7 @@ def evenly_spaced_streamlines(
         _empty(grid, separation, int(room)),
         middles[seeds],
         seeds,
+        np.asarray(region.centroid.coords[0]),
         separation,
         closest * separation,
         step,
@@ -135,11 +136,14 @@ def _empty(grid: SectionGrid, cell: float, room: int) -> _Laid:
 
 
 @njit(cache=True, nogil=True)
-def _lay(field, grid, laid, seeds, homes, apart, test, step, least):  # type: ignore[no-untyped-def]
+def _lay(field, grid, laid, seeds, homes, centre, apart, test, step, least):  # type: ignore[no-untyped-def]
     """Points of all lines, (start, turn, end) of each among them, and whether it is closed.
 
-    From start to turn the points run ahead from the seed, from turn to end back from it.
+    From start to turn the points run ahead from the seed, from turn to end back from it. Ahead is
+    as in the line beside which a line begins, or else away from the centre: no matter how the part
+    lies, lines follow on each other in the same order.
     """
+    way = np.zeros(2)
     spans = np.empty((len(laid.line) // 4, 3), np.int64)
     closed = np.zeros(len(spans), np.bool_)
     # Literals as arguments would be signatures of their own, compiled beside those of numbers.
@@ -152,16 +156,18 @@ def _lay(field, grid, laid, seeds, homes, apart, test, step, least):  # type: ig
             x = laid.spot[p, 0] - side * apart * laid.way[p, 1]
             y = laid.spot[p, 1] + side * apart * laid.way[p, 0]
             home = laid.home[p]
+            way[0], way[1] = laid.way[p, 0], laid.way[p, 1]
             looked += 1
         else:
             x, y = seeds[tried, 0], seeds[tried, 1]
             home = homes[tried]
+            way[0], way[1] = x - centre[0], y - centre[1]
             tried += 1
         homing = lines < 0  # never
         taken = _crowded(laid, x, y, no_line, 0.0, apart * (1.0 - _SLACK), homing)
         if taken or not contains(grid, x, y):
             continue
-        turn, end, ring = _trace(field, grid, laid, count, lines, x, y, home, test, step)
+        turn, end, ring = _trace(field, grid, laid, count, lines, x, y, way, home, test, step)
         if (end - count) * step < least:
             _take_back(laid, count, end)
             continue
@@ -173,12 +179,11 @@ def _lay(field, grid, laid, seeds, homes, apart, test, step, least):  # type: ig
 
 
 @njit(cache=True, nogil=True)
-def _trace(field, grid, laid, first, number, x0, y0, home, test, step):  # type: ignore[no-untyped-def]
+def _trace(field, grid, laid, first, number, x0, y0, way, home, test, step):  # type: ignore[no-untyped-def]
     """Add points of a line from its seed ahead and back: end of either, and whether it is closed.
 
-    The numbers of the points start at `first`.
+    The numbers of the points start at `first`; ahead is where `way` points, more or less.
     """
-    way = np.zeros(2)
     dx, dy, home, fine = direction_at(field, home, x0, y0, -1.0, way)
     count = first
     if not fine:

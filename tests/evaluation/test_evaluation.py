@@ -237,7 +237,7 @@ def generic_lines(draw):
     return [size - np.abs(size - (line + 2.0) % (2.0 * size)) - 2.0 for line in ends]
 
 
-@settings(max_examples=25, deadline=None)
+@settings(max_examples=12, deadline=None)
 @given(lines=generic_lines(), seed=st.integers(0, 10**6))
 def test_order_direction_and_subdivision_do_not_matter(part, lines, seed):
     rng = np.random.default_rng(seed)

@@ -65,19 +65,19 @@ def bundles(layer, stress, machine):
 
 
 def short_pieces(layer, stress, machine):
-    return [piece for line in rings(layer, stress, machine, 2.0) for piece in pieces(line)]
+    return [piece for line in rings(layer, stress, machine, 6.0) for piece in pieces(line)]
 
 
 def micro_waves(layer, stress, machine):
-    return [waves(line, 0.4, 1.2) for line in rings(layer, stress, machine, 2.0)]
+    return [waves(line, 0.4, 1.2) for line in rings(layer, stress, machine, 6.0)]
 
 
 def meanders(layer, stress, machine):
-    return [waves(line, 1.2, 1.0) for line in rings(layer, stress, machine)]
+    return [waves(line, 1.2, 1.0) for line in rings(layer, stress, machine, 6.0)]
 
 
 def there_and_back(layer, stress, machine):
-    return [back_and_forth(line) for line in rings(layer, stress, machine)]
+    return [back_and_forth(line) for line in rings(layer, stress, machine, 6.0)]
 
 
 def one_layer(layer, stress, machine):
