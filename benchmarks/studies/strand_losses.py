@@ -42,8 +42,8 @@ COVERAGE = 0.45
 AUTHORS = 34.66e3
 """Length of the authors' fibre in twelve layers, mm."""
 
-_PLACES = np.array([[0.25] * 4, *(np.eye(4) * 0.4 + 0.15)])
-"""Barycentric coordinates at which a cell is looked at."""
+_PLACES = np.random.default_rng(0).dirichlet(np.ones(4), 64)
+"""Barycentric coordinates at which a cell is looked at, evenly spread over it."""
 
 _NONE = 0.02
 """Share of its room that a cell keeps for fibre where none may lie: a field needs a slope."""
