@@ -19,13 +19,13 @@ from ccfem.toolpaths import Toolpaths
 from ccfem.virtual_testing.bars import bars
 from ccfem.virtual_testing.strands import cut_strands
 
-__all__ = ["Extraction", "middle", "refined"]
+__all__ = ["CLEARANCE", "SHORTEST", "Extraction", "middle", "refined"]
 
-_CLEARANCE = 0.95
+CLEARANCE = 0.95
 """Least distance of strands in widths: they are designed to be 1 / 0.975 apart, and what is cut for
 a hundredth of a width would be lost."""
 
-_SHORTEST = 5.0
+SHORTEST = 5.0
 """Length, in strand widths, of the shortest pieces that are kept for linking."""
 
 _CUT_COST = 20.0
@@ -136,15 +136,19 @@ class Extraction:
     def layer_paths(self, layer: Layer, field: FloatArray, shift: float) -> Toolpaths:
         """Paths of one layer along unit levels, the first one `shift` above the lowest value."""
         width, section = self.machine.fibre_width, layer.plane.polygon
-        points, triangles = refined(layer)
-        values = self.grid.values(points) @ field
-        curves = isocontours(points, triangles, values, float(values.min()) + shift, 1.0)
-        lines = keep_off_border(curves.lines(), section, self.inset * width)
-        lines = trim_to_clearance(lines, _CLEARANCE * width, _SHORTEST * width)
+        lines = self.levels(layer, field, shift)
+        lines = keep_off_border(lines, section, self.inset * width)
+        lines = trim_to_clearance(lines, CLEARANCE * width, SHORTEST * width)
         limit, least = self.link_limit * width, self.machine.minimum_length
         radius = self.machine.minimum_radius
         found = linked_paths(lines, section, width, limit, least, radius=radius)
         return Toolpaths.from_plane(found.lines, layer, link=found.link)
+
+    def levels(self, layer: Layer, field: FloatArray, shift: float) -> list[FloatArray]:
+        """Trace unit levels on a layer, (n, 2), mm, the first `shift` above the lowest value."""
+        points, triangles = refined(layer)
+        values = self.grid.values(points) @ field
+        return isocontours(points, triangles, values, float(values.min()) + shift, 1.0).lines()
 
     def profiles(self, toolpaths: Toolpaths) -> list[Profile]:
         """Value of the paths at the strains of the designed part."""

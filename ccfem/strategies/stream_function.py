@@ -241,14 +241,14 @@ class StreamFunction:
         field = solved(stress, "stream_function")
         problem, group, found = self.designed(field, layers, machine)
         strained = ((1.0, found.objective.solution.displacement),)
-        extraction = self._extraction(problem, (found.field,), strained, machine)
+        extraction = self.extraction(problem, (found.field,), strained, machine)
         in_all, strand = [length * len(layers) for length in lengths], Strand(self.rho)
         return [
             prune(whole, problem.part.specimen, length, machine, strand, _ROUNDS, self.strength)
             for whole, length in zip(extraction.whole(layers, group, in_all), in_all, strict=True)
         ]
 
-    def _extraction(
+    def extraction(
         self,
         problem: StreamProblem,
         fields: Sequence[FloatArray],
@@ -341,7 +341,7 @@ class StreamFunction:
             (float(share) / one.work, one.displacement)
             for share, one in zip(counts, found.objective.solution, strict=True)
         ]
-        extraction = self._extraction(problem.problem, tuple(found.fields), strained, machine)
+        extraction = self.extraction(problem.problem, tuple(found.fields), strained, machine)
         field = layers_by_case(cases.weights, layers) * problem.problem.groups + group
         specimens = [part.specimen for part in problem.parts]
         return [

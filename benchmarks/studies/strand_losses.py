@@ -1,0 +1,133 @@
+"""Where stiffness is lost between the upper bound and the paths of `stream_function`.
+
+    python -m benchmarks.studies.strand_losses [PART ...]
+
+PART is a case or a part file; `authors_loop`, the default, needs `CCFEM_CHEN2021`. Every row has
+the same length of fibre: a stage that lays more is cut to it by virtual tests. Levels are those
+whose paths are worth most; before links, pieces from five widths on count.
+"""
+
+import sys
+from collections.abc import Callable
+from dataclasses import replace
+
+import numpy as np
+import shapely
+
+import ccfem
+from ccfem.arrays import FloatArray
+from ccfem.cases.case import Case
+from ccfem.elasticity.stress_field import solved
+from ccfem.fibre_aware.heights import nearest_layer
+from ccfem.fibre_aware.prune import prune
+from ccfem.fibre_aware.smeared import SmearedPart
+from ccfem.fibre_aware.stream_design import design
+from ccfem.fibre_aware.stream_paths import CLEARANCE, SHORTEST
+from ccfem.fibre_aware.stream_start import start_field
+from ccfem.fibre_aware.upper_bound import upper_bound
+from ccfem.layers.layer import Layer
+from ccfem.layers.slicing.planar import Planar
+from ccfem.linking.clearance import trim_to_clearance
+from ccfem.linking.finishing import keep_off_border
+from ccfem.machine.machine import Machine
+from ccfem.papers.chen_2021.loop import authors_loop
+from ccfem.planning.whole_part import full_length
+from ccfem.strategies.stream_function import StreamFunction
+from ccfem.toolpaths import Toolpaths
+from ccfem.virtual_testing.virtual_test import virtual_test
+
+__all__ = ["losses", "share_inside"]
+
+COVERAGE = 0.45
+AUTHORS = 34.66e3
+"""Length of the authors' fibre in twelve layers, mm."""
+
+_PLACES = np.random.default_rng(0).dirichlet(np.ones(4), 64)
+"""Barycentric coordinates at which a cell is looked at, evenly spread over it."""
+
+_NONE = 0.02
+"""Share of its room that a cell keeps for fibre where none may lie: a field needs a slope."""
+
+
+def share_inside(part: SmearedPart, layers: tuple[Layer, ...], inset: float) -> FloatArray:
+    """Share (m,) of each cell that is farther than `inset`, mm, from the border of its layer."""
+    mesh = part.mesh
+    corners = mesh.points[mesh.corners] @ part.frame[:2].T
+    nearest, share = nearest_layer(part, layers), np.zeros(len(corners))
+    for k, layer in enumerate(layers):
+        room, own = shapely.buffer(layer.plane.polygon, -inset), np.flatnonzero(nearest == k)
+        shapely.prepare(room)
+        x, y = np.einsum("pq,cqd->dcp", _PLACES, corners[own])
+        share[own] = shapely.contains_xy(room, x, y).mean(axis=1)
+    return share
+
+
+def losses(case: Case, layers: tuple[Layer, ...], length: float) -> dict[str, float]:
+    """Stiffness ratio of each stage at a length of fibre, mm in all layers."""
+    machine, width = case.machine, case.machine.fibre_width
+    stress = solved(next(iter(ccfem.solve(case.problem).values())), "strand_losses")
+    coverage = length / len(layers) / full_length(layers, machine)
+    strategy = StreamFunction(coverage=coverage)
+    problem, group, found = strategy.designed(stress, layers, machine)
+    rows = {"bound": upper_bound(stress, layers, length, machine).ratio}
+    inside = np.maximum(share_inside(problem.part, layers, 0.5 * width), _NONE)
+    exact = replace(problem, budget=problem.budget / strategy.overfill)
+    middle = [layers[len(layers) // 2]] * problem.groups
+    for what, share in (("designed field", 1.0), ("designed field, border left free", inside)):
+        posed = replace(exact, capacity=problem.capacity * share)
+        start = start_field(posed, stress, middle, strategy.cap)
+        rows[what] = design(posed, start, strategy.evaluations).objective.ratio
+    strained = ((1.0, found.objective.solution.displacement),)
+    extraction = strategy.extraction(problem, (found.field,), strained, machine)
+    one = len(layers) // 2
+    shifts = (np.arange(strategy.phases) + 0.5) / strategy.phases
+    tried = [extraction.layer_paths(layers[one], extraction.fields[group[one]], x) for x in shifts]
+    values = [extraction.profiles(paths) for paths in tried]
+    (best,) = extraction.best_phases([values], [len(layers)], length)
+    shift = float(shifts[best])
+
+    def tested(paths: Toolpaths, cutter: Machine) -> float:
+        cut = prune(paths, problem.part.specimen, length, cutter, rounds=3)
+        return virtual_test(cut, problem.part.specimen, machine=machine, span=()).ratio
+
+    def stage(change: Callable[[list[FloatArray], Layer], list[FloatArray]]) -> float:
+        laid = []
+        for k, layer in enumerate(layers):
+            lines = extraction.levels(layer, extraction.fields[group[k]], shift)
+            laid.append(Toolpaths.from_plane(change(lines, layer), layer))
+        shortest = replace(machine, minimum_length=SHORTEST * width)
+        return tested(Toolpaths.concatenate(laid), shortest)
+
+    def inset(lines: list[FloatArray], layer: Layer) -> list[FloatArray]:
+        return keep_off_border(lines, layer.plane.polygon, strategy.inset * width)
+
+    def apart(lines: list[FloatArray], layer: Layer) -> list[FloatArray]:
+        return trim_to_clearance(inset(lines, layer), CLEARANCE * width, SHORTEST * width)
+
+    rows["its levels"] = stage(lambda lines, _: lines)
+    rows["kept off the border"] = stage(inset)
+    rows["kept apart"] = stage(apart)
+    whole = [
+        extraction.layer_paths(x, extraction.fields[group[k]], shift) for k, x in enumerate(layers)
+    ]
+    rows["linked: the paths"] = tested(Toolpaths.concatenate(whole), machine)
+    return rows
+
+
+def main() -> None:
+    """Print a table for each part."""
+    for name in sys.argv[1:] or ["authors_loop"]:
+        case = authors_loop() if name == "authors_loop" else ccfem.read(name)
+        stress = next(iter(ccfem.solve(case.problem).values()))
+        layers = Planar(count=12 if name == "authors_loop" else 8)(stress, case.build, case.machine)
+        every = len(layers) * full_length(layers, case.machine)
+        length = AUTHORS if name == "authors_loop" else COVERAGE * every
+        rows = losses(case, layers, length)
+        most = rows["bound"] - 1.0
+        print(f"\n{name}: {length / 1e3:.2f} m of fibre in {len(layers)} layers")
+        for what, ratio in rows.items():
+            print(f"{what:36}{ratio:7.3f}{(ratio - 1.0) / most:7.1%}", flush=True)
+
+
+if __name__ == "__main__":
+    main()
