@@ -58,7 +58,7 @@ assert 0.19 < thickness.min() < thickness.max() < 0.51
 
 # %%
 some = sliced.layers[20:24]
-paths = plan(create("fiso"), some, stress, case.machine)
+paths = plan(create("fiso", {"turns": "tight"}), some, stress, case.machine)
 print(f"{len(paths)} strands, {paths.lengths.sum():.0f} mm on {len(some)} layers")
 area = sum(layer.areas.sum() for layer in some)
 assert 0.85 * area < case.machine.fibre_width * paths.lengths.sum() < 1.1 * area

@@ -65,9 +65,9 @@ assert abs(drop["s_fram"] - 42.0) < 1.0
 patterns = {
     "grid 45": create("grid", {"angle": 45.0}),
     "grid 0": create("grid", {"angle": 0.0}),
-    "concentric": create("concentric", {"joined": False, "filled": True}),
+    "concentric": create("concentric", {"joined": False, "filled": True, "turns": "tight"}),
     "mat": create("mat"),
-    "mps": create("mps"),
+    "mps": create("mps", {"turns": "tight"}),
 }
 machine = Machine(
     fibre_width=plate.bead, minimum_length=0.0, minimum_radius=0.0

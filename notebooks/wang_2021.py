@@ -84,9 +84,9 @@ assert shares["optimised"] > shares["full"] + 0.25
 # %%
 strategies = {
     "svt": create("svt"),
-    "concentric": create("concentric", {"joined": False, "filled": True}),
-    "zigzag 45": create("zigzag", {"angle": 45.0}),
-    "zigzag 90": create("zigzag", {"angle": 90.0}),
+    "concentric": create("concentric", {"joined": False, "filled": True, "turns": "tight"}),
+    "zigzag 45": create("zigzag", {"angle": 45.0, "turns": "tight"}),
+    "zigzag 90": create("zigzag", {"angle": 90.0, "turns": "tight"}),
 }
 laid, indices, rates = {}, {}, {}
 for where, (machine, field, layer) in parts.items():

@@ -2,6 +2,7 @@
 
 from collections.abc import Mapping
 from dataclasses import dataclass
+from types import MappingProxyType
 
 import numpy as np
 
@@ -37,6 +38,7 @@ def check_before_meshing(
     rules: Mapping[str, PatchRule],
     supports: tuple[AnySupport, ...],
     loads: Mapping[str, tuple[Load, ...]],
+    case_supports: Mapping[str, tuple[AnySupport, ...]] = MappingProxyType({}),
 ) -> None:
     """Try rules, supports and loads on the surface, cut finer than the mesh will be.
 
@@ -56,13 +58,16 @@ def check_before_meshing(
     for name, rule in rules.items():
         with found.noted():
             shell = patches_from_rules(shell, {name: rule})
-    for name in set(patches_in_use(supports, loads)) - set(rules):
+    own = [support for each in case_supports.values() for support in each]
+    for name in set(patches_in_use((*supports, *own), loads)) - set(rules):
         with found.noted():
             shell.patch(name)
     found.complain()
-    outline = _Outline(shell, shell, supports, loads)
-    with found.noted():
-        held(outline)
+    sets = [(*supports, *case_supports.get(name, ())) for name in loads] or [supports]
+    for k, one in enumerate(sets):
+        if one not in sets[:k]:
+            with found.noted():
+                held(_Outline(shell, shell, one, loads))
     for those in loads.values():
         for load in those:
             if isinstance(load, SurfaceLoad) and not isinstance(load, PointForce):

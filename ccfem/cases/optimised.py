@@ -293,7 +293,7 @@ def _to_keep(problem: Problem) -> tuple[str, ...]:
     """Patches that stay whole: loaded ones, and curved ones that hold the part."""
     loaded = set(patches_in_use((), problem.loads))
     mesh = problem.mesh
-    for name in patches_in_use(problem.supports, {}):
+    for name in patches_in_use(problem.all_supports, {}):
         _, normal = mesh.facet_areas(mesh.patch(name))
         if np.linalg.norm(normal.mean(axis=0)) < 0.9:
             loaded.add(name)

@@ -117,6 +117,8 @@ them with a minus ("-z"), or three numbers.
     patch = "foot"
     components = "xyz"                # which are held; default all
     value = [0, 0, 0]                 # displacement they take, mm; default none
+    case = ["pull", "weight"]         # load cases in which it holds, or one name; default all.
+                                      # Of every kind of support
 
     [[supports]]
     kind = "pressing"                 # the patch lies on something rigid: it may slide and lift
@@ -316,7 +318,8 @@ def _case(content: Mapping[str, Any], path: Path) -> Case:
             given.fibre = fibre_of(part.fibre, path.parent)
     check_strategies(part.strategies, found)
     rules = rules_of(part.patches, found)
-    supports = supports_of(part.supports, found) if "supports" not in unread else ()
+    readable = "supports" not in unread
+    supports, own = supports_of(part.supports, part.loads, found) if readable else ((), {})
     others = alternative_supports_of(part.alternative_supports, found)
     loads = loads_of(part.loads, found) if "loads" not in unread else {}
     combinations = combinations_of(part.combinations, part.loads, found)
@@ -328,7 +331,7 @@ def _case(content: Mapping[str, Any], path: Path) -> Case:
 
     def before(surface: Surface) -> None:
         assert part.edge_length is not None
-        check_before_meshing(surface, part.edge_length, rules, supports, loads)
+        check_before_meshing(surface, part.edge_length, rules, supports, loads, own)
 
     mesh, findings = part.read(path.parent, before)
     for each, rule in rules.items():
@@ -339,7 +342,8 @@ def _case(content: Mapping[str, Any], path: Path) -> Case:
     near = patches_of_fibre(given.fibre)
     for each in near:
         mesh.patch(each)
-    mesh = without_faces(mesh, (*rules, *near, *patches_in_use((*supports, *others), loads)))
+    held = (*supports, *others, *(each for some in own.values() for each in some))
+    mesh = without_faces(mesh, (*rules, *near, *patches_in_use(held, loads)))
     build, slicing, machine, material = given.whole()
     return Case(
         name=name,
@@ -352,6 +356,7 @@ def _case(content: Mapping[str, Any], path: Path) -> Case:
             regions=regions_of(mesh, regions),
             combinations=combinations,
             order=part.order,
+            case_supports=own,
         ),
         build=(float(build[0]), float(build[1]), float(build[2])),
         slicing=slicing,

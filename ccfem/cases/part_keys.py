@@ -18,7 +18,7 @@ class Part(Body):
     material : str or table
         A name of the table of materials, or moduli.
     supports : tuple of tables
-        What holds the part; at least one.
+        What holds the part; at least one. With ``case`` one holds in these load cases alone.
     loads : dict
         The load cases by name, each a list of loads; at least one.
     alternative_supports : tuple of tables

@@ -56,7 +56,7 @@ LOADS: dict[str, Callable[..., Load]] = {
 }
 """Loads by their kind."""
 
-_HELD = "held"
+_HELD, _CASE = "held", "case"
 SUPPORTS: dict[str, Callable[..., AnySupport]] = {
     _HELD: Support,
     "edge": EdgeSupport,
@@ -72,33 +72,63 @@ SUPPORTS: dict[str, Callable[..., AnySupport]] = {
 """Supports by their kind."""
 
 
-def supports_of(tables: tuple[dict[str, Any], ...], found: Mistakes) -> tuple[AnySupport, ...]:
-    """Supports of the tables [[supports]]; one without a kind holds its patch.
+def supports_of(
+    tables: tuple[dict[str, Any], ...], cases: Mapping[str, Any], found: Mistakes
+) -> tuple[tuple[AnySupport, ...], dict[str, tuple[AnySupport, ...]]]:
+    """Supports of the tables [[supports]]: those of all load cases, and those of each alone.
 
-    What is wrong is noted.
+    One without a kind holds its patch; one with ``case`` holds in the load cases named alone. What
+    is wrong is noted.
     """
     if not tables:
         found.lines.append("a part needs a support: add [[supports]] with its patch")
-    return _supports(tables, "supports", found)
+    always: list[AnySupport] = []
+    own: dict[str, tuple[AnySupport, ...]] = {}
+    for k, table in enumerate(tables):
+        with found.noted():
+            names = _cases_of(table, cases, f"supports[{k}]")
+            rest = {key: value for key, value in table.items() if key != _CASE}
+            support = _support(rest, f"supports[{k}]")
+            if not names:
+                always.append(support)
+            for name in names:
+                own[name] = (*own.get(name, ()), support)
+    return tuple(always), own
+
+
+def _cases_of(table: Mapping[str, Any], cases: Mapping[str, Any], where: str) -> tuple[str, ...]:
+    """Load cases that a support holds in; none where it holds in all."""
+    if _CASE not in table:
+        return ()
+    given = table[_CASE]
+    names = [given] if isinstance(given, str) else given
+    if not isinstance(names, list) or not names or not all(isinstance(n, str) for n in names):
+        raise InputError(
+            f"{where}.case must be the name of a load case, or a list of names; got "
+            f"{shown(given)}: correct it, or leave it out where the support holds in all"
+        )
+    for name in names:
+        if name not in cases:
+            raise InputError(
+                f"{where}.case names no load case '{name}'; there are: {known_names(name, cases)}"
+            )
+    return tuple(dict.fromkeys(names))
 
 
 def alternative_supports_of(
     tables: tuple[dict[str, Any], ...], found: Mistakes
 ) -> tuple[AnySupport, ...]:
     """Supports of the tables [[alternative_supports]], if any; what is wrong is noted."""
-    return _supports(tables, "alternative_supports", found)
-
-
-def _supports(
-    tables: tuple[dict[str, Any], ...], key: str, found: Mistakes
-) -> tuple[AnySupport, ...]:
     supports: list[AnySupport] = []
     for k, table in enumerate(tables):
         with found.noted():
-            where = f"{key}[{k}]"
-            kind, rest = named_table({"kind": _HELD, **table}, "kind", SUPPORTS, where)
-            supports.append(from_table(SUPPORTS[kind], rest, where))
+            supports.append(_support(table, f"alternative_supports[{k}]"))
     return tuple(supports)
+
+
+def _support(table: Mapping[str, Any], where: str) -> AnySupport:
+    kind, rest = named_table({"kind": _HELD, **table}, "kind", SUPPORTS, where)
+    return from_table(SUPPORTS[kind], rest, where)
 
 
 def loads_of(cases: Mapping[str, Any], found: Mistakes) -> dict[str, tuple[Load, ...]]:

@@ -11,6 +11,7 @@ from ccfem.cases.case import Case
 from ccfem.cases.part_fibre import fibre_table
 from ccfem.cases.part_loads import LOADS, SUPPORTS
 from ccfem.checks import member_name
+from ccfem.elasticity.problem import Problem
 from ccfem.errors import InputError
 from ccfem.layers.slicing.planar import Planar
 from ccfem.machine.machine import Machine
@@ -51,7 +52,7 @@ def part_text(case: Case, mesh: str, comment: str = "") -> str:
         "material": _material(problem.material),
         "slicing": {"method": member_name(case.slicing), **_changed(case.slicing, Planar())},
         "fibre": fibre_table(case.fibre),
-        "supports": [_kind(each, SUPPORTS) for each in problem.supports],
+        "supports": _supports(problem),
         "alternative_supports": [_kind(each, SUPPORTS) for each in case.alternative_supports],
         "loads": {
             name: [_kind(each, LOADS) for each in loads] for name, loads in problem.loads.items()
@@ -63,6 +64,15 @@ def part_text(case: Case, mesh: str, comment: str = "") -> str:
     }
     lines = [f"# {line}".rstrip() for line in comment.splitlines()]
     return "\n".join([*lines, "", *_table(content, "")]).lstrip("\n") + "\n"
+
+
+def _supports(problem: Problem) -> list[dict[str, Any]]:
+    """Tables of the supports, those that hold in some load cases alone with their names."""
+    found = [_kind(each, SUPPORTS) for each in problem.supports]
+    for each in problem.all_supports[len(problem.supports) :]:
+        cases = [name for name, own in problem.case_supports.items() if each in own]
+        found.append({**_kind(each, SUPPORTS), "case": cases})
+    return found
 
 
 def _kind(value: Any, kinds: Mapping[str, Any]) -> dict[str, Any]:

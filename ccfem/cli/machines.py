@@ -114,7 +114,9 @@ def machine_file(name: str) -> str:
 
     machine = updated(Machine(), machine_table(name))
     head = textwrap.fill(machine_about(name), _WIDTH, initial_indent="# ", subsequent_indent="# ")
-    return "\n".join([head] * bool(machine_about(name)) + _lines(machine, "machine")) + "\n"
+    ends = ["# A file without this table at its end is cut off.", 'last_table = "end"', ""]
+    lines = [head] * bool(machine_about(name)) + ends + _lines(machine, "machine")
+    return "\n".join([*lines, "", "[end]"]) + "\n"
 
 
 def _lines(value: Any, where: str) -> list[str]:

@@ -32,9 +32,6 @@ from ccfem.support import SupportLayers, slice_with_support
 
 __all__ = ["Solved", "judged"]
 
-_BOUND_ITERATIONS = 7
-"""The bound holds after any number of iterations; more than these lower it by half a per cent."""
-
 
 @dataclass(frozen=True)
 class Solved:
@@ -214,11 +211,8 @@ def _bound(
     if longest is None or solved.tests is None:
         return None
     tell("bounding what any paths could reach")
-    strand, iterations = solved.tests.strand, _BOUND_ITERATIONS
     with timed(seconds, "bound"):
-        return upper_bound(
-            solved.field, part.layers, longest, part.machine, strand, iterations=iterations
-        )
+        return upper_bound(solved.field, part.layers, longest, part.machine, solved.tests.strand)
 
 
 def _bound_of_cases(
@@ -244,7 +238,9 @@ def _longest_bounded(
 ) -> float | None:
     """Most fibre of the runs that a bound holds for, mm; None where there is no bound."""
     equal = [run for run in runs if run.tested is not None and not off_length(run, wanted)]
-    pressing = any(isinstance(each, PressingSupport) for each in solved.field.problem.supports)
+    fields = (solved.field,) if solved.cases is None else solved.cases.fields
+    supports = [support for field in fields for support in field.problem.supports]
+    pressing = any(isinstance(each, PressingSupport) for each in supports)
     flat = all(layer.flat is not None for layer in part.layers)
     if solved.tests is None or not equal or pressing or not flat:
         return None

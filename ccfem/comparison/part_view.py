@@ -51,7 +51,7 @@ def part_view(checked: Check, stress: StressField) -> dict[str, Any]:
         "colour": drawn,
         "size": size,
         "labels": [{"text": label.text, "at": label.place.tolist()} for label in labels],
-        "supports": support_marks(checked).tolist(),
+        "supports": support_marks(checked, stress.case).tolist(),
         "arrows": [
             {"text": arrow.text, "at": arrow.place.tolist(), "along": _unit(arrow.direction)}
             for arrow in load_arrows(checked, stress.case)

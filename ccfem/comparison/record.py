@@ -132,6 +132,7 @@ def record(comparison: Comparison, command: str, seconds: Mapping[str, float]) -
             "strain_energy": stress.strain_energy,
             "fibre_per_layer": comparison.fibre_per_layer,
             "upper_bound": None if comparison.bound is None else comparison.bound.ratio,
+            "upper_bound_gap": None if comparison.bound is None else comparison.bound.gap,
             "load_cases": None if comparison.cases is None else _load_cases(comparison),
             "curve": None
             if comparison.curve is None

@@ -9,7 +9,7 @@ from ccfem.comparison.runs import Run, Wanted
 from ccfem.evaluation.evaluation import Evaluation
 from ccfem.evaluation.open_places import open_places
 from ccfem.evaluation.plane_paths import plane_paths
-from ccfem.fibre_aware.upper_bound import UpperBound
+from ccfem.fibre_aware.upper_bound import LOOSE, UpperBound
 from ccfem.layers.layer import Layer
 from ccfem.virtual_testing.stiffer import RESOLUTION, SAME, UNDECIDED
 
@@ -192,10 +192,11 @@ def bound_remark(tested: Sequence[Run], bound: UpperBound) -> str:
     share = bound.share(stiffness_ratio(best))
     bonded = max(stiffness_ratio(run, "bonded") for run in tested)
     free = "; bonded fibres are not bounded" if bonded > bound.ratio else ""
+    loose = f"; it may be loose by {bound.gap:.1%}" if bound.gap > LOOSE else ""
     most = (
         f"paths of {length:.0f} mm a layer in {layers} layers can make the part "
         f"more than {bound.ratio:.2f} times as stiff (fibres carrying tension only"
-        f"{free})"
+        f"{free}{loose})"
     )
     if share > 1.0:
         return f"only where strands overlap, as those of {name} do, {most}"

@@ -8,6 +8,7 @@ from ccfem.comparison.ranking import merit, off_length, order_of, ranking
 from ccfem.comparison.runs import Run, Wanted
 from ccfem.elasticity.weighted_cases import WeightedCases
 from ccfem.fibre_aware.cases_bound import CasesBound
+from ccfem.fibre_aware.upper_bound import LOOSE
 from ccfem.virtual_testing.stiffer import FIRST, RESOLUTION, SAME
 
 __all__ = ["cases_remarks", "cases_rows", "cases_verdict"]
@@ -87,11 +88,13 @@ def cases_remarks(
     if bound is None or not tested or tested[0].tested is None or tested[0].tested.cases is None:
         return found
     ratios = tested[0].tested.cases.tension.ratios
+    gap = bound.duality_gap
+    loose = f"; the bound may be loose by {gap:.1%}" if gap > LOOSE else ""
     return [
         *found,
         f"no paths of this length bring the worst case above {1.0 / bound.least:.0%} of what is "
         f"possible for it alone: {tested[0].name} reaches {bound.shares(ratios).min():.0%}, "
-        f"{bound.gap(ratios):.1%} from that bound (fibres carrying tension only)",
+        f"{bound.gap(ratios):.1%} from that bound (fibres carrying tension only{loose})",
     ]
 
 

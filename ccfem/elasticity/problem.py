@@ -7,6 +7,7 @@ from typing import Literal
 import numpy as np
 
 from ccfem.arrays import FloatArray, IntArray, freeze
+from ccfem.checks import check_known
 from ccfem.display import Shown
 from ccfem.elasticity.load_kinds import (
     Bearing,
@@ -90,6 +91,9 @@ class Problem(Shown):
     order : "auto", 1 or 2, default "auto"
         Order of the displacement that `solve` takes on a mesh of linear cells: see
         `ccfem.elasticity.order`. Quadratic cells stay.
+    case_supports : mapping of load case name to tuple of supports
+        Supports that hold in that load case alone, besides `supports`. Each set of supports is
+        solved on its own: see `ccfem.elasticity.support_sets`.
 
     Raises
     ------
@@ -108,15 +112,17 @@ class Problem(Shown):
     regions: tuple[Region, ...] = ()
     combinations: Mapping[str, Mapping[str, float]] = field(default_factory=dict)
     order: Order = "auto"
+    case_supports: Mapping[str, tuple[AnySupport, ...]] = field(default_factory=dict)
 
     def __repr__(self) -> str:
         return (
-            f"Problem of {self.material.name} on {self.mesh!r}; {len(self.supports)} supports, "
+            f"Problem of {self.material.name} on {self.mesh!r}; {len(self.all_supports)} supports, "
             f"load cases {', '.join(self.loads) or 'none'}"
         )
 
     def __post_init__(self) -> None:
         freeze(self, supports=tuple, loads=tuple, regions=tuple, combinations=dict)
+        freeze(self, case_supports=tuple)
         freeze(self, axes=float, density=float, stiffness=float)
         if self.mesh.flaw:
             raise InputError(self.mesh.flaw)
@@ -174,10 +180,13 @@ class Problem(Shown):
             seen[cells] = True
 
     def _check_names(self) -> None:
-        for kind in (*self.supports, *(load for case in self.loads.values() for load in case)):
+        loads = (load for case in self.loads.values() for load in case)
+        for kind in (*self.all_supports, *loads):
             for name in patches_of(kind):
                 if not len(self.mesh.patch(name)):
                     raise InputError(f"patch '{name}' is empty: no boundary facet meets its rule")
+        for name in self.case_supports:
+            check_known("load case", name, self.loads)
         for name, factors in self.combinations.items():
             unknown = sorted(set(factors) - set(self.loads))
             if name in self.loads or unknown or not factors:
@@ -188,6 +197,13 @@ class Problem(Shown):
                 )
             if not np.isfinite(list(factors.values())).all():
                 raise InputError(f"factors of combination '{name}' must be finite; got {factors}")
+            first, *others = factors
+            for other in others:
+                if self.supports_of(other) != self.supports_of(first):
+                    raise InputError(
+                        f"combination '{name}' adds up load cases '{first}' and '{other}', whose "
+                        "supports differ: make it a load case with loads and supports of its own"
+                    )
 
     @property
     def body(self) -> TetMesh:
@@ -197,7 +213,19 @@ class Problem(Shown):
     @property
     def held_or_loaded(self) -> tuple[str, ...]:
         """Names of the patches that carry a support or a load, sorted."""
-        return patches_in_use(self.supports, self.loads)
+        return patches_in_use(self.all_supports, self.loads)
+
+    @property
+    def all_supports(self) -> tuple[AnySupport, ...]:
+        """Supports of all load cases, each once."""
+        found = list(self.supports)
+        for own in self.case_supports.values():
+            found += [support for support in own if support not in found]
+        return tuple(found)
+
+    def supports_of(self, case: str) -> tuple[AnySupport, ...]:
+        """Return the supports that hold in a load case, or in a combination of them."""
+        return (*self.supports, *self.case_supports.get(next(iter(self.factors(case))), ()))
 
     @property
     def cases(self) -> tuple[str, ...]:

@@ -17,8 +17,9 @@ from ccfem.elasticity.order import LARGEST_ERROR, MOST_CELLS, linear_locks, on_q
 from ccfem.elasticity.problem import Problem
 from ccfem.elasticity.solvers import LARGEST_DIRECT, Solver, direct_backend
 from ccfem.elasticity.stress_field import SolveRecord, StressField
+from ccfem.elasticity.support_sets import support_sets
 from ccfem.elasticity.system import prepare
-from ccfem.errors import SolveError
+from ccfem.errors import InputError, SolveError
 
 __all__ = ["solve", "solve_system"]
 
@@ -32,7 +33,7 @@ hundredth of what the cells themselves leave of it."""
 def solve(
     problem: Problem, backend: str = "auto", tolerance: float = 1e-8
 ) -> dict[str, StressField]:
-    """Solve a problem for all its load cases with one factorisation.
+    """Solve a problem for all its load cases, with one factorisation for each set of supports.
 
     Parameters
     ----------
@@ -55,7 +56,8 @@ def solve(
     dict of load case name to StressField
         Combinations of load cases come last. Where supports only press they are solved as load
         cases of their own, since the contact is another one. The time of the factorisation counts
-        in the record of the first load case.
+        in the record of the first load case. Where cases have supports of their own, the problem
+        of each field is that of its set of supports, and all are on one mesh.
 
     Raises
     ------
@@ -64,6 +66,26 @@ def solve(
     SolveError
         When a solution is not accepted; what makes the equations ill-conditioned is named.
     """
+    fields: dict[str, StressField] = {}
+    sets = support_sets(problem)
+    for one in sets:
+        try:
+            fields |= _solved(one, backend, tolerance)
+        except InputError as error:
+            if len(sets) == 1:
+                raise
+            case = next(iter(one.loads))
+            raise InputError(*(f"load case '{case}': {line}" for line in error.mistakes)) from None
+    if len({len(field.mesh.points) for field in fields.values()}) > 1:
+        for one in sets:
+            if fields[next(iter(one.loads))].mesh.order == 1:
+                why = "other supports call for them"
+                fields |= _solved_as_it_is(on_quadratic(one), backend, tolerance, why)
+    return {case: fields[case] for case in problem.cases}
+
+
+def _solved(problem: Problem, backend: str, tolerance: float) -> dict[str, StressField]:
+    """Solve a problem with one set of supports."""
     if problem.order != "auto" or problem.mesh.order == 2:
         wanted = on_quadratic(problem) if problem.order == 2 else problem
         return _solved_as_it_is(wanted, backend, tolerance, "")
@@ -145,7 +167,7 @@ def solve_system(
     fields, found = {}, {}
     started = assembled
     for case in alone:
-        work = partial(_solved, matrix, system.held_in(case), system.forces_in(case), tolerance)
+        work = partial(_solution, matrix, system.held_in(case), system.forces_in(case), tolerance)
         try:
             contact, energy = work(solver)
         except SolveError:
@@ -175,7 +197,7 @@ def solve_system(
     return fields
 
 
-def _solved(
+def _solution(
     matrix: sp.bsr_array, held: Held, forces: FloatArray, tolerance: float, solver: Solver
 ) -> tuple[Contact, float]:
     """Solution for forces (n, 3), N, and the bound of the energy of its error."""

@@ -20,6 +20,7 @@ from ccfem.elasticity.springs import add_springs, soft_supports, spring_forces
 from ccfem.elasticity.stress_field import SolveRecord, StressField
 from ccfem.elasticity.supports import held, held_in
 from ccfem.elasticity.volume_loads import free_strain, strain_forces
+from ccfem.errors import InputError
 from ccfem.mesh.tet_mesh import TetMesh
 
 __all__ = ["System", "prepare"]
@@ -171,8 +172,15 @@ def prepare(problem: Problem) -> System:
     Raises
     ------
     InputError
-        For supports or loads that nothing sensible can follow from.
+        For supports or loads that nothing sensible can follow from, and for load cases whose
+        supports differ.
     """
+    if problem.case_supports:
+        raise InputError(
+            f"load cases {', '.join(problem.case_supports)} have supports of their own, and one "
+            "set of supports is expected here: leave them out, or solve each set on its own "
+            "(ccfem.solve does)"
+        )
     forces = load_cases(problem)
     at_rest = held(problem)
     moved = {}

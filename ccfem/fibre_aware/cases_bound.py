@@ -7,7 +7,8 @@ displacements u_i,
 
 where S is the most that fibre of that length can gather: the cells of the largest
 ``max_t sum v_i max(t.eps_i t, 0)^2``, filled until the length is used. No principal direction is
-known for several strains: 360 angles are tried, with a margin for those between.
+known for several strains: 360 angles are tried, with a margin for those between. A case that moves
+supports in place of forces has a compliance too: see `SmearedPart.pull`.
 
 What counts of a case is C_i over the least that any paths could make of it alone. The factors that
 raise the bound of the largest of these are found by growing those of the cases that are worst off;
@@ -24,9 +25,10 @@ from numpy.typing import ArrayLike
 from ccfem.arrays import FloatArray, freeze, in_brief
 from ccfem.checks import check_known, check_number
 from ccfem.elasticity.weighted_cases import WeightedCases
+from ccfem.fibre_aware.density_ascent import DensityAscent
 from ccfem.fibre_aware.heights import fibre_capacity
 from ccfem.fibre_aware.smeared import SmearedPart, SmearedSolution, smeared_cases
-from ccfem.fibre_aware.upper_bound import criterion_step, directions, upper_bound
+from ccfem.fibre_aware.upper_bound import LOOSE, affordable_iterations, directions, upper_bound
 from ccfem.layers.layer import Layer
 from ccfem.machine.machine import Machine
 from ccfem.virtual_testing.strand import Strand
@@ -48,13 +50,10 @@ WORST, SUM = OBJECTIVES = ("worst", "sum")
 
 _SINGLE_ITERATIONS = 30
 """Of the bounds of each case alone, at most."""
-_ANGLES = 12
+_ANGLES = 24
 _CERTIFIED_ANGLES = 360
 _FULL_STEPS = 10
 """Iterations after which the steps of the factors shrink."""
-_LEAST_PROGRESS = 2e-4
-_PATIENCE = 12
-"""The iterations stop when this many of them have not raised the bound by this share."""
 
 
 @dataclass(frozen=True)
@@ -89,6 +88,11 @@ class CasesBound:
     def __post_init__(self) -> None:
         freeze(self, singles=float, case_weights=float, factors=float)
 
+    @property
+    def duality_gap(self) -> float:
+        """Share by which what a density of fibre reaches lies above what is certified."""
+        return self.reached / self.least - 1.0
+
     def value(self, ratios: ArrayLike) -> float:
         """Objective of a design with these stiffness ratios (n,)."""
         return objective_value(self.singles / np.asarray(ratios), self.case_weights, self.objective)
@@ -114,7 +118,8 @@ def cases_bound(
     machine: Machine,
     strand: Strand | None = None,
     objective: str = WORST,
-    iterations: int = 60,
+    iterations: int | None = None,
+    gap: float = LOOSE,
 ) -> CasesBound:
     """Bound the stiffness of a part with fibre under several load cases, in tension only.
 
@@ -130,8 +135,10 @@ def cases_bound(
     strand : Strand, optional
         Stiffness of a strand; default rho = EA/E = 4 mm^2.
     objective : {"worst", "sum"}
-    iterations : int, default 60
-        Maximum number, a solve a case each; at least 1. They stop where the bound no longer rises.
+    iterations : int, optional
+        Maximum number, a solve a case each; at least 1. Default as `upper_bound`.
+    gap : float, default 0.01
+        They stop where what is reached lies no farther than this share above the bound.
 
     Raises
     ------
@@ -139,6 +146,8 @@ def cases_bound(
         As `upper_bound`, and for an unknown objective.
     """
     check_known("objective", objective, OBJECTIVES)
+    if iterations is None:
+        iterations = affordable_iterations(len(cases.mesh.cells))
     check_number("iterations", iterations, at_least=1)
     check_number("number of layers", len(layers), at_least=1)
     parts = smeared_cases(cases.fields, layers[0].plane.frame)
@@ -151,13 +160,13 @@ def cases_bound(
 
     _, along = directions(_ANGLES)
     outer = (along[:, :, None] * along[:, None, :]).reshape(_ANGLES, 9)
-    density = np.repeat((length / float(volume @ most) * most / _ANGLES)[:, None], _ANGLES, axis=1)
+    ascent = DensityAscent.even(volume, most, length, _ANGLES)
     solutions: list[SmearedSolution | None] = [None] * len(cases)
     factors, best = cases.weights, cases.weights
     reached, bounds = np.inf, [0.0]
     for k in range(iterations):
 
-        def fibre(strain: FloatArray, density: FloatArray = density) -> FloatArray:
+        def fibre(strain: FloatArray, density: FloatArray = ascent.density) -> FloatArray:
             carried = np.where(strain @ along.T > 0.0, density, 0.0)
             return axial * (carried @ outer).reshape(-1, 3, 3)
 
@@ -165,23 +174,25 @@ def cases_bound(
             part.solve(fibre, start, 1e-3) for part, start in zip(parts, solutions, strict=True)
         ]
         solutions = list(found)
-        terms = scale * np.array([one.work for one in found])
+        compliances = [part.compliance(one.work) for part, one in zip(parts, found, strict=True)]
+        terms = scale * np.array(compliances)
         reached = min(reached, objective_value(terms, cases.weights, objective))
         bounds.append(cases_certificate(parts, found, factors * scale, axial, most, length))
         if bounds[-1] >= max(bounds):
             best = factors
-        if max(bounds[-_PATIENCE:]) < (1.0 + _LEAST_PROGRESS) * max(bounds[:-_PATIENCE], default=0):
+        if reached <= (1.0 + gap) * max(bounds):
             break
+        merit = -float(factors @ terms)
         if objective == WORST:
             factors = factors * (terms / terms.max()) ** min(1.0, _FULL_STEPS / (k + 1))
             factors = factors / factors.sum()
         stretch = np.sqrt(
             sum(
-                v * np.maximum(one.strain @ along.T, 0.0) ** 2
-                for v, one in zip(factors * scale, found, strict=True)
+                v * (part.pull(one)[0] * np.maximum(one.strain @ along.T, 0.0)) ** 2
+                for v, part, one in zip(factors * scale, parts, found, strict=True)
             )
         )
-        density = criterion_step(density, stretch, volume, most, length)
+        ascent = ascent.step(stretch, merit)
     return CasesBound(objective, singles, cases.weights, max(bounds), reached, best)
 
 
@@ -215,9 +226,10 @@ def cases_certificate(
     Parameters
     ----------
     parts : sequence of SmearedPart
-        One for each case; forces load them.
+        One for each case.
     solutions : sequence of SmearedSolution
-        Any displacements that respect the supports, with their strains in the plane.
+        Any displacements that respect the supports, with their strains in the plane; where
+        supports move also the work.
     factors : (n,) array
         Not negative.
     axial_stiffness : float, N
@@ -227,16 +239,17 @@ def cases_certificate(
     length : float, mm
         Of fibre.
     """
-    strains = np.stack([one.strain for one in solutions])
+    pulls = [part.pull(one) for part, one in zip(parts, solutions, strict=True)]
+    strains = np.stack([s * one.strain for (s, _), one in zip(pulls, solutions, strict=True)])
     square = largest_gathered(strains, np.asarray(factors, dtype=np.float64))
     order = np.argsort(-square, kind="stable")
     room = (parts[0].mesh.volumes * most)[order]
     used = np.minimum(room, np.maximum(length - (np.cumsum(room) - room), 0.0))
     energy, work = axial_stiffness * float(used @ square[order]), 0.0
-    for factor, part, one in zip(factors, parts, solutions, strict=True):
-        u, specimen = one.displacement.reshape(-1), part.specimen
-        energy += factor * float(u @ (specimen.matrix @ u))
-        work += factor * float(specimen.forces.reshape(-1) @ u)
+    for factor, part, one, (s, own) in zip(factors, parts, solutions, pulls, strict=True):
+        u = s * one.displacement.reshape(-1)
+        energy += factor * float(u @ (part.specimen.matrix @ u))
+        work += factor * own
     return work**2 / energy
 
 

@@ -20,6 +20,7 @@ from ccfem.machine.machine import Machine
 from ccfem.planning.equal_fibre import TOLERANCE, length_per_layer, plan_to_length
 from ccfem.planning.plan import check_layers, plan, plan_layers
 from ccfem.planning.planned import Planned
+from ccfem.planning.short_pieces import about_short_pieces
 from ccfem.planning.strategy import CasesStrategy, LengthStrategy, Strategy
 from ccfem.toolpaths import Toolpaths
 from ccfem.virtual_testing.several_cases import specimens
@@ -71,7 +72,7 @@ def plan_cases(
     if isinstance(strategy, CasesStrategy) and wanted is not None:
         told, planner = strategy.for_cases(cases, layers, machine, (wanted,))[0]
         paths = plan_layers(planner, layers, layers, cases.fields[0], machine)
-        return _told(told, paths, layers, wanted)
+        return _told(told, paths, layers, machine, wanted)
     if len(cases) == 1 or getattr(strategy, "ignores_stress", False):
         field = cases.fields[int(np.argmax(cases.weights))]
         if wanted is not None:
@@ -85,13 +86,13 @@ def plan_cases(
             "choose a planar slicing, or one load case"
         )
     if wanted is None:
-        return _told(strategy, plan_by_layers(strategy, layers, cases, machine), layers)
+        return _told(strategy, plan_by_layers(strategy, layers, cases, machine), layers, machine)
     too_much = plan_by_layers(strategy, layers, cases, machine, _TOO_MUCH * wanted)
     in_all = wanted * len(layers)
     bounds = single_bounds(cases, layers, in_all, machine, strand)
     parts = specimens(cases)
     paths = prune_cases(too_much, parts, cases.weights, bounds, in_all, machine, strand, objective)
-    return _told(strategy, paths, layers, wanted)
+    return _told(strategy, paths, layers, machine, wanted)
 
 
 def plan_by_layers(
@@ -127,11 +128,16 @@ def plan_by_layers(
 
 
 def _told(
-    strategy: Strategy, toolpaths: Toolpaths, layers: Sequence[Layer], wanted: float | None = None
+    strategy: Strategy,
+    toolpaths: Toolpaths,
+    layers: Sequence[Layer],
+    machine: Machine,
+    wanted: float | None = None,
 ) -> Planned:
     """Plan with what has to be said of its length."""
     length = length_per_layer(toolpaths, layers)
     if wanted is None or length >= (1.0 - TOLERANCE) * wanted:
         return Planned(strategy, toolpaths, length)
     note = f"lays {length:.0f} of {wanted:.0f} mm per layer: its most for all load cases"
+    note += about_short_pieces(layers, machine)
     return Planned(strategy, toolpaths, length, note, reached=False)

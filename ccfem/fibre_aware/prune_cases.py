@@ -16,7 +16,7 @@ from ccfem.fibre_aware.cases_bound import OBJECTIVES, WORST
 from ccfem.fibre_aware.prune import fibre_length, profiles, shorten
 from ccfem.machine.machine import Machine
 from ccfem.toolpaths import Toolpaths
-from ccfem.virtual_testing.equilibrium import equilibrium
+from ccfem.virtual_testing.equilibrium import Equilibrium, equilibrium
 from ccfem.virtual_testing.specimen import Specimen
 from ccfem.virtual_testing.strand import Strand
 from ccfem.virtual_testing.strands import cut_strands
@@ -103,14 +103,11 @@ def prune_cases(
             for part, near in zip(parts, known, strict=True)
         ]
         known = [(one.displacement,) for one in found]
-        work = np.array(
-            [
-                float(np.vdot(part.forces, one.displacement))
-                for part, one in zip(parts, found, strict=True)
-            ]
-        )
+        work = np.array([_work(part, one) for part, one in zip(parts, found, strict=True)])
         before = np.array([2.0 * part.unreinforced.strain_energy for part in parts])
-        counts = case_counts(weights, bounds, before / work, objective)
+        moved = np.array([not part.forces.any() for part in parts])
+        ratios = np.where(moved, work / before, before / work)
+        counts = case_counts(weights, bounds, ratios, objective)
         value = np.zeros(len(strands.length))
         for share, one in zip(counts / work, found, strict=True):
             value += share * np.where(one.carries, one.strain, 0.0) ** 2
@@ -118,3 +115,11 @@ def prune_cases(
         along = profiles(toolpaths, strands, value)
         toolpaths = shorten(toolpaths, along, wanted, machine.minimum_length)
     return toolpaths
+
+
+def _work(part: Specimen, found: Equilibrium) -> float:
+    """Work of the forces, or of the supports that move, N mm: twice the strain energy."""
+    u = found.displacement
+    if part.forces.any():
+        return float(np.vdot(part.forces, u))
+    return float(u.reshape(-1) @ (found.matrix @ u.reshape(-1)))

@@ -13,6 +13,8 @@ from ccfem.display import Shown
 from ccfem.elasticity.held import Held
 from ccfem.elasticity.load_kinds import patches_of
 from ccfem.elasticity.loads import load_case
+from ccfem.elasticity.problem import Problem
+from ccfem.elasticity.support_sets import support_sets
 from ccfem.elasticity.supports import held, held_in
 from ccfem.errors import Mistakes
 from ccfem.inspection.cost import solve_costs
@@ -136,20 +138,12 @@ def check(part: str | os.PathLike[str] | Case, **parameters: Any) -> Check:
     """
     case = read(part, **parameters)
     problem, found = case.problem, Mistakes()
-    at_rest: Held | None = None
-    with found.noted():
-        at_rest = held(problem)
-    rows = []
-    for name, loads in problem.loads.items():
-        before = len(found.lines)
-        for load in loads:
-            with found.noted(f"load case '{name}': "):
-                rows.append(load_row(problem, name, load, at_rest))
-        if len(found.lines) == before:
-            with found.noted():
-                load_case(problem, name)
-                if at_rest is not None:
-                    held_in(problem, name, at_rest)
+    rows: list[LoadRow] = []
+    sets = support_sets(problem)
+    for one in sets:
+        rows += _load_rows(one, found, len(sets) > 1)
+    order = list(problem.loads)
+    rows.sort(key=lambda row: order.index(row.case))
     found.lines += [
         f"load case '{row.case}': {row.what} acts on held nodes alone and does nothing: choose "
         "another patch for the load, or for the support"
@@ -170,6 +164,25 @@ def check(part: str | os.PathLike[str] | Case, **parameters: Any) -> Check:
         tuple(dict.fromkeys(found.lines)),
         fibre,
     )
+
+
+def _load_rows(problem: Problem, found: Mistakes, named: bool) -> list[LoadRow]:
+    """Rows of the loads on one set of supports; what is wrong is noted, with the case if named."""
+    at_rest: Held | None = None
+    rows = []
+    with found.noted(f"load case '{next(iter(problem.loads))}': " if named else ""):
+        at_rest = held(problem)
+    for name, loads in problem.loads.items():
+        before = len(found.lines)
+        for load in loads:
+            with found.noted(f"load case '{name}': "):
+                rows.append(load_row(problem, name, load, at_rest))
+        if len(found.lines) == before:
+            with found.noted():
+                load_case(problem, name)
+                if at_rest is not None:
+                    held_in(problem, name, at_rest)
+    return rows
 
 
 def _facts(case: Case) -> tuple[str, ...]:
@@ -225,12 +238,15 @@ def _only_told(finding: str) -> bool:
 def _carried(case: Case) -> dict[str, list[str]]:
     """Say what each patch carries."""
     carried: dict[str, list[str]] = {}
-    for support in case.problem.supports:
+    problem = case.problem
+    for support in problem.all_supports:
         held_along = getattr(support, "components", "")
+        within = [c for c, own in problem.case_supports.items() if support in own]
+        only = f" in {', '.join(within)}" if within and support not in problem.supports else ""
         for name in patches_of(support):
             word = kind_of(support)
-            carried.setdefault(name, []).append(f"{word} {held_along}".strip())
-    for label, loads in case.problem.loads.items():
+            carried.setdefault(name, []).append(f"{f'{word} {held_along}'.strip()}{only}")
+    for label, loads in problem.loads.items():
         for load in loads:
             for name in patches_of(load):
                 carried.setdefault(name, []).append(f"{kind_of(load)} of {label}")
@@ -255,8 +271,19 @@ def _warnings(case: Case, rows: Sequence[LoadRow]) -> list[str]:
                 f"load case '{row.case}': {row.what} has no resultant: its parts cancel; check "
                 "that the patch faces one way"
             )
+    for each in support_sets(problem):
+        lines += [line for line in _shared(each) if line not in lines]
+    unused = sorted(set(problem.mesh.patches) - set(problem.held_or_loaded))
+    if unused and len(unused) <= 6:
+        lines.append(f"patches without load and support: {', '.join(unused)}")
+    return lines
+
+
+def _shared(problem: Problem) -> list[str]:
+    """Say which patches are loaded and held at once, on one set of supports."""
     supported = {name for each in problem.supports for name in patches_of(each)}
     loaded = {name for those in problem.loads.values() for x in those for name in patches_of(x)}
+    lines = []
     for one in sorted(loaded):
         for other in sorted(supported - {one}):
             both = are_among(problem.mesh.patch(one), problem.mesh.patch(other))
@@ -265,9 +292,6 @@ def _warnings(case: Case, rows: Sequence[LoadRow]) -> list[str]:
                     f"patches '{one}' (loaded) and '{other}' (held) share {int(both.sum())} of "
                     f"{len(both)} facets: choose them apart"
                 )
-    unused = sorted(set(problem.mesh.patches) - loaded - supported)
-    if unused and len(unused) <= 6:
-        lines.append(f"patches without load and support: {', '.join(unused)}")
     return lines
 
 

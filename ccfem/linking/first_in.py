@@ -16,6 +16,7 @@ from scipy.spatial import KDTree
 
 from ccfem.arrays import BoolArray, FloatArray, IntArray
 from ccfem.geometry.contour_tree import SAMPLES, ContourTree
+from ccfem.geometry.polylines import line_length
 
 __all__ = ["first_in_spiral_out"]
 
@@ -65,6 +66,7 @@ def first_in_spiral_out(
     start: FloatArray,
     entry: bool = False,
     radius: float = 0.0,
+    alone_from: float = np.inf,
 ) -> list[FloatArray]:
     """Join the contours of a tree to one open strand from the innermost to the outermost.
 
@@ -86,6 +88,9 @@ def first_in_spiral_out(
     radius : float, mm, default 0
         With a radius laps all run in one sense, and ramps with no smaller radius lead from each to
         the next; without `entry`. Where contours are merged, turns stay half a spacing wide.
+    alone_from : float, mm, default inf
+        Length from which on contours that are no laps stay closed curves of their own, for turns
+        half a spacing wide would merge them.
 
     Returns
     -------
@@ -100,7 +105,7 @@ def first_in_spiral_out(
     places = _openings([tree.contours[k] for k in chain], gap, spacing, start)
     wide = np.linalg.norm(np.diff(places.points, axis=0), axis=1).max(initial=0.0) > _STEP * spacing
     laps = {} if wide else dict(zip(chain, places.before, strict=True))
-    loops, alone = _merged(tree, laps, gap, spacing, start)
+    loops, alone = _merged(tree, laps, gap, spacing, start, alone_from)
     if wide:
         strands = [_opened(loops[0], SAMPLES)]
     elif (
@@ -175,6 +180,7 @@ def _merged(
     gap: int,
     spacing: float,
     start: FloatArray,
+    alone_from: float,
 ) -> tuple[list[_Loop], list[FloatArray]]:
     """Laps, or the outermost contour alone, with all that hangs on them; contours left alone."""
     loops: dict[int, _Loop] = {}
@@ -193,9 +199,11 @@ def _merged(
         if k in laps:
             continue
         parent = int(tree.parent[k])
-        joined = _joined(loops[parent], loops[k], spacing, start)
+        ring = np.concatenate([loops[k].points, loops[k].points[:1]])
+        long = line_length(ring) >= alone_from
+        joined = None if long else _joined(loops[parent], loops[k], spacing, start)
         if joined is None:
-            alone.append(np.concatenate([loops[k].points, loops[k].points[:1]]))
+            alone.append(ring)
         else:
             loops[parent] = joined
     return [loops[k] for k in (laps or (0,))], alone

@@ -45,12 +45,12 @@ def machine_table(name: str | Path) -> dict[str, Any]:
     ----------
     name : str or Path
         Of a machine that comes with ccfem, or of a TOML file with a table ``[machine]``, as in part
-        files.
+        files. A file that names its ``last_table`` ends with it, or is cut off.
 
     Raises
     ------
     InputError
-        For an unknown name, and a file that is none of a machine.
+        For an unknown name, and a file that is none of a machine or is cut off.
     """
     text = str(name)
     if not text.endswith(".toml") and not {"/", "\\"} & set(text):
@@ -63,6 +63,11 @@ def machine_table(name: str | Path) -> dict[str, Any]:
             content = tomllib.load(stream)
     except (ValueError, RecursionError) as error:
         raise InputError(f"{file} is not a TOML file: {error}: correct it") from None
+    last = content.get("last_table")
+    if last is not None and not (isinstance(last, str) and last in content):
+        raise InputError(
+            f"{file} is cut off: its last_table {shown(last)} is missing: copy or print it again"
+        )
     if not isinstance(content.get("machine"), Mapping):
         raise InputError(f"{file} is no machine file: it has no table [machine]: write one")
     try:

@@ -19,6 +19,7 @@ from ccfem.planning.dial import Dial, around
 from ccfem.planning.mixing import layer_lengths, mixed
 from ccfem.planning.plan import check_layers, plan, plan_layers
 from ccfem.planning.planned import Planned
+from ccfem.planning.short_pieces import about_short_pieces
 from ccfem.planning.strategy import LengthStrategy, Strategy
 from ccfem.toolpaths import FIBRE, Toolpaths
 
@@ -154,7 +155,13 @@ def plan_to_lengths(
         check_layers(strategy, layers, machine)
         found = strategy.to_lengths(stress, layers, machine, lengths)
         return [
-            _told(told, plan_layers(planner, layers, layers, stress, machine), layers, wanted)
+            _told(
+                told,
+                plan_layers(planner, layers, layers, stress, machine),
+                layers,
+                machine,
+                wanted,
+            )
             for (told, planner), wanted in zip(found, lengths, strict=True)
         ]
     search = _Search(Dial(strategy), layers, stress, machine, tolerance)
@@ -183,13 +190,18 @@ def _length(planned: Planned) -> float:
 
 
 def _told(
-    strategy: Strategy, toolpaths: Toolpaths, layers: Sequence[Layer], wanted: float
+    strategy: Strategy,
+    toolpaths: Toolpaths,
+    layers: Sequence[Layer],
+    machine: Machine,
+    wanted: float,
 ) -> Planned:
     """Plan of a strategy that was told the length."""
     length = length_per_layer(toolpaths, layers)
     if _meets(length, wanted):
         return Planned(strategy, toolpaths, length)
     note = f"lays {length:.0f} of {wanted:.0f} mm per layer: its most"
+    note += about_short_pieces(layers, machine)
     return Planned(strategy, toolpaths, length, note, reached=False)
 
 

@@ -6,13 +6,16 @@ from dataclasses import dataclass
 from functools import partial
 from typing import Any, ClassVar, Literal
 
-from ccfem.arrays import FloatArray
+import numpy as np
+
+from ccfem.arrays import BoolArray, FloatArray
 from ccfem.checks import check_choices, check_fields
 from ccfem.elasticity.part_stress import PartStress
 from ccfem.geometry.sections import corners_only
 from ccfem.geometry.shapes import Region
 from ccfem.layers.layer import Layer
 from ccfem.layers.layer_stress import LayerStress
+from ccfem.linking.cut_turns import cut_turns
 from ccfem.linking.joining import Joined, join
 from ccfem.machine.machine import Machine
 from ccfem.planning.strategy import Amount, LayerPlanner
@@ -22,7 +25,7 @@ from ccfem.raster.raster_plan import RasterPlan, raster_plan
 from ccfem.threads import in_threads
 from ccfem.toolpaths import Toolpaths
 
-__all__ = ["SPACING", "Infill", "check_fill", "check_shells", "long_enough"]
+__all__ = ["SPACING", "Infill", "check_fill", "check_shells", "long_enough", "with_turns"]
 
 SPACING = Amount("spacing", most=1.0, least=20.0)
 """Of a strategy whose parameter `spacing` is the distance of strands in fibre widths."""
@@ -55,6 +58,34 @@ def check_shells(strategy: object) -> None:
 def long_enough(paths: Toolpaths, least: float | None, machine: Machine) -> Toolpaths:
     """Paths no shorter than `least`, mm; None for the shortest that the machine can cut."""
     return paths.select(paths.lengths >= (machine.minimum_length if least is None else least))
+
+
+def with_turns(
+    strategy: Any,
+    lines: Sequence[FloatArray],
+    machine: Machine,
+    link: Sequence[BoolArray] | None = None,
+) -> Joined:
+    """Strands cut at turns that the machine's fibre cannot follow, if a strategy wants that.
+
+    Parameters
+    ----------
+    strategy : object
+        With `turns`, "tight" or "printable", a `spacing`, and a `minimum_length` where it has one.
+    lines : sequence of (n_i, 2) arrays, mm
+    machine : Machine
+    link : sequence of (n_i,) bool arrays, optional
+        Which of their steps are marked as links.
+    """
+    lines = list(lines)
+    none = [np.zeros(len(line), dtype=bool) for line in lines]
+    joined = Joined(lines, none if link is None else list(link))
+    if strategy.turns == "tight":
+        return joined
+    width, least = machine.fibre_width, getattr(strategy, "minimum_length", None)
+    least = max(machine.minimum_length, least or 0.0)  # no cut is made that the cutter cannot
+    spacing, radius = strategy.spacing * width, machine.minimum_radius
+    return cut_turns(joined, radius, width, least, spacing)
 
 
 class Infill(ABC):

@@ -89,11 +89,12 @@ def load_arrows(checked: Check, case: str | None = None) -> list[Arrow]:
     ]
 
 
-def support_marks(checked: Check) -> FloatArray:
-    """Places on what is held, spread evenly over its facets."""
+def support_marks(checked: Check, case: str | None = None) -> FloatArray:
+    """Places on what is held, in one load case or in any, spread evenly over its facets."""
     problem = checked.case.problem
+    supports = problem.supports_of(case) if case in problem.cases else problem.all_supports
     found: list[FloatArray] = []
-    for support in problem.supports:
+    for support in supports:
         found += [np.asarray(point, dtype=float)[None] for point in points_of(support)]
         for name in patches_of(support):
             facets = problem.mesh.patches.get(name, np.zeros((0, 3), dtype=np.int64))

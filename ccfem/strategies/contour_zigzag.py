@@ -2,7 +2,7 @@
 
 from collections.abc import Mapping
 from dataclasses import dataclass
-from typing import Any, ClassVar
+from typing import Any, ClassVar, Literal
 
 import numpy as np
 
@@ -11,7 +11,7 @@ from ccfem.geometry.hatch import zigzag
 from ccfem.layers.layer import Layer
 from ccfem.layers.layer_stress import LayerStress
 from ccfem.machine.machine import Machine
-from ccfem.planning.infill import SPACING, check_fill, long_enough
+from ccfem.planning.infill import SPACING, check_fill, long_enough, with_turns
 from ccfem.planning.strategy import Amount
 from ccfem.strategies.concentric import Concentric
 from ccfem.toolpaths import Toolpaths
@@ -36,6 +36,7 @@ class ContourZigzag:
     angle, turn : float, degrees, default 45 and 90
         As in `Zigzag`.
     joined : bool, default True
+    turns : {"tight", "printable"}, default "tight"
         As in `Concentric`.
     """
 
@@ -44,12 +45,16 @@ class ContourZigzag:
     angle: float = 45.0
     turn: float = 90.0
     joined: bool = True
+    turns: Literal["tight", "printable"] = "tight"
 
     amount: ClassVar[Amount] = SPACING
     ignores_stress: ClassVar[bool] = True
     in_plane: ClassVar[bool] = True
     direction: ClassVar[str] = "angle"
-    variants: ClassVar[Mapping[str, Mapping[str, Any]]] = {"single": {"joined": False}}
+    variants: ClassVar[Mapping[str, Mapping[str, Any]]] = {
+        "single": {"joined": False},
+        "printable": {"turns": "printable"},
+    }
 
     def __post_init__(self) -> None:
         check_fill(self)
@@ -59,11 +64,13 @@ class ContourZigzag:
     def __call__(self, layer: Layer, stress: LayerStress, machine: Machine) -> Toolpaths:
         """Plan the paths of one layer; none where the section is thinner than a fibre."""
         width = machine.fibre_width
-        contours = Concentric(rings=self.contours, joined=self.joined)(layer, stress, machine)
+        rings = Concentric(rings=self.contours, joined=self.joined, turns=self.turns)
+        contours = rings(layer, stress, machine)
         inside, angle = (
             (self.contours + 0.5) * width,
             np.radians(self.angle + self.turn * layer.index),
         )
         lines = zigzag(layer.plane.polygon, inside, width, self.spacing * width, angle)
+        lines = with_turns(self, lines, machine).lines
         inner = long_enough(Toolpaths.from_plane(lines, layer), None, machine)
         return Toolpaths.concatenate([contours, inner])

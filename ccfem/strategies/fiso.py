@@ -6,7 +6,9 @@ continuous carbon fiber parts, Materials 16 (2023) 998.
 
 from collections.abc import Mapping
 from dataclasses import dataclass
-from typing import Any, ClassVar
+from typing import Any, ClassVar, Literal
+
+import numpy as np
 
 from ccfem.arrays import FloatArray
 from ccfem.checks import check_fields
@@ -16,7 +18,7 @@ from ccfem.layers.layer import Layer
 from ccfem.layers.layer_stress import LayerStress
 from ccfem.linking.first_in import first_in_spiral_out
 from ccfem.machine.machine import Machine
-from ccfem.planning.infill import SPACING, check_fill, long_enough
+from ccfem.planning.infill import SPACING, check_fill, long_enough, with_turns
 from ccfem.planning.strategy import Amount
 from ccfem.toolpaths import Toolpaths
 
@@ -53,6 +55,10 @@ class Fiso:
         openings of the laps. Not with `least_radius`.
     minimum_length : float, mm, optional
         Shorter paths are dropped; by default the shortest that the machine can cut.
+    turns : {"tight", "printable"}, default "tight"
+        Whether strands go round all turns; or are cut where they turn more tightly than the
+        machine's fibre follows, if both sides are long enough for its cutter. Contours that long
+        are not merged then.
     """
 
     spacing: float = 1.0
@@ -60,6 +66,7 @@ class Fiso:
     least_radius: float = 0.0
     entry: bool = False
     minimum_length: float | None = None
+    turns: Literal["tight", "printable"] = "tight"
 
     amount: ClassVar[Amount] = SPACING
     in_plane: ClassVar[bool] = True
@@ -67,6 +74,7 @@ class Fiso:
         "apart": {"closest": 1.0},
         "round": {"least_radius": 3.85},
         "entry": {"entry": True},
+        "printable": {"turns": "printable"},
     }
 
     def __post_init__(self) -> None:
@@ -85,6 +93,9 @@ class Fiso:
         closest = max(self.closest, _NARROW) if radius > 0.0 else self.closest
         start = layer.plane.points[layer.loops[0][:2]].mean(axis=0)
         lines: list[FloatArray] = []
-        for tree in contour_trees(layer.plane.polygon, spacing, start, closest, radius):
-            lines += first_in_spiral_out(tree, spacing, start, self.entry, radius)
+        least = np.inf if self.turns == "tight" else machine.minimum_length
+        section = layer.plane.polygon
+        for tree in contour_trees(section, spacing, start, closest, radius):
+            lines += first_in_spiral_out(tree, spacing, start, self.entry, radius, least)
+        lines = with_turns(self, lines, machine).lines
         return long_enough(Toolpaths.from_plane(lines, layer), self.minimum_length, machine)

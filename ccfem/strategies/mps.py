@@ -24,9 +24,9 @@ from ccfem.geometry.shapes import Region
 from ccfem.geometry.shells import shells
 from ccfem.layers.layer import Layer
 from ccfem.layers.layer_stress import LayerStress
-from ccfem.linking.joining import Joined, join, link_ends
+from ccfem.linking.joining import Joined, link_ends
 from ccfem.machine.machine import Machine
-from ccfem.planning.infill import Infill, check_shells
+from ccfem.planning.infill import Infill, check_shells, with_turns
 from ccfem.raster.bitmap import Bitmap
 from ccfem.raster.guides import stress_guides
 from ccfem.raster.patterns import Regions, inside_shells, stress_regions
@@ -85,6 +85,9 @@ class Mps(Infill):
         then stop a fibre width before the sides of other strands.
     mode : {"polyline", "raster"}, default "polyline"
         Polylines; or paths of pixels a spacing wide, as in the paper: see `ccfem.raster`.
+    turns : {"tight", "printable"}, default "tight"
+        Whether strands go round all turns; or are cut where they turn more tightly than the
+        machine's fibre follows, if both sides are long enough for its cutter.
     """
 
     spacing: float = 1.0
@@ -93,10 +96,12 @@ class Mps(Infill):
     closest: float = 0.6
     minimum_length: float | None = None
     mode: Literal["polyline", "raster"] = "polyline"
+    turns: Literal["tight", "printable"] = "tight"
 
     variants: ClassVar[Mapping[str, Mapping[str, Any]]] = {
         "ends": {"seeds": "ends"},
         "raster": {"mode": "raster"},
+        "printable": {"turns": "printable"},
         "raster_ends": {"mode": "raster", "seeds": "ends"},
     }
 
@@ -129,16 +134,17 @@ class Mps(Infill):
         least = machine.minimum_length if self.minimum_length is None else self.minimum_length
         short = any(line_length(line) < least for line in lines)
         if not short or shapely.is_empty(prepared.interior):
-            return join(lines, [])
+            return with_turns(self, lines, machine)
         width, radius = machine.fibre_width, machine.minimum_radius
         limit = _LINK * self.spacing * width
         interior = shapely.force_2d(prepared.interior)
         rings = len(prepared.rings)
         worth = [line for line in lines[rings:] if line_length(line) >= _WORTH * width]
         lines = clear_ends(lines[:rings] + worth, width, rings)
-        return link_ends(
+        joined = link_ends(
             lines, interior, limit, width, radius=radius, enough=least, one_by_one=True
         )
+        return with_turns(self, joined.lines, machine, joined.link)
 
     def regions(self, image: Bitmap, layer: Layer, stress: LayerStress) -> Regions:
         """Shells of pixels, guides and rings round them."""

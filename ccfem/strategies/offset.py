@@ -5,8 +5,9 @@ Papapetrou, C. Patel, A. Y. Tamijani, Stiffness-based optimization framework for
 fiber paths of continuous fiber composites, Composites Part B 183 (2020) 107681.
 """
 
+from collections.abc import Mapping
 from dataclasses import dataclass
-from typing import ClassVar
+from typing import Any, ClassVar, Literal
 
 import shapely
 
@@ -16,7 +17,7 @@ from ccfem.geometry.shapes import Region
 from ccfem.layers.layer import Layer
 from ccfem.layers.layer_stress import LayerStress
 from ccfem.machine.machine import Machine
-from ccfem.planning.infill import SPACING, check_fill, long_enough
+from ccfem.planning.infill import SPACING, check_fill, long_enough, with_turns
 from ccfem.planning.strategy import Amount
 from ccfem.toolpaths import Toolpaths
 
@@ -40,14 +41,19 @@ class Offset:
         Distance of neighbouring rings in fibre widths, at least 1.
     minimum_length : float, mm, optional
         Shorter paths are dropped; by default the shortest that the machine can cut.
+    turns : {"tight", "printable"}, default "tight"
+        Whether strands go round all turns; or are cut where they turn more tightly than the
+        machine's fibre follows, if both sides are long enough for its cutter.
     """
 
     spacing: float = 1.0
     minimum_length: float | None = None
+    turns: Literal["tight", "printable"] = "tight"
 
     amount: ClassVar[Amount] = SPACING
     ignores_stress: ClassVar[bool] = True
     in_plane: ClassVar[bool] = True
+    variants: ClassVar[Mapping[str, Mapping[str, Any]]] = {"printable": {"turns": "printable"}}
 
     def __post_init__(self) -> None:
         check_fill(self)
@@ -56,6 +62,7 @@ class Offset:
         """Plan the paths of one layer; none where the section is thinner than a fibre."""
         width = machine.fibre_width
         lines = _level_sets(layer.plane.polygon, 0.5 * width, self.spacing * width)
+        lines = with_turns(self, lines, machine).lines
         return long_enough(Toolpaths.from_plane(lines, layer), self.minimum_length, machine)
 
 

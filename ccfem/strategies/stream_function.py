@@ -212,7 +212,7 @@ class StreamFunction:
         Raises
         ------
         InputError
-            When no layer has a tensile direction in any case, or a case moves supports.
+            When no layer has a tensile direction in any case.
         """
         if len(cases) == 1:
             return self.to_lengths(cases.fields[0], layers, machine, lengths)

@@ -1,7 +1,8 @@
 """Baseline: parallel lines across the section, linked at their ends."""
 
+from collections.abc import Mapping
 from dataclasses import dataclass
-from typing import ClassVar
+from typing import Any, ClassVar, Literal
 
 import numpy as np
 
@@ -10,7 +11,7 @@ from ccfem.geometry.hatch import zigzag
 from ccfem.layers.layer import Layer
 from ccfem.layers.layer_stress import LayerStress
 from ccfem.machine.machine import Machine
-from ccfem.planning.infill import SPACING, check_fill, long_enough
+from ccfem.planning.infill import SPACING, check_fill, long_enough, with_turns
 from ccfem.planning.strategy import Amount
 from ccfem.toolpaths import Toolpaths
 
@@ -33,16 +34,21 @@ class Zigzag:
     turn : float, degrees, default 90
         Turn from each layer to the next; 90 alternates between two directions as the published
         paths of Chen et al. 2021 do, 45 goes round four.
+    turns : {"tight", "printable"}, default "tight"
+        Whether strands go round all turns; or are cut where they turn more tightly than the
+        machine's fibre follows, if both sides are long enough for its cutter.
     """
 
     spacing: float = 1.0
     angle: float = 45.0
     turn: float = 90.0
+    turns: Literal["tight", "printable"] = "tight"
 
     amount: ClassVar[Amount] = SPACING
     ignores_stress: ClassVar[bool] = True
     in_plane: ClassVar[bool] = True
     direction: ClassVar[str] = "angle"
+    variants: ClassVar[Mapping[str, Mapping[str, Any]]] = {"printable": {"turns": "printable"}}
 
     def __post_init__(self) -> None:
         check_fill(self)
@@ -53,4 +59,5 @@ class Zigzag:
         width = machine.fibre_width
         angle = np.radians(self.angle + self.turn * layer.index)
         lines = zigzag(layer.plane.polygon, 0.5 * width, width, self.spacing * width, angle)
+        lines = with_turns(self, lines, machine).lines
         return long_enough(Toolpaths.from_plane(lines, layer), None, machine)

@@ -32,13 +32,17 @@ from ccfem.elasticity import (
     Support,
     Temperature,
     Traction,
+    prepare,
     solve,
 )
+from ccfem.elasticity.support_sets import support_sets
 from ccfem.errors import InputError
+from ccfem.inspection import check
 from ccfem.io import write_mesh
 from ccfem.io.surface import Surface
 from ccfem.mesh import box_mesh
 from ccfem.mesh.patches import Plane
+from ccfem.plot.part_picture import support_marks
 
 EXAMPLE = Path(ccfem.__file__).parent / "cases" / "examples" / "loads_and_supports.toml"
 
@@ -357,3 +361,107 @@ def test_every_kind_is_weighed_on_a_surface_before_it_is_meshed():
     turned = {"all": (Bearing("right", (0.0, 1.0, 0.0)), *loads)}
     with pytest.raises(InputError, match="bearing"):
         check_before_meshing(surface, 1.0, rules, (Support("left"),), turned)
+
+
+OWN_SUPPORTS = """
+[[supports]]
+patch = "x_min"
+
+[[supports]]
+patch = "x_max"
+case = "between"
+
+[[loads.hanging]]
+kind = "body_force"
+vector = [0.5, 0, 0]
+
+[[loads.between]]
+kind = "body_force"
+vector = [0.5, 0, 0]
+"""
+
+
+def test_a_load_case_may_have_supports_of_its_own(folder):
+    # A bar under its weight b: b L^2 / (2 E) at its free end, b L^2 / (8 E) in the middle where
+    # both ends are held, and then each end carries half of it.
+    problem = read(folder, PART.replace("order = 1", "order = 2") + OWN_SUPPORTS)
+    fields_of = solve(problem)
+    assert list(fields_of) == ["hanging", "between"]
+    hanging, between = (fields_of[name].displacement[:, 0] for name in fields_of)
+    assert hanging.max() == pytest.approx(0.5 * 400.0 / 2000.0, rel=1e-9)
+    assert between.max() == pytest.approx(0.5 * 400.0 / 8000.0, rel=1e-9)
+    ends = fields_of["between"].mesh.points[:, 0] == 20.0
+    assert fields_of["hanging"].reactions[ends].sum() == pytest.approx(0.0, abs=1e-9)
+    assert fields_of["between"].reactions[ends, 0].sum() == pytest.approx(-10.0, rel=1e-9)
+    assert fields_of["hanging"].problem.supports == (Support("x_min"),)
+
+
+def test_supports_of_cases_are_written_and_read_again(folder):
+    text = PART + OWN_SUPPORTS.replace('"between"', '["between", "hanging"]')
+    (folder / "part.toml").write_text(text)
+    case = read_part(folder / "part.toml")
+    written = part_text(case, "body.npz")
+    (folder / "again.toml").write_text(written)
+    again = read_part(folder / "again.toml").problem
+    assert again.case_supports == case.problem.case_supports
+    assert again.case_supports["hanging"] == (Support("x_max"),) == again.case_supports["between"]
+    # What both cases have is one set of supports.
+    assert len(support_sets(again)) == 1
+
+
+def test_check_says_in_which_load_case_a_patch_is_held(folder):
+    text = PART + OWN_SUPPORTS
+    (folder / "part.toml").write_text(text)
+    found = check(folder / "part.toml")
+    carries = {row.name: row.carries for row in found.patches}
+    assert carries["x_max"] == "support xyz in between"
+    assert carries["x_min"] == "support xyz"
+    assert [row.case for row in found.loads] == ["hanging", "between"]
+    assert not found.mistakes
+    # A patch may be loaded in one case and held in another.
+    (folder / "part.toml").write_text(
+        text + '[[loads.hanging]]\nkind = "force"\npatch = "x_max"\nvector = [1, 0, 0]\n'
+    )
+    assert not [line for line in check(folder / "part.toml").warnings if "share" in line]
+    # One mark a facet, four on each end.
+    assert len(support_marks(found)) == 8
+    assert len(support_marks(found, "hanging")) == 4
+
+
+@pytest.mark.parametrize(
+    ("text", "message"),
+    [
+        (OWN_SUPPORTS.replace('"between"', '"betwen"', 1), r"names no load case 'betwen'.*between"),
+        (OWN_SUPPORTS.replace('case = "between"', "case = 3"), r"supports\[1\].case must be the"),
+        (OWN_SUPPORTS.replace('case = "between"', "case = []"), r"supports\[1\].case must be the"),
+        (OWN_SUPPORTS + "[combinations.sum]\nhanging = 1\nbetween = 1\n", "whose supports differ"),
+    ],
+)
+def test_wrong_cases_of_supports_are_one_line(folder, text, message):
+    with pytest.raises(InputError, match=message) as error:
+        read(folder, PART + text)
+    assert len(error.value.mistakes) == 1
+
+
+def test_a_case_that_nothing_holds_is_named(folder):
+    text = PART + OWN_SUPPORTS.replace("[[supports]]", '[[supports]]\ncase = "between"', 1)
+    problem = read(folder, text)
+    with pytest.raises(InputError, match="load case 'hanging': the part has no support"):
+        solve(problem)
+    with pytest.raises(InputError, match="load cases between have supports of their own"):
+        prepare(problem)
+    found = check(folder / "part.toml")
+    assert [line.split(":")[0] for line in found.mistakes] == ["load case 'hanging'"]
+
+
+def test_supports_of_cases_are_tried_before_meshing():
+    box = box_mesh((20.0, 2.0, 1.0), (2, 1, 1))
+    surface = Surface(box.points, box.boundary)
+    rules = {"left": Plane("x", "min"), "right": Plane("x", "max")}
+    loads = {name: (Force("right", (1, 0, 0)),) for name in ("up", "down")}
+    own = {"up": (Support("left"),)}
+    with pytest.raises(InputError, match="no support"):
+        check_before_meshing(surface, 1.0, rules, (), loads, own)
+    own["down"] = (SlidingSupport("left"),)
+    with pytest.raises(InputError, match="free"):
+        check_before_meshing(surface, 1.0, rules, (), loads, own)

@@ -15,6 +15,7 @@ from ccfem.comparison.files import write_results
 from ccfem.comparison.headline import HEADLINE, headline_values
 from ccfem.comparison.pictures import caption
 from ccfem.comparison.ranking import best_values
+from ccfem.comparison.remarks import bound_remark
 from ccfem.elasticity.problem import Force, Problem, Support
 from ccfem.elasticity.support_kinds import PressingSupport
 from ccfem.elasticity.system import System
@@ -432,6 +433,13 @@ def test_no_run_exceeds_the_bound(compared):
     area = SIZE[1] * SIZE[2]
     assert compared.bound.ratio == pytest.approx(1.0 + 4.0 * length / SIZE[0] / area, rel=2e-2)
     assert f"more than {compared.bound.ratio:.2f} times" in compared.remarks[-1]
+
+
+def test_a_bound_that_may_be_loose_is_told_so(compared):
+    tested = [run for run in compared.runs if run.tested is not None]
+    assert "loose" not in bound_remark(tested, compared.bound)
+    loose = replace(compared.bound, reached=compared.bound.ratio / 1.05)
+    assert "it may be loose by 5.0%" in bound_remark(tested, loose)
 
 
 def test_tables_say_what_share_of_the_possible_gain_each_strategy_reaches(compared):

@@ -56,3 +56,19 @@ def two_bends():
     problem = Problem(mesh, isotropic(3500.0, 0.35), (Support("x_min"),), loads, order=1)
     fields = solve(problem, tolerance=1e-10)
     return WeightedCases.of(fields, {"tip": 2.0, "slant": 1.0}), Planar(count=4).cut(mesh)
+
+
+@pytest.fixture(scope="session")
+def pulled_and_moved():
+    """The plate of `two_pulls`; along y it is stretched by moving a support, not by a force."""
+    mesh = box_mesh((24.0, 24.0, 4.0), (8, 8, 2))
+    supports = (Support("x_min", "x"), Support("y_min", "y"), Support("z_min", "z"))
+    problem = Problem(
+        mesh,
+        isotropic(3500.0, 0.0),
+        supports,
+        {"along_x": (Traction("x_max", (5.0, 0.0, 0.0)),), "along_y": ()},
+        order=1,
+        case_supports={"along_y": (Support("y_max", "y", (0.0, 0.1, 0.0)),)},
+    )
+    return WeightedCases.of(solve(problem, tolerance=1e-10)), Planar(count=4).cut(mesh)

@@ -15,9 +15,12 @@ from ccfem.fibre_aware.cases_bound import (
     largest_gathered,
 )
 from ccfem.fibre_aware.heights import fibre_capacity
+from ccfem.fibre_aware.prune_cases import prune_cases
 from ccfem.fibre_aware.smeared import SmearedPart, SmearedSolution, smeared_cases
 from ccfem.fibre_aware.upper_bound import certificate
 from ccfem.machine import Machine
+from ccfem.toolpaths import Toolpaths
+from ccfem.virtual_testing.several_cases import specimens, virtual_tests
 
 MACHINE = Machine()
 RHO = 4.0
@@ -59,7 +62,8 @@ def test_no_feasible_density_goes_below_the_bound(two_bends, rng):
     cases, layers = two_bends
     length = 2500.0
     bounds = {
-        each: cases_bound(cases, layers, length, MACHINE, objective=each) for each in (WORST, SUM)
+        each: cases_bound(cases, layers, length, MACHINE, objective=each, iterations=12)
+        for each in (WORST, SUM)
     }
     parts = smeared_cases(cases.fields, layers[0].plane.frame)
     most, axial = fibre_capacity(parts[0], layers, MACHINE), RHO * parts[0].modulus
@@ -150,11 +154,48 @@ def test_what_makes_no_sense_is_refused(two_bends):
         WeightedCases((cases.fields[0],) * 2, np.ones(2))
     with pytest.raises(InputError, match="worst, sum"):
         cases_bound(cases, layers, 100.0, MACHINE, objective="best")
-    moving = replace(
-        cases.fields[0].problem,
-        loads={"move": ()},
-        supports=(Support("x_min"), Support("x_max", "y", (0.0, 0.1, 0.0))),
+
+
+@pytest.mark.parametrize("objective", [WORST, SUM])
+def test_a_support_that_moves_counts_as_a_force_does(pulled_and_moved, objective):
+    # As for two forces: the stiffness of the plate does not depend on what pulls it.
+    cases, layers = pulled_and_moved
+    m = 600.0 / (24.0 * 24.0 * 4.0)
+    parts = smeared_cases(cases.fields, layers[0].plane.frame)
+    assert [part.forced for part in parts] == [True, False]
+    assert parts[1].unreinforced.work == pytest.approx(3500.0 * 96.0 / 24.0 * 0.01, rel=1e-9)
+    found = cases_bound(cases, layers, 600.0, MACHINE, objective=objective)
+    np.testing.assert_allclose(found.singles, 1.0 + RHO * m, rtol=1e-3)
+    exact = (1.0 + RHO * m) / (1.0 + RHO * m / 2.0)
+    assert found.least == pytest.approx(exact, rel=2e-3)
+    assert found.least <= found.reached * (1.0 + 1e-9)
+    # Whatever the scale of the displacement and the work that is told: it stays a bound.
+    scale = found.singles / [part.unreinforced.work for part in parts]
+    most = fibre_capacity(parts[0], layers, MACHINE)
+    axial = RHO * parts[0].modulus
+    for factor in (0.5, 1.0, 3.0):
+        told = [parts[0].unreinforced, replace(parts[1].unreinforced, work=factor * 14.0)]
+        least = cases_certificate(parts, told, cases.weights * scale, axial, most, 600.0)
+        assert least <= exact * (1.0 + 1e-9)
+
+
+def test_strands_are_cut_alike_for_forces_and_moving_supports(pulled_and_moved, two_pulls):
+    # Equal strands along x and along y. Which of them go is a matter of rounding; what is left
+    # serves both cases about alike, whatever loads them.
+    (moved, layers), (forced, _) = pulled_and_moved, two_pulls
+    at = np.arange(1.5, 24.0, 3.0)
+    rows = [np.array([[0.5, y], [23.5, y]]) for y in at]
+    columns = [np.array([[x, 0.5], [x, 23.5]]) for x in at]
+    lines = (rows, columns, rows, columns)
+    paths = Toolpaths.concatenate(
+        Toolpaths.from_plane(those, layer) for those, layer in zip(lines, layers, strict=True)
     )
-    moved = solve(moving)["move"]
-    with pytest.raises(InputError, match="load case 'move' moves supports"):
-        cases_bound(WeightedCases.of({**fields, "move": moved}), layers, 100.0, MACHINE)
+    machine, half, bounds = Machine(minimum_length=5.0), np.full(2, 0.5), np.full(2, 2.0)
+    worst = []
+    for cases in (moved, forced):
+        kept = prune_cases(paths, specimens(cases), half, bounds, 480.0, machine)
+        assert 470.0 < kept.lengths.sum() <= 480.0 + 1e-6
+        worst.append(virtual_tests(kept, cases).ratios.min())
+    # All of 736 mm would give each 1.63.
+    assert worst[0] == pytest.approx(worst[1], rel=0.05)
+    assert min(worst) > 1.0 + 0.8 * 480.0 / 736.0 * 0.63

@@ -163,3 +163,15 @@ def test_no_tension_in_any_case_is_refused(two_pulls):
 
 def vars_of(field):
     return {name: getattr(field, name) for name in field.__dataclass_fields__}
+
+
+def test_stream_function_plans_for_a_force_and_a_support_that_moves(pulled_and_moved):
+    # The part is alike along x and along y, and so is what loads it: so are the gains.
+    cases, layers = pulled_and_moved
+    strategy = StreamFunction(evaluations=8)
+    planned = plan_cases(strategy, layers, cases, MACHINE, wanted=200.0)
+    ratios = virtual_tests(planned.toolpaths, cases).ratios
+    x, y = along_x(planned.toolpaths)
+    assert x == pytest.approx(y, rel=0.3)
+    # As much fibre, straight and half of it each way, would add 4 x 400 / 2304 = .69.
+    assert 1.5 < ratios.min() <= ratios.max() < 1.75

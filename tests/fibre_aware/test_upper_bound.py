@@ -6,7 +6,7 @@ import pytest
 from ccfem.errors import InputError
 from ccfem.fibre_aware.heights import fibre_capacity
 from ccfem.fibre_aware.smeared import SmearedPart, SmearedSolution
-from ccfem.fibre_aware.upper_bound import certificate, upper_bound
+from ccfem.fibre_aware.upper_bound import LARGEST_GAP, certificate, upper_bound
 from ccfem.machine import Machine
 from ccfem.planning import plan
 from ccfem.strategies.isocurve import Isocurve
@@ -16,6 +16,7 @@ from ccfem.virtual_testing.strand import Strand
 from ccfem.virtual_testing.virtual_test import virtual_test
 
 MACHINE = Machine()
+bound_of = upper_bound
 
 
 def straight(layers, spacing):
@@ -77,6 +78,10 @@ def test_scale_of_the_displacement_does_not_matter(bent_beam):
 
 def test_more_fibre_and_more_layers_allow_more(bent_beam):
     stress, layers = bent_beam
+
+    def upper_bound(*args, **options):
+        return bound_of(*args, **options, gap=0.03)
+
     ratios = [upper_bound(stress, layers, length, MACHINE).ratio for length in (500, 1500, 4500)]
     assert 1.0 < ratios[0] < ratios[1] < ratios[2]
     thicker = [replace(layer, thickness=2.0) for layer in layers[::2]]
@@ -108,3 +113,53 @@ def test_unknown_mode_is_refused(bent_beam):
     stress, layers = bent_beam
     with pytest.raises(InputError, match="bonded, tension"):
         upper_bound(stress, layers, 100.0, MACHINE, mode="glued")
+
+
+def test_iterations_stop_where_bound_and_density_meet(bent_beam):
+    stress, layers = bent_beam
+    found = upper_bound(stress, layers, 2000.0, MACHINE)
+    assert 0.0 <= found.gap <= LARGEST_GAP
+    # The stop is by the gap: one iteration earlier it was not met.
+    before = upper_bound(stress, layers, 2000.0, MACHINE, iterations=len(found.bounds) - 2)
+    assert before.gap > LARGEST_GAP
+    assert upper_bound(stress, layers, 2000.0, MACHINE, gap=0.05).gap <= 0.05
+
+
+def test_no_other_density_is_stiffer(bent_beam, rng):
+    # The density that is found, moved towards others of the same length within the room: the
+    # stiffness may rise by no more than the gap, and never above the bound.
+    stress, layers = bent_beam
+    length = 2000.0
+    found = upper_bound(stress, layers, length, MACHINE)
+    part = SmearedPart.of(stress, layers[0].plane.frame)
+    most, axial = fibre_capacity(part, layers, MACHINE), 4.0 * part.modulus
+    a = np.stack([np.cos(found.angles) ** 2, np.sin(found.angles) ** 2], axis=1)
+    along = np.column_stack([a, np.sqrt(a[:, 0] * a[:, 1]) * np.sign(np.cos(found.angles))])
+    outer = axial * along[:, :, None] * along[:, None, :]
+
+    def ratio(density):
+        def fibre(strain):
+            return np.einsum("ck,kij->cij", density * (strain @ along.T > 0.0), outer)
+
+        return part.ratio(part.solve(fibre, tolerance=1e-8).work)
+
+    assert ratio(found.density) == pytest.approx(found.reached, rel=1e-3)
+    for kind in range(4):
+        other = rng.random(found.density.shape) ** (1 + 8 * (kind % 2))
+        room = np.minimum(1.0, rng.random(len(most)) + 0.5)
+        other *= (room * most / other.sum(axis=1))[:, None]
+        other *= length / (part.mesh.volumes @ other.sum(axis=1))
+        other *= np.minimum(1.0, most / other.sum(axis=1))[:, None]
+        for share in (0.02, 1.0):
+            mixed = (1.0 - share) * found.density + share * other
+            assert part.mesh.volumes @ mixed.sum(axis=1) <= length * (1.0 + 1e-4)
+            assert 1.0 < ratio(mixed) < found.ratio
+
+
+def test_density_of_a_pulled_bar_runs_along_the_pull(pulled_bar):
+    stress, layers = pulled_bar
+    found = upper_bound(stress, layers, 1200.0, MACHINE)
+    m = 1200.0 / (60.0 * 20.0 * 4.0)
+    mean = np.average(found.tensor, axis=0, weights=stress.mesh.volumes)
+    np.testing.assert_allclose(mean, [m, 0.0, 0.0], atol=0.02 * m)
+    np.testing.assert_allclose(found.tensor[:, :2].sum(axis=1), found.density.sum(axis=1))

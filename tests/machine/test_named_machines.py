@@ -44,7 +44,23 @@ def test_a_printout_is_the_machine(name, tmp_path):
     (tmp_path / "mine.toml").write_text(text.replace("start_speed = 2.0", "start_speed = 3.5"))
     mine = updated(Machine(), machine_table(tmp_path / "mine.toml"))
     assert mine.process.start_speed == 3.5
-    assert machine_file(str(tmp_path / "mine.toml")).startswith("[machine]")
+    assert 'last_table = "end"\n\n[machine]\n' in machine_file(str(tmp_path / "mine.toml"))
+
+
+def test_a_printout_that_is_cut_off_is_refused(tmp_path):
+    """Wherever it is cut off, though what is left may be a whole machine in TOML."""
+    text, file = machine_file("klipper"), tmp_path / "mine.toml"
+    valid = 0
+    for end in range(text.index("[machine]") + len("[machine]"), len(text) - 1, 97):
+        file.write_text(text[:end])
+        with pytest.raises(InputError, match=r"is cut off|is not a TOML file"):
+            machine_table(file)
+    for end in [k for k, letter in enumerate(text) if letter == "\n"][10:-1:20]:
+        file.write_text(text[:end])
+        with pytest.raises(InputError, match="last_table 'end' is missing") as caught:
+            machine_table(file)
+        valid += "\n" not in str(caught.value)
+    assert valid > 3
 
 
 def test_the_later_one_wins(tmp_path):

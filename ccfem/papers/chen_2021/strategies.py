@@ -67,7 +67,10 @@ def main() -> None:
         "isocurve, cone": as_is(Isocurve(spacing="cone")),
         "isocurve, loaded holes": at_length(Isocurve(conformal="loaded")),
         "isocurve, literal": as_is(Isocurve.literal()),
-        **{name: at_length(create(name)) for name in ("concentric", "zigzag", "contour_zigzag")},
+        **{
+            name: at_length(create(name, {"turns": "tight"}))
+            for name in ("concentric", "zigzag", "contour_zigzag")
+        },
     }
     if slicer_found():
         rows |= {name: sliced(*settings) for name, settings in PATTERNS.items()}

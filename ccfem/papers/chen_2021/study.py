@@ -160,7 +160,7 @@ def _compared(loop: Model) -> dict[str, tuple[Toolpaths, float]]:
     found = {
         "the paper's algorithm": paths,
         "contour_zigzag": plan_to_length(
-            create("contour_zigzag"), loop.layers, loop.stress, machine, wanted
+            create("contour_zigzag", {"turns": "tight"}), loop.layers, loop.stress, machine, wanted
         ).toolpaths,
         "isocurve": plan(create("isocurve"), loop.layers, loop.stress, machine),
     }

@@ -87,7 +87,7 @@ def study() -> dict[tuple[str, str], tuple[float, ...]]:
 def _slicings(stress: StressField) -> dict[str, tuple[Sequence[Layer], Toolpaths]]:
     """Layers and fibre of each row."""
     machine = Machine(minimum_length=42.0)
-    rings = create("concentric", {"spacing": 2.2})
+    rings = create("concentric", {"spacing": 2.2, "turns": "tight"})
     found: dict[str, tuple[Sequence[Layer], Toolpaths]] = {}
     for name, count in COUNTS.items():
         build = (float(name == "x"), float(name == "y"), float(name == "z"))

@@ -73,7 +73,7 @@ def chain(name: str) -> Chain:
         )
         seconds["support layers"] = time.perf_counter() - start
         start = time.perf_counter()
-        paths = plan(create("fiso"), sliced.layers, stress, case.machine)
+        paths = plan(create("fiso", {"turns": "tight"}), sliced.layers, stress, case.machine)
         seconds["paths"] = time.perf_counter() - start
         stages = ("critical regions", "vector field", "scalar field", "layers")
         parts = (*stages, "support layers", "paths")

@@ -97,7 +97,7 @@ class Strand:
 def measured(name: str, bent: bool, **options: Any) -> Strand:
     """Lay strands on a shape, and measure them where it lies flat."""
     section, machine = SHAPES[name], Machine(fibre_width=WIDTH)
-    lay, no_stress = Fiso(**options), cast(LayerStress, None)
+    lay, no_stress = Fiso(**options, turns="tight"), cast(LayerStress, None)
     layer = Planar(count=1).cut(extrude(section, 1.0, 1.5))[0]
     if bent:
         x, y, _ = layer.points.T

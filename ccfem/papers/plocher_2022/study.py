@@ -64,9 +64,9 @@ MATERIALS = {"C": "c_fram", "S": "s_fram"}
 PATTERNS: dict[str, tuple[str, dict[str, Any]]] = {
     "grid 45": ("grid", {"angle": 45.0}),
     "grid 0": ("grid", {"angle": 0.0}),
-    "concentric": ("concentric", {"joined": False, "filled": True}),
+    "concentric": ("concentric", {"joined": False, "filled": True, "turns": "tight"}),
     "mat": ("mat", {}),
-    "mps": ("mps", {}),
+    "mps": ("mps", {"turns": "tight"}),
 }
 """The patterns in the order of the paper: name, then strategy and its parameters."""
 

@@ -31,8 +31,8 @@ __all__ = [
     "variant_table",
 ]
 
-_MPS: tuple[str, dict[str, Any]] = ("mps", {})
-_ENDS: tuple[str, dict[str, Any]] = ("mps", {"seeds": "ends"})
+_MPS: tuple[str, dict[str, Any]] = ("mps", {"turns": "tight"})
+_ENDS: tuple[str, dict[str, Any]] = ("mps", {"seeds": "ends", "turns": "tight"})
 _GRID: tuple[str, dict[str, Any]] = ("grid", {"angle": 45.0})
 _PIXEL_ENDS: tuple[str, dict[str, Any]] = ("mps", {"seeds": "ends", "mode": "raster"})
 

@@ -59,15 +59,18 @@ PATTERNS: Mapping[str, tuple[str, dict[str, Any]]] = MappingProxyType(
     {
         "lpp": ("svt", {}),
         "lpp uncrossed": ("svt", {"crossings": False}),
-        "concentric": ("concentric", {"joined": False, "filled": True}),
-        "zigzag 45": ("zigzag", {"angle": 45.0}),
-        "zigzag 90": ("zigzag", {"angle": 90.0}),
-        "offset": ("offset", {}),
+        "concentric": ("concentric", {"joined": False, "filled": True, "turns": "tight"}),
+        "zigzag 45": ("zigzag", {"angle": 45.0, "turns": "tight"}),
+        "zigzag 90": ("zigzag", {"angle": 90.0, "turns": "tight"}),
+        "offset": ("offset", {"turns": "tight"}),
         "streamline": ("streamline", {}),
         "eqs": ("eqs", {}),
     }
 )
-"""Name, then strategy and its parameters; lpp uncrossed ends its tracks in the joints."""
+"""Name, then strategy and its parameters, with the turns of the paper.
+
+lpp uncrossed ends its tracks in the joints.
+"""
 
 BASELINES = ("concentric", "zigzag 45", "zigzag 90")
 """The patterns of the slicer that the paper compares with."""

@@ -1,0 +1,72 @@
+"""Where a line turns more tightly than a radius."""
+
+import numpy as np
+
+from ccfem.arrays import FloatArray, IntArray
+from ccfem.geometry.polylines import points_along, runs
+
+__all__ = ["tight_bends"]
+
+_SAMPLES = 8
+"""Places a width at which curvature is looked at."""
+
+
+def tight_bends(
+    line: FloatArray, along: FloatArray, closed: bool, radius: float, width: float
+) -> FloatArray:
+    """Stretches of a line that are bent more tightly than a radius.
+
+    A line turns as tightly as the angle between its chords of a width before and behind a place,
+    over the width. A corner is a bend of up to two widths.
+
+    Parameters
+    ----------
+    line : (n, 2) array, mm
+    along : (n,) array, mm
+        Arc length at its points.
+    closed : bool
+        Whether it turns where it closes, too.
+    radius, width : float, mm
+
+    Returns
+    -------
+    (k, 2) array, mm
+        Start and end of each by arc length; on a closed line one may end beyond its length. None
+        for a closed line that is bent all the way round.
+    """
+    size = float(along[-1])
+    step = size / np.ceil(size * _SAMPLES / width)
+    at = np.arange(0.0, size - 0.5 * step, step)
+    if not closed:
+        at = at[(at >= width) & (at <= size - width)]
+    if not len(at):
+        return np.zeros((0, 2))
+
+    def places(positions: FloatArray) -> FloatArray:
+        return points_along(line, along, positions % size if closed else positions)
+
+    here = places(at)
+    into, out = here - places(at - width), places(at + width) - here
+    across = into[:, 0] * out[:, 1] - into[:, 1] * out[:, 0]
+    angle = np.abs(np.arctan2(across, (into * out).sum(axis=1)))
+    over = angle - width * (1.0 - 1e-6) / radius
+    tight = over >= 0.0
+    if closed and tight.all():
+        return np.zeros((0, 2))
+    first = int(np.argmin(tight)) if closed else 0  # no bend goes over the start
+    over = np.roll(over, -first)
+    found = runs(over >= 0.0)
+
+    def crossing(outside: IntArray, inside: IntArray) -> FloatArray:
+        """Places between two samples where the limit is met: the same wherever samples lie."""
+        last = len(over) - 1
+        o, i = np.clip(outside, 0, last), np.clip(inside, 0, last)
+        share = np.divide(over[i], over[i] - over[o], out=np.zeros(len(o)), where=over[o] < 0.0)
+        place: FloatArray = inside + (outside - inside) * share
+        return place
+
+    if closed:
+        over = np.append(over, over[0])
+    a = crossing(found[:, 0] - 1, found[:, 0])
+    b = crossing(found[:, 1], found[:, 1] - 1)
+    return np.column_stack([a, b]) * step + (first * step + at[0])

@@ -1,0 +1,233 @@
+"""Strands cut where they turn more tightly than the fibre can follow, where both sides are long.
+
+A fibre that is led round a tighter turn than the machine's radius folds. Cutting it there leaves
+two strands that end beside each other. Where that would leave a strand too short for the cutter
+the turn stays: of all ways to cut a strand the one that keeps the least bent fibre is taken.
+"""
+
+from typing import NamedTuple
+
+import numpy as np
+import shapely
+
+from ccfem.arrays import BoolArray, FloatArray
+from ccfem.geometry.polylines import along_line, between, is_closed, points_along
+from ccfem.geometry.tight_bends import tight_bends
+from ccfem.linking.joining import Joined
+
+__all__ = ["cut_turns"]
+
+_ONE_TURN = 3.0
+"""Bends nearer to each other than this, in spacings, are one turn."""
+_LONGEST = 9.0
+"""Longest part of a turn, in spacings, that is left out where a strand is cut; a longer bend, as
+that of a ring round a small hole, is no turn between two strands."""
+_APART = 0.998
+"""Distance, in widths, that the end of a cut strand keeps from the one that begins beside it."""
+_TRIM = 1.5
+"""Longest piece, in widths, that is taken from the end of a strand for that."""
+
+_FIRSTS = 8
+"""Turns at which a ring is tried to be cut first."""
+_STUB = 0.4
+"""Longest piece behind a corner, in widths, that a cut leaves out with the turn."""
+_CORNER = 0.2
+"""Least turn of a corner, radians."""
+
+
+class _Turns(NamedTuple):
+    """Bends of a line that are too tight, by arc length, mm.
+
+    Attributes
+    ----------
+    end, begin : (t,) arrays
+        Where the strand before a turn would end, and the one after it begin.
+    cost : (t,) array
+        Length that is bent too tightly.
+    """
+
+    end: FloatArray
+    begin: FloatArray
+    cost: FloatArray
+
+
+def cut_turns(
+    joined: Joined, radius: float, width: float, least: float, spacing: float | None = None
+) -> Joined:
+    """Cut strands at turns tighter than a radius.
+
+    Parameters
+    ----------
+    joined : Joined
+        Lines, and which of their steps are links.
+    radius : float, mm
+        Tightest turn that stays uncut. A line turns as tightly as the angle between its chords of
+        a width before and behind a place, over the width, as the curvature of the evaluator does.
+    width : float, mm
+        Of a strand.
+    least : float, mm
+        No cut leaves a strand shorter than this.
+    spacing : float, mm, optional
+        Of the lines, where it is more than a width.
+
+    Returns
+    -------
+    Joined
+        The pieces of each line in its order; uncut lines as they were.
+    """
+    pitch = width if spacing is None else spacing
+    found = Joined([], [])
+    for line, mark in zip(*joined, strict=True):
+        along = along_line(line)
+        pieces = _pieces(line, along, radius, width, least, pitch)
+        if not pieces:
+            found.lines.append(line)
+            found.link.append(mark)
+        for start, stop in pieces:
+            piece, marked = _piece(line, along, mark, start, stop)
+            found.lines.append(piece)
+            found.link.append(marked)
+    return found
+
+
+def _pieces(
+    line: FloatArray, along: FloatArray, radius: float, width: float, least: float, pitch: float
+) -> list[tuple[float, float]]:
+    """Start and end of each piece by arc length; none where nothing is cut.
+
+    The end of a closed line's piece may lie beyond its length, for it runs on over the start.
+    """
+    size = float(along[-1])
+    if size < least or size < 4.0 * width:
+        return []
+    closed = is_closed(line)
+    turns = _turns(line, along, closed, radius, width, pitch)
+    if not len(turns.cost):
+        return []
+    if not closed:
+        cuts = _chosen(turns, size, least)
+        starts = [0.0, *turns.begin[cuts].tolist()]
+        return list(zip(starts, [*turns.end[cuts].tolist(), size], strict=True)) if cuts else []
+    # A ring is cut at one turn first: of a few the one from which the others keep the least bent.
+    firsts = np.argsort(-np.round(turns.cost, 3), kind="stable")[:_FIRSTS]
+    tried = [_ring_pieces(turns, int(first), size, least) for first in firsts]
+    return min(tried, key=lambda one: round(one[0], 3))[1]
+
+
+def _ring_pieces(
+    turns: _Turns, first: int, size: float, least: float
+) -> tuple[float, list[tuple[float, float]]]:
+    """Bent length that is kept where a ring is cut at one turn first, and its pieces."""
+    begin, whole = float(turns.begin[first]), float(turns.cost.sum())
+    rest = np.roll(np.arange(len(turns.cost)), -first)[1:]
+    shift = np.where(turns.end[rest] < begin, size, 0.0)
+    ends, begins = turns.end[rest] + shift - begin, turns.begin[rest] + shift - begin
+    stop = float(turns.end[first]) - begin
+    stop += size if stop <= 0.0 else 0.0
+    if stop < least:
+        return whole, []
+    cuts = _chosen(_Turns(ends, begins, turns.cost[rest]), stop, least)
+    kept = whole - float(turns.cost[first] + turns.cost[rest][cuts].sum())
+    starts = [0.0, *begins[cuts].tolist()]
+    pieces = zip(starts, [*ends[cuts].tolist(), stop], strict=True)
+    return kept, [(begin + a, begin + b) for a, b in pieces]
+
+
+def _turns(
+    line: FloatArray, along: FloatArray, closed: bool, radius: float, width: float, pitch: float
+) -> _Turns:
+    """Find the turns of a line that are tighter than a radius and short enough to be left out."""
+    size = float(along[-1])
+    a, b = tight_bends(line, along, closed, radius, width).T
+    if not len(a):
+        return _Turns(a, a, a)
+
+    def places(positions: FloatArray) -> FloatArray:
+        return points_along(line, along, positions % size if closed else positions)
+
+    joined = np.concatenate([[True], a[1:] - b[:-1] > _ONE_TURN * pitch - 2.0 * width])
+    cost = np.add.reduceat(b - a, np.flatnonzero(joined))
+    a, b = a[joined], b[np.append(joined[1:], True)]
+    middle = 0.5 * (a + b)
+    end, begin = np.minimum(a + width, middle), np.maximum(b - width, middle)
+    corner = along[1:-1][_corners(line)]
+    if closed:
+        corner = np.concatenate([corner, [size], corner + size])
+    end, begin = _off_corners(end, begin, corner, _STUB * width)
+    kept = begin - end <= _LONGEST * pitch
+    end, begin, cost = end[kept], begin[kept], cost[kept]
+    for k in range(len(end)):
+        reach = np.linspace(begin[k], begin[k] + 4.0 * width, 33)
+        beyond = shapely.linestrings(places(reach if closed else np.minimum(reach, size)))
+        trims = np.linspace(0.0, _TRIM * width, 25)
+        heads = shapely.points(
+            places(end[k] - trims if closed else np.maximum(end[k] - trims, 0.0))
+        )
+        clear = shapely.distance(heads, beyond) >= _APART * width
+        end[k] -= trims[int(np.argmax(clear))] if clear.any() else trims[-1]
+    return _Turns(end, begin, cost)
+
+
+def _corners(line: FloatArray) -> BoolArray:
+    """Inner points (n - 2,) of a line at which it turns by more than it may on a stub."""
+    step = np.diff(line, axis=0)
+    into, out = step[:-1], step[1:]
+    across = np.abs(into[:, 0] * out[:, 1] - into[:, 1] * out[:, 0])
+    return np.asarray(np.arctan2(across, (into * out).sum(axis=1)) > _CORNER)
+
+
+def _off_corners(
+    end: FloatArray, begin: FloatArray, corner: FloatArray, stub: float
+) -> tuple[FloatArray, FloatArray]:
+    """Move ends and beginnings to corners that they lie behind, or before, by a stub at most."""
+    if not len(corner):
+        return end, begin
+    before = np.searchsorted(corner, end, side="right") - 1
+    passed = np.where(before >= 0, end - corner[before], np.inf)
+    after = np.minimum(np.searchsorted(corner, begin), len(corner) - 1)
+    ahead = np.where(corner[after] >= begin, corner[after] - begin, np.inf)
+    end = np.where(passed <= stub, corner[before], end)
+    return end, np.where(ahead <= stub, corner[after], begin)
+
+
+def _chosen(turns: _Turns, size: float, least: float) -> list[int]:
+    """Which turns to cut, so that the sum of the costs of the others is least."""
+    count = len(turns.cost)
+    starts = np.append(0.0, turns.begin)
+    ends = np.append(turns.end, size)
+    before = np.concatenate([[0.0, 0.0], np.cumsum(turns.cost)])  # of turns up to each start
+    best = np.full(count + 2, np.inf)
+    best[0] = 0.0
+    source = np.zeros(count + 2, dtype=np.int64)
+    for k in range(1, count + 2):
+        # From a cut before to this one: the turns between stay.
+        total = best[:k] + before[k] - before[1 : k + 1]
+        total[ends[k - 1] - starts[:k] < least] = np.inf
+        source[k] = int(np.argmin(np.round(total, 6)))
+        best[k] = total[source[k]]
+    if not np.isfinite(best[-1]):
+        return []
+    cuts = []
+    k = int(source[-1])
+    while k > 0:
+        cuts.append(k - 1)
+        k = int(source[k])
+    return cuts[::-1]
+
+
+def _piece(
+    line: FloatArray, along: FloatArray, link: BoolArray, start: float, stop: float
+) -> tuple[FloatArray, BoolArray]:
+    """Part of a line between two places of its arc length, and which of its steps are links."""
+    size = float(along[-1])
+    start, stop = (start % size, start % size + stop - start) if start >= size else (start, stop)
+    if stop <= size:
+        piece = between(line, start, stop)
+    else:
+        piece = np.concatenate([between(line, start, size)[:-1], between(line, 0.0, stop - size)])
+    piece = piece[np.append(True, np.linalg.norm(np.diff(piece, axis=0), axis=1) > 1e-9)]
+    if not link.any():
+        return piece, np.zeros(len(piece), dtype=bool)
+    middle = start + along_line(piece)[:-1] + 0.5 * np.linalg.norm(np.diff(piece, axis=0), axis=1)
+    step = np.searchsorted(along, middle % size, side="right") - 1
+    return piece, np.append(link[step], False)
