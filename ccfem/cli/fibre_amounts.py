@@ -125,7 +125,10 @@ def _say(found: "FibreFront") -> None:
         )
     for count, reason in found.refused.items():
         print(f"{count:>6} no plan: {reason}")
-    print("* none with as little fibre is better. One of them again:")
+    if found.stiffest.any():
+        print("* none with as little fibre is better. One of them again:")
+    else:
+        print("None can be printed as planned. The one with most fibre again:")
     best = max(
         (each for each, kept in zip(found.points, found.stiffest.tolist(), strict=True) if kept),
         key=lambda each: each.ratio,

@@ -84,8 +84,6 @@ def stretched_index(
 ) -> tuple[float, float, FloatArray]:
     """Index of the fibre, its norm, and how much each piece counts in that: the sum is 1.
 
-    The most stretched hundredth of the length counts in neither, as in `fibre_peak`.
-
     Parameters
     ----------
     strain : (s,) array
@@ -100,20 +98,19 @@ def stretched_index(
     InputError
         Where no fibre is stretched.
     """
-    order = np.argsort(strain, kind="stable")
-    reached = np.cumsum(length[order])
-    last = min(int(np.searchsorted(reached, FIBRE_SHARE * reached[-1])), len(order) - 1)
-    kept = order[: last + 1]
-    most = float(strain[kept[-1]])
+    most = float(strain.max(initial=0.0))
     if not most > 0.0:
         raise InputError(
-            "strength is planned for where fibre is stretched; it is so next to nowhere: turn the "
-            "load round, or plan with strength = 0"
+            "strength is planned for where fibre is stretched; it is so nowhere: turn the load "
+            "round, or plan with strength = 0"
         )
-    power = np.zeros(len(strain))
-    power[kept] = length[kept] * (np.maximum(strain[kept], 0.0) / most) ** POWER
+    order = np.argsort(strain, kind="stable")
+    reached = np.cumsum(length[order])
+    at = order[min(np.searchsorted(reached, FIBRE_SHARE * reached[-1]), len(order) - 1)]
+    power = length * (np.maximum(strain, 0.0) / most) ** POWER
     whole = float(power.sum())
-    return most / limit, most * whole ** (1.0 / POWER) / limit, power / whole
+    norm = most * whole ** (1.0 / POWER) / limit
+    return max(float(strain[at]), 0.0) / limit, norm, power / whole
 
 
 @dataclass(frozen=True)
