@@ -36,6 +36,7 @@ class ContourZigzag:
     angle, turn : float, degrees, default 45 and 90
         As in `Zigzag`.
     joined : bool, default True
+        As in `Concentric`.
     turns : {"tight", "printable"}, default "tight"
         As in `Concentric`.
     """

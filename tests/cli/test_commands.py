@@ -399,7 +399,7 @@ def test_bad_parts_end_in_one_line(ccfem, folder, text, message):
         (["part.toml", "--strategies", "zigzag,spiral"], "no strategy named 'spiral'; there are:"),
         (["lop"], r"two_pull_loop: did you mean 'loop'\? \(or name a part file"),
         (["part.toml", "--strategies", "isocurv"], "zigzag: did you mean 'isocurve'"),
-        (["part.toml", "--set", "zigzag.spacin=2"], "turn: did you mean 'spacing'"),
+        (["part.toml", "--set", "zigzag.spacin=2"], "turns: did you mean 'spacing'"),
         (["part.toml", "--set", "zigzga.turn=2"], "contour_zigzag: did you mean 'zigzag'"),
         (["bar", "--set-case", "element_siz=1"], "did you mean 'element_size'"),
         (["part.toml", "--strategies", ","], "at least one strategy"),
