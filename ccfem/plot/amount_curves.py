@@ -1,6 +1,6 @@
 """What a part gains over the length of its fibre: a curve a number of layers, the bound above."""
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Iterable, Mapping, Sequence
 from typing import TYPE_CHECKING, Any, NamedTuple
 
 import numpy as np
@@ -102,6 +102,7 @@ def amount_curves(
         Line2D([], [], color=colours[name], lw=1.6, marker="o", ms=4, label=name) for name in names
     ]
     marks.append(Line2D([], [], color=OUTLINE, lw=1.0, ls=(0, (4, 3)), label="no paths exceed"))
+    marks += _hollow(p for curves in panels.values() for points in curves.values() for p in points)
     figure.legend(
         handles=marks,
         loc="lower center",
@@ -141,6 +142,7 @@ def trade_curves(curves: Mapping[str, Sequence[TradePoint]], heading: str = "") 
     axes.margins(0.08)
     _name_points(axes, [p for points in curves.values() for p in points])
     marks = [Line2D([], [], color=colours[name], lw=1.6, label=name) for name in curves]
+    marks += _hollow(p for points in curves.values() for p in points)
     columns = 4 if max(len(name) for name in curves) <= 10 else 2
     figure.legend(
         handles=marks,
@@ -151,6 +153,16 @@ def trade_curves(curves: Mapping[str, Sequence[TradePoint]], heading: str = "") 
         labelcolor=INK,
     )
     return figure
+
+
+def _hollow(points: Iterable[AmountPoint | TradePoint]) -> list[Any]:
+    """Entry of the legend for what is drawn hollow, where anything is."""
+    from matplotlib.lines import Line2D
+
+    if all(p.printable for p in points):
+        return []
+    style: dict[str, Any] = {"marker": "o", "ms": 5.0, "mfc": "white", "ls": "none"}
+    return [Line2D([], [], color=OUTLINE, label="not printable", **style)]
 
 
 def _name_points(axes: Any, points: Sequence[TradePoint]) -> None:
