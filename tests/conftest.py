@@ -1,4 +1,5 @@
 import gc
+import os
 
 import numpy as np
 import pytest
@@ -47,6 +48,15 @@ def box():
 @pytest.fixture(scope="session")
 def build_box():
     return make_box
+
+
+def pytest_configure():
+    """Give each process of the tests one thread of linear algebra: they share the processors.
+
+    More of them wait for each other, busily. This runs before the processes are started.
+    """
+    for name in ("OMP_NUM_THREADS", "OPENBLAS_NUM_THREADS"):
+        os.environ.setdefault(name, "1")
 
 
 def pytest_collection_finish():
