@@ -15,6 +15,7 @@ from pathlib import Path
 import numpy as np
 import shapely
 
+from benchmarks.studies.table import print_table
 from ccfem.cases.loop import loop_mesh
 from ccfem.elasticity.problem import Force, Problem, Support
 from ccfem.elasticity.solve import solve
@@ -133,17 +134,8 @@ def compared(name: str, pictures: Path | None = None) -> list[str]:
 
 def main(arguments: list[str]) -> None:
     """Print the table."""
-    pictures = None
-    if "--pictures" in arguments:
-        at = arguments.index("--pictures")
-        pictures = Path(arguments[at + 1])
-        pictures.mkdir(parents=True, exist_ok=True)
-        arguments = arguments[:at] + arguments[at + 2 :]
     heads = "as planned | midside nodes | load turned | share of the bound's gain"
-    print(f"| part | strategy | fibre, m | {heads} |")
-    print("|---|---|---|---|---|---|---|")
-    for name in arguments or PARTS:
-        print("\n".join(compared(name, pictures)), flush=True)
+    print_table(arguments, f"part | strategy | fibre, m | {heads}", PARTS, compared)
 
 
 if __name__ == "__main__":

@@ -14,6 +14,7 @@ from pathlib import Path
 
 import numpy as np
 
+from benchmarks.studies.table import print_table
 from ccfem.cases.named import create_case
 from ccfem.elasticity.solve import solve
 from ccfem.elasticity.weighted_cases import WeightedCases
@@ -83,17 +84,12 @@ def compared(name: str, parameters: Mapping[str, object], pictures: Path | None)
 
 def main(arguments: list[str]) -> None:
     """Print the table."""
-    pictures = None
-    if "--pictures" in arguments:
-        at = arguments.index("--pictures")
-        pictures = Path(arguments[at + 1])
-        pictures.mkdir(parents=True, exist_ok=True)
-        arguments = arguments[:at] + arguments[at + 2 :]
     heads = "stiffness × by case | worst of best single | worst of bound | gap | time"
-    print(f"| part | planned | {heads} |")
-    print("|---|---|---|---|---|---|---|")
-    for name in arguments or PARTS:
-        print("\n".join(compared(*PARTS[name], pictures)), flush=True)
+
+    def rows(name: str, pictures: Path | None) -> list[str]:
+        return compared(*PARTS[name], pictures)
+
+    print_table(arguments, f"part | planned | {heads}", PARTS, rows)
 
 
 if __name__ == "__main__":
