@@ -1,6 +1,7 @@
 """README and CONTRIBUTING are true: their examples run, their lists are complete."""
 
 import dataclasses
+import hashlib
 import json
 import os
 import re
@@ -73,6 +74,14 @@ def test_links_lead_somewhere():
             assert target.startswith("http") or (ROOT / target).exists(), target
 
 
+def compiled(folder):
+    """Where numba keeps what it compiles of a folder of the project."""
+    if "NUMBA_CACHE_DIR" not in os.environ:
+        return folder / "__pycache__"
+    digest = hashlib.sha1(str(folder).encode()).hexdigest()
+    return Path(os.environ["NUMBA_CACHE_DIR"]) / f"{folder.name}_{digest}"
+
+
 @pytest.fixture
 def copy(tmp_path):
     """A copy of the project, and what runs a module in it."""
@@ -80,9 +89,11 @@ def copy(tmp_path):
         ignored = shutil.ignore_patterns("__pycache__")
         shutil.copytree(ROOT / folder, tmp_path / folder, ignore=ignored)
     # What is compiled is shared with the project, whoever compiles it first.
-    for cache in (ROOT / "ccfem").rglob("__pycache__"):
-        (tmp_path / cache.relative_to(ROOT)).symlink_to(cache)
+    for folder in {path.parent for path in (ROOT / "ccfem").rglob("*.py")}:
+        compiled(folder).mkdir(parents=True, exist_ok=True)
+        (tmp_path / folder.relative_to(ROOT) / "__pycache__").symlink_to(compiled(folder))
     shutil.copy(ROOT / "pyproject.toml", tmp_path)
+    others = {name: value for name, value in os.environ.items() if name != "NUMBA_CACHE_DIR"}
 
     def run(command):
         done = subprocess.run(
@@ -91,7 +102,7 @@ def copy(tmp_path):
             capture_output=True,
             text=True,
             check=False,
-            env={**os.environ, "PYTHONDONTWRITEBYTECODE": "1"},
+            env={**others, "PYTHONDONTWRITEBYTECODE": "1"},
         )
         assert done.returncode == 0, done.stdout + done.stderr
         return done.stdout
