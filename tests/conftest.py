@@ -57,12 +57,17 @@ def pytest_configure():
     """
     for name in ("OMP_NUM_THREADS", "OPENBLAS_NUM_THREADS"):
         os.environ.setdefault(name, "1")
+    gc.disable()
 
 
 def pytest_collection_finish():
-    """Keep what is imported out of every later search for garbage: it stays to the end."""
+    """Keep what is imported out of every later search for garbage: it stays to the end.
+
+    While it was imported nothing was searched.
+    """
     gc.collect()
     gc.freeze()
+    gc.enable()
 
 
 @pytest.fixture(scope="session", autouse=True)
