@@ -7,6 +7,7 @@ triangulation in every round.
 """
 
 from collections.abc import Callable
+from functools import lru_cache
 from itertools import pairwise
 
 import numpy as np
@@ -36,6 +37,8 @@ _SPACING = 0.8
 """Minimum distance between points at the start, in edge lengths."""
 _MOST = 2e6
 """Number of triangles above which an edge length is taken for a mistake of units."""
+_REMEMBERED = 16
+"""Triangulations that a process keeps: a part is read more than once in a session."""
 
 Size = Callable[[FloatArray], FloatArray]
 
@@ -69,6 +72,17 @@ def triangulate(
         When the polygon is empty or not valid, or the edge length is too long or too short for it.
     """
     _check(polygon, edge_length)
+    places = None if keep is None else tuple(map(tuple, np.asarray(keep).tolist()))
+    points, triangles = _triangulated(polygon, edge_length, places)
+    return points.copy(), triangles.copy()
+
+
+@lru_cache(maxsize=_REMEMBERED)
+def _triangulated(
+    polygon: shapely.Polygon, edge_length: float, places: tuple[tuple[float, float], ...] | None
+) -> tuple[FloatArray, IntArray]:
+    """Triangulate as `triangulate` does, once for the same planform."""
+    keep = None if places is None else np.array(places)
     rings = [np.asarray(r.coords)[:-1, :2] for r in (polygon.exterior, *polygon.interiors)]
     size = _size_function(rings, edge_length)
     marked = [_with_points(ring, keep, 0.25 * edge_length) for ring in rings]

@@ -193,3 +193,17 @@ def test_diagonals_favour_no_direction():
 def test_bad_planforms(make, message):
     with pytest.raises(InputError, match=message):
         make()
+
+
+def test_what_is_remembered_is_neither_shared_nor_mixed_up():
+    square, ends = shapely.box(0, 0, 20, 20), np.array([[7.3, 0.0], [0.0, 12.1]])
+    points, triangles = triangulate(square, 2.0)
+    marked, _ = triangulate(square, 2.0, ends)
+    assert all((marked == end).all(axis=1).any() for end in ends)
+    assert not any((points == end).all(axis=1).any() for end in ends)
+    again, corners = triangulate(square, 2.0)
+    np.testing.assert_array_equal(again, points)
+    again += 1.0
+    corners[:] = 0
+    for one, other in zip(triangulate(square, 2.0), (points, triangles), strict=True):
+        np.testing.assert_array_equal(one, other)
