@@ -18,9 +18,12 @@ from ccfem.mesh.box import box_mesh
 
 @pytest.fixture(scope="module")
 def body():
-    """Stiffness of a body that nothing holds, and its rigid motions (n, 3, 6)."""
+    """Stiffness of a body that nothing holds, and its rigid motions (n, 3, 6).
+
+    A copy may be written to, as the stiffness of a held part: functions are compiled for one kind.
+    """
     mesh = box_mesh((3.0, 2.0, 1.0), (6, 4, 3))
-    return assemble(mesh, isotropic(10.0, 0.3).stiffness), rigid_modes(mesh.points - 0.5)
+    return assemble(mesh, isotropic(10.0, 0.3).stiffness).copy(), rigid_modes(mesh.points - 0.5)
 
 
 @pytest.fixture(scope="module")
