@@ -18,7 +18,7 @@ from ccfem.strategies import create, named
 MACHINE = Machine(minimum_length=25.0)
 JOINTS = ("winding",)
 """Strategies that need a hole at a joint."""
-SLOW = ("streamline", "svt")
+SLOW = ("eqs", "mps", "streamline", "svt")
 
 
 @pytest.fixture(scope="module")
