@@ -3,7 +3,7 @@
 import numpy as np
 from numba import njit
 
-from ccfem.arrays import BoolArray, FloatArray, IntArray
+from ccfem.arrays import BoolArray, FloatArray, IntArray, seen_only
 
 __all__ = ["earlier_in_cones", "groups_in_cones"]
 
@@ -82,10 +82,10 @@ def _in_cones(
         radius = np.maximum.reduceat(off, first)
     half = np.radians(half_angle)
     found = _point_in_cones(
-        *(np.ascontiguousarray(each, dtype=np.float64) for each in (tips, axes, points)),
-        np.ascontiguousarray(when, dtype=np.int64),
+        *(seen_only(np.asarray(each, dtype=np.float64)) for each in (tips, axes, points)),
+        seen_only(np.asarray(when, dtype=np.int64)),
         ends.astype(np.int64),
-        np.ascontiguousarray(group[first], dtype=np.int64),
+        seen_only(np.asarray(group[first], dtype=np.int64)),
         centre,
         radius,
         np.array([np.cos(half), np.sin(half), length]),
