@@ -23,7 +23,7 @@ from ccfem.fibre_aware.upper_bound import upper_bound
 from ccfem.layers.slicing.planar import Planar
 from ccfem.machine.machine import Machine
 from ccfem.materials import printed_pla
-from ccfem.mesh.patches import Cylinder, PatchRule, Plane, patches_from_rules
+from ccfem.mesh.patches import Box, Cylinder, PatchRule, Plane, patches_from_rules
 from ccfem.mesh.tet_mesh import TetMesh
 from ccfem.meshing import extrude
 from ccfem.planning.equal_fibre import plan_to_length
@@ -43,10 +43,11 @@ def lever() -> TetMesh:
     head, tip = shapely.Point(0.0, 0.0).buffer(24.0), shapely.Point(118.0, 0.0).buffer(10.0)
     arm = shapely.Polygon([(0.0, 12.0), (118.0, 8.0), (118.0, -8.0), (0.0, -12.0)])
     jaw = shapely.box(-30.0, -9.0, 4.0, 9.0)
-    outline = shapely.union_all([head, arm, tip]).difference(jaw)
-    outline = outline.difference(shapely.Point(118.0, 0.0).buffer(4.0)).buffer(-3.0).buffer(3.0)
+    outline = shapely.union_all([head, arm, tip]).difference(jaw).buffer(-3.0).buffer(3.0)
+    outline = outline.difference(shapely.Point(118.0, 0.0).buffer(4.0))
     rules: dict[str, PatchRule] = {
-        "support": Plane("y", 9.0, tolerance=0.05),
+        # In a box: the arm's upper edge comes through the height of the jaw's wall, too.
+        "support": Box((-30.0, 8.95, -1.0), (5.0, 9.05, 9.0)),
         "load": Cylinder((118.0, 0.0, 0.0), "z", 4.0),
     }
     return patches_from_rules(extrude(outline, 8.0, 2.2), rules)
