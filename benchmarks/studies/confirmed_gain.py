@@ -32,7 +32,7 @@ from ccfem.strategies import create
 from ccfem.virtual_testing.specimen import Specimen
 from ccfem.virtual_testing.virtual_test import virtual_test
 
-__all__ = ["PARTS", "compared"]
+__all__ = ["COVERAGE", "LAYERS", "PARTS", "compared", "posed"]
 
 COVERAGE, LAYERS, TURN = 0.45, 6, 15.0
 STRATEGIES = ("isocurve", "pruned", "stream_function")
@@ -91,8 +91,8 @@ PARTS: dict[str, tuple[Callable[[], TetMesh], tuple[str, ...], tuple[float, floa
 """What makes the mesh, the patches that are held, and the force on the patch `load`, N."""
 
 
-def compared(name: str, pictures: Path | None = None) -> list[str]:
-    """Rows of the table for one part."""
+def posed(name: str) -> Problem:
+    """Problem of one part, with the load that is planned for and the same one turned."""
     make, held, force = PARTS[name]
     turn = np.radians(TURN)
     turned = (
@@ -104,7 +104,12 @@ def compared(name: str, pictures: Path | None = None) -> list[str]:
         "turned": (Force("load", (*turned, 0.0)),),
     }
     supports = tuple(Support(patch) for patch in held)
-    problem = Problem(make(), printed_pla(), supports, loads, order=1)
+    return Problem(make(), printed_pla(), supports, loads, order=1)
+
+
+def compared(name: str, pictures: Path | None = None) -> list[str]:
+    """Rows of the table for one part."""
+    problem = posed(name)
     coarse = solve(problem)
     fine = solve(replace(problem, mesh=problem.mesh.quadratic(), order=2))
     layers, machine = Planar(count=LAYERS).cut(problem.mesh), Machine()
