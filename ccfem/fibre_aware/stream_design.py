@@ -13,9 +13,9 @@ from typing import Any, Protocol
 import numpy as np
 import scipy.sparse as sp
 from scipy.optimize import minimize
-from scipy.sparse.linalg import splu
 
 from ccfem.arrays import FloatArray, IntArray
+from ccfem.fibre_aware.field_metric import FieldMetric
 from ccfem.fibre_aware.smeared import SmearedPart, SmearedSolution
 from ccfem.fibre_aware.spline_grid import SplineGrid
 
@@ -50,6 +50,15 @@ _MEMORY = 20
 
 _REACH = 1.0
 """Radius of the filter in squares of the grid."""
+
+_SPREAD = 0.1
+"""Share of the fibre's energy that the curvature of the objective spreads evenly over the part."""
+
+_LEAST_ENERGY = 1e-6
+"""Least energy of the fibre for that, as a share of all: a field may lay none that is stretched."""
+
+_BENT, _HELD = 0.02, 1e-6
+"""What the curvature holds against bends of the field, and its constant, in its mean diagonal."""
 
 _TOLERANCE = 5e-3
 """Relative residual of the solves of a design. The error of the compliance is its square."""
@@ -227,6 +236,25 @@ class StreamProblem:
         gradient += 2.0 * _ROUGH / len(bend) * (self.laplacian @ bend)
         return np.asarray(gradient)
 
+    def curvature(self, field: FloatArray, solution: SmearedSolution) -> Any:
+        """Positive definite matrix (c, c) that is about the second derivative of the objective.
+
+        The energy of stretched fibre, of degree one in the slope of its field, changes with a turn
+        of that by ``energy / |g|^2``. A tenth of it is taken to be spread evenly over the part. Where
+        strands are too dense, the penalty of that counts across them.
+        """
+        laid = self.laid(field)
+        stretch = np.maximum(np.einsum("ci,ci->c", laid.along, solution.strain), 0.0)
+        energy = self.axial_stiffness * self.room * stretch**2 / (laid.size**3 * solution.work)
+        weight = energy / laid.size**2
+        weight = weight + _SPREAD * max(float(weight.sum()), _LEAST_ENERGY) * self.mean
+        dense = 2.0 * _STEEP * self.mean * (laid.size > DENSEST)
+        x, y = self.slopes
+        across = sp.diags_array(laid.gx / laid.size) @ x + sp.diags_array(laid.gy / laid.size) @ y
+        even = (x.T * weight) @ x + (y.T * weight) @ y + (across.T * dense) @ across
+        size, square = even.diagonal().mean(), self.laplacian.T @ self.laplacian
+        return even + size * (_BENT * square + _HELD * sp.eye_array(len(field)))
+
     def signed(self, field: FloatArray, group: int) -> FloatArray:
         """Coefficients (k,) of one group, with the sign that does not depend on the axes."""
         count = len(self.grid)
@@ -290,10 +318,7 @@ class StreamDesign:
 
 
 def design(problem: StreamProblem, start: FloatArray, evaluations: int = 50) -> StreamDesign:
-    """Improve fields by L-BFGS on filtered coefficients.
-
-    The unknowns x give the coefficients ``(1 + Laplacian)^-1 x``, the Laplacian in squares of the
-    grid: steps are smooth, and what the cells do not feel stays as it is.
+    """Improve fields by L-BFGS, in unknowns of even curvature (`StreamProblem.curvature`).
 
     Parameters
     ----------
@@ -307,7 +332,9 @@ def design(problem: StreamProblem, start: FloatArray, evaluations: int = 50) -> 
     StreamDesign
         The best of all evaluations.
     """
-    return StreamDesign(*improved(problem, start, evaluations))
+    first = problem.evaluate(start, tolerance=_TOLERANCE)
+    metric = FieldMetric.of(problem.curvature(start, first.solution))
+    return StreamDesign(*improved(problem, start, evaluations, metric))
 
 
 class _Evaluated(Protocol):
@@ -320,16 +347,20 @@ class _Evaluated(Protocol):
 
 
 def improved(
-    problem: _Evaluated, start: FloatArray, evaluations: int
+    problem: _Evaluated, start: FloatArray, evaluations: int, metric: FieldMetric | None = None
 ) -> tuple[FloatArray, Any, tuple[Any, ...]]:
-    """Coefficients, objective there, and stiffness ratios at every evaluation of `design`."""
-    smoother = (sp.eye_array(len(start)) + _REACH**2 * problem.laplacian).tocsc()
-    factor = splu(smoother)
+    """Coefficients, objective there, and stiffness ratios at every evaluation of L-BFGS.
+
+    Without a metric that of ``(1 + Laplacian)^2`` is taken, the Laplacian in squares of the grid.
+    """
+    if metric is None:
+        smoother = sp.eye_array(len(start)) + _REACH**2 * problem.laplacian
+        metric = FieldMetric.of(smoother @ smoother)
     tried: list[tuple[FloatArray, Any]] = []
     ratios: list[Any] = []
 
     def objective(x: FloatArray) -> tuple[float, FloatArray]:
-        field = factor.solve(x)
+        field = metric.field(x)
         # The last solution is near to this one, the best one is to be returned.
         last = tried[-1][1].solution if tried else None
         found = problem.evaluate(field, last, _TOLERANCE)
@@ -337,9 +368,9 @@ def improved(
         if len(tried) == 2:
             tried.pop() if tried[0][1].value <= tried[1][1].value else tried.pop(0)
         tried.append((field, found))
-        return found.value, factor.solve(found.gradient)
+        return found.value, metric.pulled(found.gradient)
 
     options = {"maxfun": evaluations, "maxiter": evaluations, "maxcor": _MEMORY, "ftol": 1e-9}
-    minimize(objective, smoother @ start, jac=True, method="L-BFGS-B", options=options)
+    minimize(objective, metric.unknowns(start), jac=True, method="L-BFGS-B", options=options)
     field, found = min(tried, key=lambda one: one[1].value)
     return field, found, tuple(ratios)
