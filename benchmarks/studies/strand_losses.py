@@ -82,7 +82,7 @@ def losses(
     strained = ((1.0, found.objective.solution.displacement),)
     extraction = strategy.extraction(problem, (found.field,), strained, machine)
     one = len(layers) // 2
-    shifts = (np.arange(strategy.phases) + 0.5) / strategy.phases
+    shifts = np.arange(strategy.phases) / strategy.phases
     tried = [extraction.layer_paths(layers[one], extraction.fields[group[one]], x) for x in shifts]
     values = [extraction.profiles(paths) for paths in tried]
     (best,) = extraction.best_phases([values], [len(layers)], length)
