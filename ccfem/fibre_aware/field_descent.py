@@ -83,11 +83,15 @@ class _Evaluated(Protocol):
 
 
 def improved(
-    problem: _Evaluated, start: FloatArray, evaluations: int, metric: FieldMetric | None = None
+    problem: _Evaluated,
+    start: FloatArray,
+    evaluations: int,
+    metric: FieldMetric | None = None,
+    solution: Any = None,
 ) -> tuple[FloatArray, Any, tuple[Any, ...]]:
     """Coefficients, objective there, and stiffness ratios at every evaluation of L-BFGS.
 
-    Without a metric that of ``(1 + Laplacian)^2`` is taken, the Laplacian in squares of the grid.
+    The solves begin from a solution, if there is one. Without a metric that of ``(1 + Laplacian)^2`` is taken, the Laplacian in squares of the grid.
     """
     if metric is None:
         smoother = sp.eye_array(len(start)) + _REACH**2 * problem.laplacian
@@ -98,7 +102,7 @@ def improved(
     def objective(x: FloatArray) -> tuple[float, FloatArray]:
         field = metric.field(x)
         # The last solution is near to this one, the best one is to be returned.
-        last = tried[-1][1].solution if tried else None
+        last = tried[-1][1].solution if tried else solution
         found = problem.evaluate(field, last, TOLERANCE)
         ratios.append(found.ratio)
         if len(tried) == 2:

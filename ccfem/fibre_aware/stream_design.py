@@ -348,13 +348,15 @@ def design(problem: StreamProblem, start: FloatArray, evaluations: int = 50) -> 
     last = int(_AT_BORDERS * evaluations)
     before = problem.evaluate(start, tolerance=TOLERANCE)
     metric = FieldMetric.of(problem.curvature(start, before.solution))
-    found = StreamDesign(*improved(problem, start, evaluations - last, metric))
+    first = improved(problem, start, evaluations - last, metric, before.solution)
+    found = StreamDesign(*first)
     if not last:
         return found
     solution = found.objective.solution
     levels = BorderLevels.of(problem, found.field, solution)
     lifted = levels.lifted(found.field)
     metric = FieldMetric.of(problem.curvature(lifted, solution) + levels.curvature())
-    field, drawn, ratios = improved(_AtBorders(problem, levels), lifted, last, metric)
+    posed = _AtBorders(problem, levels)
+    field, drawn, ratios = improved(posed, lifted, last, metric, solution)
     objective = problem.evaluate(field, drawn.solution, TOLERANCE)
     return StreamDesign(field, objective, (*found.ratios, *ratios))
