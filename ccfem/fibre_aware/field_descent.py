@@ -91,7 +91,8 @@ def improved(
 ) -> tuple[FloatArray, Any, tuple[Any, ...]]:
     """Coefficients, objective there, and stiffness ratios at every evaluation of L-BFGS.
 
-    The solves begin from a solution, if there is one. Without a metric that of ``(1 + Laplacian)^2`` is taken, the Laplacian in squares of the grid.
+    The solves begin from a solution, if there is one. Without a metric that of
+    ``(1 + Laplacian)^2`` is taken, the Laplacian in squares of the grid.
     """
     if metric is None:
         smoother = sp.eye_array(len(start)) + _REACH**2 * problem.laplacian
