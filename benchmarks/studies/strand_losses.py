@@ -2,9 +2,10 @@
 
     python -m benchmarks.studies.strand_losses [PART ...]
 
-PART is a case or a part file; `authors_loop`, the default, needs `CCFEM_CHEN2021`. Every row has
-the same length of fibre: a stage that lays more is cut to it by virtual tests. Levels are those
-whose paths are worth most; before links, pieces from five widths on count.
+PART is a case, a part file, or, with `study:` in front, a part of `confirmed_gain`,
+as in `study:lever`; `authors_loop`, the default, needs `CCFEM_CHEN2021`. Every row has the same
+length of fibre: a stage that lays more is cut to it by virtual tests. Levels are those whose paths
+are worth most; before links, pieces from five widths on count.
 """
 
 import sys
@@ -15,9 +16,9 @@ import numpy as np
 import shapely
 
 import ccfem
+from benchmarks.studies import confirmed_gain
 from ccfem.arrays import FloatArray
-from ccfem.cases.case import Case
-from ccfem.elasticity.stress_field import solved
+from ccfem.elasticity.stress_field import StressField, solved
 from ccfem.fibre_aware.heights import nearest_layer
 from ccfem.fibre_aware.prune import prune
 from ccfem.fibre_aware.smeared import SmearedPart
@@ -62,10 +63,11 @@ def share_inside(part: SmearedPart, layers: tuple[Layer, ...], inset: float) -> 
     return share
 
 
-def losses(case: Case, layers: tuple[Layer, ...], length: float) -> dict[str, float]:
+def losses(
+    stress: StressField, layers: tuple[Layer, ...], machine: Machine, length: float
+) -> dict[str, float]:
     """Stiffness ratio of each stage at a length of fibre, mm in all layers."""
-    machine, width = case.machine, case.machine.fibre_width
-    stress = solved(next(iter(ccfem.solve(case.problem).values())), "strand_losses")
+    width = machine.fibre_width
     coverage = length / len(layers) / full_length(layers, machine)
     strategy = StreamFunction(coverage=coverage)
     problem, group, found = strategy.designed(stress, layers, machine)
@@ -80,7 +82,7 @@ def losses(case: Case, layers: tuple[Layer, ...], length: float) -> dict[str, fl
     strained = ((1.0, found.objective.solution.displacement),)
     extraction = strategy.extraction(problem, (found.field,), strained, machine)
     one = len(layers) // 2
-    shifts = (np.arange(strategy.phases) + 0.5) / strategy.phases
+    shifts = np.arange(strategy.phases) / strategy.phases
     tried = [extraction.layer_paths(layers[one], extraction.fields[group[one]], x) for x in shifts]
     values = [extraction.profiles(paths) for paths in tried]
     (best,) = extraction.best_phases([values], [len(layers)], length)
@@ -114,15 +116,27 @@ def losses(case: Case, layers: tuple[Layer, ...], length: float) -> dict[str, fl
     return rows
 
 
+def _posed(name: str) -> tuple[StressField, tuple[Layer, ...], Machine, float]:
+    """Stress of a part, its layers, the machine, and the length of fibre, mm."""
+    if name.startswith("study:"):
+        problem = confirmed_gain.posed(name.removeprefix("study:"))
+        stress, machine = ccfem.solve(problem)["planned"], Machine()
+        layers = Planar(count=confirmed_gain.LAYERS).cut(problem.mesh)
+    else:
+        case = authors_loop() if name == "authors_loop" else ccfem.read(name)
+        stress, machine = next(iter(ccfem.solve(case.problem).values())), case.machine
+        count = 12 if name == "authors_loop" else 8
+        layers = Planar(count=count)(stress, case.build, machine)
+    every = len(layers) * full_length(layers, machine)
+    length = AUTHORS if name == "authors_loop" else COVERAGE * every
+    return solved(stress, "strand_losses"), layers, machine, length
+
+
 def main() -> None:
     """Print a table for each part."""
     for name in sys.argv[1:] or ["authors_loop"]:
-        case = authors_loop() if name == "authors_loop" else ccfem.read(name)
-        stress = next(iter(ccfem.solve(case.problem).values()))
-        layers = Planar(count=12 if name == "authors_loop" else 8)(stress, case.build, case.machine)
-        every = len(layers) * full_length(layers, case.machine)
-        length = AUTHORS if name == "authors_loop" else COVERAGE * every
-        rows = losses(case, layers, length)
+        stress, layers, machine, length = _posed(name)
+        rows = losses(stress, layers, machine, length)
         most = rows["bound"] - 1.0
         print(f"\n{name}: {length / 1e3:.2f} m of fibre in {len(layers)} layers")
         for what, ratio in rows.items():

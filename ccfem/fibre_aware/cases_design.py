@@ -13,8 +13,9 @@ import numpy as np
 import scipy.sparse as sp
 
 from ccfem.arrays import FloatArray, freeze
+from ccfem.fibre_aware.field_descent import improved
 from ccfem.fibre_aware.smeared import SmearedPart, SmearedSolution
-from ccfem.fibre_aware.stream_design import OVER_BUDGET, StreamProblem, improved
+from ccfem.fibre_aware.stream_design import OVER_BUDGET, StreamProblem
 from ccfem.fibre_aware.stream_start import field_along, mixed_tension
 from ccfem.fields.layer_tension import layer_tension
 from ccfem.layers.layer import Layer

@@ -7,7 +7,7 @@ from typing import Any
 import numpy as np
 import scipy.sparse as sp
 
-from ccfem.arrays import FloatArray, IntArray, freeze
+from ccfem.arrays import BoolArray, FloatArray, IntArray, freeze
 
 __all__ = ["SplineGrid"]
 
@@ -59,6 +59,15 @@ class SplineGrid:
         table = np.full(np.ptp(self.used, axis=0) + 1, -1, dtype=np.int64)
         table[tuple((self.used - low).T)] = np.arange(len(self.used))
         return low, table
+
+    def covers(self, points: FloatArray) -> BoolArray:
+        """Whether all splines that reach each of the points (n, 2) have a coefficient, (n,)."""
+        low, table = self._number
+        square = np.floor((points - self.centre) @ self.axes.T / self.size).astype(np.int64) - low
+        padded = np.pad(table, 2, constant_values=-1)
+        near = np.clip(square, -1, table.shape)[:, None] + 2
+        near = near + np.stack(np.meshgrid(*2 * [[-1, 0, 1]]), axis=-1).reshape(-1, 2)
+        return np.asarray((padded[near[..., 0], near[..., 1]] >= 0).all(axis=1))
 
     def values(self, points: FloatArray) -> Any:
         """Matrix (n, k) from coefficients to values at points (n, 2)."""

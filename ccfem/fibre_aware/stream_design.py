@@ -6,16 +6,16 @@ levels: it runs across g, and there are |g| strands a mm, so that a layer of thi
 and the gradient of the compliance; L-BFGS does the rest.
 """
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from functools import cached_property
-from typing import Any, Protocol
+from typing import Any
 
 import numpy as np
 import scipy.sparse as sp
-from scipy.optimize import minimize
-from scipy.sparse.linalg import splu
 
 from ccfem.arrays import FloatArray, IntArray
+from ccfem.fibre_aware.border_levels import BorderLevels
+from ccfem.fibre_aware.field_descent import TOLERANCE, FieldMetric, improved
 from ccfem.fibre_aware.smeared import SmearedPart, SmearedSolution
 from ccfem.fibre_aware.spline_grid import SplineGrid
 
@@ -28,7 +28,6 @@ __all__ = [
     "StreamDesign",
     "StreamProblem",
     "design",
-    "improved",
 ]
 
 DENSEST = 0.975
@@ -45,14 +44,17 @@ _SMALLEST = 0.02
 SLACK = 1e-3
 """Share of their stiffness that shortened fibres keep."""
 
-_MEMORY = 20
-"""Steps that L-BFGS remembers."""
+_SPREAD = 0.1
+"""Share of the fibre's energy that the curvature of the objective spreads evenly over the part."""
 
-_REACH = 1.0
-"""Radius of the filter in squares of the grid."""
+_AT_BORDERS = 0.4
+"""Share of the evaluations in which levels are drawn to the border."""
 
-_TOLERANCE = 5e-3
-"""Relative residual of the solves of a design. The error of the compliance is its square."""
+_LEAST_ENERGY = 1e-6
+"""Least energy of the fibre for that, as a share of all: a field may lay none that is stretched."""
+
+_BENT, _HELD = 0.02, 1e-6
+"""What the curvature holds against bends of the field, and its constant, in its mean diagonal."""
 
 
 @dataclass(frozen=True)
@@ -150,13 +152,13 @@ class StreamProblem:
     @cached_property
     def slopes(self) -> tuple[Any, Any]:
         """Matrices (m, c) from coefficients to the components of g, strands a width."""
-        x, y = (self._of_group(matrix) for matrix in self.grid.slopes(self.centres))
+        x, y = (self.of_group(matrix, self.group) for matrix in self.grid.slopes(self.centres))
         return self.width * x, self.width * y
 
-    def _of_group(self, matrix: Any) -> Any:
-        """Matrix that takes the row of each cell from the block of its group."""
+    def of_group(self, matrix: Any, group: IntArray) -> Any:
+        """Matrix (n, k) that takes each row from the block of its group (n,)."""
         entries = matrix.tocoo()
-        column = entries.col + len(self.grid) * self.group[entries.row]
+        column = entries.col + len(self.grid) * group[entries.row]
         shape = (matrix.shape[0], self.groups * len(self.grid))
         return sp.csr_array((entries.data, (entries.row, column)), shape=shape)
 
@@ -227,6 +229,25 @@ class StreamProblem:
         gradient += 2.0 * _ROUGH / len(bend) * (self.laplacian @ bend)
         return np.asarray(gradient)
 
+    def curvature(self, field: FloatArray, solution: SmearedSolution) -> Any:
+        """Positive definite matrix (c, c) that is about the second derivative of the objective.
+
+        The energy of stretched fibre, of degree one in the slope of its field, changes with a turn
+        of that by ``energy / |g|^2``. A tenth of it is taken to be spread evenly over the part.
+        Where strands are too dense, the penalty of that counts across them.
+        """
+        laid = self.laid(field)
+        stretch = np.maximum(np.einsum("ci,ci->c", laid.along, solution.strain), 0.0)
+        energy = self.axial_stiffness * self.room * stretch**2 / (laid.size**3 * solution.work)
+        weight = energy / laid.size**2
+        weight = weight + _SPREAD * max(float(weight.sum()), _LEAST_ENERGY) * self.mean
+        dense = 2.0 * _STEEP * self.mean * (laid.size > DENSEST)
+        x, y = self.slopes
+        across = sp.diags_array(laid.gx / laid.size) @ x + sp.diags_array(laid.gy / laid.size) @ y
+        even = (x.T * weight) @ x + (y.T * weight) @ y + (across.T * dense) @ across
+        size, square = even.diagonal().mean(), self.laplacian.T @ self.laplacian
+        return even + size * (_BENT * square + _HELD * sp.eye_array(len(field)))
+
     def signed(self, field: FloatArray, group: int) -> FloatArray:
         """Coefficients (k,) of one group, with the sign that does not depend on the axes."""
         count = len(self.grid)
@@ -289,11 +310,28 @@ class StreamDesign:
     ratios: tuple[float, ...]
 
 
-def design(problem: StreamProblem, start: FloatArray, evaluations: int = 50) -> StreamDesign:
-    """Improve fields by L-BFGS on filtered coefficients.
+@dataclass(frozen=True)
+class _AtBorders:
+    """The problem with the cost of levels that keep farther from the border than they need."""
 
-    The unknowns x give the coefficients ``(1 + Laplacian)^-1 x``, the Laplacian in squares of the
-    grid: steps are smooth, and what the cells do not feel stays as it is.
+    problem: StreamProblem
+    levels: BorderLevels
+
+    @property
+    def laplacian(self) -> Any:
+        return self.problem.laplacian
+
+    def evaluate(self, field: FloatArray, start: Any, tolerance: float) -> Objective:
+        found = self.problem.evaluate(field, start, tolerance)
+        cost, slope = self.levels.cost(field)
+        return replace(found, value=found.value + cost, gradient=found.gradient + slope)
+
+
+def design(problem: StreamProblem, start: FloatArray, evaluations: int = 50) -> StreamDesign:
+    """Improve fields by L-BFGS, in unknowns of even curvature (`StreamProblem.curvature`).
+
+    In the last evaluations whole numbers of the fields are drawn to half a width inside the border,
+    where that is stretched along strands (`BorderLevels`).
 
     Parameters
     ----------
@@ -307,39 +345,18 @@ def design(problem: StreamProblem, start: FloatArray, evaluations: int = 50) -> 
     StreamDesign
         The best of all evaluations.
     """
-    return StreamDesign(*improved(problem, start, evaluations))
-
-
-class _Evaluated(Protocol):
-    """An objective that `improved` can make smaller."""
-
-    @property
-    def laplacian(self) -> Any: ...
-
-    def evaluate(self, field: FloatArray, start: Any, tolerance: float) -> Any: ...
-
-
-def improved(
-    problem: _Evaluated, start: FloatArray, evaluations: int
-) -> tuple[FloatArray, Any, tuple[Any, ...]]:
-    """Coefficients, objective there, and stiffness ratios at every evaluation of `design`."""
-    smoother = (sp.eye_array(len(start)) + _REACH**2 * problem.laplacian).tocsc()
-    factor = splu(smoother)
-    tried: list[tuple[FloatArray, Any]] = []
-    ratios: list[Any] = []
-
-    def objective(x: FloatArray) -> tuple[float, FloatArray]:
-        field = factor.solve(x)
-        # The last solution is near to this one, the best one is to be returned.
-        last = tried[-1][1].solution if tried else None
-        found = problem.evaluate(field, last, _TOLERANCE)
-        ratios.append(found.ratio)
-        if len(tried) == 2:
-            tried.pop() if tried[0][1].value <= tried[1][1].value else tried.pop(0)
-        tried.append((field, found))
-        return found.value, factor.solve(found.gradient)
-
-    options = {"maxfun": evaluations, "maxiter": evaluations, "maxcor": _MEMORY, "ftol": 1e-9}
-    minimize(objective, smoother @ start, jac=True, method="L-BFGS-B", options=options)
-    field, found = min(tried, key=lambda one: one[1].value)
-    return field, found, tuple(ratios)
+    last = int(_AT_BORDERS * evaluations)
+    before = problem.evaluate(start, tolerance=TOLERANCE)
+    metric = FieldMetric.of(problem.curvature(start, before.solution))
+    first = improved(problem, start, evaluations - last, metric, before.solution)
+    found = StreamDesign(*first)
+    if not last:
+        return found
+    solution = found.objective.solution
+    levels = BorderLevels.of(problem, found.field, solution)
+    lifted = levels.lifted(found.field)
+    metric = FieldMetric.of(problem.curvature(lifted, solution) + levels.curvature())
+    posed = _AtBorders(problem, levels)
+    field, drawn, ratios = improved(posed, lifted, last, metric, solution)
+    objective = problem.evaluate(field, drawn.solution, TOLERANCE)
+    return StreamDesign(field, objective, (*found.ratios, *ratios))

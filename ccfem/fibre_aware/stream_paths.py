@@ -57,7 +57,8 @@ class Extraction:
         each load case.
     machine : Machine
     phases : int
-        Positions of the levels of which the best is taken, for all layers of the same section.
+        Positions of the levels of which the best is taken, for all layers of the same section; one
+        is at whole numbers of the field.
     inset, link_limit : float
         Least distance from the boundary, and of ends that are linked, in strand widths.
     """
@@ -89,7 +90,7 @@ class Extraction:
 
         def paths(number: int, phase: int) -> Toolpaths:
             if (number, phase) not in drawn:
-                shift = (phase + 0.5) / self.phases
+                shift = phase / self.phases
                 field = self.fields[group[number]]
                 drawn[number, phase] = self.layer_paths(layers[number], field, shift)
             return drawn[number, phase]
@@ -134,7 +135,7 @@ class Extraction:
         return tuple(int(np.argmax([gain(along) for along in one])) for one in tried)
 
     def layer_paths(self, layer: Layer, field: FloatArray, shift: float) -> Toolpaths:
-        """Paths of one layer along unit levels, the first one `shift` above the lowest value."""
+        """Paths of one layer along the levels that are `shift` above whole numbers."""
         width, section = self.machine.fibre_width, layer.plane.polygon
         lines = self.levels(layer, field, shift)
         lines = keep_off_border(lines, section, self.inset * width)
@@ -145,10 +146,11 @@ class Extraction:
         return Toolpaths.from_plane(found.lines, layer, link=found.link)
 
     def levels(self, layer: Layer, field: FloatArray, shift: float) -> list[FloatArray]:
-        """Trace unit levels on a layer, (n, 2), mm, the first `shift` above the lowest value."""
+        """Trace the levels `shift` above whole numbers on a layer, (n, 2), mm."""
         points, triangles = refined(layer)
         values = self.grid.values(points) @ field
-        return isocontours(points, triangles, values, float(values.min()) + shift, 1.0).lines()
+        first = float(np.ceil(values.min() - shift)) + shift
+        return isocontours(points, triangles, values, first, 1.0).lines()
 
     def profiles(self, toolpaths: Toolpaths) -> list[Profile]:
         """Value of the paths at the strains of the designed part."""

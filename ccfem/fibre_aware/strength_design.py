@@ -12,6 +12,7 @@ import numpy as np
 
 from ccfem.arrays import FloatArray, in_brief
 from ccfem.elasticity.volume_loads import strain_forces
+from ccfem.fibre_aware.field_descent import improved
 from ccfem.fibre_aware.smeared import SmearedSolution
 from ccfem.fibre_aware.stream_design import (
     OVER_BUDGET,
@@ -20,7 +21,6 @@ from ccfem.fibre_aware.stream_design import (
     Objective,
     StreamDesign,
     StreamProblem,
-    improved,
 )
 from ccfem.tensor import to_voigt
 from ccfem.virtual_testing.near_failure import (

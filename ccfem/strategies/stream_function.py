@@ -89,7 +89,7 @@ class StreamFunction:
         1.15, with strength no less than 1.25.
     rho : float, mm^2, default 4
         Axial stiffness of a strand over Young's modulus of the matrix.
-    evaluations : int, default 50
+    evaluations : int, default 80
         Of the stiffness, in the design.
     groups : int, default 0
         Number of fields over the height of the part; 0 for one, or for at most six where the
@@ -122,7 +122,7 @@ class StreamFunction:
     coverage: float = 0.45
     overfill: float = 1.1
     rho: float = RHO
-    evaluations: int = 50
+    evaluations: int = 80
     groups: int = 0
     grid: float = 2.0
     cap: float = 90.0

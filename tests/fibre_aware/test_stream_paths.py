@@ -20,11 +20,12 @@ def test_levels_of_a_linear_field_are_straight_and_a_unit_apart(two_pulls):
     # Splines of degree two hold a linear field whose coefficients are its values at their middles.
     field = 0.8 * (grid.centre[1] + grid.size * (grid.used[:, 1] + 0.5))
     extraction = Extraction((field,), grid, mesh, (), Machine(), 5, 0.5, 10.0)
-    lines = extraction.levels(layer, field, 0.3)
-    assert len(lines) == 19  # 24 mm at 0.8 levels a mm, the first one 0.3 levels from the side
     low = points[:, 1].min()
+    field = field - 0.8 * low - 0.2  # at the side 0.2 below a whole number
+    lines = extraction.levels(layer, field, 0.3)
+    assert len(lines) == 19  # 24 mm at 0.8 levels a mm, the first one 0.5 levels from the side
     for k, line in enumerate(sorted(lines, key=lambda line: line[0, 1])):
-        np.testing.assert_allclose(line[:, 1], low + (0.3 + k) / 0.8, atol=1e-9)
+        np.testing.assert_allclose(line[:, 1], low + (0.5 + k) / 0.8, atol=1e-9)
         assert np.ptp(line[:, 0]) == pytest.approx(SIDE, abs=1e-9)
 
 

@@ -1,0 +1,106 @@
+"""Levels that run along a stretched border as near to it as whole strands can.
+
+Strands keep half a width off the border. Where the first lies farther from it, the strip between
+them goes without fibre, by up to a width, and along the border stress is highest. Fields that are
+designed without regard to where their levels lie leave half a width on average.
+"""
+
+from dataclasses import dataclass
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+import scipy.sparse as sp
+
+from ccfem.arrays import FloatArray, freeze
+from ccfem.fibre_aware.smeared import SmearedSolution
+
+if TYPE_CHECKING:
+    from ccfem.fibre_aware.stream_design import StreamProblem
+
+__all__ = ["BorderLevels"]
+
+_UPRIGHT = 0.1
+"""Largest cosine of a wall's normal to that of the layers at which it counts as upright."""
+
+_DEPTH = 0.53
+"""Distance, in widths, of the first strand from the border: what rounding takes off is not cut."""
+
+_OBLIQUE = float(np.tan(np.radians(20.0)))
+"""Slope of strands to the border from which on none of them is the first one."""
+
+_CONSTANTS = 40
+"""Constants of a field that are tried."""
+
+_SHARE = 0.5
+"""Of the work of the fibre that the strip could hold: what it costs to have none there."""
+
+
+@dataclass(frozen=True)
+class BorderLevels:
+    """What it costs that no whole number of the field lies half a width inside stretched borders.
+
+    The cost is ``sum of weight * sin^2(pi s)`` over places half a width inside upright walls. The
+    weight is half of the share that fibre on a strip a width wide would have in the compliance; it
+    falls to zero where strands meet the border at 20 degrees.
+
+    Attributes
+    ----------
+    values : sparse (b, c) array
+        From coefficients to the field s there.
+    weight : (b,) array
+    blocks : (c, groups) array
+        Coefficients of a constant on each group of layers.
+    """
+
+    values: Any
+    weight: FloatArray
+    blocks: FloatArray
+
+    def __post_init__(self) -> None:
+        freeze(self, weight=float, blocks=float)
+
+    @classmethod
+    def of(
+        cls, problem: "StreamProblem", field: FloatArray, solution: SmearedSolution
+    ) -> "BorderLevels":
+        """Weights at a field (c,) and its solution."""
+        part, grid, mesh = problem.part, problem.grid, problem.part.mesh
+        area, normal = mesh.facet_areas(mesh.boundary)
+        upright = np.flatnonzero(np.abs(normal @ part.frame[2]) < _UPRIGHT)
+        inward = -normal[upright] @ part.frame[:2].T
+        inward = inward / np.linalg.norm(inward, axis=1)[:, None]
+        at = mesh.points[mesh.boundary[upright]].mean(axis=1) @ part.frame[:2].T
+        at = at + _DEPTH * problem.width * inward
+        kept = grid.covers(at)
+        at, inward, upright = at[kept], inward[kept], upright[kept]
+        cell = mesh.boundary_cells[upright]
+        gx, gy = (problem.of_group(matrix, problem.group[cell]) for matrix in grid.slopes(at))
+        (a, b), (x, y) = inward.T, (gx @ field, gy @ field)
+        across, along = np.abs(a * x + b * y), np.abs(a * y - b * x)
+        e1, e2, e12 = solution.strain[cell].T
+        stretch = np.maximum(e1 * b * b + e2 * a * a - e12 * a * b, 0.0)
+        oblique = np.minimum(along / np.maximum(_OBLIQUE * across, 1e-300), 1.0)
+        length = area[upright] * problem.width * problem.capacity[cell]
+        work = problem.axial_stiffness * length * stretch**2 / solution.work
+        weight = _SHARE * work * (1.0 - oblique**2)
+        values = problem.of_group(grid.values(at), problem.group[cell])
+        ones = np.ones((len(grid), 1))
+        blocks = sp.block_diag(problem.groups * [ones]).toarray()
+        return cls(values, weight, blocks)
+
+    def cost(self, field: FloatArray) -> tuple[float, FloatArray]:
+        """Cost, and its derivative (c,) by the coefficients."""
+        angle = np.pi * (self.values @ field)
+        slope = np.pi * self.weight * np.sin(2.0 * angle)
+        return float(self.weight @ np.sin(angle) ** 2), np.asarray(self.values.T @ slope)
+
+    def curvature(self) -> Any:
+        """Second derivative (c, c) of the cost where it is least, and half of that."""
+        return np.pi**2 * (self.values.T * self.weight) @ self.values
+
+    def lifted(self, field: FloatArray) -> FloatArray:
+        """Field (c,) with the constant on each group that costs least."""
+        for block in self.blocks.T:
+            tried = [field + k / _CONSTANTS * block for k in range(_CONSTANTS)]
+            field = tried[int(np.argmin([self.cost(one)[0] for one in tried]))]
+        return field

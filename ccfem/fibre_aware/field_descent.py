@@ -1,0 +1,117 @@
+"""Descent on fields, in unknowns in which it takes even steps: those of a positive matrix."""
+
+from dataclasses import dataclass
+from typing import Any, Protocol
+
+import numpy as np
+import scipy.sparse as sp
+from scipy.optimize import minimize
+from scipy.sparse.linalg import splu
+
+from ccfem.arrays import FloatArray
+from ccfem.errors import SolveError
+
+__all__ = ["TOLERANCE", "FieldMetric", "improved"]
+
+_MEMORY = 20
+"""Steps that L-BFGS remembers."""
+
+_REACH = 1.0
+"""Radius of the filter in squares of the grid."""
+
+TOLERANCE = 5e-3
+"""Relative residual of the solves of a design. The error of the compliance is its square."""
+
+
+@dataclass(frozen=True)
+class FieldMetric:
+    """Unknowns x of a field s, with ``x.x = s.A s`` for a positive definite matrix A.
+
+    A descent that knows nothing of its objective takes all directions of its unknowns for alike.
+    Where A is about the second derivative of the objective, they are. With ``A = C C^T`` the field
+    is ``A^-1 C x``.
+
+    Attributes
+    ----------
+    factor : SuperLU
+        Of A, (c, c).
+    root : sparse (c, c) array
+        C.
+    """
+
+    factor: Any
+    root: Any
+
+    @classmethod
+    def of(cls, matrix: Any) -> "FieldMetric":
+        """Metric of a symmetric positive definite sparse matrix (c, c).
+
+        Raises
+        ------
+        SolveError
+            When the matrix is not positive definite.
+        """
+        options = {"SymmetricMode": True}
+        order = "MMD_AT_PLUS_A"
+        factor = splu(sp.csc_array(matrix), order, diag_pivot_thresh=0.0, options=options)
+        pivot = factor.U.diagonal()
+        if pivot.min() <= 0.0 or (factor.perm_r != factor.perm_c).any():
+            raise SolveError("metric of fields: the matrix is not positive definite")
+        root = (factor.L @ sp.diags_array(np.sqrt(pivot))).tocsr()
+        return cls(factor, root[factor.perm_r].tocsc())
+
+    def unknowns(self, field: FloatArray) -> FloatArray:
+        """Unknowns (c,) of a field (c,)."""
+        return np.asarray(self.root.T @ field)
+
+    def field(self, unknowns: FloatArray) -> FloatArray:
+        """Field (c,) of unknowns (c,)."""
+        return np.asarray(self.factor.solve(self.root @ unknowns))
+
+    def pulled(self, gradient: FloatArray) -> FloatArray:
+        """Turn a derivative (c,) by the field into that by the unknowns."""
+        return np.asarray(self.root.T @ self.factor.solve(gradient))
+
+
+class _Evaluated(Protocol):
+    """An objective that `improved` can make smaller."""
+
+    @property
+    def laplacian(self) -> Any: ...
+
+    def evaluate(self, field: FloatArray, start: Any, tolerance: float) -> Any: ...
+
+
+def improved(
+    problem: _Evaluated,
+    start: FloatArray,
+    evaluations: int,
+    metric: FieldMetric | None = None,
+    solution: Any = None,
+) -> tuple[FloatArray, Any, tuple[Any, ...]]:
+    """Coefficients, objective there, and stiffness ratios at every evaluation of L-BFGS.
+
+    The solves begin from a solution, if there is one. Without a metric that of
+    ``(1 + Laplacian)^2`` is taken, the Laplacian in squares of the grid.
+    """
+    if metric is None:
+        smoother = sp.eye_array(len(start)) + _REACH**2 * problem.laplacian
+        metric = FieldMetric.of(smoother @ smoother)
+    tried: list[tuple[FloatArray, Any]] = []
+    ratios: list[Any] = []
+
+    def objective(x: FloatArray) -> tuple[float, FloatArray]:
+        field = metric.field(x)
+        # The last solution is near to this one, the best one is to be returned.
+        last = tried[-1][1].solution if tried else solution
+        found = problem.evaluate(field, last, TOLERANCE)
+        ratios.append(found.ratio)
+        if len(tried) == 2:
+            tried.pop() if tried[0][1].value <= tried[1][1].value else tried.pop(0)
+        tried.append((field, found))
+        return found.value, metric.pulled(found.gradient)
+
+    options = {"maxfun": evaluations, "maxiter": evaluations, "maxcor": _MEMORY, "ftol": 1e-9}
+    minimize(objective, metric.unknowns(start), jac=True, method="L-BFGS-B", options=options)
+    field, found = min(tried, key=lambda one: one[1].value)
+    return field, found, tuple(ratios)
