@@ -31,10 +31,10 @@ from ccfem.fibre_aware.heights import (
     nearest_layer,
 )
 from ccfem.fibre_aware.layer_shares import layer_counts, layers_by_case
-from ccfem.fibre_aware.prune import prune
 from ccfem.fibre_aware.prune_cases import case_counts, prune_cases
 from ccfem.fibre_aware.smeared import SmearedPart, smeared_cases
 from ccfem.fibre_aware.spline_grid import SplineGrid
+from ccfem.fibre_aware.strand_moves import check_moves, prune_and_move
 from ccfem.fibre_aware.stream_design import DENSEST, StreamDesign, StreamProblem, design
 from ccfem.fibre_aware.stream_paths import Extraction, refined
 from ccfem.fibre_aware.stream_start import plane_axes, start_field
@@ -102,12 +102,10 @@ class StreamFunction:
         Positions of the levels of which the best is taken, for all layers of the same section.
     link_limit : float, default 10
         Largest distance of two ends that are linked, in strand widths. Links keep the machine's
-        minimum radius; those with corners join only what is too short to be cut alone, and are
-        marked as links.
+        minimum radius; those with corners join only what is too short alone, and are marked.
     inset : float, default 0.5
-        Least distance of strands from the boundary, in strand widths. 0.5 keeps them in, and their
-        ends still meet the links along the boundary; at 0 they may run along it with half of their
-        width outside.
+        Least distance of strands from the boundary, in strand widths: 0.5 keeps them in, at 0 they
+        may run along it with half of their width outside.
     objective : {"worst", "sum"}
         What counts of several load cases: the one that is farthest from the stiffest that it could
         be made alone, or the weighted mean over the cases.
@@ -117,6 +115,9 @@ class StreamFunction:
     strength : float, default 0
         How much the load at first failure counts, in [0, 1]; the stiffness counts the rest. A
         share of the one is then worth as much as one of the other. Of one load case only.
+    moves : int, default 0
+        Steps by which paths are moved sideways, each tested (`ccfem.fibre_aware.strand_moves`). Of
+        one load case only, without strength.
     """
 
     coverage: float = 0.45
@@ -132,12 +133,14 @@ class StreamFunction:
     objective: Literal["worst", "sum"] = "worst"
     tilt: float = 0.75
     strength: float = 0.0
+    moves: int = 0
 
     amount: ClassVar[Amount] = Amount("coverage", most=0.85, least=0.1)
     flat_layers_only: ClassVar[bool] = True
     variants: ClassVar[Mapping[str, Mapping[str, Any]]] = {
         "border": {"inset": 0.0, "evaluations": 5},
         "groups": {"groups": 2, "evaluations": 5},
+        "moves": {"moves": 2, "evaluations": 5},
     }
 
     def __post_init__(self) -> None:
@@ -149,6 +152,7 @@ class StreamFunction:
         check_fields(self, "groups", "link_limit", "inset", at_least=0)
         check_fields(self, "tilt", above=0.0, at_most=1.0)
         check_fields(self, "strength", at_least=0.0, at_most=1.0)
+        check_moves("stream_function", self.moves, self.strength)
         check_choices(self)
 
     def natural_length(self, layers: Sequence[Layer], machine: Machine) -> float:
@@ -217,6 +221,7 @@ class StreamFunction:
         if len(cases) == 1:
             return self.to_lengths(cases.fields[0], layers, machine, lengths)
         refuse_strength("stream_function", self.strength)
+        check_moves("stream_function", self.moves, cases=len(cases))
         return _to_lengths(
             replace(self, overfill=max(self.overfill, _CASES_OVERFILL)),
             layers,
@@ -243,8 +248,9 @@ class StreamFunction:
         strained = ((1.0, found.objective.solution.displacement),)
         extraction = self.extraction(problem, (found.field,), strained, machine)
         in_all, strand = [length * len(layers) for length in lengths], Strand(self.rho)
+        part, cut_by = problem.part.specimen, (_ROUNDS, self.strength, self.moves)
         return [
-            prune(whole, problem.part.specimen, length, machine, strand, _ROUNDS, self.strength)
+            prune_and_move(whole, layers, part, length, machine, strand, *cut_by)
             for whole, length in zip(extraction.whole(layers, group, in_all), in_all, strict=True)
         ]
 

@@ -1,0 +1,226 @@
+"""Strands moved sideways to where they make the part stiffer.
+
+The stiffness that a strand lends grows where it slides to fibre that is stretched more, and the
+strain of one virtual test says which way that is. A step along that slope is spread until strands
+keep their distances again, and tested: only what makes the part stiffer stays.
+"""
+
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
+from scipy.sparse.linalg import splu
+
+from ccfem.arrays import FloatArray, in_brief
+from ccfem.checks import check_number
+from ccfem.errors import InputError
+from ccfem.fibre_aware.prune import prune
+from ccfem.fibre_aware.strand_lines import StrandLines, strand_lines
+from ccfem.fibre_aware.strand_pull import fibre_energy, plane_strain
+from ccfem.fibre_aware.strand_spacing import spacing
+from ccfem.layers.layer import Layer
+from ccfem.machine.machine import Machine
+from ccfem.mesh.tet_mesh import TetMesh
+from ccfem.toolpaths import FIBRE, Toolpaths
+from ccfem.virtual_testing.equilibrium import equilibrium
+from ccfem.virtual_testing.specimen import Specimen
+from ccfem.virtual_testing.strand import Strand
+from ccfem.virtual_testing.strands import cut_strands
+
+__all__ = ["Judged", "check_moves", "moved", "prune_and_move", "stiffness_judge"]
+
+_STEP = 0.2
+"""First step, in widths: 95 % of the points move by no more, and none by more than twice that."""
+
+_FALL = 0.4
+"""Share of the step that is tried after one that did not help."""
+
+_SMALLEST = 0.01
+"""Step, in widths, below which it is left at that."""
+
+_BETTER = 1e-6
+"""Share by which a step has to help."""
+
+_CHEAPEST = 0.1
+"""Share of the fibre, that of the least strain, whose squared strain is the price of length."""
+
+_TOLERANCE = 1e-4
+"""Relative residual of the tests; the error of the stiffness is of its square."""
+
+
+@dataclass(frozen=True)
+class Judged:
+    """What a test of paths says.
+
+    Attributes
+    ----------
+    value : float
+        What is to grow.
+    strains_of : tuple of (float, (n, 3) array)
+        What a squared strain is worth, and the displacement, mm, that strains the fibre; one for
+        each load case.
+    """
+
+    value: float
+    strains_of: tuple[tuple[float, FloatArray], ...]
+
+    __repr__ = in_brief
+
+
+def stiffness_judge(
+    part: Specimen, machine: Machine, strand: Strand | None = None
+) -> Callable[[Toolpaths], Judged]:
+    """Judge of paths by the stiffness of the part, as in `ccfem.virtual_test` with the machine."""
+    axial = (Strand() if strand is None else strand).stiffness(part.modulus)
+    known: list[FloatArray] = []
+
+    def judge(toolpaths: Toolpaths) -> Judged:
+        strands = cut_strands(toolpaths, part.unreinforced.mesh, machine=machine)
+        found = equilibrium(part, strands, axial, known=known[-1:], tolerance=_TOLERANCE)
+        u = found.displacement
+        known[:] = [u]
+        energy = 0.5 * float(u.reshape(-1) @ (found.matrix @ u.reshape(-1)))
+        return Judged(part.stiffness(u, energy), ((1.0, u),))
+
+    return judge
+
+
+def moved(
+    toolpaths: Toolpaths,
+    layers: Sequence[Layer],
+    mesh: TetMesh,
+    machine: Machine,
+    judge: Callable[[Toolpaths], Judged],
+    moves: int,
+    inset: float = 0.5,
+) -> Toolpaths:
+    """Move fibre sideways, step by step, as long as a test says that it helps.
+
+    Strands keep a width from each other, or what they had of it, and the machine's least length.
+    Tight bends, what lies within two widths of them, and links that are marked stay where they are,
+    and so do paths of other kinds.
+
+    Parameters
+    ----------
+    toolpaths : Toolpaths
+        Of any strategy, on flat layers.
+    layers : sequence of Layer
+        Those layers.
+    mesh : TetMesh
+        Of the part.
+    machine : Machine
+    judge : callable
+        Tests toolpaths: `stiffness_judge` for one load case.
+    moves : int
+        Steps that are tested, at least 0.
+    inset : float, default 0.5
+        Least distance from the border, in widths; what is nearer to begin with comes no nearer.
+
+    Returns
+    -------
+    Toolpaths
+        The given ones where no step helped. Lengths change by some tenths of a per cent.
+
+    Raises
+    ------
+    InputError
+        When a layer is curved, or a number is out of its range.
+    """
+    check_number("moves", moves, at_least=0)
+    check_number("inset", inset, at_least=0.0, unit="fibre widths")
+    if any(layer.flat is None for layer in layers):
+        raise InputError("strands move on flat layers only; got a curved one: set moves to 0")
+    fibre = toolpaths.of_kind(FIBRE)
+    if not moves or not len(fibre):
+        return toolpaths
+    lines = strand_lines(fibre, layers, machine)
+    apart = spacing(lines, layers, machine, inset * machine.fibre_width)
+    smooth = splu(apart.roughness)
+    best, slide = judge(fibre), np.zeros(len(lines.path))
+    direction, step, helped = None, _STEP * machine.fibre_width, False
+    for _ in range(moves):
+        if direction is None:
+            direction = _direction(slide, lines, mesh, best, smooth)
+        trial = apart.spread(slide + step * direction)
+        judged = judge(lines.slid(trial))
+        if judged.value > (1.0 + _BETTER) * best.value:
+            best, slide, direction, helped = judged, trial, None, True
+            continue
+        step *= _FALL
+        if step < _SMALLEST * machine.fibre_width:
+            break
+    if not helped:
+        return toolpaths
+    others = toolpaths.select(toolpaths.kind != FIBRE)
+    return Toolpaths.concatenate([lines.slid(slide), others])
+
+
+def prune_and_move(
+    toolpaths: Toolpaths,
+    layers: Sequence[Layer],
+    part: Specimen,
+    length: float,
+    machine: Machine,
+    strand: Strand,
+    rounds: int,
+    strength: float,
+    moves: int,
+) -> Toolpaths:
+    """Cut fibre to a length, mm in all, move what is left, and cut what has become longer.
+
+    Parameters as of `ccfem.fibre_aware.prune.prune` and `moved`; moves follow the stiffness.
+    """
+    kept = prune(toolpaths, part, length, machine, strand, rounds, strength)
+    judge = stiffness_judge(part, machine, strand)
+    found = moved(kept, layers, part.unreinforced.mesh, machine, judge, moves)
+    return found if found is kept else prune(found, part, length, machine, strand, rounds=1)
+
+
+def check_moves(strategy: str, moves: int, strength: float = 0.0, cases: int = 1) -> None:
+    """Refuse moves where more counts than the stiffness in one load case.
+
+    Raises
+    ------
+    InputError
+    """
+    check_number(f"{strategy}.moves", moves, at_least=0)
+    if moves and strength:
+        raise InputError(
+            f"{strategy}.moves follow the stiffness alone; got moves {moves} and strength "
+            f"{strength:g}: set one of them to 0"
+        )
+    if moves and cases > 1:
+        raise InputError(
+            f"{strategy}.moves follow one load case; got moves {moves} and {cases} load cases: "
+            "set moves to 0"
+        )
+
+
+def _direction(
+    slide: FloatArray,
+    lines: StrandLines,
+    mesh: TetMesh,
+    judged: Judged,
+    smooth: Any,
+) -> FloatArray:
+    """Direction (P,) of slides that ascends the energy in the fibre less the price of its length.
+
+    95 % of the points move by at most 1, and none by more than 2.
+    """
+    points = lines.points(slide)
+    strain = plane_strain(mesh, judged.strains_of, lines.frame)
+    energy, length, slope = fibre_energy(points, lines.heights, lines.offsets, strain)
+    squared = energy / np.where(length > 0.0, length, 1.0)
+    order = np.argsort(squared)
+    along = np.cumsum(length[order])
+    price = squared[order][np.searchsorted(along, _CHEAPEST * along[-1])]
+    step = np.diff(points, axis=0) * (lines.path[1:] == lines.path[:-1])[:, None]
+    size = np.linalg.norm(step, axis=1)
+    step *= price / np.where(size > 0.0, size, 1.0)[:, None]
+    slope[:-1] += step
+    slope[1:] -= step
+    found = smooth.solve(np.einsum("pi,pi->p", slope, lines.normals))
+    size = np.abs(found[~lines.fixed])
+    usual = float(np.quantile(size, 0.95)) if len(size) else 0.0
+    return np.clip(found / usual, -2.0, 2.0) if usual > 0.0 else found

@@ -1,0 +1,162 @@
+"""Where the strain pulls strands: the energy in stretched fibre, and its gradient by their points.
+
+Sliding a piece of fibre with the strain held makes the part stiffer, to first order, by what the
+energy of that piece grows. The strain of linear cells jumps from cell to cell and has no slope in
+them; it is averaged at the corners of the cells and linear between them.
+"""
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+
+import numpy as np
+from numba import njit
+
+from ccfem.arrays import FloatArray, IntArray, freeze, in_brief
+from ccfem.elasticity.assembly import cell_gradients
+from ccfem.elasticity.recovery import strain_at_nodes
+from ccfem.geometry.locate import locate
+from ccfem.geometry.polylines import starts_segment
+from ccfem.mesh.tet_mesh import TetMesh
+from ccfem.tensor import in_plane, strain_from_voigt
+
+__all__ = ["PlaneStrain", "fibre_energy", "plane_strain"]
+
+_REACH = 1.0
+"""Distance outside the mesh, mm, up to which the strain goes on as in the nearest cell."""
+
+
+@dataclass(frozen=True)
+class PlaneStrain:
+    """Strain in the planes of the layers, continuous over the mesh.
+
+    Attributes
+    ----------
+    mesh : TetMesh
+    frame : (3, 3) array
+        Axes of the layers: two in their planes, and the normal.
+    values : (cases, n, 3) array
+        At the nodes, e11, e22 and e12 in the plane, times the square root of what the case counts.
+        Zero at nodes that are no corner of a cell.
+    slopes : (m, 4, 2) array, 1/mm
+        Gradients of the barycentric coordinates of each cell in the plane.
+    """
+
+    mesh: TetMesh
+    frame: FloatArray
+    values: FloatArray
+    slopes: FloatArray
+
+    __repr__ = in_brief
+
+    def __post_init__(self) -> None:
+        freeze(self, frame=float, values=float, slopes=float)
+
+
+def plane_strain(
+    mesh: TetMesh, strains_of: Sequence[tuple[float, FloatArray]], frame: FloatArray
+) -> PlaneStrain:
+    """Average the strain of displacements at the corners of the cells, weighted by volume.
+
+    Parameters
+    ----------
+    mesh : TetMesh
+    strains_of : sequence of (float, (n, 3) array)
+        What a squared strain is worth, and the displacement, mm, that strains the part; one for
+        each load case.
+    frame : (3, 3) array
+        Axes of the layers.
+    """
+    corners, n = mesh.corners, len(mesh.points)
+    weight = np.repeat(mesh.volumes, 4)
+    total = np.bincount(corners.ravel(), weight, n)
+    values = []
+    for worth, displacement in strains_of:
+        tensor = strain_from_voigt(strain_at_nodes(mesh, displacement)[:, :4])
+        strain = np.sqrt(worth) * in_plane(tensor, frame).reshape(-1, 3)
+        at_nodes = [np.bincount(corners.ravel(), weight * part, n) for part in strain.T]
+        values.append(np.stack(at_nodes, axis=1) / np.where(total > 0.0, total, 1.0)[:, None])
+    return PlaneStrain(mesh, frame, np.array(values), cell_gradients(mesh) @ frame[:2].T)
+
+
+def fibre_energy(
+    points: FloatArray, heights: FloatArray, offsets: IntArray, strain: PlaneStrain
+) -> tuple[FloatArray, FloatArray, FloatArray]:
+    """Energy in the stretched segments of polylines, and how it changes with their points.
+
+    A segment d has the energy ``max(d . eps d, 0)^2 / |d|^3``, eps being the strain at its middle:
+    its length times the square of the strain along it. All load cases add.
+
+    Parameters
+    ----------
+    points : (P, 2) array, mm
+        In the frame of the strain.
+    heights : (P,) array, mm
+        Along its normal.
+    offsets : (K + 1,) int array
+        As in CSR.
+    strain : PlaneStrain
+
+    Returns
+    -------
+    energy : (s,) array, mm
+        Of each segment.
+    length : (s,) array, mm
+    gradient : (P, 2) array
+        Of the sum of the energies.
+    """
+    first = np.flatnonzero(starts_segment(offsets))
+    middle = 0.5 * (points[first] + points[first + 1])
+    height = 0.5 * (heights[first] + heights[first + 1])
+    places = middle @ strain.frame[:2] + height[:, None] * strain.frame[2]
+    cell, weights = locate(strain.mesh.points, strain.mesh.corners, places, _REACH)
+    energy, length = np.zeros(len(first)), np.zeros(len(first))
+    gradient = np.zeros(points.shape)
+    _energy(
+        points,
+        first,
+        cell,
+        weights,
+        strain.mesh.corners,
+        strain.slopes,
+        strain.values,
+        energy,
+        length,
+        gradient,
+    )
+    return energy, length, gradient
+
+
+@njit(cache=True)
+def _energy(points, first, cell, weights, corners, slopes, values, energy, length, gradient):  # type: ignore[no-untyped-def]  # pragma: no cover
+    for s in range(len(first)):
+        i = first[s]
+        dx, dy = points[i + 1, 0] - points[i, 0], points[i + 1, 1] - points[i, 1]
+        size = np.sqrt(dx * dx + dy * dy)
+        length[s] = size
+        c = cell[s]
+        if c < 0 or size == 0.0:
+            continue
+        for k in range(len(values)):
+            e1, e2, e12 = 0.0, 0.0, 0.0
+            qx, qy = 0.0, 0.0  # slope of d . eps d with the place
+            for a in range(4):
+                n = corners[c, a]
+                v1, v2, v12 = values[k, n, 0], values[k, n, 1], values[k, n, 2]
+                e1 += weights[s, a] * v1
+                e2 += weights[s, a] * v2
+                e12 += weights[s, a] * v12
+                along = v1 * dx * dx + v2 * dy * dy + 2.0 * v12 * dx * dy
+                qx += along * slopes[c, a, 0]
+                qy += along * slopes[c, a, 1]
+            ex, ey = e1 * dx + e12 * dy, e12 * dx + e2 * dy
+            q = dx * ex + dy * ey
+            if q <= 0.0:
+                continue
+            cube = size * size * size
+            energy[s] += q * q / cube
+            turn, fall = 4.0 * q / cube, 3.0 * q * q / (cube * size * size)
+            slide = q / cube  # half of 2 q / |d|^3: the middle moves by half of each end
+            gradient[i, 0] += slide * qx - turn * ex + fall * dx
+            gradient[i, 1] += slide * qy - turn * ey + fall * dy
+            gradient[i + 1, 0] += slide * qx + turn * ex - fall * dx
+            gradient[i + 1, 1] += slide * qy + turn * ey - fall * dy

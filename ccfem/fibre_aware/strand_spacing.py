@@ -1,0 +1,279 @@
+"""Strands spread until they keep their distances: from each other, and from the border.
+
+Of all smooth slides the least one is looked for that undoes what is too near. That is a sparse
+least-squares problem, solved again with what is too near then, so that a whole pack of strands
+gives way at once.
+"""
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
+import scipy.sparse as sp
+import shapely
+from numba import njit
+from scipy.sparse.linalg import splu
+from scipy.spatial import cKDTree
+
+from ccfem.arrays import FloatArray, IntArray, freeze, in_brief
+from ccfem.fibre_aware.strand_lines import StrandLines
+from ccfem.layers.layer import Layer
+from ccfem.machine.machine import Machine
+
+__all__ = ["Spacing", "spacing"]
+
+_REACH = 2.0
+"""Distance, in widths, within which points are looked at."""
+
+_OWN = 5.0
+"""Arc length, in widths, from which on a strand keeps its distance from itself."""
+
+_STIFF = 300.0
+"""What a missing distance counts against a slide of the same size."""
+
+_ROUNDS = 5
+"""Times that what is too near is looked for."""
+
+_FACING = 0.35
+"""Cosine of the largest angle between a strand's normal and that of the border at which points
+slide off the border; ends that run onto it do not."""
+
+_BORDER_STEP = 0.5
+"""Longest piece of the border, in widths."""
+
+_NEAREST = 3
+"""Pieces of the border that are looked at for a point."""
+
+_FAR = 1e6
+"""Distance, mm, of layers in the search for what is near."""
+
+
+@dataclass(frozen=True)
+class Spacing:
+    """Distances that strands keep.
+
+    Attributes
+    ----------
+    lines : StrandLines
+    width : float, mm
+        That strands are apart.
+    inset : (P,) array, mm
+        Least distance of each point from the border.
+    border : (b, 2, 2) array, mm
+        Pieces of the borders of all layers, the section on their left.
+    inward : (b, 3, 2) array
+        Vectors into the section at the start, along, and at the end of each piece.
+    tree : cKDTree
+        Of the middles of the pieces, with their layers.
+    roughness : csc_array (P, P)
+        What slides cost (`StrandLines.roughness`).
+    """
+
+    lines: StrandLines
+    width: float
+    inset: FloatArray
+    border: FloatArray
+    inward: FloatArray
+    tree: cKDTree
+    roughness: Any
+
+    __repr__ = in_brief
+
+    def __post_init__(self) -> None:
+        freeze(self, inset=float, border=float, inward=float)
+
+    def spread(self, slide: FloatArray) -> FloatArray:
+        """Slides (P,), mm, near to given ones after which strands keep their distances."""
+        lines, count = self.lines, len(self.lines.path)
+        points = lines.points(slide)
+        pairs = self._pairs(points)
+        _, near = self.tree.query(_lifted(points, lines.layer), k=_NEAREST)
+        for _ in range(_ROUNDS):
+            points = lines.start + slide[:, None] * lines.normals
+            column, value, missing = _too_near(points, lines.normals, pairs, self.width)
+            off, wanted = _outside(
+                points, near, self.border, self.inward, self.inset, lines.normals
+            )
+            rows = np.repeat(np.arange(len(missing)), 3)
+            apart = sp.csr_array((value.ravel(), (rows, column.ravel())), (len(missing), count))
+            matrix = self.roughness + _STIFF * (apart.T @ apart + sp.diags_array(off * off))
+            right = _STIFF * (apart.T @ missing + off * wanted)
+            slide = slide + _solve(matrix, right)
+        return slide
+
+    def _pairs(self, points: FloatArray) -> IntArray:
+        """Points and first points of segments (n, 2) that may come too near to each other."""
+        lines, width = self.lines, self.width
+        paths, reach = lines.toolpaths, _REACH * width
+        low = points.min(axis=0)
+        shape = ((points.max(axis=0) - low) / reach).astype(np.int64) + 1
+        order, layer = np.unique(lines.layer, return_inverse=True)
+        heads = np.full((len(order), *shape), -1)
+        following = np.empty(len(points), dtype=np.int64)
+        place = ((points - low) / reach).astype(np.int64)
+        pairs = np.empty((0, 2), dtype=np.int64)
+        whole = np.where(paths.closed, paths.lengths, np.inf)
+        for _ in range(2):  # counted, then written
+            heads[:] = -1
+            found = _near(
+                points,
+                place,
+                layer,
+                lines.path,
+                lines.arc,
+                whole,
+                reach,
+                _OWN * width,
+                heads,
+                following,
+                pairs,
+            )
+            pairs = np.empty((found, 2), dtype=np.int64) if len(pairs) < found else pairs
+        return pairs
+
+
+def spacing(lines: StrandLines, layers: Sequence[Layer], machine: Machine, inset: float) -> Spacing:
+    """Distances that strands keep on their layers.
+
+    Parameters
+    ----------
+    lines : StrandLines
+    layers : sequence of Layer
+        All on which there are strands.
+    machine : Machine
+    inset : float, mm
+        Least distance from the border. What lies nearer to begin with comes no nearer.
+    """
+    pieces, inward, owner = [], [], []
+    for layer in layers:
+        section = shapely.orient_polygons(layer.plane.polygon)
+        for ring in shapely.get_rings(shapely.get_parts(section)):
+            longest = _BORDER_STEP * machine.fibre_width
+            line = shapely.get_coordinates(shapely.segmentize(ring, longest))
+            line = line[np.append(True, (np.diff(line, axis=0) != 0.0).any(axis=1))]
+            step = np.diff(line, axis=0)
+            left = np.stack([-step[:, 1], step[:, 0]], axis=1)
+            left /= np.linalg.norm(left, axis=1)[:, None]
+            corner = left + np.roll(left, 1, axis=0)
+            pieces.append(np.stack([line[:-1], line[1:]], axis=1))
+            inward.append(np.stack([corner, left, np.roll(corner, -1, axis=0)], axis=1))
+            owner.append(np.full(len(step), layer.index))
+    border, normals = np.concatenate(pieces), np.concatenate(inward)
+    tree = cKDTree(_lifted(border.mean(axis=1), np.concatenate(owner)))
+    _, near = tree.query(_lifted(lines.start, lines.layer), k=_NEAREST)
+    depth = np.clip(_depths(lines.start, near, border, normals), 0.0, inset)
+    return Spacing(lines, machine.fibre_width, depth, border, normals, tree, lines.roughness)
+
+
+def _lifted(points: FloatArray, layer: IntArray) -> FloatArray:
+    """Points (n, 3) of which those on different layers are far from each other."""
+    return np.column_stack([points, _FAR * layer])
+
+
+def _solve(matrix: Any, right: FloatArray) -> FloatArray:
+    """Solve a sparse symmetric positive definite system."""
+    options = {"SymmetricMode": True}
+    factor = splu(
+        matrix.tocsc(), permc_spec="MMD_AT_PLUS_A", diag_pivot_thresh=0.0, options=options
+    )
+    return np.asarray(factor.solve(right))
+
+
+@njit(cache=True)
+def _near(points, place, layer, path, arc, whole, reach, own, heads, following, pairs):  # type: ignore[no-untyped-def]  # pragma: no cover
+    """Count, and write where there is room, points and segments whose starts are within reach."""
+    for p in range(len(points)):
+        following[p] = heads[layer[p], place[p, 0], place[p, 1]]
+        heads[layer[p], place[p, 0], place[p, 1]] = p
+    count, most = 0, reach * reach
+    for p in range(len(points)):
+        for i in range(max(place[p, 0] - 1, 0), min(place[p, 0] + 2, heads.shape[1])):
+            for j in range(max(place[p, 1] - 1, 0), min(place[p, 1] + 2, heads.shape[2])):
+                q = heads[layer[p], i, j]
+                while q >= 0:
+                    dx, dy = points[q, 0] - points[p, 0], points[q, 1] - points[p, 1]
+                    wanted = dx * dx + dy * dy < most
+                    wanted = wanted and q + 1 < len(points) and path[q + 1] == path[q]
+                    if wanted and path[q] == path[p]:
+                        apart = abs(arc[q] - arc[p])
+                        wanted = min(apart, whole[path[p]] - apart) > own
+                    if wanted:
+                        if count < len(pairs):
+                            pairs[count, 0], pairs[count, 1] = p, q
+                        count += 1
+                    q = following[q]
+    return count
+
+
+@njit(cache=True)
+def _too_near(points, normals, pairs, least):  # type: ignore[no-untyped-def]  # pragma: no cover
+    """Points and segments that are too near: which slide, how that parts them, and what misses."""
+    count = 0
+    for write in range(2):
+        if write:
+            column, value = np.zeros((count, 3), np.int64), np.zeros((count, 3))
+            missing = np.zeros(count)
+            count = 0
+        for k in range(len(pairs)):
+            p, q = pairs[k, 0], pairs[k, 1]
+            ex, ey = points[q + 1, 0] - points[q, 0], points[q + 1, 1] - points[q, 1]
+            rx, ry = points[p, 0] - points[q, 0], points[p, 1] - points[q, 1]
+            square = ex * ex + ey * ey
+            s = min(max((rx * ex + ry * ey) / square, 0.0), 1.0) if square > 0.0 else 0.0
+            gx, gy = rx - s * ex, ry - s * ey
+            distance = np.sqrt(gx * gx + gy * gy)
+            if distance >= least or distance < 1e-9:
+                continue
+            if write:
+                gx, gy = gx / distance, gy / distance
+                column[count, 0], column[count, 1], column[count, 2] = p, q, q + 1
+                value[count, 0] = gx * normals[p, 0] + gy * normals[p, 1]
+                value[count, 1] = -(1.0 - s) * (gx * normals[q, 0] + gy * normals[q, 1])
+                value[count, 2] = -s * (gx * normals[q + 1, 0] + gy * normals[q + 1, 1])
+                missing[count] = least - distance
+            count += 1
+    return column, value, missing
+
+
+@njit(cache=True)
+def _from_border(x, y, near, border, inward):  # type: ignore[no-untyped-def]  # pragma: no cover
+    """Signed depth of a place in the section, and the unit vector that leads farther in."""
+    best, gx, gy, nx, ny = np.inf, 0.0, 0.0, 0.0, 0.0
+    for b in near:
+        ex, ey = border[b, 1, 0] - border[b, 0, 0], border[b, 1, 1] - border[b, 0, 1]
+        rx, ry = x - border[b, 0, 0], y - border[b, 0, 1]
+        s = min(max((rx * ex + ry * ey) / (ex * ex + ey * ey), 0.0), 1.0)
+        hx, hy = rx - s * ex, ry - s * ey
+        if hx * hx + hy * hy < best:
+            best, gx, gy = hx * hx + hy * hy, hx, hy
+            side = 0 if s == 0.0 else (2 if s == 1.0 else 1)
+            nx, ny = inward[b, side, 0], inward[b, side, 1]
+    distance = np.sqrt(best)
+    if distance < 1e-9:
+        size = max(np.sqrt(nx * nx + ny * ny), 1e-9)
+        return 0.0, nx / size, ny / size
+    sign = 1.0 if gx * nx + gy * ny >= 0.0 else -1.0
+    return sign * distance, sign * gx / distance, sign * gy / distance
+
+
+@njit(cache=True)
+def _depths(points, near, border, inward):  # type: ignore[no-untyped-def]  # pragma: no cover
+    depth = np.empty(len(points))
+    for p in range(len(points)):
+        depth[p], _, _ = _from_border(points[p, 0], points[p, 1], near[p], border, inward)
+    return depth
+
+
+@njit(cache=True)
+def _outside(points, near, border, inward, inset, normals):  # type: ignore[no-untyped-def]  # pragma: no cover
+    """How far in a slide leads, and how much farther in points should be; 0 where they are in."""
+    off, missing = np.zeros(len(points)), np.zeros(len(points))
+    for p in range(len(points)):
+        if inset[p] == 0.0:
+            continue
+        depth, x, y = _from_border(points[p, 0], points[p, 1], near[p], border, inward)
+        across = x * normals[p, 0] + y * normals[p, 1]
+        if depth < inset[p] and abs(across) > _FACING:
+            off[p], missing[p] = across, inset[p] - depth
+    return off, missing

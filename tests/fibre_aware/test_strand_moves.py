@@ -1,0 +1,163 @@
+"""Strands that are moved to where they make the part stiffer."""
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+import shapely
+
+from ccfem.errors import InputError
+from ccfem.fibre_aware.strand_lines import strand_lines
+from ccfem.fibre_aware.strand_moves import moved, stiffness_judge
+from ccfem.fibre_aware.strand_pull import fibre_energy, plane_strain
+from ccfem.fibre_aware.strand_spacing import spacing
+from ccfem.machine.machine import Machine
+from ccfem.strategies import create
+from ccfem.toolpaths import FIBRE, TRAVEL, Toolpaths
+from ccfem.virtual_testing.specimen import Specimen
+from ccfem.virtual_testing.virtual_test import virtual_test
+
+MACHINE = Machine()
+
+
+def laid(lines, layers):
+    """Lay the same lines on all layers."""
+    return Toolpaths.concatenate([Toolpaths.from_plane(lines, layer) for layer in layers])
+
+
+def in_plane_of(layer, line):
+    """Points in the axes of a layer from points (x, y) of the part."""
+    line = np.asarray(line, dtype=float)
+    return np.column_stack([line, np.zeros(len(line))]) @ layer.plane.frame[:2].T
+
+
+def straight(layers, *heights):
+    """Straight strands along the beam at some heights."""
+    along = np.linspace(3.0, 57.0, 60)
+    lines = [np.column_stack([along, np.full(60, y)]) for y in heights]
+    return laid([in_plane_of(layers[0], line) for line in lines], layers)
+
+
+def test_energy_of_even_strain_is_length_times_strain_squared(bent_beam):
+    stress, layers = bent_beam
+    mesh, frame = stress.mesh, layers[0].plane.frame
+    slope = np.array([[2e-3, 1e-3, 0.0], [4e-4, -1e-3, 0.0], [0.0, 0.0, 5e-4]])
+    strain = plane_strain(mesh, [(2.0, mesh.points @ slope.T)], frame)
+    points = np.array([[10.0, 3.0], [25.0, 7.0]]) @ frame[:2, :2].T
+    energy, length, _ = fibre_energy(points, np.full(2, 1.5), np.array([0, 2]), strain)
+    direction = np.array([15.0, 4.0, 0.0]) / np.hypot(15.0, 4.0)
+    along = direction @ (0.5 * (slope + slope.T)) @ direction
+    assert length[0] == pytest.approx(np.hypot(15.0, 4.0))
+    assert energy[0] == pytest.approx(2.0 * along**2 * length[0], rel=1e-9)
+
+
+def test_slope_of_the_energy_is_its_difference(bent_beam):
+    stress, layers = bent_beam
+    mesh, frame = stress.mesh, layers[0].plane.frame
+    rng = np.random.default_rng(3)
+    # Several load cases add; shortened segments have no energy and no slope.
+    cases = [(1.5, rng.normal(size=mesh.points.shape)), (0.5, stress.displacement)]
+    strain = plane_strain(mesh, cases, frame)
+    points = np.column_stack([np.linspace(5.0, 55.0, 40), rng.uniform(2.0, 22.0, 40)])
+    heights, offsets = np.full(40, 1.3), np.array([0, 17, 40])
+    energy, _, slope = fibre_energy(points, heights, offsets, strain)
+    assert 0 < (energy > 0.0).sum() <= 38
+    step = 1e-6
+    for p, axis in [(0, 0), (5, 1), (16, 0), (17, 1), (30, 0), (39, 1)]:
+        values = []
+        for sign in (1.0, -1.0):
+            other = points.copy()
+            other[p, axis] += sign * step
+            values.append(fibre_energy(other, heights, offsets, strain)[0].sum())
+        difference = (values[0] - values[1]) / (2.0 * step)
+        assert slope[p, axis] == pytest.approx(difference, rel=1e-5, abs=1e-6 * abs(slope).max())
+
+
+def test_a_pack_of_strands_gives_way_at_once_and_keeps_off_the_border(bent_beam):
+    _, layers = bent_beam
+    paths = straight(layers, 1.0, 1.7, 2.4, 3.1, 3.8, 4.5)
+    lines = strand_lines(paths, layers, MACHINE)
+    apart = spacing(lines, layers, MACHINE, 0.5)
+    slide = apart.spread(np.zeros(len(lines.path)))
+    for layer in layers:
+        section = layer.plane.polygon
+        strands = [
+            shapely.linestrings(path @ layer.plane.frame[:2].T)
+            for path in lines.slid(slide).on_layer(layer.index)
+        ]
+        for k, strand in enumerate(strands):
+            assert strand.distance(section.boundary) > 0.49
+            for other in strands[k + 1 :]:
+                assert strand.distance(other) > 0.98
+            assert shapely.hausdorff_distance(strand, strand.simplify(0.05)) < 0.05
+
+
+def test_what_is_far_enough_apart_stays(bent_beam):
+    _, layers = bent_beam
+    lines = strand_lines(straight(layers, 2.0, 3.1, 6.0), layers, MACHINE)
+    slide = spacing(lines, layers, MACHINE, 0.5).spread(np.zeros(len(lines.path)))
+    assert np.array_equal(slide, np.zeros(len(lines.path)))
+
+
+def test_strands_of_a_bent_beam_move_to_its_stretched_side(bent_beam):
+    stress, layers = bent_beam
+    paths = straight(layers, 8.0, 9.2, 10.4)
+    judge = stiffness_judge(Specimen.of(stress), MACHINE)
+    found = moved(paths, layers, stress.mesh, MACHINE, judge, 6)
+    before, after = (
+        virtual_test(each, stress, machine=MACHINE, span=()).ratio for each in (paths, found)
+    )
+    assert after > 1.01 * before
+    assert found.points[:, 1].mean() < paths.points[:, 1].mean() - 0.2
+    assert (found.lengths >= MACHINE.minimum_length).all()
+
+
+def test_paths_that_no_step_helps_are_returned(bent_beam):
+    stress, layers = bent_beam
+    paths = straight(layers, 20.0, 22.0)  # shortened: they carry nothing wherever they lie
+    judge = stiffness_judge(Specimen.of(stress), MACHINE)
+    assert moved(paths, layers, stress.mesh, MACHINE, judge, 2) is paths
+    assert moved(paths, layers, stress.mesh, MACHINE, judge, 0) is paths
+
+
+def test_links_turns_and_other_kinds_stay(bent_beam):
+    stress, layers = bent_beam
+    low = np.column_stack([np.linspace(5.0, 55.0, 40), np.full(40, 7.0)])
+    high = low[::-1] + np.array([0.0, 1.2])
+    line = in_plane_of(layers[0], np.concatenate([low, high]))
+    link = np.zeros(80, dtype=bool)
+    link[39] = True
+    fibre = Toolpaths.concatenate(
+        [Toolpaths.from_plane([line], layer, link=[link]) for layer in layers]
+    )
+    travel = replace(straight(layers, 3.0), kind=np.full(len(layers), TRAVEL))
+    judge = stiffness_judge(Specimen.of(stress), MACHINE)
+    paths = Toolpaths.concatenate([fibre, travel])
+    found = moved(paths, layers, stress.mesh, MACHINE, judge, 3)
+    assert found is not paths
+    assert np.array_equal(found.of_kind(TRAVEL).points, travel.points)
+    after = found.of_kind(FIBRE)
+    assert after.link.sum() == np.ceil(1.2 / 0.6) * len(layers)
+    turn = np.abs(after.points[:, 0] - 55.0) < 0.3
+    assert np.isin(np.round(after.points[turn, 1], 6), [7.0, 7.6, 8.2]).all()
+
+
+def test_paths_keep_the_least_length(bent_beam):
+    _, layers = bent_beam
+    angle = np.linspace(0.0, np.pi, 60)
+    arc = np.column_stack([30.0 + 14.0 * np.cos(angle), 20.0 - 14.0 * np.sin(angle)])
+    paths = laid([in_plane_of(layers[0], arc)], layers)
+    length = paths.lengths[0]
+    lines = strand_lines(paths, layers, replace(MACHINE, minimum_length=length - 1e-6))
+    lengths = [lines.slid(np.full(len(lines.path), s)).lengths for s in (-0.5, 0.5)]
+    # An arc of radius 14 that is 0.5 wider is longer by pi / 2; the other one is drawn out.
+    assert np.min(lengths) == pytest.approx(length - 1e-6, rel=1e-9)
+    assert np.max(lengths) == pytest.approx(length + 0.5 * np.pi, rel=1e-3)
+
+
+@pytest.mark.parametrize("strategy", ["pruned", "stream_function"])
+def test_moves_are_of_stiffness_alone(strategy):
+    with pytest.raises(InputError, match="set one of them to 0"):
+        create(strategy, {"moves": 3, "strength": 0.2})
+    with pytest.raises(InputError, match="moves"):
+        create(strategy, {"moves": -1})
