@@ -2,10 +2,11 @@
 
     python -m benchmarks.studies.confirmed_gain [PART ...] [--pictures DIR]
 
-Four parts are planned at equal fibre by `isocurve`, `pruned` and `stream_function`, on linear cells
-under one load. The same paths are tested on cells with midside nodes, and under that load turned by
-15 degrees in the plane of the layers. The last three were looked at for how a design converges and
-meets the border; no other parameter was chosen on them.
+Four parts are planned at equal fibre by `isocurve`, `pruned` and `stream_function`, the last two
+with and without moves, on linear cells under one load. The same paths are tested on cells with
+midside nodes, and under that load turned by 15 degrees in the plane of the layers. The last three
+parts were looked at for how a design converges and meets the border; no other parameter was chosen
+on them.
 """
 
 import sys
@@ -36,7 +37,14 @@ from ccfem.virtual_testing.virtual_test import virtual_test
 __all__ = ["COVERAGE", "LAYERS", "PARTS", "compared", "posed"]
 
 COVERAGE, LAYERS, TURN = 0.45, 6, 15.0
-STRATEGIES = ("isocurve", "pruned", "stream_function")
+STRATEGIES: dict[str, tuple[str, dict[str, int]]] = {
+    "isocurve": ("isocurve", {}),
+    "pruned": ("pruned", {}),
+    "pruned, moved": ("pruned", {"moves": 6}),
+    "stream_function": ("stream_function", {}),
+    "stream_function, moved": ("stream_function", {"moves": 6}),
+}
+"""Names and parameters of what is compared."""
 
 
 def lever() -> TetMesh:
@@ -122,8 +130,9 @@ def compared(name: str, pictures: Path | None = None) -> list[str]:
     }
     most = upper_bound(coarse["planned"], layers, wanted * LAYERS, machine)
     rows = []
-    for strategy in STRATEGIES:
-        planned = plan_to_length(create(strategy), layers, coarse["planned"], machine, wanted)
+    for strategy, parameters in STRATEGIES.items():
+        planner = create(*parameters)
+        planned = plan_to_length(planner, layers, coarse["planned"], machine, wanted)
         ratios = [
             virtual_test(planned.toolpaths, part, span=(), machine=machine).ratio
             for part in parts.values()

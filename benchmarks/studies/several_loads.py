@@ -10,6 +10,7 @@ that of isocurves with layers by case and the same cut, and against the bound th
 import sys
 import time
 from collections.abc import Mapping
+from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
@@ -28,7 +29,7 @@ from ccfem.virtual_testing.several_cases import virtual_tests
 
 __all__ = ["PARTS", "compared"]
 
-COVERAGE = 0.45
+COVERAGE, MOVES = 0.45, 6
 PARTS = {
     "two_load_plate": ("two_load_plate", {}),
     "two_load_plate, 3 cases": ("two_load_plate", {"both_ways": True}),
@@ -54,7 +55,12 @@ def compared(name: str, parameters: Mapping[str, object], pictures: Path | None)
         spent[f"for {field.case}"] = time.process_time() - started
         tested[f"for {field.case}"] = virtual_tests(planned.toolpaths, cases, machine=machine)
     best = np.array([found.ratios[k] for k, found in enumerate(tested.values())])
-    for what, one in {"isocurve": Isocurve(), "stream_function": strategy}.items():
+    together = {
+        "isocurve": Isocurve(),
+        "stream_function": strategy,
+        "stream_function, moved": replace(strategy, moves=MOVES),
+    }
+    for what, one in together.items():
         started = time.process_time()
         planned = plan_cases(one, layers, cases, machine, wanted)
         spent[f"for all, {what}"] = time.process_time() - started

@@ -22,6 +22,7 @@ from ccfem.elasticity.stress_field import StressField, solved
 from ccfem.fibre_aware.heights import nearest_layer
 from ccfem.fibre_aware.prune import prune
 from ccfem.fibre_aware.smeared import SmearedPart
+from ccfem.fibre_aware.strand_moves import prune_and_move
 from ccfem.fibre_aware.stream_design import design
 from ccfem.fibre_aware.stream_paths import CLEARANCE, SHORTEST
 from ccfem.fibre_aware.stream_start import start_field
@@ -35,11 +36,13 @@ from ccfem.papers.chen_2021.loop import authors_loop
 from ccfem.planning.whole_part import full_length
 from ccfem.strategies.stream_function import StreamFunction
 from ccfem.toolpaths import Toolpaths
+from ccfem.virtual_testing.strand import Strand
 from ccfem.virtual_testing.virtual_test import virtual_test
 
 __all__ = ["losses", "share_inside"]
 
 COVERAGE = 0.45
+MOVES = 6
 AUTHORS = 34.66e3
 """Length of the authors' fibre in twelve layers, mm."""
 
@@ -112,7 +115,11 @@ def losses(
     whole = [
         extraction.layer_paths(x, extraction.fields[group[k]], shift) for k, x in enumerate(layers)
     ]
-    rows["linked: the paths"] = tested(Toolpaths.concatenate(whole), machine)
+    paths = Toolpaths.concatenate(whole)
+    rows["linked: the paths"] = tested(paths, machine)
+    part, how = problem.part.specimen, (3, 0.0, MOVES)
+    moved = prune_and_move(paths, layers, part, length, machine, Strand(), *how)
+    rows[f"moved in {MOVES} steps"] = tested(moved, machine)
     return rows
 
 

@@ -6,7 +6,8 @@ case counts, s_i, grows with its compliance over the least that any paths could 
 where the worst case matters, with the twentieth power.
 """
 
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass
 
 import numpy as np
 
@@ -14,14 +15,16 @@ from ccfem.arrays import FloatArray
 from ccfem.checks import check_known, check_number
 from ccfem.fibre_aware.cases_bound import OBJECTIVES, WORST
 from ccfem.fibre_aware.prune import fibre_length, profiles, shorten
+from ccfem.fibre_aware.strand_moves import Judged, moved
+from ccfem.layers.layer import Layer
 from ccfem.machine.machine import Machine
 from ccfem.toolpaths import Toolpaths
 from ccfem.virtual_testing.equilibrium import Equilibrium, equilibrium
 from ccfem.virtual_testing.specimen import Specimen
 from ccfem.virtual_testing.strand import Strand
-from ccfem.virtual_testing.strands import cut_strands
+from ccfem.virtual_testing.strands import Strands, cut_strands
 
-__all__ = ["case_counts", "prune_cases"]
+__all__ = ["case_counts", "cases_judge", "prune_and_move_cases", "prune_cases"]
 
 _POWERS = {WORST: 20.0, "sum": 1.0}
 _TOLERANCE = 1e-5
@@ -94,27 +97,104 @@ def prune_cases(
     excess = fibre_length(toolpaths) - length
     if excess <= 0.0:
         return toolpaths
-    axial = (Strand() if strand is None else strand).stiffness(parts[0].modulus)
-    known: list[tuple[FloatArray, ...]] = [()] * len(parts)
+    test = _tests(parts, weights, bounds, strand, objective)
     for k in range(rounds):
         strands = cut_strands(toolpaths, parts[0].unreinforced.mesh)
-        found = [
-            equilibrium(part, strands, axial, known=near, tolerance=_TOLERANCE)
-            for part, near in zip(parts, known, strict=True)
-        ]
-        known = [(one.displacement,) for one in found]
-        work = np.array([_work(part, one) for part, one in zip(parts, found, strict=True)])
-        before = np.array([2.0 * part.unreinforced.strain_energy for part in parts])
-        moved = np.array([not part.forces.any() for part in parts])
-        ratios = np.where(moved, work / before, before / work)
-        counts = case_counts(weights, bounds, ratios, objective)
+        tested = test(strands)
         value = np.zeros(len(strands.length))
-        for share, one in zip(counts / work, found, strict=True):
-            value += share * np.where(one.carries, one.strain, 0.0) ** 2
+        for worth, one in zip(tested.worth, tested.found, strict=True):
+            value += worth * np.where(one.carries, one.strain, 0.0) ** 2
         wanted = length + excess * (1.0 - (k + 1) / rounds)
         along = profiles(toolpaths, strands, value)
         toolpaths = shorten(toolpaths, along, wanted, machine.minimum_length)
     return toolpaths
+
+
+def prune_and_move_cases(
+    toolpaths: Toolpaths,
+    layers: Sequence[Layer],
+    parts: Sequence[Specimen],
+    weights: FloatArray,
+    bounds: FloatArray,
+    length: float,
+    machine: Machine,
+    strand: Strand,
+    objective: str = WORST,
+    rounds: int = 3,
+    moves: int = 0,
+) -> Toolpaths:
+    """Cut fibre to a length, mm in all, move what is left, and cut what has become longer.
+
+    Parameters as of `prune_cases` and `ccfem.fibre_aware.strand_moves.moved`.
+    """
+    alike = (parts, weights, bounds, length, machine, strand, objective)
+    kept = prune_cases(toolpaths, *alike, rounds)
+    judge = cases_judge(parts, weights, bounds, machine, strand, objective)
+    found = moved(kept, layers, parts[0].unreinforced.mesh, machine, judge, moves)
+    return found if found is kept else prune_cases(found, *alike, rounds=1)
+
+
+def cases_judge(
+    parts: Sequence[Specimen],
+    weights: FloatArray,
+    bounds: FloatArray,
+    machine: Machine,
+    strand: Strand | None = None,
+    objective: str = WORST,
+) -> Callable[[Toolpaths], Judged]:
+    """Judge of paths by the stiffness in all load cases, with the room that strands need.
+
+    Parameters as of `prune_cases`. The value is the mean of ratio over bound that counts each case
+    as `case_counts` does: with the objective "worst" it is near to the worst.
+    """
+    test = _tests(parts, weights, bounds, strand, objective)
+    power = _POWERS[objective]
+
+    def judge(toolpaths: Toolpaths) -> Judged:
+        tested = test(cut_strands(toolpaths, parts[0].unreinforced.mesh, machine=machine))
+        shares = np.asarray(weights) / np.sum(weights)
+        mean = float(shares @ (np.asarray(bounds) / tested.ratios) ** power)
+        strains = [one.displacement for one in tested.found]
+        return Judged(
+            mean ** (-1.0 / power), tuple(zip(tested.worth.tolist(), strains, strict=True))
+        )
+
+    return judge
+
+
+@dataclass(frozen=True)
+class _Tested:
+    """Tests under all load cases: equilibrium, stiffness ratio, worth of a squared strain."""
+
+    found: tuple[Equilibrium, ...]
+    ratios: FloatArray
+    worth: FloatArray
+
+
+def _tests(
+    parts: Sequence[Specimen],
+    weights: FloatArray,
+    bounds: FloatArray,
+    strand: Strand | None,
+    objective: str,
+) -> Callable[[Strands], _Tested]:
+    """Test of strands under all load cases, each from where the last one ended."""
+    axial = (Strand() if strand is None else strand).stiffness(parts[0].modulus)
+    before = np.array([2.0 * part.unreinforced.strain_energy for part in parts])
+    pulled = np.array([part.forces.any() for part in parts])
+    known: list[tuple[FloatArray, ...]] = [()] * len(parts)
+
+    def test(strands: Strands) -> _Tested:
+        found = [
+            equilibrium(part, strands, axial, known=near, tolerance=_TOLERANCE)
+            for part, near in zip(parts, known, strict=True)
+        ]
+        known[:] = [(one.displacement,) for one in found]
+        work = np.array([_work(part, one) for part, one in zip(parts, found, strict=True)])
+        ratios = np.where(pulled, before / work, work / before)
+        return _Tested(tuple(found), ratios, case_counts(weights, bounds, ratios, objective) / work)
+
+    return test
 
 
 def _work(part: Specimen, found: Equilibrium) -> float:

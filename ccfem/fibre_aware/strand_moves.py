@@ -111,7 +111,7 @@ def moved(
         Of the part.
     machine : Machine
     judge : callable
-        Tests toolpaths: `stiffness_judge` for one load case.
+        Tests toolpaths: `stiffness_judge`, or `ccfem.fibre_aware.prune_cases.cases_judge`.
     moves : int
         Steps that are tested, at least 0.
     inset : float, default 0.5
@@ -177,8 +177,8 @@ def prune_and_move(
     return found if found is kept else prune(found, part, length, machine, strand, rounds=1)
 
 
-def check_moves(strategy: str, moves: int, strength: float = 0.0, cases: int = 1) -> None:
-    """Refuse moves where more counts than the stiffness in one load case.
+def check_moves(strategy: str, moves: int, strength: float) -> None:
+    """Refuse moves where strength counts beside the stiffness.
 
     Raises
     ------
@@ -189,11 +189,6 @@ def check_moves(strategy: str, moves: int, strength: float = 0.0, cases: int = 1
         raise InputError(
             f"{strategy}.moves follow the stiffness alone; got moves {moves} and strength "
             f"{strength:g}: set one of them to 0"
-        )
-    if moves and cases > 1:
-        raise InputError(
-            f"{strategy}.moves follow one load case; got moves {moves} and {cases} load cases: "
-            "set moves to 0"
         )
 
 

@@ -16,7 +16,7 @@ from ccfem.elasticity.weighted_cases import WeightedCases
 from ccfem.errors import InputError
 from ccfem.fibre_aware.cases_bound import single_bounds
 from ccfem.fibre_aware.plan_cases import plan_by_layers
-from ccfem.fibre_aware.prune_cases import prune_cases
+from ccfem.fibre_aware.prune_cases import prune_and_move_cases
 from ccfem.fibre_aware.strand_moves import check_moves, prune_and_move
 from ccfem.fibre_aware.strength_value import refuse_strength
 from ccfem.layers.layer import Layer
@@ -66,7 +66,7 @@ class Pruned:
     moves : int, default 0
         Steps by which what is left is moved sideways, each tested
         (`ccfem.fibre_aware.strand_moves`): 6 make a part stiffer by 1 to 3 %, for some three times
-        the time. Of one load case, without strength.
+        the time. Not with strength.
     """
 
     of: str = "isocurve"
@@ -173,7 +173,6 @@ class Pruned:
         if len(cases) == 1:
             return self.to_lengths(cases.fields[0], layers, machine, lengths)
         refuse_strength("pruned", self.strength)
-        check_moves("pruned", self.moves, cases=len(cases))
         full, strand = full_length(layers, machine), Strand(self.rho)
         most = max(self.amount.most, self.coverage) * full
         lengths = [min(length, most) for length in lengths]
@@ -184,8 +183,11 @@ class Pruned:
         found: list[tuple[Pruned, LayerPlanner]] = []
         for length in lengths:
             wanted = length * len(layers)
-            kept = prune_cases(
-                paths, parts, cases.weights, bounds, wanted, machine, strand, rounds=rounds
+            judged = (cases.weights, bounds)
+            kept = prune_and_move_cases(
+                *(paths, layers, parts, *judged, wanted, machine, strand),
+                rounds=rounds,
+                moves=self.moves,
             )
             coverage = length / full
             overfill = max(planned / full / coverage, 1.0)

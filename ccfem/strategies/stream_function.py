@@ -31,7 +31,7 @@ from ccfem.fibre_aware.heights import (
     nearest_layer,
 )
 from ccfem.fibre_aware.layer_shares import layer_counts, layers_by_case
-from ccfem.fibre_aware.prune_cases import case_counts, prune_cases
+from ccfem.fibre_aware.prune_cases import case_counts, prune_and_move_cases
 from ccfem.fibre_aware.smeared import SmearedPart, smeared_cases
 from ccfem.fibre_aware.spline_grid import SplineGrid
 from ccfem.fibre_aware.strand_moves import check_moves, prune_and_move
@@ -64,8 +64,9 @@ _NEAR = 0.95
 _ROUNDS = 3
 """Virtual tests that say what to cut."""
 
-_CASES_OVERFILL = 1.15
-"""Least overfill for several load cases: tests of all of them have more to choose between."""
+_CASES_OVERFILL, _CASES_MOST = 1.15, 50
+"""Least overfill for several load cases, whose tests have more to choose between, and most
+evaluations, of which more do not help."""
 
 _MORE = 1.03
 """By how much more it then asks for than by proportion."""
@@ -90,7 +91,7 @@ class StreamFunction:
     rho : float, mm^2, default 4
         Axial stiffness of a strand over Young's modulus of the matrix.
     evaluations : int, default 80
-        Of the stiffness, in the design.
+        Of the stiffness, in the design; at most 50 of several load cases, whom more do not help.
     groups : int, default 0
         Number of fields over the height of the part; 0 for one, or for at most six where the
         stress differs over the height.
@@ -116,8 +117,7 @@ class StreamFunction:
         How much the load at first failure counts, in [0, 1]; the stiffness counts the rest. A
         share of the one is then worth as much as one of the other. Of one load case only.
     moves : int, default 0
-        Steps by which paths are moved sideways, each tested (`ccfem.fibre_aware.strand_moves`). Of
-        one load case only, without strength.
+        Steps by which strands are moved sideways (`moved`), each tested; not with strength.
     """
 
     coverage: float = 0.45
@@ -221,9 +221,9 @@ class StreamFunction:
         if len(cases) == 1:
             return self.to_lengths(cases.fields[0], layers, machine, lengths)
         refuse_strength("stream_function", self.strength)
-        check_moves("stream_function", self.moves, cases=len(cases))
+        most = min(self.evaluations, _CASES_MOST)
         return _to_lengths(
-            replace(self, overfill=max(self.overfill, _CASES_OVERFILL)),
+            replace(self, overfill=max(self.overfill, _CASES_OVERFILL), evaluations=most),
             layers,
             machine,
             lengths,
@@ -350,10 +350,10 @@ class StreamFunction:
         extraction = self.extraction(problem.problem, tuple(found.fields), strained, machine)
         field = layers_by_case(cases.weights, layers) * problem.problem.groups + group
         specimens = [part.specimen for part in problem.parts]
+        judged = (specimens, cases.weights, bounds)
+        how: dict[str, Any] = {"objective": self.objective, "moves": self.moves}
         return [
-            prune_cases(
-                whole, specimens, cases.weights, bounds, length, machine, strand, self.objective
-            )
+            prune_and_move_cases(whole, layers, *judged, length, machine, strand, **how)
             for whole, length in zip(extraction.whole(layers, field, in_all), in_all, strict=True)
         ]
 

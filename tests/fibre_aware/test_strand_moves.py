@@ -7,6 +7,7 @@ import pytest
 import shapely
 
 from ccfem.errors import InputError
+from ccfem.fibre_aware.prune_cases import cases_judge
 from ccfem.fibre_aware.strand_lines import strand_lines
 from ccfem.fibre_aware.strand_moves import moved, stiffness_judge
 from ccfem.fibre_aware.strand_pull import fibre_energy, plane_strain
@@ -14,7 +15,11 @@ from ccfem.fibre_aware.strand_spacing import spacing
 from ccfem.machine.machine import Machine
 from ccfem.strategies import create
 from ccfem.toolpaths import FIBRE, TRAVEL, Toolpaths
+from ccfem.virtual_testing.bars import bars
+from ccfem.virtual_testing.several_cases import specimens
 from ccfem.virtual_testing.specimen import Specimen
+from ccfem.virtual_testing.strand import Strand
+from ccfem.virtual_testing.strands import cut_strands
 from ccfem.virtual_testing.virtual_test import virtual_test
 
 MACHINE = Machine()
@@ -161,3 +166,37 @@ def test_moves_are_of_stiffness_alone(strategy):
         create(strategy, {"moves": 3, "strength": 0.2})
     with pytest.raises(InputError, match="moves"):
         create(strategy, {"moves": -1})
+
+
+def test_all_load_cases_move_strands_together(two_bends):
+    cases, layers = two_bends
+    parts = specimens(cases)
+    bounds = np.array([2.0, 2.0])
+    paths = straight(layers, 6.0, 8.0, 16.0, 18.0)
+    judge = cases_judge(parts, cases.weights, bounds, MACHINE)
+    found = moved(paths, layers, parts[0].unreinforced.mesh, MACHINE, judge, 3)
+
+    def worst(each):
+        tests = [virtual_test(each, part, machine=MACHINE, span=()) for part in parts]
+        return min(test.ratio for test in tests)
+
+    assert worst(found) > worst(paths)
+    assert judge(found).value == pytest.approx(0.5 * worst(found), rel=0.05)
+
+
+def test_worth_of_strain_in_several_cases_is_the_slope_of_the_value(two_bends):
+    cases, layers = two_bends
+    parts, bounds = specimens(cases), np.array([2.0, 1.5])
+    paths = straight(layers, 4.0, 12.0)
+    values = []
+    for rho in (4.0, 4.001):
+        judge = cases_judge(parts, cases.weights, bounds, MACHINE, Strand(rho), "sum")
+        values.append(judge(paths))
+    strands = cut_strands(paths, parts[0].unreinforced.mesh)
+    pieces = bars(strands, parts[0].unreinforced.mesh)
+    energy = sum(
+        worth * (strands.length @ np.maximum(pieces.strain(u), 0.0) ** 2)
+        for worth, u in values[0].strains_of
+    )
+    slope = (np.log(values[1].value) - np.log(values[0].value)) / (0.001 * parts[0].modulus)
+    assert slope == pytest.approx(energy, rel=1e-3)
