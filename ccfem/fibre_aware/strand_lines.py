@@ -38,6 +38,10 @@ within two widths of them: a turn that is squeezed gets tighter still."""
 
 _BESIDE = 2.0
 
+_SMALL_RING = 1.1
+"""Rings shorter than that many of the machine's least lengths stay: they have no ends that could be
+drawn out."""
+
 _STRETCH, _BEND = 20.0, 200.0
 """Weights of the squares of first and second differences from point to point."""
 
@@ -66,7 +70,8 @@ class StrandLines:
     arc : (P,) array, mm
         Arc length of the path at each point, before it slides.
     fixed : (P,) bool array
-        Points that stay: of tight bends, of links that are marked, and where a ring closes.
+        Points that stay: of tight bends, of links that are marked, of rings hardly longer than the
+        machine's least length, and where a ring closes.
     least : (K,) array, mm
         Length below which no slide makes a path: the machine's least one, or its own.
     """
@@ -141,9 +146,8 @@ class StrandLines:
             ends = [end for end in ((first, 1), (last, -1)) if not self.fixed[end[0]]]
             for end, inward in ends or [(first, 1)]:
                 out = points[end] - points[end + inward]
-                points[end] += (
-                    missing[k] / max(len(ends), 1) * out / max(np.linalg.norm(out), 1e-12)
-                )
+                share = missing[k] / max(len(ends), 1)
+                points[end] += share * out / max(float(np.linalg.norm(out)), 1e-12)
         return points
 
 
@@ -164,10 +168,12 @@ def strand_lines(fibre: Toolpaths, layers: Sequence[Layer], machine: Machine) ->
     offsets, points = paths.offsets, paths.points @ frame[:2].T
     path = np.repeat(np.arange(len(paths)), np.diff(offsets))
     fixed = paths.link | np.roll(paths.link, 1)
+    lengths = paths.lengths
     for k, (first, end) in enumerate(pairwise(offsets)):
         closed = bool(paths.closed[k])
         fixed[first:end] |= _bent(points[first:end], closed, machine)
         fixed[[first, end - 1]] |= closed
+        fixed[first:end] |= closed and lengths[k] < _SMALL_RING * machine.minimum_length
     return StrandLines(
         toolpaths=paths,
         frame=frame,

@@ -59,7 +59,7 @@ class Spacing:
     width : float, mm
         That strands are apart.
     inset : (P,) array, mm
-        Least distance of each point from the border.
+        Least depth of each point in the section; below 0 outside.
     border : (b, 2, 2) array, mm
         Pieces of the borders of all layers, the section on their left.
     inward : (b, 3, 2) array
@@ -162,7 +162,7 @@ def spacing(lines: StrandLines, layers: Sequence[Layer], machine: Machine, inset
     border, normals = np.concatenate(pieces), np.concatenate(inward)
     tree = cKDTree(_lifted(border.mean(axis=1), np.concatenate(owner)))
     _, near = tree.query(_lifted(lines.start, lines.layer), k=_NEAREST)
-    depth = np.clip(_depths(lines.start, near, border, normals), 0.0, inset)
+    depth = np.minimum(_depths(lines.start, near, border, normals), inset)
     return Spacing(lines, machine.fibre_width, depth, border, normals, tree, lines.roughness)
 
 
@@ -270,8 +270,6 @@ def _outside(points, near, border, inward, inset, normals):  # type: ignore[no-u
     """How far in a slide leads, and how much farther in points should be; 0 where they are in."""
     off, missing = np.zeros(len(points)), np.zeros(len(points))
     for p in range(len(points)):
-        if inset[p] == 0.0:
-            continue
         depth, x, y = _from_border(points[p, 0], points[p, 1], near[p], border, inward)
         across = x * normals[p, 0] + y * normals[p, 1]
         if depth < inset[p] and abs(across) > _FACING:

@@ -160,6 +160,20 @@ def test_paths_keep_the_least_length(bent_beam):
     assert np.max(lengths) == pytest.approx(length + 0.5 * np.pi, rel=1e-3)
 
 
+def test_rings_that_could_become_too_short_stay(bent_beam):
+    _, layers = bent_beam
+    angle = np.linspace(0.0, 2.0 * np.pi, 120)
+    angle[-1] = 0.0
+    rings = [
+        np.column_stack([30.0 + r * np.cos(angle), 12.0 + r * np.sin(angle)]) for r in (7.0, 9.0)
+    ]
+    paths = laid([in_plane_of(layers[0], ring) for ring in rings], layers)
+    lines = strand_lines(paths, layers, MACHINE)
+    before, after = lines.toolpaths.lengths, lines.slid(np.full(len(lines.path), 0.3)).lengths
+    assert np.array_equal(after[before < 50.0], before[before < 50.0])
+    assert (np.abs(after - before)[before > 50.0] > 1.0).all()
+
+
 @pytest.mark.parametrize("strategy", ["pruned", "stream_function"])
 def test_moves_are_of_stiffness_alone(strategy):
     with pytest.raises(InputError, match="set one of them to 0"):
