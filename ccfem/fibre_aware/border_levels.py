@@ -6,16 +6,14 @@ designed without regard to where their levels lie leave half a width on average.
 """
 
 from dataclasses import dataclass
-from typing import TYPE_CHECKING, Any
+from typing import Any, Protocol
 
 import numpy as np
 import scipy.sparse as sp
 
-from ccfem.arrays import FloatArray, freeze
-from ccfem.fibre_aware.smeared import SmearedSolution
-
-if TYPE_CHECKING:
-    from ccfem.fibre_aware.stream_design import StreamProblem
+from ccfem.arrays import FloatArray, IntArray, freeze
+from ccfem.fibre_aware.smeared import SmearedPart, SmearedSolution
+from ccfem.fibre_aware.spline_grid import SplineGrid
 
 __all__ = ["BorderLevels"]
 
@@ -33,6 +31,26 @@ _CONSTANTS = 40
 
 _SHARE = 0.5
 """Of the work of the fibre that the strip could hold: what it costs to have none there."""
+
+
+class _Posed(Protocol):
+    """What of a `ccfem.fibre_aware.stream_design.StreamProblem` says where levels lie."""
+
+    @property
+    def part(self) -> SmearedPart: ...
+    @property
+    def grid(self) -> SplineGrid: ...
+    @property
+    def group(self) -> IntArray: ...
+    @property
+    def groups(self) -> int: ...
+    @property
+    def capacity(self) -> FloatArray: ...
+    @property
+    def width(self) -> float: ...
+    @property
+    def axial_stiffness(self) -> float: ...
+    def of_group(self, matrix: Any, group: IntArray) -> Any: ...
 
 
 @dataclass(frozen=True)
@@ -60,9 +78,7 @@ class BorderLevels:
         freeze(self, weight=float, blocks=float)
 
     @classmethod
-    def of(
-        cls, problem: "StreamProblem", field: FloatArray, solution: SmearedSolution
-    ) -> "BorderLevels":
+    def of(cls, problem: _Posed, field: FloatArray, solution: SmearedSolution) -> "BorderLevels":
         """Weights at a field (c,) and its solution."""
         part, grid, mesh = problem.part, problem.grid, problem.part.mesh
         area, normal = mesh.facet_areas(mesh.boundary)
