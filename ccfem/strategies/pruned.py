@@ -65,8 +65,8 @@ class Pruned:
         load case only.
     moves : int, default 0
         Steps by which what is left is moved sideways, each tested
-        (`ccfem.fibre_aware.strand_moves`): 6 make a part stiffer by 1 to 3 %, for some three times
-        the time. Not with strength.
+        (`ccfem.fibre_aware.strand_moves`): 6 make a part stiffer by 1 to 2 %, for two to three
+        times the time. Not with strength.
     """
 
     of: str = "isocurve"
