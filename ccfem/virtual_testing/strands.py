@@ -3,24 +3,17 @@
 from dataclasses import dataclass
 
 import numpy as np
-from numba import njit
 
 from ccfem.arrays import FloatArray, IntArray, freeze, in_brief
 from ccfem.errors import InputError
-from ccfem.geometry.buckets import Buckets, bucket
 from ccfem.geometry.polylines import starts_segment
 from ccfem.machine.machine import Machine
 from ccfem.mesh.tet_mesh import TetMesh
 from ccfem.toolpaths import FIBRE, Toolpaths
+from ccfem.virtual_testing.cut_steps import cut_steps
 from ccfem.virtual_testing.strand_room import room_of
 
 __all__ = ["Strands", "cut_strands"]
-
-_TOUCH = 1e-9
-"""Barycentric distance within which a piece counts as lying on a face."""
-
-_SLIVER = 1e-12
-"""Share of a step below which a piece is dropped."""
 
 
 @dataclass(frozen=True)
@@ -117,17 +110,8 @@ def cut_strands(
             f"the virtual test needs fibre; got {len(toolpaths)} paths and 0 mm of fibre: "
             "lower the least amount that the strategy lays, or test the unreinforced part"
         )
-    origin, gradient = _barycentric(mesh)
-    grid = _grid(mesh)
-    room = 4 * len(start) + 1024
-    while True:
-        whole, real = np.empty((room, 2), dtype=np.int64), np.empty((room, 3))
-        count = _cut(start, step, length, origin, gradient, *grid, whole, real)
-        if count <= room:
-            break
-        room = count
-    segment, cell = whole[:count].T
-    begin, end, share = real[:count].T
+    segment, cell, begin, end, share = cut_steps(start, step, length, mesh)
+    count = len(segment)
     piece = (end - begin) * length[segment]
     own = np.where(toolpaths.link[first_point], 0.0, length)
     if not count and not own.any():
@@ -159,177 +143,3 @@ def cut_strands(
         outside=outside,
         share=lent,
     )
-
-
-def _barycentric(mesh: TetMesh) -> tuple[FloatArray, FloatArray]:
-    """First corner (m, 3) and gradients (m, 3, 3) of the other corners' barycentric coordinates."""
-    corners = mesh.points[mesh.corners]
-    a, b, c = np.moveaxis(corners[:, 1:] - corners[:, :1], 1, 0)
-    cross = np.stack([np.cross(b, c), np.cross(c, a), np.cross(a, b)], axis=1)
-    return corners[:, 0].copy(), cross / np.einsum("ij,ij->i", a, cross[:, 0])[:, None, None]
-
-
-def _grid(mesh: TetMesh) -> Buckets:
-    """Cells of the mesh by the boxes of a regular grid that each may touch."""
-    corners = mesh.points[mesh.corners]
-    low, high = corners.min(axis=1), corners.max(axis=1)
-    extent = np.prod(mesh.bounds[1] - mesh.bounds[0])
-    # The second keeps the number of boxes near that of the cells in parts that are mostly empty.
-    spacing = max(float(np.mean(high - low)), float(np.cbrt(extent / (4 * len(low)))))
-    margin = 1e-6 * spacing
-    return bucket(low - 2.0 * margin, high + margin, spacing)
-
-
-@njit(cache=True)
-def _cut(  # type: ignore[no-untyped-def]
-    start, step, length, origin, gradient, first, spacing, shape, offsets, candidates, whole, real
-):  # pragma: no cover
-    """Write the pieces and return their number, which may exceed the room given.
-
-    `whole` takes segment and cell; `real` takes begin, end (parameters in [0, 1]) and share.
-    """
-    count = 0
-    found = np.empty(len(origin), dtype=np.int64)
-    ends = np.empty(2 * len(origin) + 1)
-    point, leap, middle = np.empty(3), np.empty(3), np.empty(3)
-    for s in range(len(start)):
-        steps = int(np.ceil(length[s] / spacing))
-        for part in range(steps):
-            t0, t1 = part / steps, (part + 1) / steps
-            for i in range(3):
-                point[i] = start[s, i] + t0 * step[s, i]
-                leap[i] = (t1 - t0) * step[s, i]
-            number, size = _touching(
-                point, leap, origin, gradient, first, spacing, shape, offsets, candidates, found,
-                ends,
-            )  # fmt: skip
-            u0 = 0.0
-            for e in range(size):
-                u1 = ends[e]
-                if u1 - u0 < _SLIVER:
-                    continue
-                for i in range(3):
-                    middle[i] = point[i] + 0.5 * (u0 + u1) * leap[i]
-                number = _complete(
-                    middle, origin, gradient, first, spacing, shape, offsets, candidates, found,
-                    number,
-                )  # fmt: skip
-                sharing = 0
-                for f in range(number):
-                    if _least(middle, origin, gradient, found[f]) >= -_TOUCH:
-                        found[sharing], found[f] = found[f], found[sharing]
-                        sharing += 1
-                begin, end = t0 + u0 * (t1 - t0), t0 + u1 * (t1 - t0)
-                u0 = u1
-                old = min(count, len(whole)) - 1
-                if (
-                    sharing == 1 and old >= 0 and real[old, 1] == begin and real[old, 2] == 1.0
-                    and whole[old, 0] == s and whole[old, 1] == found[0]
-                ):  # fmt: skip
-                    real[old, 1] = end
-                    continue
-                for f in range(sharing):
-                    if count < len(whole):
-                        whole[count, 0], whole[count, 1] = s, found[f]
-                        real[count, 0], real[count, 1] = begin, end
-                        real[count, 2] = 1.0 / sharing
-                    count += 1
-    return count
-
-
-@njit(cache=True)
-def _least(point, origin, gradient, cell):  # type: ignore[no-untyped-def]  # pragma: no cover
-    """Smallest barycentric coordinate of a point."""
-    rest, least = 1.0, 1.0
-    for i in range(3):
-        v = 0.0
-        for j in range(3):
-            v += gradient[cell, i, j] * (point[j] - origin[cell, j])
-        rest -= v
-        least = min(least, v)
-    return min(least, rest)
-
-
-@njit(cache=True)
-def _complete(  # type: ignore[no-untyped-def]
-    point, origin, gradient, first, spacing, shape, offsets, candidates, found, number
-):  # pragma: no cover
-    """Add the cells that hold a point where rounding hid all of them; return the new number."""
-    for f in range(number):
-        if _least(point, origin, gradient, found[f]) >= -_TOUCH:
-            return number
-    box = 0
-    for i in range(3):
-        at = int(np.floor((point[i] - first[i]) / spacing))
-        if at < 0 or at >= shape[i]:
-            return number
-        box = box * shape[i] + at
-    for c in range(offsets[box + 1] - 1, offsets[box] - 1, -1):
-        if _least(point, origin, gradient, candidates[c]) >= -_TOUCH:
-            found[number] = candidates[c]
-            number += 1
-    return number
-
-
-@njit(cache=True)
-def _touching(  # type: ignore[no-untyped-def]
-    point, step, origin, gradient, first, spacing, shape, offsets, candidates, found, ends
-):  # pragma: no cover
-    """Cells that a step touches, and the sorted parameters of entry and exit, with 1."""
-    low = np.empty(3, dtype=np.int64)
-    high = np.empty(3, dtype=np.int64)
-    for i in range(3):
-        a = (point[i] - first[i]) / spacing
-        b = a + step[i] / spacing
-        low[i] = max(int(np.floor(min(a, b))), 0)
-        high[i] = min(int(np.floor(max(a, b))) + 1, shape[i])
-    number, size = 0, 1
-    ends[0] = 1.0
-    for i in range(low[0], high[0]):
-        for j in range(low[1], high[1]):
-            for k in range(low[2], high[2]):
-                box = (i * shape[1] + j) * shape[2] + k
-                for c in range(offsets[box + 1] - 1, offsets[box] - 1, -1):
-                    cell = candidates[c]
-                    u0, u1 = _inside(point, step, origin, gradient, cell)
-                    known = u1 - u0 < _SLIVER
-                    for f in range(number):
-                        known = known or found[f] == cell
-                    if known:
-                        continue
-                    found[number] = cell
-                    number += 1
-                    for u in (u0, u1):
-                        at = size
-                        while at > 0 and ends[at - 1] > u:
-                            ends[at] = ends[at - 1]
-                            at -= 1
-                        ends[at] = u
-                        size += 1
-    return number, size
-
-
-@njit(cache=True)
-def _inside(point, step, origin, gradient, cell):  # type: ignore[no-untyped-def]  # pragma: no cover
-    """Interval of parameters in [0, 1] within which a step is inside a cell."""
-    u0, u1, rest, change = 0.0, 1.0, 1.0, 0.0
-    for i in range(4):
-        if i < 3:
-            a, slope = 0.0, 0.0
-            for j in range(3):
-                a += gradient[cell, i, j] * (point[j] - origin[cell, j])
-                slope += gradient[cell, i, j] * step[j]
-            rest -= a
-            change -= slope
-        else:
-            a, slope = rest, change
-        b = a + slope
-        if a < -_TOUCH and b < -_TOUCH:
-            return 1.0, 0.0
-        if abs(a) <= _TOUCH and abs(b) <= _TOUCH:
-            continue
-        if slope > 0.0:
-            u0 = max(u0, -a / slope)
-        elif slope < 0.0:
-            u1 = min(u1, -a / slope)
-    return u0, u1

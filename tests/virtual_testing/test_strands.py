@@ -106,6 +106,23 @@ def test_pieces_are_those_of_clipping_each_cell():
         np.testing.assert_allclose(found, clipped(MESH, a, b), atol=1e-12)
 
 
+@pytest.mark.parametrize("reach", [0.1, 0.5, 3.0])
+def test_pieces_of_long_lines_are_those_of_clipping_each_step(reach):
+    """Steps that end in cells and on faces, of less than a cell and of several."""
+    generator = np.random.default_rng(1)
+    line, corners = [np.array([2.0, 1.5, 1.5])], MESH.points[FACES]
+    for k in range(120):
+        ahead = line[-1] + reach * generator.uniform(-1.0, 1.0, 3)
+        ahead = np.clip(ahead, [0.1, 0.12, 0.17], [3.9, 2.92, 2.81])
+        near = corners[np.linalg.norm(corners.mean(axis=1) - ahead, axis=1).argmin()]
+        line.append(generator.dirichlet(3.0 * np.ones(3)) @ near if k % 2 else ahead)
+    strands = cut_strands(toolpaths(np.array(line)), MESH)
+    found = np.bincount(strands.cell, strands.length, len(MESH.cells))
+    wanted = sum(clipped(MESH, a, b) for a, b in itertools.pairwise(line))
+    np.testing.assert_allclose(found, wanted, atol=1e-9)
+    assert (np.diff(strands.arc) > 0.0).all()
+
+
 def test_a_piece_on_a_face_is_shared_by_both_cells():
     face = MESH.points[FACES]
     key = np.sort(FACES, axis=1)
