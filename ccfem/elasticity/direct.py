@@ -10,6 +10,7 @@ import scipy.sparse as sp
 from scipy.sparse.linalg import splu
 
 from ccfem.arrays import FloatArray
+from ccfem.elasticity.supernodes import supernodes
 from ccfem.errors import SolveError
 
 __all__ = ["Pardiso", "cholmod", "superlu"]
@@ -24,8 +25,17 @@ _PIVOT = -4
 """Error of PARDISO at a pivot that is not positive."""
 
 
-def superlu(matrix: sp.bsr_array) -> Apply:
-    """SuperLU in symmetric mode: minimum degree ordering, no pivoting off the diagonal."""
+def superlu(matrix: sp.bsr_array, often: bool = False) -> Apply:
+    """SuperLU in symmetric mode: minimum degree ordering, no pivoting off the diagonal.
+
+    Parameters
+    ----------
+    matrix : bsr_array (n, n)
+        Symmetric.
+    often : bool, default False
+        Whether many solves follow: its lower factor is then kept by supernodes, which takes as long
+        as some thirty solves save.
+    """
     rows = matrix.tocsr()
     columns = sp.csc_array((rows.data, rows.indices, rows.indptr), shape=rows.shape)
     try:
@@ -37,7 +47,8 @@ def superlu(matrix: sp.bsr_array) -> Apply:
         )
     except RuntimeError as error:
         raise SolveError(f"superlu: {error}; the stiffness is not positive definite") from error
-    return lambda rhs: np.asarray(factor.solve(rhs))
+    kept = supernodes(factor) if often else None
+    return (lambda rhs: np.asarray(factor.solve(rhs))) if kept is None else kept.solve
 
 
 class Pardiso:

@@ -38,6 +38,9 @@ _SEVERAL = 3
 """Right-hand sides from which a multigrid that takes several times as long to make is worth it on
 thin parts (measured: from 3 on one cell high, from 9 on two; never on higher ones)."""
 
+_OFTEN = 30
+"""Right-hand sides from which it is worth it to keep the factor of SuperLU by supernodes."""
+
 _THIN = 12.4
 """Neighbours of a node of linear cells, itself among them, below which a part is so thin that
 PARDISO is quicker than a multigrid for one right-hand side already (measured): two cells high."""
@@ -333,4 +336,6 @@ def _maker(
     if backend == "amg":
         frugal = solves < _SEVERAL or _neighbours(matrix) >= _THIN
         return partial(multigrid.smoothed_aggregation, points=points, frugal=frugal)
-    return {"cholmod": direct.cholmod, "superlu": direct.superlu, "skyline": skyline}[backend]
+    if backend == "superlu":
+        return partial(direct.superlu, often=solves >= _OFTEN)
+    return {"cholmod": direct.cholmod, "skyline": skyline}[backend]

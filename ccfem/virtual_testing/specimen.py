@@ -16,8 +16,8 @@ from ccfem.errors import InputError
 
 __all__ = ["Specimen"]
 
-_SOLVES = 3
-"""Right-hand sides to expect: at least, and what a better preconditioner needs to be worth it."""
+_SOLVES = 30
+"""Right-hand sides to expect: a virtual test takes some twenty, a design hundreds."""
 
 
 @dataclass(frozen=True)

@@ -6,12 +6,14 @@ from dataclasses import replace
 import numpy as np
 import pytest
 import scipy.sparse as sp
+from scipy.sparse.linalg import splu
 
 from ccfem.elasticity import solvers
 from ccfem.elasticity.assembly import assemble
 from ccfem.elasticity.problem import Force, Problem, Support
 from ccfem.elasticity.solve import solve
 from ccfem.elasticity.solvers import BACKENDS, choose, factorise, preconditioned_cg
+from ccfem.elasticity.supernodes import supernodes
 from ccfem.elasticity.system import prepare
 from ccfem.errors import InputError, SolveError
 from ccfem.materials import isotropic, transversely_isotropic
@@ -41,6 +43,25 @@ def equations(prepared):
     reduced = prepared.held.reduce(matrix)
     rhs = prepared.held.right_hand_side(matrix, prepared.forces["down"])
     return reduced, rhs, prepared.problem.mesh.points[prepared.held.nodes]
+
+
+@pytest.mark.parametrize("divisions", [(1, 1, 1), (4, 2, 2), (9, 6, 5)])
+def test_a_factor_kept_by_supernodes_solves_as_a_dense_one(divisions):
+    prepared = system(1, divisions)
+    matrix, _, _ = equations(prepared)
+    solver = prepared.factorise(prepared.assemble(), "superlu", solves=100)
+    assert solver.apply.__name__ == "solve"  # of the supernodes
+    rhs = np.random.default_rng(0).normal(size=matrix.shape[0])
+    exact = np.linalg.solve(matrix.toarray(), rhs)
+    np.testing.assert_allclose(solver.apply(rhs), exact, atol=1e-11 * np.abs(exact).max())
+    stiffer = solver.refactorise(2.0 * matrix)
+    np.testing.assert_allclose(stiffer.apply(rhs), 0.5 * exact, atol=1e-11 * np.abs(exact).max())
+
+
+def test_pivots_off_the_diagonal_are_left_to_superlu():
+    matrix = np.array([[0.0, 1.0, 0.0], [1.0, 0.0, 0.0], [0.0, 0.0, 1.0]])
+    factor = splu(sp.csc_array(matrix), permc_spec="NATURAL")
+    assert supernodes(factor) is None
 
 
 @pytest.mark.parametrize("order", [1, 2])
