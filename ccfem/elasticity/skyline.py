@@ -130,13 +130,13 @@ def _ordering(matrix: sp.bsr_array) -> tuple[IntArray, IntArray]:
     """Find the new place of each block row, and the skyline: as it comes, or Cuthill-McKee.
 
     Reverse Cuthill-McKee (George and Liu, Computer Solution of Large Sparse Positive Definite
-    Systems, 1981, chapter 4) is taken where its factorisation is cheaper; where the band is as
-    narrow as that of a square grid already, it is not tried.
+    Systems, 1981, chapter 4) is taken where its factorisation is cheaper; where that costs no
+    more than on a square grid already, it is not tried.
     """
     n = len(matrix.indptr) - 1
     natural = np.arange(n)
     best = _lowest(matrix, natural)
-    if (natural - best).mean() <= 1.1 * np.sqrt(n):
+    if ((natural - best) ** 2).mean() <= 1.21 * n:
         return natural, best
     graph = sp.csr_array(
         (np.ones(len(matrix.indices), dtype=np.int8), matrix.indices, matrix.indptr), shape=(n, n)

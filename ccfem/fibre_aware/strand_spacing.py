@@ -17,6 +17,7 @@ from scipy.sparse.linalg import splu
 from scipy.spatial import cKDTree
 
 from ccfem.arrays import FloatArray, IntArray, freeze, in_brief
+from ccfem.elasticity.skyline import skyline, skyline_operations
 from ccfem.fibre_aware.strand_lines import StrandLines
 from ccfem.layers.layer import Layer
 from ccfem.machine.machine import Machine
@@ -34,6 +35,9 @@ _STIFF = 300.0
 
 _ROUNDS = 5
 """Times that what is too near is looked for."""
+
+_NARROW = 2e9
+"""Multiplications up to which a band is eliminated as it is, and not by minimum degree."""
 
 _FACING = 0.35
 """Cosine of the largest angle between a strand's normal and that of the border at which points
@@ -172,7 +176,10 @@ def _lifted(points: FloatArray, layer: IntArray) -> FloatArray:
 
 
 def _solve(matrix: Any, right: FloatArray) -> FloatArray:
-    """Solve a sparse symmetric positive definite system."""
+    """Solve a sparse symmetric positive definite system: a narrow band along packs of strands."""
+    band = sp.bsr_array(matrix, blocksize=(1, 1))
+    if skyline_operations(band) <= _NARROW:
+        return skyline(band)(right)
     options = {"SymmetricMode": True}
     factor = splu(
         matrix.tocsc(), permc_spec="MMD_AT_PLUS_A", diag_pivot_thresh=0.0, options=options
