@@ -14,7 +14,7 @@ from scipy.sparse.csgraph import reverse_cuthill_mckee
 from ccfem.arrays import FloatArray, IntArray
 from ccfem.errors import SolveError
 
-__all__ = ["skyline", "skyline_operations"]
+__all__ = ["skyline", "skyline_operations", "skyline_within"]
 
 _TOGETHER = 4
 """Rows that are eliminated together, two columns at a time; they share their first column."""
@@ -152,7 +152,10 @@ def _ordering(matrix: sp.bsr_array) -> tuple[IntArray, IntArray]:
 
 def skyline_operations(matrix: sp.bsr_array) -> float:
     """Multiplications of a factorisation by `skyline`."""
-    _, lowest = _ordering(matrix)
+    return _operations(matrix, _ordering(matrix)[1])
+
+
+def _operations(matrix: sp.bsr_array, lowest: IntArray) -> float:
     size = matrix.blocksize[0]
     height = size * (np.arange(len(lowest)) - lowest + 0.5)
     return 0.5 * size * float((height**2).sum())
@@ -171,8 +174,22 @@ def skyline(matrix: sp.bsr_array) -> Callable[[FloatArray], FloatArray]:
     SolveError
         When the matrix is not positive definite.
     """
-    (n, _), d = matrix.shape, matrix.blocksize[0]
+    return _factor(matrix, *_ordering(matrix))
+
+
+def skyline_within(matrix: sp.bsr_array, most: float) -> Callable[[FloatArray], FloatArray] | None:
+    """Cholesky factorisation within the skyline, where it takes no more multiplications.
+
+    Parameters and errors as of `skyline`; None where it takes more than `most`.
+    """
     place, lowest = _ordering(matrix)
+    return _factor(matrix, place, lowest) if _operations(matrix, lowest) <= most else None
+
+
+def _factor(
+    matrix: sp.bsr_array, place: IntArray, lowest: IntArray
+) -> Callable[[FloatArray], FloatArray]:
+    (n, _), d = matrix.shape, matrix.blocksize[0]
     padded = -(-n // _TOGETHER) * _TOGETHER
     first = np.arange(padded)
     first[:n] = np.repeat(d * lowest, d)

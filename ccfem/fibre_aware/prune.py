@@ -6,14 +6,14 @@ left is tested again, for it takes over the load.
 """
 
 from collections.abc import Sequence
-from dataclasses import dataclass, replace
+from dataclasses import replace
 
 import numpy as np
-from numba import njit
 
 from ccfem.arrays import BoolArray, FloatArray, IntArray
 from ccfem.checks import check_number
 from ccfem.elasticity.stress_field import StressField
+from ccfem.fibre_aware.path_profile import Profile, least_price
 from ccfem.fibre_aware.strength_value import Worth, layer_normal, raised
 from ccfem.geometry.polylines import along_line, points_along, runs
 from ccfem.machine.machine import Machine
@@ -23,7 +23,7 @@ from ccfem.virtual_testing.specimen import Specimen
 from ccfem.virtual_testing.strand import Strand
 from ccfem.virtual_testing.strands import Strands, cut_strands
 
-__all__ = ["Profile", "fibre_length", "least_price", "profiles", "prune", "shorten"]
+__all__ = ["fibre_length", "profiles", "prune", "shorten"]
 
 _STATION = 1.0
 """Length of path, mm, that is kept or taken off as a whole."""
@@ -34,14 +34,9 @@ _SAME = 1e-9
 _WINDOW = 10
 """Stations over which the least valuable place of a closed path is looked for."""
 
-_BISECTIONS = 50
-
 _TILT = 1e-6
 """Share by which the first piece of the first path is worth more than its strain says, others in
 proportion: of equally good pieces the last go first, whatever rounding makes of their values."""
-
-_EQUAL = 1e-12
-"""Share of the largest gain of a piece by which one choice has to be better than another."""
 
 _ENOUGH = 0.95
 """Share of the wanted length below which fibre that is worth less than nothing is kept, too."""
@@ -124,80 +119,6 @@ def prune(
 def fibre_length(toolpaths: Toolpaths) -> float:
     """Length of all fibre, mm."""
     return float(toolpaths.lengths[toolpaths.kind == FIBRE].sum())
-
-
-@dataclass(frozen=True)
-class Profile:
-    """What each piece of one fibre path is worth.
-
-    Attributes
-    ----------
-    path : int
-        Number of the path in the toolpaths.
-    value : (n,) array
-        Mean value per length of equal pieces; of a closed path, from its least valuable place on.
-    step : float, mm
-        Length of a piece.
-    origin : float, mm
-        Arc length of the path at which the first piece starts.
-    """
-
-    path: int
-    value: FloatArray
-    step: float
-    origin: float
-
-    def kept(self, price: float, minimum: float, cut_cost: float) -> tuple[BoolArray, float]:
-        """Pieces to keep where a mm of fibre costs `price`, and what they are worth beyond it.
-
-        Of all ways to part the path into stretches no shorter than `minimum`, mm, the one with the
-        largest ``sum of (value - price) * length - cut_cost * price * (stretches - 1)``.
-        """
-        least = int(np.ceil(minimum / self.step - 1e-9))
-        least = min(max(least, 1), len(self.value))
-        keep = np.empty(len(self.value), dtype=np.bool_)
-        each = (self.value - price) * self.step
-        equal = _EQUAL * float(np.abs(each).max())
-        gain = _best_stretches(each, least, cut_cost * price, equal, keep)
-        return keep, float(gain)
-
-
-@njit(cache=True)
-def _best_stretches(gain, least, cost, equal, keep):  # type: ignore[no-untyped-def]  # pragma: no cover
-    """Mark the pieces to keep and return their gain: dynamic programming over the pieces.
-
-    `free[i]` is the most that the first i pieces can gain, `held[i]` the most where piece i is
-    kept. Stretches are at least `least` pieces long; each but the first costs `cost`.
-    """
-    n = len(gain)
-    total = np.zeros(n + 1)
-    for i in range(n):
-        total[i + 1] = total[i] + gain[i]
-    free = np.zeros(n + 1)
-    held = np.empty(n + 1)
-    start = np.zeros(n + 1, np.int64)  # of the stretch that ends with piece i
-    alone = np.zeros(n + 1, np.bool_)  # whether nothing is kept before that stretch
-    for i in range(least):
-        held[i] = -np.inf
-    for i in range(least, n + 1):
-        held[i] = held[i - 1] + gain[i - 1]
-        start[i], alone[i] = start[i - 1], alone[i - 1]
-        before = max(free[i - least] - cost, 0.0)
-        opened = total[i] - total[i - least] + before
-        if opened >= held[i] - equal:
-            held[i], start[i], alone[i] = opened, i - least, before == 0.0
-        free[i] = held[i] if held[i] > free[i - 1] + equal else free[i - 1]
-    for i in range(n):
-        keep[i] = False
-    i = n
-    while i > 0 and free[i] > 0.0:
-        if free[i] == free[i - 1]:
-            i -= 1
-            continue
-        for k in range(start[i], i):
-            keep[k] = True
-        i = 0 if alone[i] else start[i]
-    return free[n]
 
 
 def profiles(toolpaths: Toolpaths, strands: Strands, value: FloatArray) -> list[Profile]:
@@ -317,23 +238,6 @@ def _grown(kept: BoolArray, longer: BoolArray, count: int) -> BoolArray:
         grown[fresh] = True
         count -= len(fresh)
     return grown
-
-
-def least_price(
-    along: Sequence[Profile], length: float, minimum: float, cut_cost: float = 20.0
-) -> float:
-    """Smallest price of fibre at which no more than a length, mm, is worth keeping."""
-
-    def left(price: float) -> float:
-        return sum(one.step * float(one.kept(price, minimum, cut_cost)[0].sum()) for one in along)
-
-    if left(0.0) <= length:
-        return 0.0
-    low, high = 0.0, 2.0 * max(float(one.value.max()) for one in along)
-    for _ in range(_BISECTIONS):
-        middle = 0.5 * (low + high)
-        low, high = (middle, high) if left(middle) > length else (low, middle)
-    return high
 
 
 def _cut(toolpaths: Toolpaths, along: Sequence[Profile], chosen: dict[int, BoolArray]) -> Toolpaths:

@@ -17,7 +17,7 @@ from scipy.sparse.linalg import splu
 from scipy.spatial import cKDTree
 
 from ccfem.arrays import FloatArray, IntArray, freeze, in_brief
-from ccfem.elasticity.skyline import skyline, skyline_operations
+from ccfem.elasticity.skyline import skyline_within
 from ccfem.fibre_aware.strand_lines import StrandLines
 from ccfem.layers.layer import Layer
 from ccfem.machine.machine import Machine
@@ -177,9 +177,9 @@ def _lifted(points: FloatArray, layer: IntArray) -> FloatArray:
 
 def _solve(matrix: Any, right: FloatArray) -> FloatArray:
     """Solve a sparse symmetric positive definite system: a narrow band along packs of strands."""
-    band = sp.bsr_array(matrix, blocksize=(1, 1))
-    if skyline_operations(band) <= _NARROW:
-        return skyline(band)(right)
+    band = skyline_within(sp.bsr_array(matrix, blocksize=(1, 1)), _NARROW)
+    if band is not None:
+        return band(right)
     options = {"SymmetricMode": True}
     factor = splu(
         matrix.tocsc(), permc_spec="MMD_AT_PLUS_A", diag_pivot_thresh=0.0, options=options

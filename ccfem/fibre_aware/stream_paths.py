@@ -7,7 +7,8 @@ import numpy as np
 import shapely
 
 from ccfem.arrays import FloatArray, IntArray
-from ccfem.fibre_aware.prune import Profile, least_price, profiles
+from ccfem.fibre_aware.path_profile import Profile, least_price
+from ccfem.fibre_aware.prune import profiles
 from ccfem.fibre_aware.spline_grid import SplineGrid
 from ccfem.geometry.isocontours import isocontours, triangle_edges
 from ccfem.layers.layer import Layer

@@ -4,7 +4,7 @@ import scipy.sparse as sp
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from ccfem.elasticity.skyline import skyline, skyline_operations
+from ccfem.elasticity.skyline import skyline, skyline_operations, skyline_within
 from ccfem.errors import SolveError
 
 
@@ -43,6 +43,23 @@ def test_a_shuffled_band_is_found_again():
     rhs = np.random.default_rng(1).normal(size=n)
     found = skyline(sp.bsr_array(shuffled))(rhs)
     np.testing.assert_allclose(shuffled @ found, rhs, atol=1e-12)
+
+
+def test_few_far_couplings_are_ordered_away():
+    """Two chains beside each other that are numbered one after the other, and coupled at places."""
+    n, every = 2000, 100
+    first = np.arange(0, n // 2, every)
+    chain = sp.diags_array([np.full(n, 4.0), -np.ones(n - 1), -np.ones(n - 1)], offsets=[0, 1, -1])
+    entries = (-np.ones(len(first)), (first, first + n // 2))
+    far = sp.csr_array(entries, shape=(n, n))
+    matrix = (chain + far + far.T).tobsr((1, 1))
+    matrix.sort_indices()
+    matrix = sp.bsr_array(matrix)
+    rhs = np.random.default_rng(2).normal(size=n)
+    assert skyline_within(matrix, 1.0) is None
+    solve = skyline_within(matrix, 20.0 * n)
+    assert solve is not None
+    np.testing.assert_allclose(matrix @ solve(rhs), rhs, atol=1e-12)
 
 
 @pytest.mark.parametrize("pivot", [0.0, -1.0])

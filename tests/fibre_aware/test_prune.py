@@ -7,7 +7,8 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from ccfem.errors import InputError
-from ccfem.fibre_aware.prune import Profile, profiles, prune, shorten
+from ccfem.fibre_aware.path_profile import Profile
+from ccfem.fibre_aware.prune import profiles, prune, shorten
 from ccfem.machine import Machine
 from ccfem.planning import plan
 from ccfem.strategies.isocurve import Isocurve
