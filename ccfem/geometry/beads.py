@@ -19,6 +19,7 @@ over a width.
 from typing import NamedTuple
 
 import numpy as np
+from numba import njit
 
 from ccfem.arrays import BoolArray, FloatArray, IntArray
 from ccfem.geometry.band_overlap import share_room
@@ -152,29 +153,35 @@ def _normals(
     return found
 
 
-def _chords(
-    own: FloatArray, length: FloatArray, line: IntArray, first: IntArray, closed: BoolArray
-) -> tuple[FloatArray, FloatArray, FloatArray]:
+@njit(cache=True, nogil=True)
+def _chords(own, length, line, first, closed):  # type: ignore[no-untyped-def]  # pragma: no cover
     """Direction (s, 3), share of the length that goes ahead (s,), and passes of the chord (s,)."""
-    index = np.arange(len(line))
-    low, high = first[line], first[line + 1]
-    ring = closed[line] & (high - low > 2 * _AHEAD)
-    window = []
-    for shift in range(-_AHEAD, _AHEAD + 1):
-        at = np.where(ring, low + (index + shift - low) % (high - low), index + shift)
-        window.append((np.clip(at, low, high - 1), (at >= low) & (at < high)))
-    chord = np.sum([own[at] * there[:, None] for at, there in window], axis=0)
-    whole = np.sum([length[at] * there for at, there in window], axis=0)
-    size = np.linalg.norm(chord, axis=1)
-    # A strand that turns back on itself within a width has the direction of its own piece.
-    lost = size < 1e-3 * whole
-    direction = np.where(lost[:, None], own, chord)
-    direction = direction / np.maximum(np.linalg.norm(direction, axis=1), 1e-300)[:, None]
-    passed = np.zeros(len(line))
-    for at, there in window:
-        piece = np.maximum(np.linalg.norm(own[at], axis=1), 1e-300)
-        along = np.abs(np.einsum("ij,ij->i", own[at], direction)) / piece
-        passed += along * length[at] * there
-    straight = np.clip(size / np.maximum(whole, 1e-300), 1e-3, 1.0)
-    often = np.clip(passed / np.maximum(size, 1e-300), 1.0, 1e3)
-    return direction, straight, np.where(lost, 1e3, often)
+    direction = np.empty((len(line), 3))
+    straight, often = np.empty(len(line)), np.empty(len(line))
+    for k in range(len(line)):
+        low, high = first[line[k]], first[line[k] + 1]
+        ring = closed[line[k]] and high - low > 2 * _AHEAD
+        x, y, z, whole = 0.0, 0.0, 0.0, 0.0
+        for near in range(k - _AHEAD, k + _AHEAD + 1):
+            at = low + (near - low) % (high - low) if ring else near
+            if low <= at < high:
+                x, y, z = x + own[at, 0], y + own[at, 1], z + own[at, 2]
+                whole += length[at]
+        size = np.sqrt(x * x + y * y + z * z)
+        # A strand that turns back on itself within a width has the direction of its own piece.
+        lost = size < 1e-3 * whole
+        if lost:
+            x, y, z = own[k, 0], own[k, 1], own[k, 2]
+        unit = max(np.sqrt(x * x + y * y + z * z), 1e-300)
+        x, y, z = x / unit, y / unit, z / unit
+        passed = 0.0
+        for near in range(k - _AHEAD, k + _AHEAD + 1):
+            at = low + (near - low) % (high - low) if ring else near
+            if low <= at < high:
+                a, b, c = own[at, 0], own[at, 1], own[at, 2]
+                piece = max(np.sqrt(a * a + b * b + c * c), 1e-300)
+                passed += abs(a * x + b * y + c * z) / piece * length[at]
+        direction[k, 0], direction[k, 1], direction[k, 2] = x, y, z
+        straight[k] = min(max(size / max(whole, 1e-300), 1e-3), 1.0)
+        often[k] = 1e3 if lost else min(max(passed / max(size, 1e-300), 1.0), 1e3)
+    return direction, straight, often

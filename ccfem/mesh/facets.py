@@ -1,10 +1,14 @@
 """Facets and edges by their nodes, whatever the order of these: pairs, places, unique edges."""
 
 import numpy as np
+from numba import njit
 
 from ccfem.arrays import BoolArray, IntArray
 
 __all__ = ["are_among", "facet_keys", "paired", "positions", "unique_edges"]
+
+_FEW = 16
+"""Node numbers to a pair of nodes, up to which all of them are counted."""
 
 
 def facet_keys(*tables: IntArray) -> list[IntArray]:
@@ -70,6 +74,39 @@ def unique_edges(ends: IntArray) -> tuple[IntArray, IntArray]:
 
     The edges ascend, and so do the nodes of each.
     """
-    (key,) = facet_keys(ends)
-    _, first, edge = np.unique(key, return_index=True, return_inverse=True)
-    return np.sort(ends[first], axis=1), edge
+    low, high = np.minimum(*ends.T), np.maximum(*ends.T)
+    nodes = int(high.max(initial=-1)) + 1
+    if nodes > _FEW * (len(ends) + 1):
+        known, number = np.unique(np.concatenate([low, high]), return_inverse=True)
+        edges, edge = _numbered(number[: len(ends)], number[len(ends) :], len(known))
+        return known[edges], edge
+    edges, edge = _numbered(low, high, nodes)
+    return edges.astype(ends.dtype, copy=False), edge
+
+
+@njit(cache=True, nogil=True)
+def _sorted(values, order, most):  # type: ignore[no-untyped-def]  # pragma: no cover
+    """Sort an order by values below a number; equal ones stay as they come."""
+    start = np.zeros(most + 1, np.int64)
+    for k in range(len(values)):
+        start[values[k] + 1] += 1
+    for i in range(most):
+        start[i + 1] += start[i]
+    result = np.empty(len(order), np.int64)
+    for k in order:
+        result[start[values[k]]] = k
+        start[values[k]] += 1
+    return result
+
+
+@njit(cache=True, nogil=True)
+def _numbered(low, high, nodes):  # type: ignore[no-untyped-def]  # pragma: no cover
+    """Edges in ascending order, and the edge of each pair."""
+    order = _sorted(low, _sorted(high, np.arange(len(low)), nodes), nodes)
+    edges, edge, count = np.empty((len(low), 2), np.int64), np.empty(len(low), np.int64), 0
+    for k in order:
+        if count == 0 or edges[count - 1, 0] != low[k] or edges[count - 1, 1] != high[k]:
+            edges[count, 0], edges[count, 1] = low[k], high[k]
+            count += 1
+        edge[k] = count - 1
+    return edges[:count].copy(), edge
