@@ -19,6 +19,10 @@ _CONTRACT = {"contract"}
 """Products and sums may be fused."""
 
 
+_SINGULAR = 1e-12
+"""Share of the largest eigenvalue of a block below which one counts as zero."""
+
+
 @njit(cache=True)
 def _halve(indptr, indices, data, start, column, low, diagonal):  # type: ignore[no-untyped-def]
     """Pick the blocks below the diagonal and on it."""
@@ -109,9 +113,11 @@ class GaussSeidel:
         stay zero.
     single : bool, default False
         Whether to keep what is beside the diagonal in single precision.
+    singular : bool, default False
+        Whether blocks on the diagonal may be singular: their pseudoinverses are taken.
     """
 
-    def __init__(self, matrix: sp.bsr_array, single: bool = False) -> None:
+    def __init__(self, matrix: sp.bsr_array, single: bool = False, singular: bool = False) -> None:
         n, d = len(matrix.indptr) - 1, matrix.data.shape[1]
         count = (len(matrix.indices) - n) // 2
         start = np.zeros(n + 1, dtype=np.uint32)
@@ -123,7 +129,11 @@ class GaussSeidel:
         _halve(indptr, indices, matrix.data, start, column, low, diagonal)
         nothing = np.einsum("npp->np", diagonal) == 0.0
         np.einsum("npp->np", diagonal)[nothing] = 1.0
-        self.inverse: FloatArray = np.linalg.inv(diagonal)
+        self.inverse: FloatArray = (
+            np.linalg.pinv(diagonal, rcond=_SINGULAR, hermitian=True)
+            if singular
+            else np.linalg.inv(diagonal)
+        )
         self._arguments: tuple[Any, ...] = (start, column, low, self.inverse)
         self._sweep = _three if d == 3 else _six
 

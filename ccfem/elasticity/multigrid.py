@@ -38,9 +38,8 @@ class Coarse:
     nodes: IntArray
 
 
-def _finest(matrix: sp.bsr_array, prolong: Any, coarse: Apply) -> Apply:
+def _cycle(smoother: GaussSeidel, prolong: Any, restrict: Any, coarse: Apply) -> Apply:
     """Sweep forward, correct in the coarse space, sweep backward: a symmetric cycle."""
-    smoother, restrict = GaussSeidel(matrix, single=True), prolong.T.tocsr()
 
     def apply(rhs: FloatArray) -> FloatArray:
         x, residual = smoother.forward(rhs)
@@ -66,19 +65,13 @@ def _coarser(levels: Any, thorough: bool) -> Apply:
     """Cycle over the levels of a pyamg hierarchy, the last one inverted: V, or thorough: W."""
     level = levels[0]
     if len(levels) == 1:
-        # Singular where an aggregate is too small, or too straight, for six rigid modes.
+        # Singular for the same reason as blocks of other levels, below.
         inverse = np.linalg.pinv(level.A.toarray(), rcond=1e-12, hermitian=True)
         return lambda rhs: np.einsum("ij,j->i", inverse, rhs)
-    below = _coarser(levels[1:], thorough)
-
-    def apply(rhs: FloatArray) -> FloatArray:
-        x = np.zeros_like(rhs)
-        level.presmoother(level.A, x, rhs)
-        x += level.P @ below(level.R @ (rhs - level.A @ x))
-        level.postsmoother(level.A, x, rhs)
-        return x
-
-    return _twice(levels, apply) if thorough else apply
+    # Singular where an aggregate is too small, or too straight, for six rigid modes.
+    smoother = GaussSeidel(sp.bsr_array(level.A), singular=True)
+    cycle = _cycle(smoother, level.P, level.P.T, _coarser(levels[1:], thorough))
+    return _twice(levels, cycle) if thorough else cycle
 
 
 def smoothed_aggregation(
@@ -109,24 +102,22 @@ def smoothed_aggregation(
         return quick_aggregation(matrix, near_kernel)
     import pyamg
 
-    # The finest level has its own compiled sweeps.
-    sweeps = {
-        name: [None, ("block_gauss_seidel", {"sweep": name})] for name in ("forward", "backward")
-    }
     levels = pyamg.smoothed_aggregation_solver(
         sp.bsr_matrix(matrix),
         B=near_kernel,
         strength=("symmetric", {"theta": 0.08}),
         smooth=_ENERGY,
         improve_candidates=None,
-        presmoother=sweeps["forward"],
-        postsmoother=sweeps["backward"],
+        presmoother=None,
+        postsmoother=None,
         max_coarse=_COARSEST,
         coarse_solver=None,
     ).levels
     if len(levels) == 1:
         return _coarser(levels, thorough)
-    return _finest(matrix, levels[0].P.tocsr(), _coarser(levels[1:], thorough))
+    prolong = levels[0].P
+    finest = GaussSeidel(matrix, single=True)
+    return _cycle(finest, prolong, prolong.T, _coarser(levels[1:], thorough))
 
 
 def two_level(matrix: sp.bsr_array, points: FloatArray, parents: IntArray | Coarse) -> Apply:
@@ -152,7 +143,8 @@ def two_level(matrix: sp.bsr_array, points: FloatArray, parents: IntArray | Coar
     coarse = (prolong.T.tobsr() @ (matrix @ prolong)).tobsr((3, 3))
     coarse.sort_indices()
     below = smoothed_aggregation(coarse, coarse_points, thorough=True)
-    return _finest(matrix, prolong.tocsr(), below)
+    prolong, finest = prolong.tocsr(), GaussSeidel(matrix, single=True)
+    return _cycle(finest, prolong, prolong.T.tocsr(), below)
 
 
 def _corners(parents: IntArray) -> Coarse:

@@ -50,6 +50,23 @@ def test_sweeps_are_triangular_solves(nodes, seed):
         np.testing.assert_allclose(smoother.backward(rhs, start.copy()), expected, atol=1e-12)
 
 
+def test_motions_that_no_aggregate_has_stay_zero():
+    """A motion of two blocks that nothing holds: sweeps solve for the rest."""
+    _, dense = random_matrix(8, 3)
+    lost = np.zeros((24, 2))
+    lost[:6, 0], lost[6:12, 1] = np.random.default_rng(4).normal(size=(2, 6))
+    lost /= np.linalg.norm(lost, axis=0)
+    keep = np.eye(24) - lost @ lost.T
+    dense = keep @ dense @ keep
+    pair = np.arange(24) // 6
+    lower = np.where(pair[:, None] >= pair, dense, 0.0) + lost @ lost.T
+    rhs = keep @ np.random.default_rng(5).normal(size=24)
+    smoother = GaussSeidel(sp.bsr_array(dense, blocksize=(6, 6)), singular=True)
+    x, residual = smoother.forward(rhs)
+    np.testing.assert_allclose(x, np.linalg.solve(lower, rhs), atol=1e-12)
+    np.testing.assert_allclose(residual, rhs - dense @ x, atol=1e-12)
+
+
 @given(st.integers(2, 8), st.integers(0, 10_000))
 @example(5, 1024)
 @settings(max_examples=15, deadline=None)
