@@ -39,7 +39,7 @@ from ccfem.toolpaths import Toolpaths
 from ccfem.virtual_testing.strand import Strand
 from ccfem.virtual_testing.virtual_test import virtual_test
 
-__all__ = ["losses", "share_inside"]
+__all__ = ["losses", "posed", "share_inside"]
 
 COVERAGE = 0.45
 MOVES = 6
@@ -123,7 +123,7 @@ def losses(
     return rows
 
 
-def _posed(name: str) -> tuple[StressField, tuple[Layer, ...], Machine, float]:
+def posed(name: str) -> tuple[StressField, tuple[Layer, ...], Machine, float]:
     """Stress of a part, its layers, the machine, and the length of fibre, mm."""
     if name.startswith("study:"):
         problem = confirmed_gain.posed(name.removeprefix("study:"))
@@ -142,7 +142,7 @@ def _posed(name: str) -> tuple[StressField, tuple[Layer, ...], Machine, float]:
 def main() -> None:
     """Print a table for each part."""
     for name in sys.argv[1:] or ["authors_loop"]:
-        stress, layers, machine, length = _posed(name)
+        stress, layers, machine, length = posed(name)
         rows = losses(stress, layers, machine, length)
         most = rows["bound"] - 1.0
         print(f"\n{name}: {length / 1e3:.2f} m of fibre in {len(layers)} layers")
