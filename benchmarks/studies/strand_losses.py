@@ -88,7 +88,7 @@ def losses(
     shifts = np.arange(strategy.phases) / strategy.phases
     tried = [extraction.layer_paths(layers[one], extraction.fields[group[one]], x) for x in shifts]
     values = [extraction.profiles(paths) for paths in tried]
-    (best,) = extraction.best_phases([values], [len(layers)], length)
+    ((best,), *_) = extraction.best_phases([values], [len(layers)], length)
     shift = float(shifts[best])
 
     def tested(paths: Toolpaths, cutter: Machine) -> float:
@@ -116,9 +116,9 @@ def losses(
         extraction.layer_paths(x, extraction.fields[group[k]], shift) for k, x in enumerate(layers)
     ]
     paths = Toolpaths.concatenate(whole)
-    rows["linked: the paths"] = tested(paths, machine)
+    rows["linked and slid in: the paths"] = tested(paths, machine)
     part, how = problem.part.specimen, (3, 0.0, MOVES)
-    moved = prune_and_move(paths, layers, part, length, machine, Strand(), *how)
+    moved = prune_and_move((paths,), layers, part, length, machine, Strand(), *how)
     rows[f"moved in {MOVES} steps"] = tested(moved, machine)
     return rows
 

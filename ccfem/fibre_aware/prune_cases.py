@@ -15,7 +15,7 @@ from ccfem.arrays import FloatArray
 from ccfem.checks import check_known, check_number
 from ccfem.fibre_aware.cases_bound import OBJECTIVES, WORST
 from ccfem.fibre_aware.prune import fibre_length, profiles, shorten
-from ccfem.fibre_aware.strand_moves import Judged, moved
+from ccfem.fibre_aware.strand_moves import Judged, moved, stiffest
 from ccfem.layers.layer import Layer
 from ccfem.machine.machine import Machine
 from ccfem.toolpaths import Toolpaths
@@ -111,7 +111,7 @@ def prune_cases(
 
 
 def prune_and_move_cases(
-    toolpaths: Toolpaths,
+    candidates: Sequence[Toolpaths],
     layers: Sequence[Layer],
     parts: Sequence[Specimen],
     weights: FloatArray,
@@ -125,11 +125,12 @@ def prune_and_move_cases(
 ) -> Toolpaths:
     """Cut fibre to a length, mm in all, move what is left, and cut what has become longer.
 
-    Parameters as of `prune_cases` and `ccfem.fibre_aware.strand_moves.moved`.
+    Of several candidates each is cut, and the one of most value moved. Parameters as of
+    `prune_cases` and `ccfem.fibre_aware.strand_moves.moved`.
     """
     alike = (parts, weights, bounds, length, machine, strand, objective)
-    kept = prune_cases(toolpaths, *alike, rounds)
     judge = cases_judge(parts, weights, bounds, machine, strand, objective)
+    kept = stiffest([prune_cases(one, *alike, rounds) for one in candidates], judge)
     found = moved(kept, layers, parts[0].unreinforced.mesh, machine, judge, moves)
     return found if found is kept else prune_cases(found, *alike, rounds=1)
 

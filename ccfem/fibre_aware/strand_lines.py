@@ -151,7 +151,9 @@ class StrandLines:
         return points
 
 
-def strand_lines(fibre: Toolpaths, layers: Sequence[Layer], machine: Machine) -> StrandLines:
+def strand_lines(
+    fibre: Toolpaths, layers: Sequence[Layer], machine: Machine, hold: bool = True
+) -> StrandLines:
     """Points of fibre paths that may slide.
 
     Parameters
@@ -162,18 +164,22 @@ def strand_lines(fibre: Toolpaths, layers: Sequence[Layer], machine: Machine) ->
         At least one; all have the same axes.
     machine : Machine
         With its fibre width, least radius and least length.
+    hold : bool, default True
+        Whether tight bends, links that are marked and small rings stay. Where a ring closes it
+        always stays.
     """
     fibre = fibre.select(fibre.lengths > _SAME * machine.fibre_width)
     frame, paths = layers[0].plane.frame, _in_even_steps(fibre, machine.fibre_width)
     offsets, points = paths.offsets, paths.points @ frame[:2].T
     path = np.repeat(np.arange(len(paths)), np.diff(offsets))
-    fixed = paths.link | np.roll(paths.link, 1)
+    fixed = hold & (paths.link | np.roll(paths.link, 1))
     lengths = paths.lengths
     for k, (first, end) in enumerate(pairwise(offsets)):
         closed = bool(paths.closed[k])
-        fixed[first:end] |= _bent(points[first:end], closed, machine)
         fixed[[first, end - 1]] |= closed
-        fixed[first:end] |= closed and lengths[k] < _SMALL_RING * machine.minimum_length
+        if hold:
+            fixed[first:end] |= _bent(points[first:end], closed, machine)
+            fixed[first:end] |= closed and lengths[k] < _SMALL_RING * machine.minimum_length
     return StrandLines(
         toolpaths=paths,
         frame=frame,

@@ -28,7 +28,7 @@ from ccfem.virtual_testing.specimen import Specimen
 from ccfem.virtual_testing.strand import Strand
 from ccfem.virtual_testing.strands import cut_strands
 
-__all__ = ["Judged", "check_moves", "moved", "prune_and_move", "stiffness_judge"]
+__all__ = ["Judged", "check_moves", "moved", "prune_and_move", "stiffest", "stiffness_judge"]
 
 _STEP = 0.2
 """First step, in widths: 95 % of the points move by no more, and none by more than twice that."""
@@ -135,7 +135,8 @@ def moved(
     if not moves or not len(fibre):
         return toolpaths
     lines = strand_lines(fibre, layers, machine)
-    apart = spacing(lines, layers, machine, inset * machine.fibre_width)
+    width = machine.fibre_width
+    apart = spacing(lines, layers, width, inset * width)
     smooth = splu(apart.roughness)
     best, slide = judge(fibre), np.zeros(len(lines.path))
     direction, step, helped = None, _STEP * machine.fibre_width, False
@@ -157,7 +158,7 @@ def moved(
 
 
 def prune_and_move(
-    toolpaths: Toolpaths,
+    candidates: Sequence[Toolpaths],
     layers: Sequence[Layer],
     part: Specimen,
     length: float,
@@ -169,12 +170,23 @@ def prune_and_move(
 ) -> Toolpaths:
     """Cut fibre to a length, mm in all, move what is left, and cut what has become longer.
 
+    Of several candidates each is cut, and the stiffest moved; with strength the first is taken.
     Parameters as of `ccfem.fibre_aware.prune.prune` and `moved`; moves follow the stiffness.
     """
-    kept = prune(toolpaths, part, length, machine, strand, rounds, strength)
+    tried = candidates[:1] if strength else candidates
     judge = stiffness_judge(part, machine, strand)
+    kept = stiffest(
+        [prune(one, part, length, machine, strand, rounds, strength) for one in tried], judge
+    )
     found = moved(kept, layers, part.unreinforced.mesh, machine, judge, moves)
     return found if found is kept else prune(found, part, length, machine, strand, rounds=1)
+
+
+def stiffest(candidates: Sequence[Toolpaths], judge: Callable[[Toolpaths], Judged]) -> Toolpaths:
+    """Return the toolpaths of most value to a judge, the first of equal ones; one is not judged."""
+    if len(candidates) == 1:
+        return candidates[0]
+    return candidates[int(np.argmax([judge(one).value for one in candidates]))]
 
 
 def check_moves(strategy: str, moves: int, strength: float) -> None:

@@ -20,7 +20,6 @@ from ccfem.arrays import FloatArray, IntArray, freeze, in_brief
 from ccfem.elasticity.skyline import skyline_within
 from ccfem.fibre_aware.strand_lines import StrandLines
 from ccfem.layers.layer import Layer
-from ccfem.machine.machine import Machine
 
 __all__ = ["Spacing", "spacing"]
 
@@ -137,7 +136,13 @@ class Spacing:
         return pairs
 
 
-def spacing(lines: StrandLines, layers: Sequence[Layer], machine: Machine, inset: float) -> Spacing:
+def spacing(
+    lines: StrandLines,
+    layers: Sequence[Layer],
+    width: float,
+    inset: float,
+    come_in: bool = False,
+) -> Spacing:
     """Distances that strands keep on their layers.
 
     Parameters
@@ -145,15 +150,18 @@ def spacing(lines: StrandLines, layers: Sequence[Layer], machine: Machine, inset
     lines : StrandLines
     layers : sequence of Layer
         All on which there are strands.
-    machine : Machine
+    width : float, mm
+        That strands are apart.
     inset : float, mm
         Least distance from the border. What lies nearer to begin with comes no nearer.
+    come_in : bool, default False
+        Whether that has to keep the distance, too.
     """
     pieces, inward, owner = [], [], []
     for layer in layers:
         section = shapely.orient_polygons(layer.plane.polygon)
         for ring in shapely.get_rings(shapely.get_parts(section)):
-            longest = _BORDER_STEP * machine.fibre_width
+            longest = _BORDER_STEP * width
             line = shapely.get_coordinates(shapely.segmentize(ring, longest))
             line = line[np.append(True, (np.diff(line, axis=0) != 0.0).any(axis=1))]
             step = np.diff(line, axis=0)
@@ -166,8 +174,10 @@ def spacing(lines: StrandLines, layers: Sequence[Layer], machine: Machine, inset
     border, normals = np.concatenate(pieces), np.concatenate(inward)
     tree = cKDTree(_lifted(border.mean(axis=1), np.concatenate(owner)))
     _, near = tree.query(_lifted(lines.start, lines.layer), k=_NEAREST)
-    depth = np.minimum(_depths(lines.start, near, border, normals), inset)
-    return Spacing(lines, machine.fibre_width, depth, border, normals, tree, lines.roughness)
+    depth = np.full(len(lines.path), inset)
+    if not come_in:
+        depth = np.minimum(_depths(lines.start, near, border, normals), inset)
+    return Spacing(lines, width, depth, border, normals, tree, lines.roughness)
 
 
 def _lifted(points: FloatArray, layer: IntArray) -> FloatArray:

@@ -9,11 +9,12 @@ import shapely
 from ccfem.arrays import FloatArray, IntArray
 from ccfem.fibre_aware.path_profile import Profile, least_price
 from ccfem.fibre_aware.prune import profiles
+from ccfem.fibre_aware.slide_in import lines_to_slide_in, slid_in
 from ccfem.fibre_aware.spline_grid import SplineGrid
 from ccfem.geometry.isocontours import isocontours, triangle_edges
 from ccfem.layers.layer import Layer
 from ccfem.linking.clearance import trim_to_clearance
-from ccfem.linking.finishing import keep_off_border, linked_paths
+from ccfem.linking.finishing import linked_paths
 from ccfem.machine.machine import Machine
 from ccfem.mesh.tet_mesh import TetMesh
 from ccfem.toolpaths import Toolpaths
@@ -31,6 +32,9 @@ SHORTEST = 5.0
 
 _CUT_COST = 20.0
 """Length, mm, of the least valuable fibre that another cut has to save."""
+
+_NEAR = 0.02
+"""Share by which the value of levels may lie below the most for them to be tried as well."""
 
 _SAME = 0.5
 """Distance, in strand widths, up to which the borders of two sections count as the same: the levels
@@ -73,10 +77,14 @@ class Extraction:
     inset: float
     link_limit: float
 
-    def whole(
+    def candidates(
         self, layers: Sequence[Layer], group: IntArray, lengths: Sequence[float]
-    ) -> list[Toolpaths]:
-        """Paths of all layers, uncut, at the levels that are best for each length.
+    ) -> list[list[Toolpaths]]:
+        """Paths of all layers, uncut, at the levels that may be the best for each length.
+
+        The strains of the design say only about which levels are worth most. Where others are
+        worth hardly less, or whole numbers, which were drawn to the border, are not the best, those
+        are given, too.
 
         Parameters
         ----------
@@ -85,6 +93,11 @@ class Extraction:
             Number of the field of each layer.
         lengths : sequence of float, mm
             In all layers.
+
+        Returns
+        -------
+        list of list of Toolpaths
+            For each length; those worth most first.
         """
         alike = _alike(layers, group, self.machine.fibre_width)
         drawn: dict[tuple[int, int], Toolpaths] = {}
@@ -101,20 +114,17 @@ class Extraction:
             for numbers in alike
         ]
         counts = [len(numbers) for numbers in alike]
-        chosen = [self.best_phases(tried, counts, length) for length in lengths]
         planned: dict[tuple[int, ...], Toolpaths] = {}
-        for phases in chosen:
-            if phases not in planned:
-                of = {k: p for some, p in zip(alike, phases, strict=True) for k in some.tolist()}
-                planned[phases] = Toolpaths.concatenate(
-                    [paths(k, of[k]) for k in range(len(layers))]
-                )
-        return [planned[phases] for phases in chosen]
+        chosen = [self.best_phases(tried, counts, length) for length in lengths]
+        for phases in {phases for some in chosen for phases in some}:
+            of = {k: p for some, p in zip(alike, phases, strict=True) for k in some.tolist()}
+            planned[phases] = Toolpaths.concatenate([paths(k, of[k]) for k in range(len(layers))])
+        return [[planned[phases] for phases in some] for some in chosen]
 
     def best_phases(
         self, tried: list[list[list[Profile]]], counts: Sequence[int], length: float
-    ) -> tuple[int, ...]:
-        """For each kind of layers the position of the levels that is worth most.
+    ) -> list[tuple[int, ...]]:
+        """For each kind of layers the position of the levels that is worth most, and others near.
 
         Parameters
         ----------
@@ -133,18 +143,26 @@ class Extraction:
         def gain(along: list[Profile]) -> float:
             return sum(one.kept(price, minimum, _CUT_COST)[1] for one in along)
 
-        return tuple(int(np.argmax([gain(along) for along in one])) for one in tried)
+        gains = np.array([[gain(along) for along in one] for one in tried])
+        first, rows = gains.argmax(axis=1), np.arange(len(gains))
+        others = gains.copy()
+        others[rows, first] = -np.inf
+        second = others.argmax(axis=1)
+        near = others[rows, second] >= (1.0 - _NEAR) * gains[rows, first]
+        found = [first, np.zeros_like(first), np.where(near, second, first)]
+        return list(dict.fromkeys(tuple(phases.tolist()) for phases in found))
 
     def layer_paths(self, layer: Layer, field: FloatArray, shift: float) -> Toolpaths:
         """Paths of one layer along the levels that are `shift` above whole numbers."""
         width, section = self.machine.fibre_width, layer.plane.polygon
         lines = self.levels(layer, field, shift)
-        lines = keep_off_border(lines, section, self.inset * width)
+        lines = lines_to_slide_in(lines, section, self.inset * width)
         lines = trim_to_clearance(lines, CLEARANCE * width, SHORTEST * width)
         limit, least = self.link_limit * width, self.machine.minimum_length
         radius = self.machine.minimum_radius
         found = linked_paths(lines, section, width, limit, least, radius=radius)
-        return Toolpaths.from_plane(found.lines, layer, link=found.link)
+        paths = Toolpaths.from_plane(found.lines, layer, link=found.link)
+        return slid_in(paths, layer, self.machine, self.inset)
 
     def levels(self, layer: Layer, field: FloatArray, shift: float) -> list[FloatArray]:
         """Trace the levels `shift` above whole numbers on a layer, (n, 2), mm."""

@@ -148,7 +148,7 @@ class Pruned:
                 part, strand = Specimen.of(solved(stress, "pruned")), Strand(self.rho)
                 wanted = length * len(layers)
                 cut_by = (self.rounds, self.strength, self.moves)
-                kept = prune_and_move(paths, layers, part, wanted, machine, strand, *cut_by)
+                kept = prune_and_move((paths,), layers, part, wanted, machine, strand, *cut_by)
             coverage = length / full
             overfill = max(planned / full / coverage, 1.0)
             found.append((replace(self, coverage=coverage, overfill=overfill), WholePart(kept)))
@@ -185,7 +185,7 @@ class Pruned:
             wanted = length * len(layers)
             judged = (cases.weights, bounds)
             kept = prune_and_move_cases(
-                *(paths, layers, parts, *judged, wanted, machine, strand),
+                *((paths,), layers, parts, *judged, wanted, machine, strand),
                 rounds=rounds,
                 moves=self.moves,
             )

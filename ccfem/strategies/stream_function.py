@@ -246,12 +246,12 @@ class StreamFunction:
         field = solved(stress, "stream_function")
         problem, group, found = self.designed(field, layers, machine)
         strained = ((1.0, found.objective.solution.displacement),)
-        extraction = self.extraction(problem, (found.field,), strained, machine)
+        drawn = self.extraction(problem, (found.field,), strained, machine)
         in_all, strand = [length * len(layers) for length in lengths], Strand(self.rho)
         part, cut_by = problem.part.specimen, (_ROUNDS, self.strength, self.moves)
         return [
-            prune_and_move(whole, layers, part, length, machine, strand, *cut_by)
-            for whole, length in zip(extraction.whole(layers, group, in_all), in_all, strict=True)
+            prune_and_move(some, layers, part, length, machine, strand, *cut_by)
+            for some, length in zip(drawn.candidates(layers, group, in_all), in_all, strict=True)
         ]
 
     def extraction(
@@ -347,14 +347,14 @@ class StreamFunction:
             (float(share) / one.work, one.displacement)
             for share, one in zip(counts, found.objective.solution, strict=True)
         ]
-        extraction = self.extraction(problem.problem, tuple(found.fields), strained, machine)
+        drawn = self.extraction(problem.problem, tuple(found.fields), strained, machine)
         field = layers_by_case(cases.weights, layers) * problem.problem.groups + group
         specimens = [part.specimen for part in problem.parts]
         judged = (specimens, cases.weights, bounds)
         how: dict[str, Any] = {"objective": self.objective, "moves": self.moves}
         return [
-            prune_and_move_cases(whole, layers, *judged, length, machine, strand, **how)
-            for whole, length in zip(extraction.whole(layers, field, in_all), in_all, strict=True)
+            prune_and_move_cases(some, layers, *judged, length, machine, strand, **how)
+            for some, length in zip(drawn.candidates(layers, field, in_all), in_all, strict=True)
         ]
 
 

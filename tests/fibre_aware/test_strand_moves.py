@@ -82,7 +82,7 @@ def test_a_pack_of_strands_gives_way_at_once_and_keeps_off_the_border(bent_beam)
     _, layers = bent_beam
     paths = straight(layers, 1.0, 1.7, 2.4, 3.1, 3.8, 4.5)
     lines = strand_lines(paths, layers, MACHINE)
-    apart = spacing(lines, layers, MACHINE, 0.5)
+    apart = spacing(lines, layers, 1.0, 0.5)
     slide = apart.spread(np.zeros(len(lines.path)))
     for layer in layers:
         section = layer.plane.polygon
@@ -100,7 +100,7 @@ def test_a_pack_of_strands_gives_way_at_once_and_keeps_off_the_border(bent_beam)
 def test_what_is_far_enough_apart_stays(bent_beam):
     _, layers = bent_beam
     lines = strand_lines(straight(layers, 2.0, 3.1, 6.0), layers, MACHINE)
-    slide = spacing(lines, layers, MACHINE, 0.5).spread(np.zeros(len(lines.path)))
+    slide = spacing(lines, layers, 1.0, 0.5).spread(np.zeros(len(lines.path)))
     assert np.array_equal(slide, np.zeros(len(lines.path)))
 
 
