@@ -110,7 +110,7 @@ class StreamFunction:
     objective : {"worst", "sum"}
         What counts of several load cases: the one that is farthest from the stiffest that it could
         be made alone, or the weighted mean over the cases.
-    tilt : float, default 0.75
+    tilt : float, default 0.6
         Weight of a layer's own case in the field that its design starts with, in (0, 1], where
         there are several; the others share the rest.
     strength : float, default 0
@@ -131,7 +131,7 @@ class StreamFunction:
     link_limit: float = 10.0
     inset: float = 0.5
     objective: Literal["worst", "sum"] = "worst"
-    tilt: float = 0.75
+    tilt: float = 0.6
     strength: float = 0.0
     moves: int = 0
 
