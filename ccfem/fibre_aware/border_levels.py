@@ -5,6 +5,7 @@ them goes without fibre, by up to a width, and along the border stress is highes
 designed without regard to where their levels lie leave half a width on average.
 """
 
+from collections.abc import Sequence
 from dataclasses import dataclass
 from typing import Any, Protocol
 
@@ -103,6 +104,13 @@ class BorderLevels:
         ones = np.ones((len(grid), 1))
         blocks = sp.block_diag(problem.groups * [ones]).toarray()
         return cls(values, weight, blocks)
+
+    @classmethod
+    def side_by_side(cls, levels: Sequence["BorderLevels"]) -> "BorderLevels":
+        """Of several fields, one after the other; their costs add up."""
+        values = sp.block_diag([one.values for one in levels], format="csr")
+        weight = np.concatenate([one.weight for one in levels])
+        return cls(values, weight, sp.block_diag([one.blocks for one in levels]).toarray())
 
     def cost(self, field: FloatArray) -> tuple[float, FloatArray]:
         """Cost, and its derivative (c,) by the coefficients."""

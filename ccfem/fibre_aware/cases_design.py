@@ -5,7 +5,7 @@ of all fields. What each case makes of that fibre is one solve; L-BFGS moves all
 """
 
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from functools import cached_property
 from typing import Any
 
@@ -13,7 +13,9 @@ import numpy as np
 import scipy.sparse as sp
 
 from ccfem.arrays import FloatArray, freeze
-from ccfem.fibre_aware.field_descent import improved
+from ccfem.fibre_aware.border_levels import BorderLevels
+from ccfem.fibre_aware.cases_bound import SUM, WORST
+from ccfem.fibre_aware.field_design import designed_fields
 from ccfem.fibre_aware.smeared import SmearedPart, SmearedSolution
 from ccfem.fibre_aware.stream_design import OVER_BUDGET, StreamProblem
 from ccfem.fibre_aware.stream_start import field_along, mixed_tension
@@ -21,7 +23,17 @@ from ccfem.fields.layer_tension import layer_tension
 from ccfem.layers.layer import Layer
 from ccfem.layers.layer_stress import stress_on
 
-__all__ = ["CasesDesign", "CasesObjective", "CasesProblem", "design_cases", "start_fields"]
+__all__ = [
+    "DESIGN_POWERS",
+    "CasesDesign",
+    "CasesObjective",
+    "CasesProblem",
+    "design_cases",
+    "start_fields",
+]
+
+DESIGN_POWERS = {WORST: 4.0, SUM: 1.0}
+"""Power of ``bound / ratio`` in the sum over the cases, by the objective that is planned for."""
 
 
 @dataclass(frozen=True)
@@ -52,8 +64,8 @@ class CasesObjective:
 class CasesProblem:
     """What fields for several cases are designed for.
 
-    Minimised is ``log(sum of w_i bound_i / ratio_i)`` plus the penalties of `StreamProblem`, those
-    of each field weighted by its share of the layers.
+    Minimised is ``log(sum of w_i (bound_i / ratio_i)^p) / p`` plus the penalties of
+    `StreamProblem`, those of each field weighted by its share of the layers.
 
     Attributes
     ----------
@@ -67,6 +79,8 @@ class CasesProblem:
         Stiffness ratio of each case that no paths exceed.
     shares : (n,) array
         Of the layers, of each field; their sum is 1.
+    power : float, default 1
+        The p above: the larger, the more the worst case counts.
     """
 
     problem: StreamProblem
@@ -74,6 +88,7 @@ class CasesProblem:
     weights: FloatArray
     bounds: FloatArray
     shares: FloatArray
+    power: float = 1.0
 
     def __post_init__(self) -> None:
         freeze(self, weights=float, bounds=float, shares=float)
@@ -117,13 +132,12 @@ class CasesProblem:
         ratio = np.array(
             [part.ratio(one.work) for part, one in zip(self.parts, found, strict=True)]
         )
-        terms = self.weights * self.bounds / ratio
-        counts = terms / terms.sum()
+        worth, counts = self._worth(ratio)
         length = sum(
             share * problem.length(one) for share, one in zip(self.shares, laid, strict=True)
         )
         over = max(length / problem.budget - 1.0, 0.0)
-        value, gradient = float(np.log(terms.sum())) + OVER_BUDGET * over**2, []
+        value, gradient = worth + OVER_BUDGET * over**2, []
         for share, one, own in zip(self.shares, laid, fields, strict=True):
             bend = problem.laplacian @ own
             value += share * sum(problem.penalties(one, bend))
@@ -134,6 +148,34 @@ class CasesProblem:
             )
             gradient.append(share * problem.gradient(one, bend, (pull[0], pull[1]), over))
         return CasesObjective(value, np.concatenate(gradient), ratio, float(length), found)
+
+    def _worth(self, ratios: FloatArray) -> tuple[float, FloatArray]:
+        """Objective of stiffness ratios (n,) without penalties, and how much each counts in it."""
+        terms = self.bounds / ratios
+        powers = self.weights * (terms / terms.max()) ** self.power
+        return float(np.log(terms.max()) + np.log(powers.sum()) / self.power), powers / powers.sum()
+
+    def _counts(self, solutions: Sequence[SmearedSolution]) -> FloatArray:
+        """How much each case counts (n,)."""
+        ratios = [part.ratio(one.work) for part, one in zip(self.parts, solutions, strict=True)]
+        return self._worth(np.array(ratios))[1]
+
+    def curvature(self, field: FloatArray, solutions: tuple[SmearedSolution, ...]) -> Any:
+        """Block of each field: the mean of `StreamProblem.curvature` by how much cases count."""
+        counts, blocks = self._counts(solutions), []
+        for share, own in zip(self.shares, field.reshape(len(self.shares), -1), strict=True):
+            each = [self.problem.curvature(own, one) for one in solutions]
+            blocks.append(share * sum(count * one for count, one in zip(counts, each, strict=True)))
+        return sp.block_diag(blocks, format="csc")
+
+    def levels(self, field: FloatArray, solutions: tuple[SmearedSolution, ...]) -> BorderLevels:
+        """Weigh what levels cost that keep farther from borders than they need, over all cases."""
+        counts, found = self._counts(solutions), []
+        for share, own in zip(self.shares, field.reshape(len(self.shares), -1), strict=True):
+            each = [self.problem.levels(own, one) for one in solutions]
+            weight = share * (counts @ np.stack([one.weight for one in each]))
+            found.append(replace(each[0], weight=weight))
+        return BorderLevels.side_by_side(found)
 
 
 @dataclass(frozen=True)
@@ -156,8 +198,12 @@ class CasesDesign:
 
 
 def design_cases(problem: CasesProblem, start: FloatArray, evaluations: int = 50) -> CasesDesign:
-    """Improve fields (n * c,) of several cases as `stream_design.design` does those of one."""
-    field, found, ratios = improved(problem, start, evaluations)
+    """Improve fields (n * c,) of several cases as `stream_design.design` does those of one.
+
+    The unknowns have the curvature of all cases, and levels of each field are drawn to the borders
+    that any case stretches along it.
+    """
+    field, found, ratios = designed_fields(problem, start, evaluations)
     return CasesDesign(field.reshape(len(problem.shares), -1), found, ratios)
 
 

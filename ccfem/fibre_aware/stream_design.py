@@ -6,7 +6,7 @@ levels: it runs across g, and there are |g| strands a mm, so that a layer of thi
 and the gradient of the compliance; L-BFGS does the rest.
 """
 
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 from functools import cached_property
 from typing import Any
 
@@ -15,7 +15,7 @@ import scipy.sparse as sp
 
 from ccfem.arrays import FloatArray, IntArray
 from ccfem.fibre_aware.border_levels import BorderLevels
-from ccfem.fibre_aware.field_descent import TOLERANCE, FieldMetric, improved
+from ccfem.fibre_aware.field_design import designed_fields
 from ccfem.fibre_aware.smeared import SmearedPart, SmearedSolution
 from ccfem.fibre_aware.spline_grid import SplineGrid
 
@@ -46,9 +46,6 @@ SLACK = 1e-3
 
 _SPREAD = 0.1
 """Share of the fibre's energy that the curvature of the objective spreads evenly over the part."""
-
-_AT_BORDERS = 0.4
-"""Share of the evaluations in which levels are drawn to the border."""
 
 _LEAST_ENERGY = 1e-6
 """Least energy of the fibre for that, as a share of all: a field may lay none that is stretched."""
@@ -248,6 +245,10 @@ class StreamProblem:
         size, square = even.diagonal().mean(), self.laplacian.T @ self.laplacian
         return even + size * (_BENT * square + _HELD * sp.eye_array(len(field)))
 
+    def levels(self, field: FloatArray, solution: SmearedSolution) -> BorderLevels:
+        """Weigh what levels of a field (c,) cost that keep farther from borders than they need."""
+        return BorderLevels.of(self, field, solution)
+
     def signed(self, field: FloatArray, group: int) -> FloatArray:
         """Coefficients (k,) of one group, with the sign that does not depend on the axes."""
         count = len(self.grid)
@@ -310,28 +311,8 @@ class StreamDesign:
     ratios: tuple[float, ...]
 
 
-@dataclass(frozen=True)
-class _AtBorders:
-    """The problem with the cost of levels that keep farther from the border than they need."""
-
-    problem: StreamProblem
-    levels: BorderLevels
-
-    @property
-    def laplacian(self) -> Any:
-        return self.problem.laplacian
-
-    def evaluate(self, field: FloatArray, start: Any, tolerance: float) -> Objective:
-        found = self.problem.evaluate(field, start, tolerance)
-        cost, slope = self.levels.cost(field)
-        return replace(found, value=found.value + cost, gradient=found.gradient + slope)
-
-
 def design(problem: StreamProblem, start: FloatArray, evaluations: int = 50) -> StreamDesign:
-    """Improve fields by L-BFGS, in unknowns of even curvature (`StreamProblem.curvature`).
-
-    In the last evaluations whole numbers of the fields are drawn to half a width inside the border,
-    where that is stretched along strands (`BorderLevels`).
+    """Improve fields by `ccfem.fibre_aware.field_design.designed_fields`.
 
     Parameters
     ----------
@@ -345,18 +326,4 @@ def design(problem: StreamProblem, start: FloatArray, evaluations: int = 50) -> 
     StreamDesign
         The best of all evaluations.
     """
-    last = int(_AT_BORDERS * evaluations)
-    before = problem.evaluate(start, tolerance=TOLERANCE)
-    metric = FieldMetric.of(problem.curvature(start, before.solution))
-    first = improved(problem, start, evaluations - last, metric, before.solution)
-    found = StreamDesign(*first)
-    if not last:
-        return found
-    solution = found.objective.solution
-    levels = BorderLevels.of(problem, found.field, solution)
-    lifted = levels.lifted(found.field)
-    metric = FieldMetric.of(problem.curvature(lifted, solution) + levels.curvature())
-    posed = _AtBorders(problem, levels)
-    field, drawn, ratios = improved(posed, lifted, last, metric, solution)
-    objective = problem.evaluate(field, drawn.solution, TOLERANCE)
-    return StreamDesign(field, objective, (*found.ratios, *ratios))
+    return StreamDesign(*designed_fields(problem, start, evaluations))

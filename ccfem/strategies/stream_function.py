@@ -18,6 +18,7 @@ from ccfem.elasticity.stress_field import StressField, solved
 from ccfem.elasticity.weighted_cases import WeightedCases
 from ccfem.fibre_aware.cases_bound import single_bounds
 from ccfem.fibre_aware.cases_design import (
+    DESIGN_POWERS,
     CasesDesign,
     CasesProblem,
     design_cases,
@@ -64,9 +65,8 @@ _NEAR = 0.95
 _ROUNDS = 3
 """Virtual tests that say what to cut."""
 
-_CASES_OVERFILL, _CASES_MOST = 1.15, 50
-"""Least overfill for several load cases, whose tests have more to choose between, and most
-evaluations, of which more do not help."""
+_CASES_OVERFILL = 1.15
+"""Least overfill for several load cases, whose tests have more to choose between."""
 
 _MORE = 1.03
 """By how much more it then asks for than by proportion."""
@@ -91,7 +91,7 @@ class StreamFunction:
     rho : float, mm^2, default 4
         Axial stiffness of a strand over Young's modulus of the matrix.
     evaluations : int, default 80
-        Of the stiffness, in the design; at most 50 of several load cases, whom more do not help.
+        Of the stiffness, in the design.
     groups : int, default 0
         Number of fields over the height of the part; 0 for one, or for at most six where the
         stress differs over the height.
@@ -110,7 +110,7 @@ class StreamFunction:
     objective : {"worst", "sum"}
         What counts of several load cases: the one that is farthest from the stiffest that it could
         be made alone, or the weighted mean over the cases.
-    tilt : float, default 0.75
+    tilt : float, default 0.6
         Weight of a layer's own case in the field that its design starts with, in (0, 1], where
         there are several; the others share the rest.
     strength : float, default 0
@@ -131,7 +131,7 @@ class StreamFunction:
     link_limit: float = 10.0
     inset: float = 0.5
     objective: Literal["worst", "sum"] = "worst"
-    tilt: float = 0.75
+    tilt: float = 0.6
     strength: float = 0.0
     moves: int = 0
 
@@ -221,9 +221,8 @@ class StreamFunction:
         if len(cases) == 1:
             return self.to_lengths(cases.fields[0], layers, machine, lengths)
         refuse_strength("stream_function", self.strength)
-        most = min(self.evaluations, _CASES_MOST)
         return _to_lengths(
-            replace(self, overfill=max(self.overfill, _CASES_OVERFILL), evaluations=most),
+            replace(self, overfill=max(self.overfill, _CASES_OVERFILL)),
             layers,
             machine,
             lengths,
@@ -290,7 +289,8 @@ class StreamFunction:
         parts = smeared_cases(cases.fields, layers[0].plane.frame)
         alone, group = self._problem(parts, layers, machine)
         shares = layer_counts(cases.weights, len(layers)) / len(layers)
-        problem = CasesProblem(alone, parts, cases.weights, bounds, shares)
+        power = DESIGN_POWERS[self.objective]
+        problem = CasesProblem(alone, parts, cases.weights, bounds, shares, power)
         chosen = middle_layers(layers, group)
         start = start_fields(problem, cases.fields, chosen, self.cap, self.tilt)
         return problem, group, design_cases(problem, start, self.evaluations)

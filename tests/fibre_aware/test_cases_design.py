@@ -16,7 +16,7 @@ from ccfem.mesh.box import box_mesh
 MACHINE = Machine()
 
 
-def problem_of(cases, layers, shares, size=3.0, coverage=0.4):
+def problem_of(cases, layers, shares, size=3.0, coverage=0.4, power=1.0):
     parts = smeared_cases(cases.fields, layers[0].plane.frame)
     centres = parts[0].centroids @ parts[0].frame[:2].T
     capacity = fibre_capacity(parts[0], layers, MACHINE)
@@ -30,14 +30,15 @@ def problem_of(cases, layers, shares, size=3.0, coverage=0.4):
         axial_stiffness=4.0 * parts[0].modulus,
         budget=coverage * float(parts[0].mesh.volumes @ capacity),
     )
-    return CasesProblem(alone, parts, cases.weights, np.array([2.0, 3.0]), np.array(shares))
+    bounds = np.array([2.0, 3.0])
+    return CasesProblem(alone, parts, cases.weights, bounds, np.array(shares), power)
 
 
-@pytest.mark.parametrize("scale", [0.7, 1.6])
-def test_gradient_agrees_with_finite_differences(two_bends, rng, scale):
+@pytest.mark.parametrize(("scale", "power"), [(0.7, 1.0), (1.6, 1.0), (0.7, 4.0)])
+def test_gradient_agrees_with_finite_differences(two_bends, rng, scale, power):
     # Scale 1.6: over budget and steeper than allowed, so that every penalty takes part.
     cases, layers = two_bends
-    problem = problem_of(cases, layers, [0.25, 0.75])
+    problem = problem_of(cases, layers, [0.25, 0.75], power=power)
     field = scale * start_fields(problem, cases.fields, layers[:1], 90.0, 0.75)
     found = problem.evaluate(field, tolerance=1e-12)
     smooth = np.linalg.inv(np.eye(len(field)) + 4.0 * problem.laplacian.toarray())
@@ -73,6 +74,63 @@ def test_design_helps_both_cases(two_bends):
     assert found.objective.value < before.value - 0.01
     assert (found.objective.ratio > 1.1).all()
     assert found.fields.shape == (2, len(problem.problem.grid))
+
+
+def test_large_power_takes_the_worst_case(two_bends):
+    cases, layers = two_bends
+    problem = problem_of(cases, layers, [0.5, 0.5], power=400.0)
+    field = 0.5 * start_fields(problem, cases.fields, layers[:1], 90.0, 0.75)
+    found = problem.evaluate(field)
+    penalties = sum(
+        0.5 * sum(problem.problem.penalties(problem.problem.laid(one), bend))
+        for one, bend in zip(
+            field.reshape(2, -1), (problem.laplacian @ field).reshape(2, -1), strict=True
+        )
+    )
+    worst = np.log((problem.bounds / found.ratio).max())
+    assert found.value - penalties == pytest.approx(worst, abs=0.01)
+
+
+def test_curvature_is_positive_definite_and_knows_each_field_alone(two_bends):
+    cases, layers = two_bends
+    problem = problem_of(cases, layers, [0.25, 0.75], power=4.0)
+    field = 0.5 * start_fields(problem, cases.fields, layers[:1], 90.0, 0.75)
+    solutions = problem.evaluate(field).solution
+    matrix = problem.curvature(field, solutions).toarray()
+    np.testing.assert_allclose(matrix, matrix.T, atol=1e-12 * matrix.max())
+    assert np.linalg.eigvalsh(matrix).min() > 0.0
+    count = len(problem.problem.grid)
+    assert not matrix[:count, count:].any()
+
+
+def test_curvature_of_one_case_in_all_layers_is_that_of_its_problem(two_bends):
+    cases, layers = two_bends
+    problem = problem_of(cases, layers, [1.0, 1.0])
+    field = start_fields(problem, cases.fields, layers[:1], 90.0, 0.75)
+    (one, _), half = problem.evaluate(field).solution, len(field) // 2
+    found = problem.curvature(field, (one, one)).toarray()[:half, :half]
+    alone = problem.problem.curvature(field[:half], one).toarray()
+    np.testing.assert_allclose(found, alone, rtol=1e-12, atol=1e-12 * alone.max())
+
+
+def test_levels_of_all_fields_cost_what_each_does_by_its_share(two_bends, rng):
+    cases, layers = two_bends
+    problem = problem_of(cases, layers, [0.25, 0.75])
+    field = start_fields(problem, cases.fields, layers[:1], 90.0, 0.75)
+    (one, _), half = problem.evaluate(field).solution, len(field) // 2
+    levels = problem.levels(field, (one, one))
+    each = [
+        problem.problem.levels(part, one).cost(part)[0] for part in (field[:half], field[half:])
+    ]
+    cost, slope = levels.cost(field)
+    assert cost == pytest.approx(0.25 * each[0] + 0.75 * each[1], rel=1e-10)
+    direction = rng.standard_normal(len(field))
+    ends = [levels.cost(field + step * direction)[0] for step in (1e-6, -1e-6)]
+    assert slope @ direction == pytest.approx((ends[0] - ends[1]) / 2e-6, rel=1e-5)
+    lifted = levels.lifted(field)
+    assert levels.cost(lifted)[0] <= cost
+    change = (lifted - field).reshape(2, -1)
+    np.testing.assert_allclose(change, change[:, :1] * np.ones_like(change), atol=1e-12)
 
 
 def test_mixed_tension_of_two_cases_at_right_angles():
