@@ -24,8 +24,8 @@ from ccfem.virtual_testing.strands import cut_strands
 __all__ = ["CLEARANCE", "SHORTEST", "Extraction", "middle", "refined"]
 
 CLEARANCE = 0.95
-"""Least distance of strands in widths: they are designed to be 1 / 0.975 apart, and what is cut for
-a hundredth of a width would be lost."""
+"""Least distance of strands in widths before they are linked: what is cut for some hundredths of a
+width would be lost. Where they slide in they are spread to a width."""
 
 SHORTEST = 5.0
 """Length, in strand widths, of the shortest pieces that are kept for linking."""
@@ -33,7 +33,7 @@ SHORTEST = 5.0
 _CUT_COST = 20.0
 """Length, mm, of the least valuable fibre that another cut has to save."""
 
-_NEAR = 0.02
+_NEAR = 0.06
 """Share by which the value of levels may lie below the most for them to be tried as well."""
 
 _SAME = 0.5
