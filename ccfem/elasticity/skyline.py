@@ -9,10 +9,10 @@ from collections.abc import Callable
 import numpy as np
 import scipy.sparse as sp
 from numba import njit
-from scipy.sparse.csgraph import reverse_cuthill_mckee
 
 from ccfem.arrays import FloatArray, IntArray
 from ccfem.errors import SolveError
+from ccfem.mesh.numbering import reverse_cuthill_mckee
 
 __all__ = ["skyline", "skyline_operations"]
 
@@ -129,19 +129,15 @@ def _lowest(matrix: sp.bsr_array, place: IntArray) -> IntArray:
 def _ordering(matrix: sp.bsr_array) -> tuple[IntArray, IntArray]:
     """Find the new place of each block row, and the skyline: as it comes, or Cuthill-McKee.
 
-    Reverse Cuthill-McKee (George and Liu, Computer Solution of Large Sparse Positive Definite
-    Systems, 1981, chapter 4) is taken where its factorisation is cheaper; where the band is as
-    narrow as that of a square grid already, it is not tried.
+    Reverse Cuthill-McKee is taken where its factorisation is cheaper; where the band is as narrow
+    as that of a square grid already, it is not tried.
     """
     n = len(matrix.indptr) - 1
     natural = np.arange(n)
     best = _lowest(matrix, natural)
     if (natural - best).mean() <= 1.1 * np.sqrt(n):
         return natural, best
-    graph = sp.csr_array(
-        (np.ones(len(matrix.indices), dtype=np.int8), matrix.indices, matrix.indptr), shape=(n, n)
-    )
-    order = reverse_cuthill_mckee(sp.csr_matrix(graph), symmetric_mode=True)
+    order = reverse_cuthill_mckee(matrix.indptr, matrix.indices)
     place = np.empty(n, dtype=np.int64)
     place[order] = natural
     other = _lowest(matrix, place)
