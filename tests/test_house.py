@@ -135,3 +135,38 @@ def test_compiled_functions_work_number_by_number():
             ):
                 found += [f"{name}.{node.name} {what}" for what in slow_to_compile(node)]
     assert not found
+
+
+def unstable_sorts(tree):
+    """Where equal values are put in an order that the processor decides."""
+    for node in ast.walk(tree):
+        called = node.func if isinstance(node, ast.Call) else None
+        if isinstance(called, ast.Attribute) and called.attr in ("argsort", "argpartition"):
+            kind = [ast.unparse(word.value) for word in node.keywords if word.arg == "kind"]
+            if kind != ["'stable'"]:
+                yield ast.unparse(node)
+
+
+def test_unstable_sort_is_found():
+    text = "a = np.argsort(b)\nc = np.argsort(b, kind='stable')\nd = np.argpartition(b, 3)"
+    assert list(unstable_sorts(ast.parse(text))) == ["np.argsort(b)", "np.argpartition(b, 3)"]
+
+
+def test_equal_values_keep_their_order_on_every_processor():
+    """NumPy sorts otherwise with and without AVX-512: a mesh once differed from one to the other.
+
+    SciPy's reverse Cuthill-McKee sorts so inside; `ccfem.mesh.numbering` stands in for it.
+    """
+    found = []
+    for name, path in modules().items():
+        tree = ast.parse(path.read_text(encoding="utf-8"))
+        found += [f"{name}: {what}" for what in unstable_sorts(tree)]
+        if name != "ccfem.mesh.numbering":
+            found += [
+                f"{name} imports SciPy's reverse_cuthill_mckee"
+                for node in ast.walk(tree)
+                if isinstance(node, ast.ImportFrom)
+                and str(node.module).startswith("scipy")
+                and "reverse_cuthill_mckee" in [alias.name for alias in node.names]
+            ]
+    assert not found

@@ -169,7 +169,7 @@ def _forces(run: Run) -> FloatArray:
     """Force, N, that each share of the fibre's length stays below."""
     assert run.tested is not None
     test = run.tested.bracket.tension
-    order = np.argsort(test.axial_force)
+    order = np.argsort(test.axial_force, kind="stable")
     below = np.cumsum(test.strands.length[order])
     if not len(order):
         return np.zeros(len(_QUANTILES))

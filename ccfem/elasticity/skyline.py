@@ -9,10 +9,10 @@ from collections.abc import Callable
 import numpy as np
 import scipy.sparse as sp
 from numba import njit
-from scipy.sparse.csgraph import reverse_cuthill_mckee
 
 from ccfem.arrays import FloatArray, IntArray
 from ccfem.errors import SolveError
+from ccfem.mesh.numbering import reverse_cuthill_mckee
 
 __all__ = ["skyline", "skyline_operations", "skyline_within"]
 
@@ -138,10 +138,7 @@ def _ordering(matrix: sp.bsr_array) -> tuple[IntArray, IntArray]:
     best = _lowest(matrix, natural)
     if ((natural - best) ** 2).mean() <= 1.21 * n:
         return natural, best
-    graph = sp.csr_array(
-        (np.ones(len(matrix.indices), dtype=np.int8), matrix.indices, matrix.indptr), shape=(n, n)
-    )
-    order = reverse_cuthill_mckee(sp.csr_matrix(graph), symmetric_mode=True)
+    order = reverse_cuthill_mckee(matrix.indptr, matrix.indices)
     place = np.empty(n, dtype=np.int64)
     place[order] = natural
     other = _lowest(matrix, place)

@@ -219,7 +219,7 @@ def _direction(
     strain = plane_strain(mesh, judged.strains_of, lines.frame)
     energy, length, slope = fibre_energy(points, lines.heights, lines.offsets, strain)
     squared = energy / np.where(length > 0.0, length, 1.0)
-    order = np.argsort(squared)
+    order = np.argsort(squared, kind="stable")
     along = np.cumsum(length[order])
     price = squared[order][np.searchsorted(along, _CHEAPEST * along[-1])]
     step = np.diff(points, axis=0) * (lines.path[1:] == lines.path[:-1])[:, None]

@@ -57,7 +57,7 @@ class Chart:
     def distortion(self) -> float:
         """Largest relative change of a length that 95 % of the area stays within."""
         worst = np.maximum(self.stretches[:, 0], 1.0 / np.maximum(self.stretches[:, 1], 1e-9))
-        order = np.argsort(worst)
+        order = np.argsort(worst, kind="stable")
         below = np.cumsum(self.layer.areas[order])
         at = min(int(np.searchsorted(below, 0.95 * below[-1])), len(order) - 1)
         return float(worst[order[at]] - 1.0)

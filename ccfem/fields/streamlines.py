@@ -128,7 +128,7 @@ def _usual_size(corners: FloatArray, plane_stress: FloatArray) -> float:
     """Size of the principal stress that `_RARE` of the area of triangles exceeds, MPa."""
     size = np.abs(strongest_in_plane(plane_stress)[0])
     a, b = np.moveaxis(corners[:, 1:] - corners[:, :1], 1, 0)
-    order = np.argsort(size)
+    order = np.argsort(size, kind="stable")
     area = np.cumsum(np.abs(a[:, 0] * b[:, 1] - a[:, 1] * b[:, 0])[order])
     return float(size[order[np.searchsorted(area, (1.0 - _RARE) * area[-1])]])
 

@@ -110,7 +110,7 @@ def _quantiles(
     values: FloatArray, weight: FloatArray, shares: tuple[float, ...]
 ) -> tuple[float, ...]:
     """Quantiles of weighted values."""
-    order = np.argsort(values)
+    order = np.argsort(values, kind="stable")
     along = np.cumsum(weight[order]) / weight.sum()
     at = np.minimum(np.searchsorted(along, shares), len(values) - 1)
     return tuple(float(v) for v in values[order][at])

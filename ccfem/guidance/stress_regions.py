@@ -125,7 +125,7 @@ def stress_regions(
 
 def _peak(values: FloatArray, volume: FloatArray, quantile: float) -> float:
     """Value that the rest of the volume exceeds."""
-    order = np.argsort(values)
+    order = np.argsort(values, kind="stable")
     along = np.cumsum(volume[order]) / volume.sum()
     at = min(int(np.searchsorted(along, quantile)), len(order) - 1)
     return float(values[order[at]])

@@ -57,7 +57,7 @@ def table_stress(path: Path) -> StressData:
             f"{path}: expected every {kinds[0]} from 0 or from 1 on, each once; got "
             f"{len(numbers)} lines from {first} to {numbers.max()}: number them as the mesh does"
         )
-    values = values[np.argsort(numbers)]
+    values = values[np.argsort(numbers, kind="stable")]
     on_nodes = kinds[0] == "node"
     return StressData(None, None, values if on_nodes else None, None if on_nodes else values,
                       given[0])  # fmt: skip

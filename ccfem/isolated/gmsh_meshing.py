@@ -158,7 +158,7 @@ def _size_at(x: float, y: float, z: float, size: float, walls: list[list[float]]
 def _mesh(gmsh: Any, scale: float) -> dict[str, Any]:
     """Nodes and tetrahedra of the model."""
     tags, points, _ = gmsh.model.mesh.getNodes()
-    order = np.argsort(tags)
+    order = np.argsort(tags, kind="stable")
     _, cells = gmsh.model.mesh.getElementsByType(4)
     return {
         "points": np.reshape(points, (-1, 3))[order] * scale,

@@ -48,7 +48,7 @@ def bisected(mesh: TetMesh, chosen: BoolArray) -> tuple[TetMesh, IntArray]:
     n, ends = len(mesh.points), np.sort(edges[halved], axis=1).astype(np.int64)
     points = np.concatenate([mesh.points, mesh.points[ends].mean(axis=1)])
     key = ends[:, 0] * n + ends[:, 1]
-    order = np.argsort(key)
+    order = np.argsort(key, kind="stable")
     cut = (n, key[order], rank[halved][order], n + order)
     cells, parent = _cut(mesh.cells, *cut)
     patches = {name: _cut(facets, *cut)[0] for name, facets in mesh.patches.items()}

@@ -3,11 +3,11 @@
 import numpy as np
 import shapely
 from scipy.sparse import coo_array
-from scipy.sparse.csgraph import reverse_cuthill_mckee
 
 from ccfem.arrays import FloatArray, IntArray
 from ccfem.checks import check_number
 from ccfem.errors import InputError
+from ccfem.mesh.numbering import reverse_cuthill_mckee
 from ccfem.mesh.tet_mesh import TetMesh
 from ccfem.meshing.planform import triangulate
 
@@ -66,7 +66,9 @@ def extrude(
     points[:, :, :2] = plane[:, None]
     points[:, :, 2] = np.linspace(0.0, height, levels)
     rank = np.random.default_rng(0).permutation(len(plane))
-    rising = np.take_along_axis(triangles, np.argsort(rank[triangles], axis=1), axis=1)
+    rising = np.take_along_axis(
+        triangles, np.argsort(rank[triangles], axis=1, kind="stable"), axis=1
+    )
     ordered = np.stack([rising[:, :: 1 - 2 * (level % 2)] for level in range(count)], axis=1)
     lower = ordered * levels + np.arange(count)[:, None]
     cells = np.concatenate([lower, lower + 1], axis=2)[:, :, _SPLIT].reshape(-1, 4)
@@ -80,7 +82,8 @@ def _numbered_along(points: FloatArray, triangles: IntArray) -> tuple[FloatArray
     n = len(points)
     ends = triangles[:, [0, 1, 2]].ravel(), triangles[:, [1, 2, 0]].ravel()
     graph = coo_array((np.ones(len(ends[0])), ends), shape=(n, n)).tocsr()
-    order = reverse_cuthill_mckee((graph + graph.T).tocsr(), symmetric_mode=True)
+    graph = (graph + graph.T).tocsr()
+    order = reverse_cuthill_mckee(graph.indptr, graph.indices)
     number = np.empty(n, dtype=np.int64)
     number[order] = np.arange(n)
     triangles = number[triangles]

@@ -93,7 +93,7 @@ def tension_limit(stress: LayerStress) -> float:
     At least a tiny positive number, so that a layer without tension has a scale too.
     """
     values = _tension(stress)[stress.layer.triangles].mean(axis=1)
-    order = np.argsort(values)
+    order = np.argsort(values, kind="stable")
     below = np.cumsum(stress.layer.areas[order])
     if not len(order):
         return 1e-12

@@ -95,7 +95,7 @@ class Tracer:
     @cached_property
     def _arguments(self) -> tuple[Any, ...]:
         """What the walk reads, in that order."""
-        mesh, order = self.mesh, np.argsort(self._place)
+        mesh, order = self.mesh, np.argsort(self._place, kind="stable")
         across = mesh.across[order]
         return (
             self.direction[order],
@@ -117,8 +117,11 @@ class Tracer:
             Bit k is set in the cells of region k, of at most 62.
         """
         place = self._place[seeds]
-        order = np.argsort(place)
-        start, touching = place[order], touching[np.argsort(self._place)].astype(np.int64)
+        order = np.argsort(place, kind="stable")
+        start, touching = (
+            place[order],
+            touching[np.argsort(self._place, kind="stable")].astype(np.int64),
+        )
         mask, length = np.zeros(len(start), dtype=np.int64), np.zeros(len(start))
         ends = np.zeros((len(start), 2), dtype=np.int64)
 
@@ -126,7 +129,7 @@ class Tracer:
             survey(start[a:b], *self._arguments, touching, mask[a:b], length[a:b], ends[a:b])
 
         _in_parts(part, len(start))
-        back = np.argsort(order)
+        back = np.argsort(order, kind="stable")
         return Traced(seeds, mask[back], length[back], ends[back])
 
     def crossings(self, seeds: IntArray) -> IntArray:

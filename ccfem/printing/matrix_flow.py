@@ -170,7 +170,7 @@ def _check(
     thin = length[volume < least].sum() / length.sum()
     if thin <= _THIN:
         return ""
-    order = np.argsort(volume)
+    order = np.argsort(volume, kind="stable")
     share = np.cumsum(length[order]) / length.sum()
     missing = least - float(volume[order[np.searchsorted(share, 0.01)]])
     cure = "" if machine.process.stacks == "end" else ", or set process.stacks = 'end'"

@@ -290,6 +290,6 @@ class _Planner:
 def _median_slope(surface: Surface, field: FloatArray) -> float:
     """Median by area of the size of a field's gradient."""
     size = np.linalg.norm(surface.gradient(field), axis=1)
-    order = np.argsort(size)
+    order = np.argsort(size, kind="stable")
     below = np.cumsum(surface.areas[order])
     return float(size[order][np.searchsorted(below, 0.5 * below[-1])])

@@ -56,7 +56,9 @@ def sheet_mesh(
         points, triangles, rank = _mirrored(points, triangles, rank, planform, axis)
     n = len(points)
     # The diagonal on a side rises from the end of the higher rank: mirror images match.
-    rising = np.take_along_axis(triangles, np.argsort(rank[triangles], axis=1), axis=1)
+    rising = np.take_along_axis(
+        triangles, np.argsort(rank[triangles], axis=1, kind="stable"), axis=1
+    )
     prism = np.concatenate([rising, rising + n], axis=1)
     cells = prism[:, [[0, 1, 2, 5], [0, 1, 4, 5], [0, 3, 4, 5]]].reshape(-1, 4)
     levels = np.repeat([low, high], n)

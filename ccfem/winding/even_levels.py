@@ -43,7 +43,7 @@ def steep(surface: Surface, field: FloatArray, share: float) -> float:
     """Size of the gradient, 1/mm, that this share of the level lines' length does not exceed."""
     size = np.linalg.norm(surface.gradient(field), axis=1)
     weight = surface.areas * size * (surface.mean(field) > 0.0)
-    order = np.argsort(size)
+    order = np.argsort(size, kind="stable")
     below = np.cumsum(weight[order])
     at = min(int(np.searchsorted(below, share * below[-1])), len(size) - 1)
     return float(size[order][at])

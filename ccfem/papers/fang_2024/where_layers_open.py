@@ -145,7 +145,7 @@ def openings_picture(found: dict[str, dict[str, Opening]], title: str, file: Pat
     shades = None
     for row, (supports, slicings) in zip(grid, found.items(), strict=True):
         for axes, (slicing, opening) in zip(row, slicings.items(), strict=True):
-            order = np.argsort(-opening.load)
+            order = np.argsort(-opening.load, kind="stable")
             x, y, _ = opening.middle[order].T
             load = opening.load[order]
             shades = axes.scatter(x, y, c=load, s=6, cmap="viridis_r", norm=LogNorm(1.0, 50.0))

@@ -185,7 +185,7 @@ def _curvature_maps(plate: PlateStudy) -> Figure:
     for letter, one, (name, (polygon, pattern)) in zip("abcd", axes, shown.items(), strict=False):
         section(one, polygon)
         path(one, pattern, _FAINT, _FAINT)
-        order = np.argsort(pattern.curvature)
+        order = np.argsort(pattern.curvature, kind="stable")
         order = order[pattern.curvature[order] > LIMIT]
         drawn = one.scatter(
             *pattern.places[order].T,
