@@ -58,7 +58,7 @@ def lines_to_slide_in(
 
 
 def slid_in(paths: Toolpaths, layer: Layer, machine: Machine, inset: float) -> Toolpaths:
-    """Slide what lies too near to the border in; neighbours give way.
+    """Slide what lies too near to the border in, and strands apart.
 
     Parameters
     ----------
@@ -67,21 +67,19 @@ def slid_in(paths: Toolpaths, layer: Layer, machine: Machine, inset: float) -> T
     layer : Layer
     machine : Machine
     inset : float
-        Least distance from the border, in strand widths.
+        Least distance from the border, in strand widths; at 0 strands slide apart only.
 
     Returns
     -------
     Toolpaths
-        Paths in even steps between corners, or the given ones where none is too near. Ends that are
-        still too near are cut; elsewhere strands stay too near where there is no room.
+        Paths in even steps between corners. Ends that are still too near to the border are cut;
+        elsewhere strands stay too near where there is no room.
     """
-    width, section = machine.fibre_width, layer.plane.polygon
-    path = np.repeat(np.arange(len(paths)), np.diff(paths.offsets))
-    laid = shapely.linestrings(paths.points @ layer.plane.frame[:2].T, indices=path)
-    if shapely.covers(shapely.buffer(section, -inset * width), laid).all():
+    width = machine.fibre_width
+    if not len(paths):
         return paths
     lines = strand_lines(paths, (layer,), machine, hold=False)
-    apart = spacing(lines, (layer,), _APART * width, _INNER * inset * width, come_in=True)
+    apart = spacing(lines, (layer,), _APART * width, _INNER * inset * width, come_in=inset > 0.0)
     slid = lines.slid(apart.spread(np.zeros(len(lines.path))))
     return _ends_cut(slid, layer, inset * width, machine)
 

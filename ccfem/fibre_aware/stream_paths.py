@@ -143,7 +143,7 @@ class Extraction:
         def gain(along: list[Profile]) -> float:
             return sum(one.kept(price, minimum, _CUT_COST)[1] for one in along)
 
-        gains = np.array([[gain(along) for along in one] for one in tried])
+        gains = np.array([[gain(along) for along in one] for one in tried], dtype=float)
         first, rows = gains.argmax(axis=1), np.arange(len(gains))
         others = gains.copy()
         others[rows, first] = -np.inf

@@ -105,8 +105,8 @@ class StreamFunction:
         Largest distance of two ends that are linked, in strand widths. Links keep the machine's
         minimum radius; those with corners join only what is too short alone, and are marked.
     inset : float, default 0.5
-        Least distance of strands from the boundary, in strand widths: 0.5 keeps them in, at 0 they
-        may run along it with half of their width outside.
+        Least distance of strands and links from the boundary, in strand widths: 0.5 keeps them in,
+        at 0 they may run along it with half of their width outside.
     objective : {"worst", "sum"}
         What counts of several load cases: the one that is farthest from the stiffest that it could
         be made alone, or the weighted mean over the cases.

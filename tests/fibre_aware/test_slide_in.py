@@ -67,10 +67,20 @@ def test_a_pack_beside_the_edge_gives_way_by_what_its_first_strand_lacks(bent_be
     np.testing.assert_allclose(shapely.length(found), 50.0, atol=0.01)
 
 
-def test_what_keeps_its_distance_is_left_as_it_is(bent_beam):
+def test_what_keeps_its_distance_stays(bent_beam):
     layer = bent_beam[1][0]
-    paths = Toolpaths.from_plane(at_depths(layer.plane.polygon, (0.5, 1.5)), layer)
-    assert slid_in(paths, layer, MACHINE, 0.5) is paths
+    paths = Toolpaths.from_plane(at_depths(layer.plane.polygon, (0.51, 1.52)), layer)
+    found = strings(slid_in(paths, layer, MACHINE, 0.5), layer)
+    away = shapely.hausdorff_distance(found, strings(paths, layer))
+    np.testing.assert_allclose(away, 0.0, atol=1e-6)
+
+
+@pytest.mark.parametrize("inset", [0.0, 0.5])
+def test_strands_slide_apart_away_from_the_border_too(bent_beam, inset):
+    layer = bent_beam[1][0]
+    paths = Toolpaths.from_plane(at_depths(layer.plane.polygon, (9.0, 9.95, 10.9)), layer)
+    found = strings(slid_in(paths, layer, MACHINE, inset), layer)
+    np.testing.assert_allclose(shapely.distance(found[:2], found[1:]), 1.0, atol=0.01)
 
 
 def test_strands_go_round_a_hole_that_they_touch(eye):
@@ -111,3 +121,8 @@ def test_strands_and_links_of_a_plan_keep_half_a_width_off_the_border(eye):
         near += shapely.length(shapely.difference(laid, room)).sum()
     assert total > 10.0 * LENGTH
     assert near < 0.003 * total
+
+
+def test_an_inset_that_leaves_no_room_leaves_no_paths(eye):
+    stress, layers = eye
+    assert not len(plan(StreamFunction(evaluations=1, inset=50.0), layers, stress, MACHINE))
