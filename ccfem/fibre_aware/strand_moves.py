@@ -184,9 +184,10 @@ def prune_and_move(
 
 def stiffest(candidates: Sequence[Toolpaths], judge: Callable[[Toolpaths], Judged]) -> Toolpaths:
     """Return the toolpaths of most value to a judge, the first of equal ones; one is not judged."""
-    if len(candidates) == 1:
-        return candidates[0]
-    return candidates[int(np.argmax([judge(one).value for one in candidates]))]
+    laid = [one for one in candidates if len(one)]
+    if len(laid) < 2:
+        return laid[0] if laid else candidates[0]
+    return laid[int(np.argmax([judge(one).value for one in laid]))]
 
 
 def check_moves(strategy: str, moves: int, strength: float) -> None:
