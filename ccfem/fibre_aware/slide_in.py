@@ -27,6 +27,9 @@ __all__ = ["lines_to_slide_in", "slid_in"]
 _DEPTH = 0.8
 """Of the distance from the border: what lies nearer is cut, the rest slides in."""
 
+_ROUNDS = 2
+"""Slides, each along the normals of where the last one ended."""
+
 _INNER, _APART = 1.01, 1.004
 """Distances that strands slide to, over those from the border and of each other: a slide comes only
 near to what is wanted, and steps between points cut corners."""
@@ -78,10 +81,13 @@ def slid_in(paths: Toolpaths, layer: Layer, machine: Machine, inset: float) -> T
     width = machine.fibre_width
     if not len(paths):
         return paths
-    lines = strand_lines(paths, (layer,), machine, hold=False)
-    apart = spacing(lines, (layer,), _APART * width, _INNER * inset * width, come_in=inset > 0.0)
-    slid = lines.slid(apart.spread(np.zeros(len(lines.path))))
-    return _ends_cut(slid, layer, inset * width, machine)
+    for _ in range(_ROUNDS):
+        lines = strand_lines(paths, (layer,), machine, hold=False)
+        apart = spacing(
+            lines, (layer,), _APART * width, _INNER * inset * width, come_in=inset > 0.0
+        )
+        paths = lines.slid(apart.spread(np.zeros(len(lines.path))))
+    return _ends_cut(paths, layer, inset * width, machine)
 
 
 def _ends_cut(paths: Toolpaths, layer: Layer, inset: float, machine: Machine) -> Toolpaths:

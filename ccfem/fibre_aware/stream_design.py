@@ -30,7 +30,7 @@ __all__ = [
     "design",
 ]
 
-DENSEST = 1.0
+DENSEST = 0.975
 """Strands a width that should not be exceeded."""
 
 OVER_BUDGET = 20.0
@@ -109,8 +109,8 @@ class Laid:
 class StreamProblem:
     """What a stream function is designed for.
 
-    Minimised is ``-log(stiffness) + 20 max(length / budget - 1, 0)^2 + 100 mean(max(|g| - 1, 0)^2)
-    + 0.001 mean((Laplacian s)^2)``, g in strands a width, means over the part and over the
+    Minimised is ``-log(stiffness) + 20 max(length / budget - 1, 0)^2 + 100 mean(max(|g| - 0.975,
+    0)^2) + 0.001 mean((Laplacian s)^2)``, g in strands a width, means over the part and over the
     coefficients.
 
     Attributes

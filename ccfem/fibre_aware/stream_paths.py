@@ -24,8 +24,8 @@ from ccfem.virtual_testing.strands import cut_strands
 __all__ = ["CLEARANCE", "SHORTEST", "Extraction", "middle", "refined"]
 
 CLEARANCE = 0.95
-"""Least distance of strands in widths before they are linked: what is cut for some hundredths of a
-width would be lost. Where they slide in they are spread to a width."""
+"""Least distance of strands in widths before they are linked: they are designed to be 1 / 0.975
+apart, what is cut for some hundredths of a width would be lost, and they slide apart then."""
 
 SHORTEST = 5.0
 """Length, in strand widths, of the shortest pieces that are kept for linking."""
