@@ -70,7 +70,7 @@ def slid_in(paths: Toolpaths, layer: Layer, machine: Machine, inset: float) -> T
     layer : Layer
     machine : Machine
     inset : float
-        Least distance from the border, in strand widths; at 0 strands slide apart only.
+        Least distance from the border, in strand widths.
 
     Returns
     -------
@@ -83,11 +83,22 @@ def slid_in(paths: Toolpaths, layer: Layer, machine: Machine, inset: float) -> T
         return paths
     for _ in range(_ROUNDS):
         lines = strand_lines(paths, (layer,), machine, hold=False)
-        apart = spacing(
-            lines, (layer,), _APART * width, _INNER * inset * width, come_in=inset > 0.0
-        )
+        apart = spacing(lines, (layer,), _APART * width, _INNER * inset * width, come_in=True)
         paths = lines.slid(apart.spread(np.zeros(len(lines.path))))
-    return _ends_cut(paths, layer, inset * width, machine)
+    return _ends_cut(_back_inside(paths, layer), layer, inset * width, machine)
+
+
+def _back_inside(paths: Toolpaths, layer: Layer) -> Toolpaths:
+    """Paths with the points that neighbours have pushed over the border back on it."""
+    section, frame = layer.plane.polygon, layer.plane.frame[:2]
+    places = shapely.points(paths.points @ frame.T)
+    shapely.prepare(section)
+    out = np.flatnonzero(~shapely.covers(section, places))
+    ways = shapely.shortest_line(places[out], shapely.boundary(section))
+    steps = np.diff(shapely.get_coordinates(ways).reshape(-1, 2, 2), axis=1)[:, 0]
+    points = paths.points.copy()
+    points[out] += steps @ frame
+    return replace(paths, points=points)
 
 
 def _ends_cut(paths: Toolpaths, layer: Layer, inset: float, machine: Machine) -> Toolpaths:

@@ -124,7 +124,9 @@ def test_the_hole_of_the_arm_is_round_and_rimmed():
 def test_the_command_makes_the_stored_outline_again():
     plate = plate_of("m_shape")
     part = plate.outline(plate.design())
-    assert part.symmetric_difference(plate.part).area < 1e-6 * part.area
+    # Iterations magnify rounding, which differs between processors, to 1e-5 of the area; 0.0003
+    # more of volume or a radius 0.4 % larger change 1e-3 of it.
+    assert part.symmetric_difference(plate.part).area < 1e-4 * part.area
     assert manifest()["m_shape_outline"]["volume_fraction"] == plate.volume_fraction
 
 

@@ -123,6 +123,14 @@ def test_strands_and_links_of_a_plan_keep_half_a_width_off_the_border(eye):
     assert near < 0.003 * total
 
 
+def test_what_neighbours_push_over_the_border_lies_on_it(bent_beam):
+    layer = bent_beam[1][0]
+    section = layer.plane.polygon
+    lines = at_depths(section, np.linspace(0.01, 23.99, 26))  # two more than there is room for
+    found = strings(slid_in(Toolpaths.from_plane(lines, layer), layer, MACHINE, 0.0), layer)
+    assert shapely.covers(shapely.buffer(section, 1e-9), found).all()
+
+
 def test_an_inset_that_leaves_no_room_leaves_no_paths(eye):
     stress, layers = eye
     assert not len(plan(StreamFunction(evaluations=1, inset=50.0), layers, stress, MACHINE))
