@@ -2,6 +2,7 @@
 
 from collections.abc import Sequence
 from dataclasses import dataclass
+from functools import partial
 
 import numpy as np
 import shapely
@@ -11,10 +12,11 @@ from ccfem.fibre_aware.path_profile import Profile, least_price
 from ccfem.fibre_aware.prune import profiles
 from ccfem.fibre_aware.slide_in import lines_to_slide_in, slid_in
 from ccfem.fibre_aware.spline_grid import SplineGrid
+from ccfem.fibre_aware.worth_links import link_by_worth
 from ccfem.geometry.isocontours import isocontours, triangle_edges
 from ccfem.layers.layer import Layer
 from ccfem.linking.clearance import trim_to_clearance
-from ccfem.linking.finishing import linked_paths
+from ccfem.linking.finishing import linked_paths, long_enough
 from ccfem.machine.machine import Machine
 from ccfem.mesh.tet_mesh import TetMesh
 from ccfem.toolpaths import Toolpaths
@@ -35,6 +37,12 @@ _CUT_COST = 20.0
 
 _NEAR = 0.06
 """Share by which the value of levels may lie below the most for them to be tried as well."""
+
+_REACHES = (0.5, 1.0)
+"""Shares of the longest link up to which those worth most are looked for."""
+
+_BETTER = 0.003
+"""Share by which paths with such links have to be worth more for them to be tried."""
 
 _SAME = 0.5
 """Distance, in strand widths, up to which the borders of two sections count as the same: the levels
@@ -84,7 +92,8 @@ class Extraction:
 
         The strains of the design say only about which levels are worth most. Where others are
         worth hardly less, or whole numbers, which were drawn to the border, are not the best, those
-        are given, too.
+        are given, too; and the best once more with the links that are worth most, where these paths
+        are worth more.
 
         Parameters
         ----------
@@ -100,26 +109,51 @@ class Extraction:
             For each length; those worth most first.
         """
         alike = _alike(layers, group, self.machine.fibre_width)
-        drawn: dict[tuple[int, int], Toolpaths] = {}
+        cut: dict[tuple[int, int], list[FloatArray]] = {}
+        drawn: dict[tuple[int, int, float], Toolpaths] = {}
 
-        def paths(number: int, phase: int) -> Toolpaths:
-            if (number, phase) not in drawn:
-                shift = phase / self.phases
+        def paths(number: int, phase: int, reach: float = 0.0) -> Toolpaths:
+            key = number, phase, reach
+            if (number, phase) not in cut:
                 field = self.fields[group[number]]
-                drawn[number, phase] = self.layer_paths(layers[number], field, shift)
-            return drawn[number, phase]
+                cut[number, phase] = self.strands(layers[number], field, phase / self.phases)
+            if key not in drawn:
+                drawn[key] = self.linked(layers[number], cut[number, phase], reach)
+            return drawn[key]
 
         tried = [
             [self.profiles(paths(middle(numbers), phase)) for phase in range(self.phases)]
             for numbers in alike
         ]
         counts = [len(numbers) for numbers in alike]
-        planned: dict[tuple[int, ...], Toolpaths] = {}
-        chosen = [self.best_phases(tried, counts, length) for length in lengths]
-        for phases in {phases for some in chosen for phases in some}:
+
+        def ways(length: float) -> list[tuple[tuple[int, ...], float]]:
+            price = self._price(tried, counts, length)
+            found = [(phases, 0.0) for phases in self.best_phases(tried, counts, length)]
+            best = found[0][0]
+            most = sum(
+                count * self._gain(one[phase], price)
+                for one, count, phase in zip(tried, counts, best, strict=True)
+            )
+            gains = [
+                sum(
+                    len(numbers)
+                    * self._gain(self.profiles(paths(middle(numbers), phase, r)), price)
+                    for numbers, phase in zip(alike, best, strict=True)
+                )
+                for r in _REACHES
+            ]
+            if max(gains) > (1.0 + _BETTER) * most:
+                found.append((best, _REACHES[int(np.argmax(gains))]))
+            return found
+
+        planned: dict[tuple[tuple[int, ...], float], Toolpaths] = {}
+        chosen = [ways(length) for length in lengths]
+        for phases, reach in {way for some in chosen for way in some}:
             of = {k: p for some, p in zip(alike, phases, strict=True) for k in some.tolist()}
-            planned[phases] = Toolpaths.concatenate([paths(k, of[k]) for k in range(len(layers))])
-        return [[planned[phases] for phases in some] for some in chosen]
+            laid = [paths(k, of[k], reach) for k in range(len(layers))]
+            planned[phases, reach] = Toolpaths.concatenate(laid)
+        return [[planned[way] for way in some] for some in chosen]
 
     def best_phases(
         self, tried: list[list[list[Profile]]], counts: Sequence[int], length: float
@@ -135,15 +169,10 @@ class Extraction:
         length : float, mm
             Of all layers together.
         """
-        minimum = self.machine.minimum_length
-        central = [one[self.phases // 2] for one in tried]
-        along = [p for one, count in zip(central, counts, strict=True) for p in count * one]
-        price = least_price(along, length, minimum, _CUT_COST) if along else 0.0
-
-        def gain(along: list[Profile]) -> float:
-            return sum(one.kept(price, minimum, _CUT_COST)[1] for one in along)
-
-        gains = np.array([[gain(along) for along in one] for one in tried], dtype=float)
+        price = self._price(tried, counts, length)
+        gains = np.array(
+            [[self._gain(along, price) for along in one] for one in tried], dtype=float
+        )
         first, rows = gains.argmax(axis=1), np.arange(len(gains))
         others = gains.copy()
         others[rows, first] = -np.inf
@@ -152,15 +181,45 @@ class Extraction:
         found = [first, np.zeros_like(first), np.where(near, second, first)]
         return list(dict.fromkeys(tuple(phases.tolist()) for phases in found))
 
+    def _price(
+        self, tried: list[list[list[Profile]]], counts: Sequence[int], length: float
+    ) -> float:
+        """Price of fibre at which a length is worth keeping, at the middle position of levels."""
+        central = [one[self.phases // 2] for one in tried]
+        along = [p for one, count in zip(central, counts, strict=True) for p in count * one]
+        return least_price(along, length, self.machine.minimum_length, _CUT_COST) if along else 0.0
+
+    def _gain(self, along: list[Profile], price: float) -> float:
+        """Return what fibre is worth beyond its price."""
+        minimum = self.machine.minimum_length
+        return sum(one.kept(price, minimum, _CUT_COST)[1] for one in along)
+
     def layer_paths(self, layer: Layer, field: FloatArray, shift: float) -> Toolpaths:
         """Paths of one layer along the levels that are `shift` above whole numbers."""
-        width, section = self.machine.fibre_width, layer.plane.polygon
+        return self.linked(layer, self.strands(layer, field, shift))
+
+    def strands(self, layer: Layer, field: FloatArray, shift: float) -> list[FloatArray]:
+        """Trace the levels, and cut what can neither slide off the border nor apart."""
+        width = self.machine.fibre_width
         lines = self.levels(layer, field, shift)
-        lines = lines_to_slide_in(lines, section, self.inset * width)
-        lines = trim_to_clearance(lines, CLEARANCE * width, SHORTEST * width)
+        lines = lines_to_slide_in(lines, layer.plane.polygon, self.inset * width)
+        return trim_to_clearance(lines, CLEARANCE * width, SHORTEST * width)
+
+    def linked(self, layer: Layer, lines: list[FloatArray], reach: float = 0.0) -> Toolpaths:
+        """Paths of one layer from its strands, linked and slid in.
+
+        Links are the shortest, or with a `reach` those worth most (`worth_links`), up to that share
+        of the longest.
+        """
+        width, section = self.machine.fibre_width, layer.plane.polygon
         limit, least = self.link_limit * width, self.machine.minimum_length
         radius = self.machine.minimum_radius
-        found = linked_paths(lines, section, width, limit, least, radius=radius)
+        if reach:
+            worth = partial(self._worth, layer)
+            found = link_by_worth(lines, section, reach * limit, width, radius, least, worth)
+            found = long_enough(found, least)
+        else:
+            found = linked_paths(lines, section, width, limit, least, radius=radius)
         paths = Toolpaths.from_plane(found.lines, layer, link=found.link)
         return slid_in(paths, layer, self.machine, self.inset)
 
@@ -170,6 +229,11 @@ class Extraction:
         values = self.grid.values(points) @ field
         first = float(np.ceil(values.min() - shift)) + shift
         return isocontours(points, triangles, values, first, 1.0).lines()
+
+    def _worth(self, layer: Layer, lines: Sequence[FloatArray]) -> list[Profile]:
+        """Profiles of lines on a layer, each from its first point on."""
+        closed = len(lines) * [False]
+        return self.profiles(Toolpaths.from_plane(lines, layer, closed))
 
     def profiles(self, toolpaths: Toolpaths) -> list[Profile]:
         """Value of the paths at the strains of the designed part."""

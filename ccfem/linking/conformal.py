@@ -8,7 +8,8 @@ import shapely
 from ccfem.arrays import FloatArray
 from ccfem.geometry.polylines import is_closed
 from ccfem.geometry.shapes import Region, open_lines
-from ccfem.linking.joining import Joint, join, ring_arc
+from ccfem.linking.joining import Joint, join
+from ccfem.linking.possible_links import ring_arc
 
 __all__ = ["lead_into", "parallel_curve"]
 

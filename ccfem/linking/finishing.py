@@ -10,7 +10,7 @@ from ccfem.geometry.polylines import along_line, is_closed, line_length, points_
 from ccfem.geometry.shapes import Region, open_lines
 from ccfem.linking.joining import Joined, link_ends
 
-__all__ = ["close_short_ring", "keep_off_border", "linked_paths"]
+__all__ = ["close_short_ring", "keep_off_border", "linked_paths", "long_enough"]
 
 _OVERLAP = 0.1
 """Largest part of a ring's length that is laid twice [Chen et al. 2021: the ring round a hole of
@@ -75,6 +75,18 @@ def linked_paths(
         alone, and are marked. 0 for any.
     """
     joined = link_ends(lines, section, link_limit, width, 1.0, along_boundary, radius, least_length)
+    return long_enough(joined, least_length)
+
+
+def long_enough(joined: Joined, least_length: float) -> Joined:
+    """Close short rings, and drop what is too short to be cut.
+
+    Parameters
+    ----------
+    joined : Joined
+    least_length : float, mm
+        Of a path.
+    """
     kept = Joined([], [])
     for line, link in zip(*joined, strict=True):
         closed = close_short_ring(line, least_length)

@@ -8,7 +8,7 @@ import shapely
 from ccfem.arrays import FloatArray
 from ccfem.geometry.polylines import is_closed
 from ccfem.geometry.shapes import Region
-from ccfem.linking.joining import ring_arc
+from ccfem.linking.possible_links import ring_arc
 
 __all__ = ["spiral"]
 
