@@ -36,7 +36,7 @@ _HOPE = 0.5
 """What a chain that is too short counts of its gain, times its share of the length that it needs:
 joined to the next it may be long enough."""
 
-_ROUNDS, _TRIES = 2, 40
+_ROUNDS, _TRIES = 2, 24
 """Times that partners are changed, and how many are tried each time."""
 
 _EQUAL = 1e-6
