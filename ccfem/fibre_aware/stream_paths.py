@@ -66,6 +66,8 @@ class Extraction:
         is at whole numbers of the field.
     inset, link_limit : float
         Least distance from the boundary, and of ends that are linked, in strand widths.
+    radius : float, mm, default 0
+        Least radius that bends are drawn to keep; 0 for any.
     """
 
     fields: tuple[FloatArray, ...]
@@ -76,6 +78,7 @@ class Extraction:
     phases: int
     inset: float
     link_limit: float
+    radius: float = 0.0
 
     def candidates(
         self, layers: Sequence[Layer], group: IntArray, lengths: Sequence[float]
@@ -162,7 +165,7 @@ class Extraction:
         radius = self.machine.minimum_radius
         found = linked_paths(lines, section, width, limit, least, radius=radius)
         paths = Toolpaths.from_plane(found.lines, layer, link=found.link)
-        return slid_in(paths, layer, self.machine, self.inset)
+        return slid_in(paths, layer, self.machine, self.inset, self.radius)
 
     def levels(self, layer: Layer, field: FloatArray, shift: float) -> list[FloatArray]:
         """Trace the levels `shift` above whole numbers on a layer, (n, 2), mm."""

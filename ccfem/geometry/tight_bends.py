@@ -21,7 +21,7 @@ def tight_bends(
 
     Parameters
     ----------
-    line : (n, 2) array, mm
+    line : (n, 2) or (n, 3) array, mm
     along : (n,) array, mm
         Arc length at its points.
     closed : bool
@@ -47,7 +47,10 @@ def tight_bends(
 
     here = places(at)
     into, out = here - places(at - width), places(at + width) - here
-    across = into[:, 0] * out[:, 1] - into[:, 1] * out[:, 0]
+    if line.shape[1] == 2:
+        across = into[:, 0] * out[:, 1] - into[:, 1] * out[:, 0]
+    else:
+        across = np.linalg.norm(np.cross(into, out), axis=1)
     angle = np.abs(np.arctan2(across, (into * out).sum(axis=1)))
     over = angle - width * (1.0 - 1e-6) / radius
     tight = over >= 0.0

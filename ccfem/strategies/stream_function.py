@@ -33,9 +33,10 @@ from ccfem.fibre_aware.heights import (
 )
 from ccfem.fibre_aware.layer_shares import layer_counts, layers_by_case
 from ccfem.fibre_aware.prune_cases import case_counts, prune_and_move_cases
+from ccfem.fibre_aware.shortening import TIGHT_SHARES
 from ccfem.fibre_aware.smeared import SmearedPart, smeared_cases
 from ccfem.fibre_aware.spline_grid import SplineGrid
-from ccfem.fibre_aware.strand_moves import check_moves, prune_and_move
+from ccfem.fibre_aware.strand_moves import check_moves, kept_radius, prune_and_move
 from ccfem.fibre_aware.stream_design import DENSEST, StreamDesign, StreamProblem, design
 from ccfem.fibre_aware.stream_paths import Extraction, refined
 from ccfem.fibre_aware.stream_start import plane_axes, start_field
@@ -67,6 +68,9 @@ _ROUNDS = 3
 
 _CASES_OVERFILL = 1.15
 """Least overfill for several load cases, whose tests have more to choose between."""
+
+_WIDE = {"tight": 0.0, "printable": 1.3}
+"""Radius, over the machine's, below which bends of the field cost."""
 
 _MORE = 1.03
 """By how much more it then asks for than by proportion."""
@@ -118,6 +122,8 @@ class StreamFunction:
         share of the one is then worth as much as one of the other. Of one load case only.
     moves : int, default 0
         Steps by which strands are moved sideways (`moved`), each tested; not with strength.
+    turns : {"tight", "printable"}
+        Whether more than 1 % of the fibre may turn more tightly than the machine's radius.
     """
 
     coverage: float = 0.45
@@ -134,6 +140,7 @@ class StreamFunction:
     tilt: float = 0.6
     strength: float = 0.0
     moves: int = 0
+    turns: Literal["tight", "printable"] = "tight"
 
     amount: ClassVar[Amount] = Amount("coverage", most=0.85, least=0.1)
     flat_layers_only: ClassVar[bool] = True
@@ -141,6 +148,7 @@ class StreamFunction:
         "border": {"inset": 0.0, "evaluations": 5},
         "groups": {"groups": 2, "evaluations": 5},
         "moves": {"moves": 2, "evaluations": 5},
+        "turns": {"turns": "printable", "evaluations": 5},
     }
 
     def __post_init__(self) -> None:
@@ -247,7 +255,8 @@ class StreamFunction:
         strained = ((1.0, found.objective.solution.displacement),)
         drawn = self.extraction(problem, (found.field,), strained, machine)
         in_all, strand = [length * len(layers) for length in lengths], Strand(self.rho)
-        part, cut_by = problem.part.specimen, (_ROUNDS, self.strength, self.moves)
+        part = problem.part.specimen
+        cut_by = (_ROUNDS, self.strength, self.moves, TIGHT_SHARES[self.turns])
         return [
             prune_and_move(some, layers, part, length, machine, strand, *cut_by)
             for some, length in zip(drawn.candidates(layers, group, in_all), in_all, strict=True)
@@ -265,8 +274,9 @@ class StreamFunction:
             problem.signed(field, group) for field in fields for group in range(problem.groups)
         ]
         mesh, widths = problem.part.mesh, (self.inset, self.link_limit)
+        radius = kept_radius(machine, TIGHT_SHARES[self.turns])
         return Extraction(
-            tuple(blocks), problem.grid, mesh, strains_of, machine, self.phases, *widths
+            tuple(blocks), problem.grid, mesh, strains_of, machine, self.phases, *widths, radius
         )
 
     def designed(
@@ -327,6 +337,7 @@ class StreamFunction:
             width=machine.fibre_width,
             axial_stiffness=self.rho * part.modulus,
             budget=self.overfill * self.coverage * float(mesh.volumes @ capacity),
+            radius=_WIDE[self.turns] * machine.minimum_radius,
         )
         return problem, group
 
@@ -352,6 +363,7 @@ class StreamFunction:
         specimens = [part.specimen for part in problem.parts]
         judged = (specimens, cases.weights, bounds)
         how: dict[str, Any] = {"objective": self.objective, "moves": self.moves}
+        how["tight"] = TIGHT_SHARES[self.turns]
         return [
             prune_and_move_cases(some, layers, *judged, length, machine, strand, **how)
             for some, length in zip(drawn.candidates(layers, field, in_all), in_all, strict=True)
