@@ -54,7 +54,7 @@ class FieldBends:
         return float((self.fibre * size) @ (np.sqrt(1.0 + excess * excess) - 1.0))
 
     def slope(self, field: FloatArray) -> FloatArray:
-        """Derivative (c,) of the cost by the coefficients."""
+        """Return the derivative (c,) of the cost by the coefficients."""
         (x, y, xx, xy, yy), size, curvature, excess = self._curvature(field)
         root = np.sqrt(1.0 + excess * excess)
         # Cost is fibre * size * (root - 1) a cell, curvature is bend / size^3.
@@ -70,7 +70,7 @@ class FieldBends:
     def _curvature(
         self, field: FloatArray
     ) -> tuple[tuple[FloatArray, ...], FloatArray, FloatArray, FloatArray]:
-        """Derivatives of the field, |g|, curvature of the levels, and its excess: (m,) each."""
+        """Find derivatives of the field, |g|, curvature of levels, and its excess: (m,) each."""
         found = tuple(matrix @ field for matrix in (*self.slopes, *self.seconds))
         x, y, xx, xy, yy = found
         size = np.sqrt(x * x + y * y + _SMALLEST**2)

@@ -11,6 +11,7 @@ import numpy as np
 
 from ccfem.arrays import BoolArray, FloatArray
 from ccfem.fibre_aware.path_profile import Profile, least_price
+from ccfem.geometry.curvature_samples import curvature_samples
 from ccfem.geometry.polylines import along_line, points_along, runs
 from ccfem.geometry.tight_bends import tight_bends
 from ccfem.machine.machine import Machine
@@ -18,9 +19,8 @@ from ccfem.toolpaths import FIBRE, Toolpaths
 
 __all__ = ["TIGHT_SHARES", "shorten", "shorten_bent", "tight_share"]
 
-TIGHT_SHARES = {"tight": 1.0, "printable": 0.008}
-"""Share of the fibre that may turn too tightly, by the parameter `turns` of strategies: the
-evaluator's samples, a width apart, then stay below 1 %."""
+TIGHT_SHARES = {"tight": 1.0, "printable": 0.0095}
+"""Share of the fibre that may turn too tightly, by the parameter `turns` of strategies."""
 
 _LOWER_PRICES = (0.999, 0.99, 0.97, 0.93, 0.85)
 """Shares of the price at which room that is left is used: a path may be worth all or nothing."""
@@ -29,6 +29,9 @@ _PRICES = (1e-3, 300.0)
 """Least and largest price of a mm that turns too tightly, over the value of the best fibre."""
 
 _BISECTIONS = 14
+
+_TRIFLE = 1e-6
+"""Value of fibre that carries nothing, over that of the best: it stays where there is room."""
 
 
 def shorten(
@@ -106,7 +109,7 @@ def shorten_bent(
         middle = 0.5 * (low + high)
         price = float(np.exp(middle))
         priced = [
-            replace(one, value=one.value - price * share)
+            replace(one, value=np.maximum(one.value, _TRIFLE * best) - price * share)
             for one, share in zip(along, shares, strict=True)
         ]
         trial = shorten(toolpaths, priced, length, least)
@@ -118,10 +121,14 @@ def shorten_bent(
 
 
 def tight_share(toolpaths: Toolpaths, machine: Machine) -> float:
-    """Share of the fibre's length in bends tighter than the machine's radius; 0 without fibre."""
-    fibre = np.flatnonzero(toolpaths.kind == FIBRE).tolist()
-    bent = sum(float(np.diff(_bends(toolpaths, k, machine)).sum()) for k in fibre)
-    return bent / max(float(toolpaths.lengths[fibre].sum()), 1e-300)
+    """Share of the fibre that turns more tightly than the machine's radius; 0 without fibre.
+
+    Of samples a fibre width apart, as the evaluator takes them.
+    """
+    fibre = toolpaths.of_kind(FIBRE)
+    points, offsets, closed = fibre.points, fibre.offsets, fibre.closed
+    found = curvature_samples(points, offsets, closed, machine.fibre_width)
+    return float((found * machine.minimum_radius >= 1.0).mean()) if len(found) else 0.0
 
 
 def _bends(toolpaths: Toolpaths, k: int, machine: Machine) -> FloatArray:

@@ -88,7 +88,7 @@ class SplineGrid:
         return self._matrices(points, ((1, 0), (0, 1), (2, 0), (1, 1), (0, 2)))
 
     def _matrices(self, points: FloatArray, orders: tuple[tuple[int, int], ...]) -> tuple[Any, ...]:
-        """Derivatives of some orders along the sides of the squares; of order 0 the value."""
+        """Find derivatives of some orders along the sides of the squares; of order 0 the value."""
         low, table = self._number
         place = (points - self.centre) @ self.axes.T / self.size
         square = np.floor(place).astype(np.int64)
