@@ -19,7 +19,7 @@ from ccfem.toolpaths import FIBRE, Toolpaths
 
 __all__ = ["TIGHT_SHARES", "shorten", "shorten_bent", "tight_share"]
 
-TIGHT_SHARES = {"tight": 1.0, "printable": 0.0095}
+TIGHT_SHARES = {"tight": 1.0, "cut": 0.0095}
 """Share of the fibre that may turn too tightly, by the parameter `turns` of strategies."""
 
 _LOWER_PRICES = (0.999, 0.99, 0.97, 0.93, 0.85)

@@ -53,7 +53,7 @@ _BETTER = 1e-6
 _CHEAPEST = 0.1
 """Share of the fibre, that of the least strain, whose squared strain is the price of length."""
 
-_KEPT = 1.05
+_KEPT = 1.15
 """Radius of bends after slides, over the machine's least: slides come only near to it."""
 
 _TOLERANCE = 1e-4

@@ -153,6 +153,8 @@ class Extraction:
         second = others.argmax(axis=1)
         near = others[rows, second] >= (1.0 - _NEAR) * gains[rows, first]
         found = [first, np.zeros_like(first), np.where(near, second, first)]
+        if self.radius:  # which bends can stay is seen in the test only
+            found += [np.full_like(first, phase) for phase in range(self.phases)]
         return list(dict.fromkeys(tuple(phases.tolist()) for phases in found))
 
     def layer_paths(self, layer: Layer, field: FloatArray, shift: float) -> Toolpaths:

@@ -68,7 +68,7 @@ class Pruned:
         Steps by which what is left is moved sideways, each tested
         (`ccfem.fibre_aware.strand_moves`): 6 make a part stiffer by 1 to 2 %, for two to three
         times the time. Not with strength.
-    turns : {"tight", "printable"}
+    turns : {"tight", "cut"}
         Whether more than 1 % of the fibre may turn more tightly than the machine's radius.
     """
 
@@ -80,14 +80,14 @@ class Pruned:
     rho: float = RHO
     strength: float = 0.0
     moves: int = 0
-    turns: Literal["tight", "printable"] = "tight"
+    turns: Literal["tight", "cut"] = "tight"
 
     amount: ClassVar[Amount] = Amount("coverage", most=0.9, least=0.1)
     flat_layers_only: ClassVar[bool] = True
     variants: ClassVar[Mapping[str, Mapping[str, Any]]] = {
         "concentric": {"of": "concentric"},
         "moves": {"moves": 2},
-        "turns": {"turns": "printable"},
+        "turns": {"turns": "cut"},
     }
 
     def __post_init__(self) -> None:

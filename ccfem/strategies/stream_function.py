@@ -64,7 +64,7 @@ _ROUNDS = 3
 _CASES_OVERFILL = 1.15
 """Least overfill for several load cases, whose tests have more to choose between."""
 
-_WIDE = {"tight": 0.0, "printable": 1.3}
+_WIDE = {"tight": 0.0, "cut": 1.3}
 """Radius, over the machine's, below which bends of the field cost."""
 
 
@@ -114,9 +114,9 @@ class StreamFunction:
         share of the one is then worth as much as one of the other. Of one load case only.
     moves : int, default 0
         Steps by which strands are moved sideways (`moved`), each tested; not with strength.
-    turns : {"tight", "printable"}
+    turns : {"tight", "cut"}
         Whether more than 1 % of the fibre may turn more tightly than the machine's radius. What
-        cannot be laid without is left out: "printable" may lay less than it was asked for.
+        cannot be laid without is left out: "cut" may lay less than it was asked for.
     """
 
     coverage: float = 0.45
@@ -133,7 +133,7 @@ class StreamFunction:
     tilt: float = 0.6
     strength: float = 0.0
     moves: int = 0
-    turns: Literal["tight", "printable"] = "tight"
+    turns: Literal["tight", "cut"] = "tight"
 
     amount: ClassVar[Amount] = Amount("coverage", most=0.85, least=0.1)
     flat_layers_only: ClassVar[bool] = True
@@ -141,7 +141,7 @@ class StreamFunction:
         "border": {"inset": 0.0, "evaluations": 5},
         "groups": {"groups": 2, "evaluations": 5},
         "moves": {"moves": 2, "evaluations": 5},
-        "turns": {"turns": "printable", "evaluations": 5},
+        "turns": {"turns": "cut", "evaluations": 5},
     }
 
     def __post_init__(self) -> None:

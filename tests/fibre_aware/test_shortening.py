@@ -102,5 +102,5 @@ def test_pruned_fibre_keeps_to_the_share(bent_beam, share):
 def test_a_share_above_one_is_refused(bent_beam):
     stress, layers = bent_beam
     paths = Toolpaths.from_plane([hairpin((4.0, 5.0))], layers[0])
-    with pytest.raises(InputError, match="tight must be at least 0 and at most 1; got 1.1"):
+    with pytest.raises(InputError, match="tight must be at least 0 and at most 1"):
         prune(paths, stress, 10.0, MACHINE, tight=1.1)
