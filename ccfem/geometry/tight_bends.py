@@ -3,7 +3,7 @@
 import numpy as np
 
 from ccfem.arrays import FloatArray, IntArray
-from ccfem.geometry.polylines import points_along, runs
+from ccfem.geometry.polylines import angles_between, points_along, runs
 
 __all__ = ["tight_bends"]
 
@@ -21,7 +21,8 @@ def tight_bends(
 
     Parameters
     ----------
-    line : (n, 2) array, mm
+    line : (n, d) array, mm
+        In two or three dimensions.
     along : (n,) array, mm
         Arc length at its points.
     closed : bool
@@ -46,9 +47,7 @@ def tight_bends(
         return points_along(line, along, positions % size if closed else positions)
 
     here = places(at)
-    into, out = here - places(at - width), places(at + width) - here
-    across = into[:, 0] * out[:, 1] - into[:, 1] * out[:, 0]
-    angle = np.abs(np.arctan2(across, (into * out).sum(axis=1)))
+    angle = angles_between(here - places(at - width), places(at + width) - here)
     over = angle - width * (1.0 - 1e-6) / radius
     tight = over >= 0.0
     if closed and tight.all():
