@@ -13,6 +13,7 @@ import numpy as np
 import shapely
 
 from ccfem.arrays import BoolArray, FloatArray
+from ccfem.geometry.even_steps import OFF, even_steps
 from ccfem.geometry.polylines import (
     along_line,
     angles_between,
@@ -99,25 +100,39 @@ def cut_turns(
     pitch = width if spacing is None else spacing
     found = Joined([], [])
     for line, mark in zip(*joined, strict=True):
-        along = along_line(line)
+        laid, on = _in_steps(line, mark, width) if every else (line, mark)
+        along = along_line(laid)
         if every:
-            pieces = _unbent(line, along, radius, width, least)
+            pieces = _unbent(laid, along, on, radius, width, least)
         else:
-            pieces = _pieces(line, along, radius, width, least, pitch) or None
+            pieces = _pieces(laid, along, radius, width, least, pitch) or None
         if pieces is None:
             found.lines.append(line)
             found.link.append(mark)
         for start, stop in pieces or ():
-            piece, marked = _piece(line, along, mark, start, stop)
+            piece, marked = _piece(laid, along, on, start, stop)
             found.lines.append(piece)
             found.link.append(marked)
     return found
 
 
+def _in_steps(line: FloatArray, link: BoolArray, width: float) -> tuple[FloatArray, BoolArray]:
+    """Line, and which of its steps are links, as it leaves the planner, which moves it a little."""
+    changes = np.append(False, link[1:] != link[:-1])
+    ends = np.array([0, len(line)])
+    points, _, source, _ = even_steps(line, ends, changes, width, OFF * width)
+    return points, np.append(link[source[:-1, 0]], False)
+
+
 def _unbent(
-    line: FloatArray, along: FloatArray, radius: float, width: float, least: float
+    line: FloatArray,
+    along: FloatArray,
+    link: BoolArray,
+    radius: float,
+    width: float,
+    least: float,
 ) -> _Pieces | None:
-    """Pieces that are long enough between all bends; None where nothing is bent.
+    """Pieces that are long enough between all bends, no link at an end; None if nothing is bent.
 
     The end of a closed line's piece may lie beyond its length, for it runs on over the start.
     """
@@ -127,12 +142,15 @@ def _unbent(
         round_about = closed and len(tight_bends(line, along, False, radius, width)) > 0
         return [] if round_about else None
     middle = 0.5 * (a + b)
-    stop, start = np.minimum(a + width, middle), np.maximum(b - width, middle)
+    # A piece is looked at in equal steps of about a width: the first may be a little shorter.
+    step = width / (1.0 + 0.5 * width / least)
+    stop, start = np.minimum(a + step, middle), np.maximum(b - step, middle)
     stop, start = _off_corners(stop, start, _corners(line, along, closed), _STUB * width)
     if closed:
         stop = np.append(stop[1:], stop[0] + size)
     else:
         start, stop = np.append(0.0, start), np.append(stop, size)
+    start, stop = _off_links(start, stop, along, link)
     kept = stop - start >= least
     start, stop = start[kept], stop[kept]
     # Of two that meet in a turn the first ends a width before the second, or begins after it.
@@ -146,6 +164,21 @@ def _unbent(
             start[after] += _room(places, float(start[after]), 1, float(stop[k]), width)
     kept = stop - start >= least
     return list(zip(start[kept].tolist(), stop[kept].tolist(), strict=True))
+
+
+def _off_links(
+    start: FloatArray, stop: FloatArray, along: FloatArray, link: BoolArray
+) -> tuple[FloatArray, FloatArray]:
+    """Move starts and ends of pieces off links to the strands between; to nothing without any."""
+    if not link.any():
+        return start, stop
+    strand, size = np.flatnonzero(~link[:-1]), float(along[-1])
+    first = np.concatenate([along[strand] + k * size for k in range(3)])  # pieces run over the end
+    last = np.concatenate([along[strand + 1] + k * size for k in range(3)])
+    after = np.searchsorted(last, start, side="right")
+    before = np.searchsorted(first, stop) - 1
+    first, last = np.append(first, np.inf), np.append(last, np.inf)
+    return np.maximum(start, first[after]), np.minimum(stop, last[before])
 
 
 def _pieces(
