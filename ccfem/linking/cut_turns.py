@@ -21,7 +21,7 @@ from ccfem.geometry.polylines import (
     is_closed,
     points_along,
 )
-from ccfem.geometry.tight_bends import tight_bends
+from ccfem.geometry.tight_bends import tight_bends, tight_samples
 from ccfem.linking.joining import Joined
 
 __all__ = ["cut_turns"]
@@ -45,6 +45,8 @@ _CORNER = 0.2
 
 _Pieces = list[tuple[float, float]]
 """Start and end of each by arc length, mm."""
+_Marked = tuple[FloatArray, BoolArray]
+"""Points (n, d) of a line, and the mask (n,) of its steps that are links."""
 _Places = Callable[[FloatArray], FloatArray]
 """Points (k, d) of a line at positions (k,) of its arc length."""
 
@@ -100,48 +102,60 @@ def cut_turns(
     pitch = width if spacing is None else spacing
     found = Joined([], [])
     for line, mark in zip(*joined, strict=True):
-        laid, on = _in_steps(line, mark, width) if every else (line, mark)
-        along = along_line(laid)
         if every:
-            pieces = _unbent(laid, along, on, radius, width, least)
+            parts = _unbent(line, mark, radius, width, least)
         else:
-            pieces = _pieces(laid, along, radius, width, least, pitch) or None
-        if pieces is None:
-            found.lines.append(line)
-            found.link.append(mark)
-        for start, stop in pieces or ():
-            piece, marked = _piece(laid, along, on, start, stop)
-            found.lines.append(piece)
-            found.link.append(marked)
+            along = along_line(line)
+            pieces = _pieces(line, along, radius, width, least, pitch)
+            parts = [_piece(line, along, mark, *piece) for piece in pieces] or [(line, mark)]
+        found.lines.extend(part for part, _ in parts)
+        found.link.extend(marked for _, marked in parts)
     return found
-
-
-def _in_steps(line: FloatArray, link: BoolArray, width: float) -> tuple[FloatArray, BoolArray]:
-    """Line, and which of its steps are links, as it leaves the planner, which moves it a little."""
-    changes = np.append(False, link[1:] != link[:-1])
-    ends = np.array([0, len(line)])
-    points, _, source, _ = even_steps(line, ends, changes, width, OFF * width)
-    return points, np.append(link[source[:-1, 0]], False)
 
 
 def _unbent(
     line: FloatArray,
-    along: FloatArray,
     link: BoolArray,
     radius: float,
     width: float,
     least: float,
-) -> _Pieces | None:
-    """Pieces that are long enough between all bends, no link at an end; None if nothing is bent.
+    again: bool = False,
+) -> list[_Marked]:
+    """Pieces of a line that are long enough between all bends; the line itself where none is bent.
+
+    Pieces are looked at again, just where the evaluator will look: it and the planner take points a
+    little aside, so that what keeps the radius by a hair may not do so there.
+    """
+    ends, changes = np.array([0, len(line)]), np.append(False, link[1:] != link[:-1])
+    laid, _, source, _ = even_steps(line, ends, changes, width, OFF * width)
+    mark = np.append(link[source[:-1, 0]], False)
+    along, closed = along_line(laid), is_closed(line)
+    a = b = np.zeros(0)
+    if not again:
+        a, b = tight_bends(laid, along, closed, radius, width).T
+    if not len(a):
+        a = b = tight_samples(laid, closed, radius, width)
+    if not len(a):
+        return [(line, link)]
+    pieces = _between_bends(laid, along, mark, a, b, width, least)
+    parts = [_piece(laid, along, mark, *piece) for piece in pieces]
+    return [each for part in parts for each in _unbent(*part, radius, width, least, True)]
+
+
+def _between_bends(
+    line: FloatArray,
+    along: FloatArray,
+    link: BoolArray,
+    a: FloatArray,
+    b: FloatArray,
+    width: float,
+    least: float,
+) -> _Pieces:
+    """Pieces of a line that are long enough between its bends from `a` to `b`, off links at ends.
 
     The end of a closed line's piece may lie beyond its length, for it runs on over the start.
     """
-    size, closed = float(along[-1]), is_closed(line)
-    a, b = tight_bends(line, along, closed, radius, width).T
-    if not len(a):
-        round_about = closed and len(tight_bends(line, along, False, radius, width)) > 0
-        return [] if round_about else None
-    middle = 0.5 * (a + b)
+    size, closed, middle = float(along[-1]), is_closed(line), 0.5 * (a + b)
     # A piece is looked at in equal steps of about a width: the first may be a little shorter.
     step = width / (1.0 + 0.5 * width / least)
     stop, start = np.minimum(a + step, middle), np.maximum(b - step, middle)
@@ -153,7 +167,7 @@ def _unbent(
     start, stop = _off_links(start, stop, along, link)
     kept = stop - start >= least
     start, stop = start[kept], stop[kept]
-    # Of two that meet in a turn the first ends a width before the second, or begins after it.
+    # Of two that meet in a turn the first ends a width before the second, or that begins after it.
     places, count = _places(line, along, closed), len(start)
     for k in range(count if closed else count - 1):
         after = (k + 1) % count
@@ -310,7 +324,7 @@ def _chosen(turns: _Turns, size: float, least: float) -> list[int]:
 
 def _piece(
     line: FloatArray, along: FloatArray, link: BoolArray, start: float, stop: float
-) -> tuple[FloatArray, BoolArray]:
+) -> _Marked:
     """Part of a line between two places of its arc length, and which of its steps are links."""
     size = float(along[-1])
     start, stop = (start % size, start % size + stop - start) if start >= size else (start, stop)
