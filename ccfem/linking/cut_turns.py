@@ -126,19 +126,19 @@ def _unbent(
     Pieces are looked at again, just where the evaluator will look: it and the planner take points a
     little aside, so that what keeps the radius by a hair may not do so there.
     """
-    ends, changes = np.array([0, len(line)]), np.append(False, link[1:] != link[:-1])
-    laid, _, source, _ = even_steps(line, ends, changes, width, OFF * width)
-    mark = np.append(link[source[:-1, 0]], False)
-    along, closed = along_line(laid), is_closed(line)
+    along, closed = along_line(line), is_closed(line)
     a = b = np.zeros(0)
     if not again:
-        a, b = tight_bends(laid, along, closed, radius, width).T
+        a, b = tight_bends(line, along, closed, radius, width).T
     if not len(a):
+        changes = np.append(False, link[1:] != link[:-1])
+        ends = np.array([0, len(line)])
+        laid, _, _, _ = even_steps(line, ends, changes, width, OFF * width)
         a = b = tight_samples(laid, closed, radius, width)
     if not len(a):
         return [(line, link)]
-    pieces = _between_bends(laid, along, mark, a, b, width, least)
-    parts = [_piece(laid, along, mark, *piece) for piece in pieces]
+    pieces = _between_bends(line, along, link, a, b, width, least)
+    parts = [_piece(line, along, link, *piece) for piece in pieces]
     return [each for part in parts for each in _unbent(*part, radius, width, least, True)]
 
 
