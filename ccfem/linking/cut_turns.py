@@ -277,10 +277,9 @@ def _room(places: _Places, tip: float, way: int, other: float, width: float) -> 
 def _corners(line: FloatArray, along: FloatArray, closed: bool) -> FloatArray:
     """Places of a line at which it turns by more than it may on a stub, of a ring twice round."""
     step = np.diff(line, axis=0)
-    corner = along[1:-1][angles_between(step[:-1], step[1:]) > _CORNER]
-    if not closed:
-        return corner
-    return np.concatenate([corner, along[-1:], corner + along[-1]])
+    after = np.roll(step, -1, axis=0)
+    corner = along[1:][angles_between(step, after) > _CORNER]
+    return np.append(corner, corner + along[-1]) if closed else corner[corner < along[-1]]
 
 
 def _off_corners(
