@@ -236,6 +236,14 @@ def test_paths_cross_neither_each_other_nor_themselves(label):
         assert crossing.shape[1] == 0
 
 
+@pytest.mark.parametrize("name", [name for name in NAMES if hasattr(named()[name], "turns")])
+def test_nothing_turns_too_tightly_where_turns_are_cut(name):
+    layers, paths = planned_again(made(name, turns="cut"))
+    stress, sections = planned_on()
+    total = evaluate(paths, [sections[k] for k in layers], stress, MACHINE).total
+    assert total["curvature_ok"] == 1.0
+
+
 @pytest.mark.parametrize("label", ALL)
 def test_evaluator_accepts_the_paths(label):
     stress, (layer, _) = planned_on()
