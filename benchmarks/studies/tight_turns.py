@@ -9,6 +9,7 @@ it, the metres laid, and how many times as stiff the part is.
 
 import sys
 from pathlib import Path
+from typing import get_args, get_type_hints
 
 from benchmarks.studies.confirmed_gain import LAYERS, PARTS, posed
 from benchmarks.studies.table import print_table
@@ -27,8 +28,6 @@ __all__ = ["NAMES", "VALUES", "measured"]
 
 NAMES = ("loop", "open_hole", "l_shape", "bracket", "lever")
 VALUES = ("tight", "printable", "cut")
-LEFT_OUT = ("pruned", "stream_function")
-"""Of the strategies: they lay a length that is asked for."""
 
 
 def _stress(name: str) -> StressField:
@@ -42,9 +41,13 @@ def measured(name: str, pictures: Path | None = None) -> list[str]:
     stress, machine = _stress(name), Machine()
     layers = Planar(count=LAYERS).cut(stress.mesh)
     rows = []
-    for strategy in sorted(set(named()) - set(LEFT_OUT)):
+    for strategy, kind in sorted(named().items()):
+        known = get_args(get_type_hints(kind).get("turns")) or VALUES[:1]
         cells = []
-        for turns in VALUES if hasattr(named()[strategy], "turns") else VALUES[:1]:
+        for turns in VALUES:
+            if turns not in known:
+                cells.append("")
+                continue
             planner = create(strategy, {} if turns == VALUES[0] else {"turns": turns})
             try:
                 paths = plan(planner, layers, stress, machine)
@@ -57,8 +60,7 @@ def measured(name: str, pictures: Path | None = None) -> list[str]:
             if pictures is not None:
                 picture = pictures / f"{name}-{strategy}-{turns}.png"
                 paths.plot(layer=0).savefig(picture, dpi=100)
-        if cells:
-            cells += [""] * (len(VALUES) - len(cells))
+        if len(cells) == len(VALUES):
             rows.append(f"| {name} | {strategy} | {' | '.join(cells)} |")
     return rows
 

@@ -87,7 +87,7 @@ class Pruned:
     variants: ClassVar[Mapping[str, Mapping[str, Any]]] = {
         "concentric": {"of": "concentric"},
         "moves": {"moves": 2},
-        "turns": {"turns": "cut"},
+        "cut": {"turns": "cut"},
     }
 
     def __post_init__(self) -> None:

@@ -141,7 +141,7 @@ class StreamFunction:
         "border": {"inset": 0.0, "evaluations": 5},
         "groups": {"groups": 2, "evaluations": 5},
         "moves": {"moves": 2, "evaluations": 5},
-        "turns": {"turns": "cut", "evaluations": 5},
+        "cut": {"turns": "cut", "evaluations": 5},
     }
 
     def __post_init__(self) -> None:

@@ -151,7 +151,9 @@ def test_gentle_bends_become_wider(bent_beam, turn):
     sign = np.sign(turn)
     arc = np.column_stack([3.0 * np.sin(angle) * sign, 3.0 * sign * (1.0 - np.cos(angle))])
     leg = np.array([np.cos(turn), np.sin(turn)])
-    line = np.array([[-20.0, 0.0], *arc, arc[-1] + 20.0 * leg]) + np.array([28.0, 12.0])
+    line = np.array([[-20.0, 0.0], *arc, arc[-1] + 20.0 * leg]) + np.array(
+        [28.0, 12.0 - 8.0 * sign]
+    )
     paths = Toolpaths.from_plane([line], layer)
 
     def tightest(found):
