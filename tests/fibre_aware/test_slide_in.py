@@ -140,7 +140,7 @@ def circle_through(a, b, c):
     """Radius of the circle through three points, by its sides and its area."""
     sides = [np.linalg.norm(p - q) for p, q in ((a, b), (b, c), (c, a))]
     (x, y), (u, v) = b - a, c - a
-    return np.prod(sides) / (2.0 * abs(x * v - y * u))
+    return np.prod(sides) / max(2.0 * abs(x * v - y * u), 1e-9)
 
 
 @pytest.mark.parametrize("turn", [0.9, -0.9])
