@@ -8,7 +8,8 @@ import shapely
 from ccfem.arrays import FloatArray, read_only
 from ccfem.evaluation.column import Column
 from ccfem.evaluation.plane_paths import PlanePaths
-from ccfem.geometry.polylines import arc_lengths, inner_points, resample, turning_angles
+from ccfem.geometry.curvature_samples import curvature_samples
+from ccfem.geometry.polylines import arc_lengths, inner_points, turning_angles
 from ccfem.machine.machine import Machine
 
 __all__ = ["COLUMNS", "CurvatureSamples", "curvature_indices", "sample_curvature"]
@@ -107,14 +108,8 @@ def sample_curvature(paths: PlanePaths, step: float) -> CurvatureSamples:
     Curvature from the planned points themselves would depend on how densely they lie.
     """
     lines = paths.in_part
-    points, offsets = resample(lines.points, lines.offsets, step)
-    angle = turning_angles(points, offsets, lines.closed)
-    inner = inner_points(offsets, lines.closed)
-    size = np.repeat(lines.lengths, np.diff(offsets)) / np.repeat(
-        np.maximum(np.diff(offsets) - 1, 1), np.diff(offsets)
-    )
     return CurvatureSamples(
-        (angle / size)[inner],
+        curvature_samples(lines.points, lines.offsets, lines.closed, step),
         _native(lines, step),
         turning_angles(paths.points, paths.offsets, paths.closed),
         np.array([paths.lengths.sum()]),

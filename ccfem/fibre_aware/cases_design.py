@@ -139,14 +139,13 @@ class CasesProblem:
         over = max(length / problem.budget - 1.0, 0.0)
         value, gradient = worth + OVER_BUDGET * over**2, []
         for share, one, own in zip(self.shares, laid, fields, strict=True):
-            bend = problem.laplacian @ own
-            value += share * sum(problem.penalties(one, bend))
+            value += share * sum(problem.penalties(own, one))
             pulls = [problem.pull(one, solution) for solution in found]
             pull = tuple(
                 np.einsum("i,im->m", counts, np.stack([each[axis] for each in pulls]))
                 for axis in (0, 1)
             )
-            gradient.append(share * problem.gradient(one, bend, (pull[0], pull[1]), over))
+            gradient.append(share * problem.gradient(own, one, (pull[0], pull[1]), over))
         return CasesObjective(value, np.concatenate(gradient), ratio, float(length), found)
 
     def _worth(self, ratios: FloatArray) -> tuple[float, FloatArray]:

@@ -5,17 +5,16 @@ per length. The paths are tested with their fibre, the pieces worth least are ta
 left is tested again, for it takes over the load.
 """
 
-from collections.abc import Sequence
 from dataclasses import replace
 
 import numpy as np
 
-from ccfem.arrays import BoolArray, FloatArray, IntArray
+from ccfem.arrays import FloatArray, IntArray
 from ccfem.checks import check_number
 from ccfem.elasticity.stress_field import StressField
-from ccfem.fibre_aware.path_profile import Profile, least_price
+from ccfem.fibre_aware.path_profile import Profile
+from ccfem.fibre_aware.shortening import shorten_bent, tight_share
 from ccfem.fibre_aware.strength_value import Worth, layer_normal, raised
-from ccfem.geometry.polylines import along_line, points_along, runs
 from ccfem.machine.machine import Machine
 from ccfem.toolpaths import FIBRE, Toolpaths
 from ccfem.virtual_testing.equilibrium import equilibrium
@@ -23,7 +22,7 @@ from ccfem.virtual_testing.specimen import Specimen
 from ccfem.virtual_testing.strand import Strand
 from ccfem.virtual_testing.strands import Strands, cut_strands
 
-__all__ = ["fibre_length", "profiles", "prune", "shorten"]
+__all__ = ["fibre_length", "profiles", "prune"]
 
 _STATION = 1.0
 """Length of path, mm, that is kept or taken off as a whole."""
@@ -41,9 +40,6 @@ proportion: of equally good pieces the last go first, whatever rounding makes of
 _ENOUGH = 0.95
 """Share of the wanted length below which fibre that is worth less than nothing is kept, too."""
 
-_LOWER_PRICES = (0.999, 0.99, 0.97, 0.93, 0.85)
-"""Shares of the price at which room that is left is used: a path may be worth all or nothing."""
-
 
 def prune(
     toolpaths: Toolpaths,
@@ -53,6 +49,7 @@ def prune(
     strand: Strand | None = None,
     rounds: int = 2,
     strength: float = 0.0,
+    tight: float = 1.0,
 ) -> Toolpaths:
     """Take the least valuable fibre off until no more than a wanted length is left.
 
@@ -77,11 +74,14 @@ def prune(
     strength : float in [0, 1], default 0
         How much the load at first failure counts beside the stiffness
         (`ccfem.fibre_aware.strength_value`).
+    tight : float in [0, 1], default 1
+        Largest share of the fibre's length in bends tighter than the machine's radius. Where less
+        is allowed than the paths have, the least valuable bends go, and what that leaves too short.
 
     Returns
     -------
     Toolpaths
-        The given ones where they are short enough.
+        The given ones where they are short enough, and not bent too tightly.
 
     Raises
     ------
@@ -91,8 +91,9 @@ def prune(
     """
     check_number("length of fibre", length, above=0.0, unit="mm")
     check_number("rounds", rounds, at_least=1)
+    check_number("tight", tight, at_least=0.0, at_most=1.0)
     laid = fibre_length(toolpaths)
-    if laid <= length:
+    if laid <= length and (tight >= 1.0 or tight_share(toolpaths, machine) <= tight):
         return toolpaths
     specimen = Specimen.of(part) if isinstance(part, StressField) else part
     axial = (Strand() if strand is None else strand).stiffness(specimen.modulus)
@@ -105,11 +106,11 @@ def prune(
         value = np.where(found.carries, found.strain, 0.0) ** 2
         if worth is not None:
             value = worth(strands, found, layer_normal(toolpaths))
-        wanted = length if k == rounds - 1 else length + 0.5 * (laid - length)
-        before, least = toolpaths, machine.minimum_length
-        toolpaths = shorten(before, profiles(before, strands, value), wanted, least)
+        wanted = length if k == rounds - 1 else length + max(0.5 * (laid - length), 0.0)
+        before, how = toolpaths, (wanted, machine, tight)
+        toolpaths = shorten_bent(before, profiles(before, strands, value), *how)
         if worth is not None and fibre_length(toolpaths) < _ENOUGH * wanted:
-            toolpaths = shorten(before, profiles(before, strands, raised(value)), wanted, least)
+            toolpaths = shorten_bent(before, profiles(before, strands, raised(value)), *how)
         laid = fibre_length(toolpaths)
         if laid <= length:
             break
@@ -182,115 +183,3 @@ def _least_valuable(value: FloatArray) -> int:
     mean = total[window : window + len(value)] - total[: len(value)]
     least = np.flatnonzero(mean <= mean.min() + _TILT * window * value.max())[0]
     return int((least + window // 2) % len(value))
-
-
-def shorten(
-    toolpaths: Toolpaths,
-    along: Sequence[Profile],
-    length: float,
-    minimum: float,
-    cut_cost: float = 20.0,
-) -> Toolpaths:
-    """Keep the most valuable stretches of fibre paths, at most a wanted length in total.
-
-    Parameters
-    ----------
-    toolpaths : Toolpaths
-    along : sequence of Profile
-        Of its fibre paths, from `profiles`.
-    length : float, mm
-    minimum : float, mm
-        Least length of a stretch.
-    cut_cost : float, mm, default 20
-        See `Profile.kept`.
-
-    Returns
-    -------
-    Toolpaths
-        The price of fibre is the same for all paths, and the smallest that keeps to the length;
-        what room it leaves is used path by path at slightly lower prices, by part of what these
-        would keep where all of it is too long.
-    """
-    price = least_price(along, length, minimum, cut_cost)
-    chosen = {one.path: one.kept(price, minimum, cut_cost)[0] for one in along}
-    room = length - sum(one.step * float(chosen[one.path].sum()) for one in along)
-    for factor in _LOWER_PRICES if price > 0.0 else ():
-        for one in along:
-            before = chosen[one.path]
-            longer = one.kept(factor * price, minimum, cut_cost)[0]
-            if one.step * (longer.sum() - before.sum()) > room:
-                longer = _grown(before, longer, int(room / one.step))
-            more = one.step * float(longer.sum() - before.sum())
-            if 0.0 < more <= room:
-                chosen[one.path] = longer
-                room -= more
-    return _cut(toolpaths, along, chosen)
-
-
-def _grown(kept: BoolArray, longer: BoolArray, count: int) -> BoolArray:
-    """Kept pieces (n,), and up to so many of a longer choice that follow on from them."""
-    grown = kept.copy()
-    while count > 0:
-        beside = np.concatenate([[False], grown[:-1]]) | np.concatenate([grown[1:], [False]])
-        fresh = np.flatnonzero(longer & ~grown & beside)[:count]
-        if not len(fresh):
-            break
-        grown[fresh] = True
-        count -= len(fresh)
-    return grown
-
-
-def _cut(toolpaths: Toolpaths, along: Sequence[Profile], chosen: dict[int, BoolArray]) -> Toolpaths:
-    """Toolpaths with each profiled path cut to its stretches."""
-    profile = {one.path: one for one in along}
-    parts: list[FloatArray] = []
-    source, closed = [], []
-    for k in range(len(toolpaths)):
-        own = slice(toolpaths.offsets[k], toolpaths.offsets[k + 1])
-        link = toolpaths.link[own, None]
-        line = np.hstack([toolpaths.points[own], toolpaths.normals[own], link])
-        whole = k not in chosen or bool(chosen[k].all())
-        found = [line] if whole else _stretches(line, profile[k], chosen[k], toolpaths.closed[k])
-        parts += found
-        source += len(found) * [k]
-        closed += len(found) * [bool(toolpaths.closed[k]) and whole]
-    if not parts:
-        return Toolpaths.empty()
-    columns = np.concatenate(parts)
-    normals = columns[:, 3:6] / np.linalg.norm(columns[:, 3:6], axis=1)[:, None]
-    return Toolpaths(
-        points=columns[:, :3],
-        normals=normals,
-        offsets=np.concatenate([[0], np.cumsum([len(part) for part in parts])]),
-        layer=toolpaths.layer[source],
-        kind=toolpaths.kind[source],
-        closed=np.array(closed),
-        link=columns[:, 6] > 0.0,
-    )
-
-
-def _stretches(
-    line: FloatArray, profile: Profile, keep: BoolArray, closed: bool
-) -> list[FloatArray]:
-    """Kept stretches of a line (n, 7); those on both sides of the seam of a ring are one."""
-    spans = runs(keep)
-    if closed and len(spans) > 1 and keep[0] and keep[-1]:
-        spans = np.concatenate([spans[1:-1], [[spans[-1, 0], len(keep) + spans[0, 1]]]])
-    step, origin = profile.step, profile.origin
-    return [_between(line, origin + a * step, origin + b * step) for a, b in spans]
-
-
-def _between(line: FloatArray, start: float, end: float) -> FloatArray:
-    """Part of a line (n, 7) between two arc lengths, which may go on past the end of a ring.
-
-    Columns are the point, its normal, and whether the step to the next point is a link.
-    """
-    along = along_line(line[:, :3])
-    if end > along[-1] * (1.0 + 1e-12):  # on past the seam, at most once round
-        line = np.concatenate([line[:-1], line[:-1], line])
-        along = np.concatenate([along, along[-1] + along[1:], 2.0 * along[-1] + along[1:]])
-    inside = along[(along > start + 1e-9) & (along < end - 1e-9)]
-    wanted = np.concatenate([[start], inside, [end]])
-    step = np.searchsorted(along, 0.5 * (wanted[1:] + wanted[:-1]), side="right") - 1
-    link = np.append(line[step, 6], 0.0)
-    return np.column_stack([points_along(line[:, :6], along, wanted), link])

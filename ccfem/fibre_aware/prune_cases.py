@@ -14,8 +14,9 @@ import numpy as np
 from ccfem.arrays import FloatArray
 from ccfem.checks import check_known, check_number
 from ccfem.fibre_aware.cases_bound import OBJECTIVES, WORST
-from ccfem.fibre_aware.prune import fibre_length, profiles, shorten
-from ccfem.fibre_aware.strand_moves import Judged, moved, stiffest
+from ccfem.fibre_aware.prune import fibre_length, profiles
+from ccfem.fibre_aware.shortening import shorten_bent, tight_share
+from ccfem.fibre_aware.strand_moves import Judged, kept_radius, moved, stiffest
 from ccfem.layers.layer import Layer
 from ccfem.machine.machine import Machine
 from ccfem.toolpaths import Toolpaths
@@ -58,6 +59,7 @@ def prune_cases(
     strand: Strand | None = None,
     objective: str = WORST,
     rounds: int = 3,
+    tight: float = 1.0,
 ) -> Toolpaths:
     """Take off the fibre that is least worth in all load cases, until a wanted length is left.
 
@@ -80,11 +82,14 @@ def prune_cases(
     objective : {"worst", "sum"}
     rounds : int, default 3
         Tests under every case, at least 1.
+    tight : float in [0, 1], default 1
+        Largest share of the fibre's length in bends tighter than the machine's radius, as in
+        `prune`.
 
     Returns
     -------
     Toolpaths
-        The given ones where they are short enough.
+        The given ones where they are short enough, and not bent too tightly.
 
     Raises
     ------
@@ -94,8 +99,9 @@ def prune_cases(
     check_number("length of fibre", length, above=0.0, unit="mm")
     check_number("rounds", rounds, at_least=1)
     check_known("objective", objective, OBJECTIVES)
-    excess = fibre_length(toolpaths) - length
-    if excess <= 0.0:
+    check_number("tight", tight, at_least=0.0, at_most=1.0)
+    excess = max(fibre_length(toolpaths) - length, 0.0)
+    if not excess and (tight >= 1.0 or tight_share(toolpaths, machine) <= tight):
         return toolpaths
     test = _tests(parts, weights, bounds, strand, objective)
     for k in range(rounds):
@@ -106,7 +112,7 @@ def prune_cases(
             value += worth * np.where(one.carries, one.strain, 0.0) ** 2
         wanted = length + excess * (1.0 - (k + 1) / rounds)
         along = profiles(toolpaths, strands, value)
-        toolpaths = shorten(toolpaths, along, wanted, machine.minimum_length)
+        toolpaths = shorten_bent(toolpaths, along, wanted, machine, tight)
     return toolpaths
 
 
@@ -122,6 +128,7 @@ def prune_and_move_cases(
     objective: str = WORST,
     rounds: int = 3,
     moves: int = 0,
+    tight: float = 1.0,
 ) -> Toolpaths:
     """Cut fibre to a length, mm in all, move what is left, and cut what has become longer.
 
@@ -130,9 +137,11 @@ def prune_and_move_cases(
     """
     alike = (parts, weights, bounds, length, machine, strand, objective)
     judge = cases_judge(parts, weights, bounds, machine, strand, objective)
-    kept = stiffest([prune_cases(one, *alike, rounds) for one in candidates], judge)
-    found = moved(kept, layers, parts[0].unreinforced.mesh, machine, judge, moves)
-    return found if found is kept else prune_cases(found, *alike, rounds=1)
+    kept = stiffest([prune_cases(one, *alike, rounds, tight) for one in candidates], judge)
+    radius = kept_radius(machine, tight)
+    mesh = parts[0].unreinforced.mesh
+    found = moved(kept, layers, mesh, machine, judge, moves, radius=radius)
+    return found if found is kept else prune_cases(found, *alike, 1, tight)
 
 
 def cases_judge(

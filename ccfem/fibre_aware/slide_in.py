@@ -60,7 +60,9 @@ def lines_to_slide_in(
     return found
 
 
-def slid_in(paths: Toolpaths, layer: Layer, machine: Machine, inset: float) -> Toolpaths:
+def slid_in(
+    paths: Toolpaths, layer: Layer, machine: Machine, inset: float, radius: float = 0.0
+) -> Toolpaths:
     """Slide what lies too near to the border in, and strands apart.
 
     Parameters
@@ -71,6 +73,8 @@ def slid_in(paths: Toolpaths, layer: Layer, machine: Machine, inset: float) -> T
     machine : Machine
     inset : float
         Least distance from the border, in strand widths.
+    radius : float, mm, default 0
+        Least radius that bends are drawn to keep; 0 for any.
 
     Returns
     -------
@@ -83,7 +87,8 @@ def slid_in(paths: Toolpaths, layer: Layer, machine: Machine, inset: float) -> T
         return paths
     for _ in range(_ROUNDS):
         lines = strand_lines(paths, (layer,), machine, hold=False)
-        apart = spacing(lines, (layer,), _APART * width, _INNER * inset * width, come_in=True)
+        off = _INNER * inset * width
+        apart = spacing(lines, (layer,), _APART * width, off, come_in=True, radius=radius)
         paths = lines.slid(apart.spread(np.zeros(len(lines.path))))
     return _ends_cut(_back_inside(paths, layer), layer, inset * width, machine)
 

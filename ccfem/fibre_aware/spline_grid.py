@@ -71,22 +71,31 @@ class SplineGrid:
 
     def values(self, points: FloatArray) -> Any:
         """Matrix (n, k) from coefficients to values at points (n, 2)."""
-        return self._matrices(points)[0]
+        return self._matrices(points, ((0, 0),))[0]
 
     def slopes(self, points: FloatArray) -> tuple[Any, Any]:
         """Matrices (n, k) from coefficients to both components of the gradient, 1/mm."""
-        _, along, across = self._matrices(points)
+        along, across = self._matrices(points, ((1, 0), (0, 1)))
         (a, b), (c, d) = self.axes.T
         return (a * along + b * across).tocsr(), (c * along + d * across).tocsr()
 
-    def _matrices(self, points: FloatArray) -> tuple[Any, Any, Any]:
-        """Values, and slopes along both sides of the squares."""
+    def derivatives(self, points: FloatArray) -> tuple[Any, ...]:
+        """Matrices (n, k) to the first two and the second three derivatives at points (n, 2).
+
+        Along the sides of the squares: x, y in 1/mm, then xx, xy and yy in 1/mm^2; xx and yy jump
+        at the lines of the grid.
+        """
+        return self._matrices(points, ((1, 0), (0, 1), (2, 0), (1, 1), (0, 2)))
+
+    def _matrices(self, points: FloatArray, orders: tuple[tuple[int, int], ...]) -> tuple[Any, ...]:
+        """Find derivatives of some orders along the sides of the squares; of order 0 the value."""
         low, table = self._number
         place = (points - self.centre) @ self.axes.T / self.size
         square = np.floor(place).astype(np.int64)
         x = place - square
         weight = np.stack([0.5 * (1.0 - x) ** 2, 0.5 + x - x * x, 0.5 * x * x], axis=2)
         slope = np.stack([x - 1.0, 1.0 - 2.0 * x, x], axis=2) / self.size
+        second = np.broadcast_to(np.array([1.0, -2.0, 1.0]) / self.size**2, weight.shape)
         i = square[:, 0, None] + np.arange(-1, 2) - low[0]
         j = square[:, 1, None] + np.arange(-1, 2) - low[1]
         column = table[i[:, :, None], j[:, None, :]].reshape(-1)
@@ -98,11 +107,8 @@ class SplineGrid:
             entries = (first[:, :, None] * second[:, None, :]).reshape(-1)
             return sp.csr_array((entries, (row, column)), shape=(len(points), len(self)))
 
-        return (
-            matrix(weight[:, 0], weight[:, 1]),
-            matrix(slope[:, 0], weight[:, 1]),
-            matrix(weight[:, 0], slope[:, 1]),
-        )
+        by_order = (weight, slope, second)
+        return tuple(matrix(by_order[a][:, 0], by_order[b][:, 1]) for a, b in orders)
 
     @cached_property
     def laplacian(self) -> Any:

@@ -28,7 +28,15 @@ from ccfem.virtual_testing.specimen import Specimen
 from ccfem.virtual_testing.strand import Strand
 from ccfem.virtual_testing.strands import cut_strands
 
-__all__ = ["Judged", "check_moves", "moved", "prune_and_move", "stiffest", "stiffness_judge"]
+__all__ = [
+    "Judged",
+    "check_moves",
+    "kept_radius",
+    "moved",
+    "prune_and_move",
+    "stiffest",
+    "stiffness_judge",
+]
 
 _STEP = 0.2
 """First step, in widths: 95 % of the points move by no more, and none by more than twice that."""
@@ -44,6 +52,9 @@ _BETTER = 1e-6
 
 _CHEAPEST = 0.1
 """Share of the fibre, that of the least strain, whose squared strain is the price of length."""
+
+_KEPT = 1.15
+"""Radius of bends after slides, over the machine's least: slides come only near to it."""
 
 _TOLERANCE = 1e-4
 """Relative residual of the tests; the error of the stiffness is of its square."""
@@ -94,6 +105,7 @@ def moved(
     judge: Callable[[Toolpaths], Judged],
     moves: int,
     inset: float = 0.5,
+    radius: float = 0.0,
 ) -> Toolpaths:
     """Move fibre sideways, step by step, as long as a test says that it helps.
 
@@ -116,6 +128,8 @@ def moved(
         Steps that are tested, at least 0.
     inset : float, default 0.5
         Least distance from the border, in widths; what is nearer to begin with comes no nearer.
+    radius : float, mm, default 0
+        Least radius that bends are drawn to keep; 0 for any.
 
     Returns
     -------
@@ -136,7 +150,7 @@ def moved(
         return toolpaths
     lines = strand_lines(fibre, layers, machine)
     width = machine.fibre_width
-    apart = spacing(lines, layers, width, inset * width)
+    apart = spacing(lines, layers, width, inset * width, radius=radius)
     smooth = splu(apart.roughness)
     best, slide = judge(fibre), np.zeros(len(lines.path))
     direction, step, helped = None, _STEP * machine.fibre_width, False
@@ -167,6 +181,7 @@ def prune_and_move(
     rounds: int,
     strength: float,
     moves: int,
+    tight: float = 1.0,
 ) -> Toolpaths:
     """Cut fibre to a length, mm in all, move what is left, and cut what has become longer.
 
@@ -176,10 +191,17 @@ def prune_and_move(
     tried = candidates[:1] if strength else candidates
     judge = stiffness_judge(part, machine, strand)
     kept = stiffest(
-        [prune(one, part, length, machine, strand, rounds, strength) for one in tried], judge
+        [prune(one, part, length, machine, strand, rounds, strength, tight) for one in tried], judge
     )
-    found = moved(kept, layers, part.unreinforced.mesh, machine, judge, moves)
-    return found if found is kept else prune(found, part, length, machine, strand, rounds=1)
+    radius = kept_radius(machine, tight)
+    mesh = part.unreinforced.mesh
+    found = moved(kept, layers, mesh, machine, judge, moves, radius=radius)
+    return found if found is kept else prune(found, part, length, machine, strand, 1, tight=tight)
+
+
+def kept_radius(machine: Machine, tight: float) -> float:
+    """Radius, mm, that slides keep where only a share of the fibre may turn too tightly."""
+    return _KEPT * machine.minimum_radius if tight < 1.0 else 0.0
 
 
 def stiffest(candidates: Sequence[Toolpaths], judge: Callable[[Toolpaths], Judged]) -> Toolpaths:

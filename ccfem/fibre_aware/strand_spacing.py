@@ -1,4 +1,4 @@
-"""Strands spread until they keep their distances: from each other, and from the border.
+"""Strands spread until they keep their distances, from each other and the border, and a radius.
 
 Of all smooth slides the least one is looked for that undoes what is too near. That is a sparse
 least-squares problem, solved again with what is too near then, so that a whole pack of strands
@@ -31,6 +31,15 @@ _OWN = 5.0
 
 _STIFF = 300.0
 """What a missing distance counts against a slide of the same size."""
+
+_STRAIGHT = 1000.0
+"""What a bend that is too tight counts: how far its middle lies off, over a slide of that size."""
+
+_CHORD = 2
+"""Points from one end of a bend to its middle."""
+
+_SHARPEST = 0.6
+"""Turn of a corner, radians, which no slide makes round."""
 
 _ROUNDS = 5
 """Times that what is too near is looked for."""
@@ -71,6 +80,8 @@ class Spacing:
         Of the middles of the pieces, with their layers.
     roughness : csc_array (P, P)
         What slides cost (`StrandLines.roughness`).
+    radius : float, mm
+        Of the tightest bends that stay as they are; 0 where all do.
     """
 
     lines: StrandLines
@@ -80,6 +91,7 @@ class Spacing:
     inward: FloatArray
     tree: cKDTree
     roughness: Any
+    radius: float
 
     __repr__ = in_brief
 
@@ -102,6 +114,12 @@ class Spacing:
             apart = sp.csr_array((value.ravel(), (rows, column.ravel())), (len(missing), count))
             matrix = self.roughness + _STIFF * (apart.T @ apart + sp.diags_array(off * off))
             right = _STIFF * (apart.T @ missing + off * wanted)
+            if self.radius:
+                column, value, over = _too_bent(points, lines.normals, lines.path, self.radius)
+                rows = np.repeat(np.arange(len(over)), 3)
+                bent = sp.csr_array((value.ravel(), (rows, column.ravel())), (len(over), count))
+                matrix = matrix + _STRAIGHT * (bent.T @ bent)
+                right = right + _STRAIGHT * (bent.T @ over)
             slide = slide + _solve(matrix, right)
         return slide
 
@@ -142,6 +160,7 @@ def spacing(
     width: float,
     inset: float,
     come_in: bool = False,
+    radius: float = 0.0,
 ) -> Spacing:
     """Distances that strands keep on their layers.
 
@@ -156,6 +175,9 @@ def spacing(
         Least distance from the border. What lies nearer to begin with comes no nearer.
     come_in : bool, default False
         Whether that has to keep the distance, too.
+    radius : float, mm, default 0
+        Least radius that bends are drawn to keep; 0 for any. Corners stay: no small slide makes
+        them round.
     """
     pieces, inward, owner = [], [], []
     for layer in layers:
@@ -177,7 +199,7 @@ def spacing(
     depth = np.full(len(lines.path), inset)
     if not come_in:
         depth = np.minimum(_depths(lines.start, near, border, normals), inset)
-    return Spacing(lines, width, depth, border, normals, tree, lines.roughness)
+    return Spacing(lines, width, depth, border, normals, tree, lines.roughness, radius)
 
 
 def _lifted(points: FloatArray, layer: IntArray) -> FloatArray:
@@ -292,3 +314,36 @@ def _outside(points, near, border, inward, inset, normals):  # type: ignore[no-u
         if depth < inset[p] and abs(across) > _FACING:
             off[p], missing[p] = across, inset[p] - depth
     return off, missing
+
+
+@njit(cache=True)
+def _too_bent(points, normals, path, radius):  # type: ignore[no-untyped-def]  # pragma: no cover
+    """Three points of bends that are too tight: what slides do to them, and how much is missing."""
+    count = 0
+    for write in range(2):
+        if write:
+            column, value = np.zeros((count, 3), np.int64), np.zeros((count, 3))
+            missing = np.zeros(count)
+            count = 0
+        for p in range(_CHORD, len(points) - _CHORD):
+            a, c = p - _CHORD, p + _CHORD
+            if path[a] != path[c]:
+                continue
+            ax, ay = points[p, 0] - points[a, 0], points[p, 1] - points[a, 1]
+            cx, cy = points[c, 0] - points[p, 0], points[c, 1] - points[p, 1]
+            into, out = np.sqrt(ax * ax + ay * ay), np.sqrt(cx * cx + cy * cy)
+            if into < 1e-9 or out < 1e-9:
+                continue
+            x, y = cx / out - ax / into, cy / out - ay / into
+            turn, step = np.sqrt(x * x + y * y), 0.5 * (into + out)
+            if turn * radius <= step or turn > _SHARPEST:
+                continue
+            if write:
+                x, y = step * x / turn, step * y / turn
+                column[count, 0], column[count, 1], column[count, 2] = a, p, c
+                value[count, 0] = (x * normals[a, 0] + y * normals[a, 1]) / into
+                value[count, 1] = -(x * normals[p, 0] + y * normals[p, 1]) * (1 / into + 1 / out)
+                value[count, 2] = (x * normals[c, 0] + y * normals[c, 1]) / out
+                missing[count] = step * (step / radius - turn)
+            count += 1
+    return column, value, missing

@@ -15,6 +15,7 @@ import scipy.sparse as sp
 
 from ccfem.arrays import FloatArray, IntArray
 from ccfem.fibre_aware.border_levels import BorderLevels
+from ccfem.fibre_aware.field_bends import FieldBends
 from ccfem.fibre_aware.field_design import designed_fields
 from ccfem.fibre_aware.smeared import SmearedPart, SmearedSolution
 from ccfem.fibre_aware.spline_grid import SplineGrid
@@ -36,7 +37,8 @@ DENSEST = 0.975
 OVER_BUDGET = 20.0
 _STEEP = 100.0
 _ROUGH = 1e-3
-"""Weights of the three penalties."""
+_BENDS = 1.0
+"""Weights of the four penalties."""
 
 _SMALLEST = 0.02
 """Strands a width below which |g| is rounded off, so that it has a gradient everywhere."""
@@ -111,7 +113,7 @@ class StreamProblem:
 
     Minimised is ``-log(stiffness) + 20 max(length / budget - 1, 0)^2 + 100 mean(max(|g| - 0.975,
     0)^2) + 0.001 mean((Laplacian s)^2)``, g in strands a width, means over the part and over the
-    coefficients.
+    coefficients. With a radius the cost of tighter bends (`FieldBends`) is added.
 
     Attributes
     ----------
@@ -130,6 +132,8 @@ class StreamProblem:
         EA of a strand.
     budget : float, mm
         Length of fibre in the whole part.
+    radius : float, mm, default 0
+        Bends of levels that are tighter have a cost; 0 for none.
     """
 
     part: SmearedPart
@@ -140,6 +144,7 @@ class StreamProblem:
     width: float
     axial_stiffness: float
     budget: float
+    radius: float = 0.0
 
     @cached_property
     def groups(self) -> int:
@@ -170,6 +175,15 @@ class StreamProblem:
         return sp.block_diag(self.groups * [self.grid.laplacian], format="csr")
 
     @cached_property
+    def bends(self) -> FieldBends | None:
+        """Cost of bends, where they have one."""
+        if not self.radius:
+            return None
+        found = (self.of_group(one, self.group) for one in self.grid.derivatives(self.centres))
+        x, y, xx, xy, yy = (self.width * matrix for matrix in found)
+        return FieldBends((x, y), (xx, xy, yy), self.room / self.budget, self.radius)
+
+    @cached_property
     def room(self) -> FloatArray:
         """Fibre length (m,), mm, of each cell at one strand a width."""
         return self.part.mesh.volumes * self.capacity
@@ -191,39 +205,43 @@ class StreamProblem:
         solution = self.part.solve(laid.stiffness, start, tolerance)
         ratio = self.part.ratio(solution.work)
         length = self.length(laid)
-        over, bend = max(length / self.budget - 1.0, 0.0), self.laplacian @ field
-        steep, rough = self.penalties(laid, bend)
-        value = -np.log(ratio) + OVER_BUDGET * over**2 + steep
-        value += rough
-        gradient = self.gradient(laid, bend, self.pull(laid, solution), over)
+        over = max(length / self.budget - 1.0, 0.0)
+        value = -np.log(ratio) + OVER_BUDGET * over**2
+        for penalty in self.penalties(field, laid):
+            value += penalty
+        gradient = self.gradient(field, laid, self.pull(laid, solution), over)
         return Objective(float(value), gradient, ratio, length, solution)
 
-    def penalties(self, laid: Laid, bend: FloatArray) -> tuple[float, float]:
-        """Penalties of too dense fibre, and of a Laplacian (c,) of the field."""
-        excess = np.maximum(laid.size - DENSEST, 0.0)
-        return _STEEP * float(self.mean @ excess**2), _ROUGH * float(bend @ bend) / len(bend)
+    def penalties(self, field: FloatArray, laid: Laid) -> tuple[float, float, float]:
+        """Penalties of too dense fibre, of a rough field (c,), and of bends."""
+        excess, rough = np.maximum(laid.size - DENSEST, 0.0), self.laplacian @ field
+        bends = _BENDS * self.bends.cost(field) if self.bends else 0.0
+        steep = _STEEP * float(self.mean @ excess**2)
+        return steep, _ROUGH * float(rough @ rough) / len(rough), bends
 
     def gradient(
-        self, laid: Laid, bend: FloatArray, pull: tuple[FloatArray, FloatArray], over: float
+        self, field: FloatArray, laid: Laid, pull: tuple[FloatArray, FloatArray], over: float
     ) -> FloatArray:
         """Gradient (c,) by the coefficients, penalties included.
 
         Parameters
         ----------
+        field : (c,) array
         laid : Laid
-        bend : (c,) array
-            Laplacian of the field.
+            Its fibre.
         pull : two (m,) arrays
             Derivatives by the components of g of all that are no penalties.
         over : float
             Share of the budget by which the length exceeds it.
         """
-        excess = np.maximum(laid.size - DENSEST, 0.0)
+        excess, rough = np.maximum(laid.size - DENSEST, 0.0), self.laplacian @ field
         push = 2.0 * (OVER_BUDGET * over / self.budget * self.room + _STEEP * self.mean * excess)
         x, y = self._transposed
         gradient = x @ (pull[0] + push * laid.gx / laid.size)
         gradient = gradient + y @ (pull[1] + push * laid.gy / laid.size)
-        gradient += 2.0 * _ROUGH / len(bend) * (self.laplacian @ bend)
+        gradient += 2.0 * _ROUGH / len(rough) * (self.laplacian @ rough)
+        if self.bends:
+            gradient += _BENDS * self.bends.slope(field)
         return np.asarray(gradient)
 
     def curvature(self, field: FloatArray, solution: SmearedSolution) -> Any:

@@ -74,6 +74,8 @@ class Extraction:
         is at whole numbers of the field.
     inset, link_limit : float
         Least distance from the boundary, and of ends that are linked, in strand widths.
+    radius : float, mm, default 0
+        Least radius that bends are drawn to keep; 0 for any.
     """
 
     fields: tuple[FloatArray, ...]
@@ -84,6 +86,7 @@ class Extraction:
     phases: int
     inset: float
     link_limit: float
+    radius: float = 0.0
 
     def candidates(
         self, layers: Sequence[Layer], group: IntArray, lengths: Sequence[float]
@@ -179,6 +182,8 @@ class Extraction:
         second = others.argmax(axis=1)
         near = others[rows, second] >= (1.0 - _NEAR) * gains[rows, first]
         found = [first, np.zeros_like(first), np.where(near, second, first)]
+        if self.radius:  # which bends can stay is seen in the test only
+            found += [np.full_like(first, phase) for phase in range(self.phases)]
         return list(dict.fromkeys(tuple(phases.tolist()) for phases in found))
 
     def _price(
@@ -221,7 +226,7 @@ class Extraction:
         else:
             found = linked_paths(lines, section, width, limit, least, radius=radius)
         paths = Toolpaths.from_plane(found.lines, layer, link=found.link)
-        return slid_in(paths, layer, self.machine, self.inset)
+        return slid_in(paths, layer, self.machine, self.inset, self.radius)
 
     def levels(self, layer: Layer, field: FloatArray, shift: float) -> list[FloatArray]:
         """Trace the levels `shift` above whole numbers on a layer, (n, 2), mm."""

@@ -98,16 +98,16 @@ class StrengthProblem:
         laid = problem.laid(field)
         solution = problem.part.solve(laid.stiffness, start, tolerance)
         ratio, length = problem.part.ratio(solution.work), problem.length(laid)
-        over, bend = max(length / problem.budget - 1.0, 0.0), problem.laplacian @ field
+        over = max(length / problem.budget - 1.0, 0.0)
         near, nearer = self._near(laid, solution)
         softer = problem.pull(laid, solution)
         if not problem.part.forced:  # the load falls with the stiffness where supports move
             near -= np.log(ratio)
             nearer = (nearer[0] + softer[0], nearer[1] + softer[1])
         value = w * near - (1.0 - w) * np.log(ratio) + OVER_BUDGET * over**2
-        value += sum(problem.penalties(laid, bend))
+        value += sum(problem.penalties(field, laid))
         x, y = (w * a + (1.0 - w) * b for a, b in zip(nearer, softer, strict=True))
-        gradient = problem.gradient(laid, bend, (x, y), over)
+        gradient = problem.gradient(field, laid, (x, y), over)
         return Objective(float(value), gradient, ratio, length, solution)
 
     def _peaks(

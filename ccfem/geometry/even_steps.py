@@ -6,7 +6,10 @@ from numba import njit
 from ccfem.arrays import BoolArray, FloatArray, IntArray
 from ccfem.geometry.polylines import merge_repeated, subdivide
 
-__all__ = ["even_steps"]
+__all__ = ["OFF", "even_steps"]
+
+OFF = 0.005
+"""Largest deviation of paths, as they leave the planner, from those planned, in their steps."""
 
 _REPEATED = 1e-6
 """Points nearer than this share of the step to the one before them are the same point."""

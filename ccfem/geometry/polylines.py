@@ -13,6 +13,7 @@ from ccfem.arrays import BoolArray, FloatArray, IntArray, repeated
 
 __all__ = [
     "along_line",
+    "angles_between",
     "arc_lengths",
     "between",
     "inner_points",
@@ -249,9 +250,13 @@ def turning_angles(points: FloatArray, offsets: IntArray, closed: BoolArray) -> 
     ring = np.asarray(closed, dtype=bool)[sizes > 0] & (ends > starts)
     before[starts] = np.where(ring, ends - 1, starts)
     after[ends] = ends
-    into, out = points - points[before], points[after] - points
+    return angles_between(points - points[before], points[after] - points)
+
+
+def angles_between(into: FloatArray, out: FloatArray) -> FloatArray:
+    """Angles (k,), radians in [0, pi], between vectors (k, d); 0 where one has no length."""
     along = np.einsum("ij,ij->i", into, out)
-    if points.shape[1] == 2:
+    if into.shape[1] == 2:
         across = np.abs(into[:, 0] * out[:, 1] - into[:, 1] * out[:, 0])
     else:
         across = np.linalg.norm(np.cross(into, out), axis=1)

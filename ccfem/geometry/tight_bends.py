@@ -3,9 +3,17 @@
 import numpy as np
 
 from ccfem.arrays import FloatArray, IntArray
-from ccfem.geometry.polylines import points_along, runs
+from ccfem.geometry.polylines import (
+    angles_between,
+    inner_points,
+    line_length,
+    points_along,
+    resample,
+    runs,
+    turning_angles,
+)
 
-__all__ = ["tight_bends"]
+__all__ = ["tight_bends", "tight_samples"]
 
 _SAMPLES = 8
 """Places a width at which curvature is looked at."""
@@ -21,7 +29,8 @@ def tight_bends(
 
     Parameters
     ----------
-    line : (n, 2) array, mm
+    line : (n, d) array, mm
+        In two or three dimensions.
     along : (n,) array, mm
         Arc length at its points.
     closed : bool
@@ -46,9 +55,7 @@ def tight_bends(
         return points_along(line, along, positions % size if closed else positions)
 
     here = places(at)
-    into, out = here - places(at - width), places(at + width) - here
-    across = into[:, 0] * out[:, 1] - into[:, 1] * out[:, 0]
-    angle = np.abs(np.arctan2(across, (into * out).sum(axis=1)))
+    angle = angles_between(here - places(at - width), places(at + width) - here)
     over = angle - width * (1.0 - 1e-6) / radius
     tight = over >= 0.0
     if closed and tight.all():
@@ -70,3 +77,27 @@ def tight_bends(
     a = crossing(found[:, 0] - 1, found[:, 0])
     b = crossing(found[:, 1], found[:, 1] - 1)
     return np.column_stack([a, b]) * step + (first * step + at[0])
+
+
+def tight_samples(line: FloatArray, closed: bool, radius: float, width: float) -> FloatArray:
+    """Places at which the evaluator finds a line no straighter than a radius.
+
+    It looks at the ends of equal steps of about a width, as many as are nearest to the length.
+
+    Parameters
+    ----------
+    line : (n, d) array, mm
+    closed : bool
+        Whether it turns where it closes, too.
+    radius, width : float, mm
+
+    Returns
+    -------
+    (k,) array, mm
+        By arc length.
+    """
+    points, offsets = resample(line, np.array([0, len(line)]), width)
+    number = np.flatnonzero(inner_points(offsets, np.array([closed])))
+    step = line_length(line) / (len(points) - 1)
+    angle = turning_angles(points, offsets, np.array([closed]))[number]
+    return np.asarray(step * number[angle * radius >= step])

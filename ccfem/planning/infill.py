@@ -16,7 +16,7 @@ from ccfem.geometry.shapes import Region
 from ccfem.layers.layer import Layer
 from ccfem.layers.layer_stress import LayerStress
 from ccfem.linking.cut_turns import cut_turns
-from ccfem.linking.joining import Joined, join
+from ccfem.linking.joining import Joined
 from ccfem.machine.machine import Machine
 from ccfem.planning.strategy import Amount, LayerPlanner
 from ccfem.raster.bitmap import Bitmap, bitmap
@@ -25,10 +25,14 @@ from ccfem.raster.raster_plan import RasterPlan, raster_plan
 from ccfem.threads import in_threads
 from ccfem.toolpaths import Toolpaths
 
-__all__ = ["SPACING", "Infill", "check_fill", "check_shells", "long_enough", "with_turns"]
+__all__ = ["SPACING", "Infill", "Turns", "check_fill", "check_shells", "long_enough", "with_turns"]
 
 SPACING = Amount("spacing", most=1.0, least=20.0)
 """Of a strategy whose parameter `spacing` is the distance of strands in fibre widths."""
+
+Turns = Literal["tight", "printable", "cut"]
+"""What becomes of turns tighter than the machine's fibre follows: strands go round them; are cut
+there if both sides are long enough for the cutter; or are cut, and what is too short goes."""
 
 
 def check_fill(strategy: object) -> None:
@@ -71,7 +75,7 @@ def with_turns(
     Parameters
     ----------
     strategy : object
-        With `turns`, "tight" or "printable", a `spacing`, and a `minimum_length` where it has one.
+        With `turns`, and a `spacing` in fibre widths and a `minimum_length` where it has them.
     lines : sequence of (n_i, 2) arrays, mm
     machine : Machine
     link : sequence of (n_i,) bool arrays, optional
@@ -84,8 +88,9 @@ def with_turns(
         return joined
     width, least = machine.fibre_width, getattr(strategy, "minimum_length", None)
     least = max(machine.minimum_length, least or 0.0)  # no cut is made that the cutter cannot
-    spacing, radius = strategy.spacing * width, machine.minimum_radius
-    return cut_turns(joined, radius, width, least, spacing)
+    spacing = strategy.spacing if strategy.amount.parameter == "spacing" else 1.0
+    every, radius = strategy.turns == "cut", machine.minimum_radius
+    return cut_turns(joined, radius, width, least, spacing * width, every)
 
 
 class Infill(ABC):
@@ -98,6 +103,7 @@ class Infill(ABC):
     spacing: float
     minimum_length: float | None
     mode: Literal["polyline", "raster"]
+    turns: Turns = "tight"
 
     amount: ClassVar[Amount] = SPACING
     in_plane: ClassVar[bool] = True
@@ -121,8 +127,8 @@ class Infill(ABC):
         """Strands (n_i, 2), mm, in the plane of a layer, however short."""
 
     def linked(self, lines: list[FloatArray], prepared: Any, machine: Machine) -> Joined:
-        """Strands joined at their ends, where a strategy does that; links are marked."""
-        return join(lines, [])
+        """Strands joined at their ends, where a strategy does that, links marked; cut at turns."""
+        return with_turns(self, lines, machine)
 
     @abstractmethod
     def regions(self, image: Bitmap, layer: Layer, stress: LayerStress) -> Regions:
@@ -161,10 +167,10 @@ class _Prepared:
     def __call__(self, layer: Layer, stress: LayerStress, machine: Machine) -> Toolpaths:
         infill = self.infill
         if infill.mode == "raster":
-            paths = infill.raster(layer, stress, machine).toolpaths(layer)
+            found = with_turns(infill, infill.raster(layer, stress, machine).lines(), machine)
         else:
             prepared = self.known[layer.index]
             lines = infill.strands(layer, stress, machine, prepared)
             found = infill.linked(lines, prepared, machine)
-            paths = Toolpaths.from_plane(found.lines, layer, link=found.link)
+        paths = Toolpaths.from_plane(found.lines, layer, link=found.link)
         return long_enough(paths, infill.minimum_length, machine)

@@ -4,13 +4,11 @@ from dataclasses import replace
 
 import numpy as np
 
-from ccfem.geometry.even_steps import even_steps
+from ccfem.geometry.even_steps import OFF, even_steps
 from ccfem.toolpaths import Toolpaths
 
 __all__ = ["in_even_steps"]
 
-_OFF = 0.005
-"""Largest deviation from the path as planned, in steps."""
 _SHORTEST = 1e-6
 """Paths no longer than that, in steps, are none."""
 
@@ -38,7 +36,7 @@ def in_even_steps(toolpaths: Toolpaths, step: float) -> Toolpaths:
     inner[paths.offsets[:-1]] = False
     changes = inner & (paths.link != np.roll(paths.link, 1))
     points, offsets, source, share = even_steps(
-        paths.points, paths.offsets, changes, step, _OFF * step
+        paths.points, paths.offsets, changes, step, OFF * step
     )
     before, after = (paths.normals[source[:, k]] for k in (0, 1))
     normals = before + share[:, None] * (after - before)

@@ -13,9 +13,8 @@ from ccfem.geometry.offsets import join_rings, offset_rings
 from ccfem.geometry.shells import concentric
 from ccfem.layers.layer import Layer
 from ccfem.layers.layer_stress import LayerStress
-from ccfem.linking.joining import Joined
 from ccfem.machine.machine import Machine
-from ccfem.planning.infill import Infill, with_turns
+from ccfem.planning.infill import Infill, Turns
 from ccfem.raster.bitmap import Bitmap
 from ccfem.raster.patterns import Regions, concentric_regions
 
@@ -53,9 +52,8 @@ class Concentric(Infill):
         Shorter paths are dropped; by default the shortest that the machine can cut.
     mode : {"polyline", "raster"}, default "polyline"
         Polylines; or paths of pixels a spacing wide, as in the paper: see `ccfem.raster`.
-    turns : {"tight", "printable"}, default "tight"
-        Whether strands go round all turns; or are cut where they turn more tightly than the
-        machine's fibre follows, if both sides are long enough for its cutter.
+    turns : {"tight", "printable", "cut"}, default "tight"
+        As in `Zigzag`.
     """
 
     spacing: float = 1.0
@@ -65,7 +63,7 @@ class Concentric(Infill):
     filled: bool = False
     minimum_length: float | None = None
     mode: Literal["polyline", "raster"] = "polyline"
-    turns: Literal["tight", "printable"] = "tight"
+    turns: Turns = "tight"
 
     ignores_stress: ClassVar[bool] = True
     variants: ClassVar[Mapping[str, Mapping[str, Any]]] = {
@@ -74,6 +72,7 @@ class Concentric(Infill):
         "filled": {"joined": False, "filled": True},
         "raster": {"joined": False, "mode": "raster"},
         "printable": {"turns": "printable"},
+        "cut": {"turns": "cut"},
     }
 
     def __post_init__(self) -> None:
@@ -96,10 +95,6 @@ class Concentric(Infill):
         first = layer.plane.points[layer.loops[0][:2]].mean(axis=0)
         start = first if self.start is None else np.asarray(self.start, dtype=np.float64)
         return join_rings(levels, start, spacing, width)
-
-    def linked(self, lines: list[FloatArray], prepared: Any, machine: Machine) -> Joined:
-        """Strands cut where they turn too tightly."""
-        return with_turns(self, lines, machine)
 
     def regions(self, image: Bitmap, layer: Layer, stress: LayerStress) -> Regions:
         """Rings of pixels."""

@@ -2,7 +2,7 @@
 
 from collections.abc import Mapping
 from dataclasses import dataclass
-from typing import Any, ClassVar, Literal
+from typing import Any, ClassVar
 
 import numpy as np
 
@@ -11,7 +11,7 @@ from ccfem.geometry.hatch import zigzag
 from ccfem.layers.layer import Layer
 from ccfem.layers.layer_stress import LayerStress
 from ccfem.machine.machine import Machine
-from ccfem.planning.infill import SPACING, check_fill, long_enough, with_turns
+from ccfem.planning.infill import SPACING, Turns, check_fill, long_enough, with_turns
 from ccfem.planning.strategy import Amount
 from ccfem.strategies.concentric import Concentric
 from ccfem.toolpaths import Toolpaths
@@ -37,8 +37,8 @@ class ContourZigzag:
         As in `Zigzag`.
     joined : bool, default True
         As in `Concentric`.
-    turns : {"tight", "printable"}, default "tight"
-        As in `Concentric`.
+    turns : {"tight", "printable", "cut"}, default "tight"
+        As in `Zigzag`.
     """
 
     spacing: float = 1.0
@@ -46,7 +46,7 @@ class ContourZigzag:
     angle: float = 45.0
     turn: float = 90.0
     joined: bool = True
-    turns: Literal["tight", "printable"] = "tight"
+    turns: Turns = "tight"
 
     amount: ClassVar[Amount] = SPACING
     ignores_stress: ClassVar[bool] = True
@@ -55,6 +55,7 @@ class ContourZigzag:
     variants: ClassVar[Mapping[str, Mapping[str, Any]]] = {
         "single": {"joined": False},
         "printable": {"turns": "printable"},
+        "cut": {"turns": "cut"},
     }
 
     def __post_init__(self) -> None:

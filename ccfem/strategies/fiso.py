@@ -6,7 +6,7 @@ continuous carbon fiber parts, Materials 16 (2023) 998.
 
 from collections.abc import Mapping
 from dataclasses import dataclass
-from typing import Any, ClassVar, Literal
+from typing import Any, ClassVar
 
 import numpy as np
 
@@ -18,7 +18,7 @@ from ccfem.layers.layer import Layer
 from ccfem.layers.layer_stress import LayerStress
 from ccfem.linking.first_in import first_in_spiral_out
 from ccfem.machine.machine import Machine
-from ccfem.planning.infill import SPACING, check_fill, long_enough, with_turns
+from ccfem.planning.infill import SPACING, Turns, check_fill, long_enough, with_turns
 from ccfem.planning.strategy import Amount
 from ccfem.toolpaths import Toolpaths
 
@@ -55,10 +55,9 @@ class Fiso:
         openings of the laps. Not with `least_radius`.
     minimum_length : float, mm, optional
         Shorter paths are dropped; by default the shortest that the machine can cut.
-    turns : {"tight", "printable"}, default "tight"
-        Whether strands go round all turns; or are cut where they turn more tightly than the
-        machine's fibre follows, if both sides are long enough for its cutter. Contours that long
-        are not merged then.
+    turns : {"tight", "printable", "cut"}, default "tight"
+        As in `Zigzag`. Unless "tight", contours as long as the cutter's shortest strand are not
+        merged.
     """
 
     spacing: float = 1.0
@@ -66,7 +65,7 @@ class Fiso:
     least_radius: float = 0.0
     entry: bool = False
     minimum_length: float | None = None
-    turns: Literal["tight", "printable"] = "tight"
+    turns: Turns = "tight"
 
     amount: ClassVar[Amount] = SPACING
     in_plane: ClassVar[bool] = True
@@ -75,6 +74,7 @@ class Fiso:
         "round": {"least_radius": 3.85},
         "entry": {"entry": True},
         "printable": {"turns": "printable"},
+        "cut": {"turns": "cut"},
     }
 
     def __post_init__(self) -> None:

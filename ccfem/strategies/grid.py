@@ -21,7 +21,7 @@ from ccfem.geometry.shells import shells
 from ccfem.layers.layer import Layer
 from ccfem.layers.layer_stress import LayerStress
 from ccfem.machine.machine import Machine
-from ccfem.planning.infill import SPACING, Infill, check_shells
+from ccfem.planning.infill import SPACING, Infill, Turns, check_shells
 from ccfem.planning.strategy import Amount
 from ccfem.raster.bitmap import Bitmap
 from ccfem.raster.patterns import Regions, grid_regions
@@ -55,6 +55,8 @@ class Grid(Infill):
         Shorter paths are dropped; by default the shortest that the machine can cut.
     mode : {"polyline", "raster"}, default "polyline"
         Polylines; or paths of pixels a spacing wide, as in the paper: see `ccfem.raster`.
+    turns : {"tight", "printable", "cut"}, default "tight"
+        As in `Zigzag`.
     """
 
     spacing: float = 1.0
@@ -66,6 +68,7 @@ class Grid(Infill):
     closest: float = 0.6
     minimum_length: float | None = None
     mode: Literal["polyline", "raster"] = "polyline"
+    turns: Turns = "tight"
 
     amount: ClassVar[Amount] = replace(SPACING, beyond=(("shells", 60),))
     ignores_stress: ClassVar[bool] = True
@@ -75,6 +78,7 @@ class Grid(Infill):
         "paper": {"lines": "paper"},
         "raster": {"mode": "raster"},
         "raster_paper": {"mode": "raster", "lines": "paper"},
+        "cut": {"turns": "cut"},
     }
 
     def __post_init__(self) -> None:

@@ -36,6 +36,7 @@ from ccfem.linking.finishing import keep_off_border, linked_paths
 from ccfem.linking.joining import Joined
 from ccfem.linking.spiral import spiral
 from ccfem.machine.machine import Machine
+from ccfem.planning.infill import Turns, with_turns
 from ccfem.planning.strategy import Amount, LayerPlanner
 from ccfem.toolpaths import Toolpaths
 
@@ -139,6 +140,8 @@ class Isocurve:
         Links keep the machine's minimum radius; those with corners join only what is too short to
         be cut alone, and are marked as links. Otherwise all that are short enough are taken, as in
         the paper.
+    turns : {"tight", "printable", "cut"}, default "tight"
+        As in `Zigzag`.
     """
 
     cap: float = 86.0
@@ -163,6 +166,7 @@ class Isocurve:
     trim: bool = True
     inset: float = 0.5
     smooth: bool = True
+    turns: Turns = "tight"
 
     amount: ClassVar[Amount] = Amount(
         "density", most=4.0, least=0.05, beyond=(("floor", 0.0), ("cap", 40.0))
@@ -174,6 +178,7 @@ class Isocurve:
         "corners": {"smooth": False},
         "search": {"spacing": "search"},
         "cone": {"spacing": "cone"},
+        "cut": {"turns": "cut"},
         "mesh": {
             "field": "mesh",
             "sense": "absolute",
@@ -334,7 +339,8 @@ class _Planner:
             lines = spiral(lines, _SPIRAL_LIMIT * width, _nearest(layer, tension.stress), section)
         limit, least = s.link_limit * width, machine.minimum_length
         radius = machine.minimum_radius if s.smooth else 0.0
-        return linked_paths(lines, section, width, limit, least, s.boundary_links, radius)
+        paths = linked_paths(lines, section, width, limit, least, s.boundary_links, radius)
+        return with_turns(s, paths.lines, machine, paths.link)
 
 
 def _nearest(layer: Layer, values: FloatArray) -> Callable[[FloatArray], FloatArray]:

@@ -16,7 +16,7 @@ from ccfem.geometry.shells import shells
 from ccfem.layers.layer import Layer
 from ccfem.layers.layer_stress import LayerStress
 from ccfem.machine.machine import Machine
-from ccfem.planning.infill import Infill, check_shells
+from ccfem.planning.infill import Infill, Turns, check_shells
 from ccfem.raster.bitmap import Bitmap
 from ccfem.raster.patterns import Regions, medial_regions
 
@@ -43,6 +43,8 @@ class Mat(Infill):
         Shorter paths are dropped; by default the shortest that the machine can cut.
     mode : {"polyline", "raster"}, default "polyline"
         Polylines; or paths of pixels a spacing wide, as in the paper: see `ccfem.raster`.
+    turns : {"tight", "printable", "cut"}, default "tight"
+        As in `Zigzag`.
     """
 
     spacing: float = 1.0
@@ -50,9 +52,13 @@ class Mat(Infill):
     closest: float = 0.6
     minimum_length: float | None = None
     mode: Literal["polyline", "raster"] = "polyline"
+    turns: Turns = "tight"
 
     ignores_stress: ClassVar[bool] = True
-    variants: ClassVar[Mapping[str, Mapping[str, Any]]] = {"raster": {"mode": "raster"}}
+    variants: ClassVar[Mapping[str, Mapping[str, Any]]] = {
+        "raster": {"mode": "raster"},
+        "cut": {"turns": "cut"},
+    }
 
     def __post_init__(self) -> None:
         super().__post_init__()

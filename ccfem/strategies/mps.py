@@ -26,7 +26,7 @@ from ccfem.layers.layer import Layer
 from ccfem.layers.layer_stress import LayerStress
 from ccfem.linking.joining import Joined, link_ends
 from ccfem.machine.machine import Machine
-from ccfem.planning.infill import Infill, check_shells, with_turns
+from ccfem.planning.infill import Infill, Turns, check_shells, with_turns
 from ccfem.raster.bitmap import Bitmap
 from ccfem.raster.guides import stress_guides
 from ccfem.raster.patterns import Regions, inside_shells, stress_regions
@@ -85,9 +85,8 @@ class Mps(Infill):
         then stop a fibre width before the sides of other strands.
     mode : {"polyline", "raster"}, default "polyline"
         Polylines; or paths of pixels a spacing wide, as in the paper: see `ccfem.raster`.
-    turns : {"tight", "printable"}, default "tight"
-        Whether strands go round all turns; or are cut where they turn more tightly than the
-        machine's fibre follows, if both sides are long enough for its cutter.
+    turns : {"tight", "printable", "cut"}, default "tight"
+        As in `Zigzag`.
     """
 
     spacing: float = 1.0
@@ -96,12 +95,13 @@ class Mps(Infill):
     closest: float = 0.6
     minimum_length: float | None = None
     mode: Literal["polyline", "raster"] = "polyline"
-    turns: Literal["tight", "printable"] = "tight"
+    turns: Turns = "tight"
 
     variants: ClassVar[Mapping[str, Mapping[str, Any]]] = {
         "ends": {"seeds": "ends"},
         "raster": {"mode": "raster"},
         "printable": {"turns": "printable"},
+        "cut": {"turns": "cut"},
         "raster_ends": {"mode": "raster", "seeds": "ends"},
     }
 

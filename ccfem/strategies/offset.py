@@ -7,7 +7,7 @@ fiber paths of continuous fiber composites, Composites Part B 183 (2020) 107681.
 
 from collections.abc import Mapping
 from dataclasses import dataclass
-from typing import Any, ClassVar, Literal
+from typing import Any, ClassVar
 
 import shapely
 
@@ -17,7 +17,7 @@ from ccfem.geometry.shapes import Region
 from ccfem.layers.layer import Layer
 from ccfem.layers.layer_stress import LayerStress
 from ccfem.machine.machine import Machine
-from ccfem.planning.infill import SPACING, check_fill, long_enough, with_turns
+from ccfem.planning.infill import SPACING, Turns, check_fill, long_enough, with_turns
 from ccfem.planning.strategy import Amount
 from ccfem.toolpaths import Toolpaths
 
@@ -41,19 +41,21 @@ class Offset:
         Distance of neighbouring rings in fibre widths, at least 1.
     minimum_length : float, mm, optional
         Shorter paths are dropped; by default the shortest that the machine can cut.
-    turns : {"tight", "printable"}, default "tight"
-        Whether strands go round all turns; or are cut where they turn more tightly than the
-        machine's fibre follows, if both sides are long enough for its cutter.
+    turns : {"tight", "printable", "cut"}, default "tight"
+        As in `Zigzag`.
     """
 
     spacing: float = 1.0
     minimum_length: float | None = None
-    turns: Literal["tight", "printable"] = "tight"
+    turns: Turns = "tight"
 
     amount: ClassVar[Amount] = SPACING
     ignores_stress: ClassVar[bool] = True
     in_plane: ClassVar[bool] = True
-    variants: ClassVar[Mapping[str, Mapping[str, Any]]] = {"printable": {"turns": "printable"}}
+    variants: ClassVar[Mapping[str, Mapping[str, Any]]] = {
+        "printable": {"turns": "printable"},
+        "cut": {"turns": "cut"},
+    }
 
     def __post_init__(self) -> None:
         check_fill(self)

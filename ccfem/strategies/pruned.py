@@ -6,10 +6,10 @@ least work go, until the wanted length is left (`ccfem.fibre_aware.prune`).
 
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field, replace
-from typing import Any, ClassVar
+from typing import Any, ClassVar, Literal
 
 from ccfem.arrays import freeze
-from ccfem.checks import check_fields
+from ccfem.checks import check_choices, check_fields
 from ccfem.elasticity.part_stress import PartStress
 from ccfem.elasticity.stress_field import solved
 from ccfem.elasticity.weighted_cases import WeightedCases
@@ -17,6 +17,7 @@ from ccfem.errors import InputError
 from ccfem.fibre_aware.cases_bound import single_bounds
 from ccfem.fibre_aware.plan_cases import plan_by_layers
 from ccfem.fibre_aware.prune_cases import prune_and_move_cases
+from ccfem.fibre_aware.shortening import TIGHT_SHARES
 from ccfem.fibre_aware.strand_moves import check_moves, prune_and_move
 from ccfem.fibre_aware.strength_value import refuse_strength
 from ccfem.layers.layer import Layer
@@ -67,6 +68,8 @@ class Pruned:
         Steps by which what is left is moved sideways, each tested
         (`ccfem.fibre_aware.strand_moves`): 6 make a part stiffer by 1 to 2 %, for two to three
         times the time. Not with strength.
+    turns : {"tight", "cut"}
+        Whether more than 1 % of the fibre may turn more tightly than the machine's radius.
     """
 
     of: str = "isocurve"
@@ -77,12 +80,14 @@ class Pruned:
     rho: float = RHO
     strength: float = 0.0
     moves: int = 0
+    turns: Literal["tight", "cut"] = "tight"
 
     amount: ClassVar[Amount] = Amount("coverage", most=0.9, least=0.1)
     flat_layers_only: ClassVar[bool] = True
     variants: ClassVar[Mapping[str, Mapping[str, Any]]] = {
         "concentric": {"of": "concentric"},
         "moves": {"moves": 2},
+        "cut": {"turns": "cut"},
     }
 
     def __post_init__(self) -> None:
@@ -90,6 +95,7 @@ class Pruned:
             raise InputError(f"pruned.of must be another strategy; got {self.of!r}: correct it")
         freeze(self, base=dict)
         self._planner()
+        check_choices(self)
         check_fields(self, "coverage", above=0.0, at_most=1.0)
         check_fields(self, "overfill", "rounds", at_least=1)
         check_fields(self, "rho", above=0.0, unit="mm^2")
@@ -147,7 +153,7 @@ class Pruned:
             if len(paths):
                 part, strand = Specimen.of(solved(stress, "pruned")), Strand(self.rho)
                 wanted = length * len(layers)
-                cut_by = (self.rounds, self.strength, self.moves)
+                cut_by = (self.rounds, self.strength, self.moves, TIGHT_SHARES[self.turns])
                 kept = prune_and_move((paths,), layers, part, wanted, machine, strand, *cut_by)
             coverage = length / full
             overfill = max(planned / full / coverage, 1.0)
@@ -188,6 +194,7 @@ class Pruned:
                 *((paths,), layers, parts, *judged, wanted, machine, strand),
                 rounds=rounds,
                 moves=self.moves,
+                tight=TIGHT_SHARES[self.turns],
             )
             coverage = length / full
             overfill = max(planned / full / coverage, 1.0)

@@ -5,7 +5,7 @@ field, as in `isocurve`, but the field is not fitted to the stress of the part w
 optimised for the compliance of the part with the fibre that its isocurves lay.
 """
 
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
 from typing import Any, ClassVar, Literal
 
@@ -24,6 +24,7 @@ from ccfem.fibre_aware.cases_design import (
     design_cases,
     start_fields,
 )
+from ccfem.fibre_aware.design_lengths import designed_to_lengths
 from ccfem.fibre_aware.heights import (
     alike_share,
     fibre_capacity,
@@ -33,10 +34,11 @@ from ccfem.fibre_aware.heights import (
 )
 from ccfem.fibre_aware.layer_shares import layer_counts, layers_by_case
 from ccfem.fibre_aware.prune_cases import case_counts, prune_and_move_cases
+from ccfem.fibre_aware.shortening import TIGHT_SHARES
 from ccfem.fibre_aware.smeared import SmearedPart, smeared_cases
 from ccfem.fibre_aware.spline_grid import SplineGrid
-from ccfem.fibre_aware.strand_moves import check_moves, prune_and_move
-from ccfem.fibre_aware.stream_design import DENSEST, StreamDesign, StreamProblem, design
+from ccfem.fibre_aware.strand_moves import check_moves, kept_radius, prune_and_move
+from ccfem.fibre_aware.stream_design import StreamDesign, StreamProblem, design
 from ccfem.fibre_aware.stream_paths import Extraction, refined
 from ccfem.fibre_aware.stream_start import plane_axes, start_field
 from ccfem.fibre_aware.strength_design import LEAST_OVERFILL, design_for_strength
@@ -56,20 +58,14 @@ _ALIKE = 0.8
 
 _MOST_GROUPS = 6
 
-_ENOUGH = 0.99
-"""Share of a wanted length below which the design is made once more."""
-
-_NEAR = 0.95
-"""Share of the largest length above which shorter ones are cut from its design."""
-
 _ROUNDS = 3
 """Virtual tests that say what to cut."""
 
 _CASES_OVERFILL = 1.15
 """Least overfill for several load cases, whose tests have more to choose between."""
 
-_MORE = 1.03
-"""By how much more it then asks for than by proportion."""
+_WIDE = {"tight": 0.0, "cut": 1.3}
+"""Radius, over the machine's, below which bends of the field cost."""
 
 
 @dataclass(frozen=True)
@@ -118,6 +114,9 @@ class StreamFunction:
         share of the one is then worth as much as one of the other. Of one load case only.
     moves : int, default 0
         Steps by which strands are moved sideways (`moved`), each tested; not with strength.
+    turns : {"tight", "cut"}
+        Whether more than 1 % of the fibre may turn more tightly than the machine's radius. What
+        cannot be laid without is left out: "cut" may lay less than it was asked for.
     """
 
     coverage: float = 0.45
@@ -134,6 +133,7 @@ class StreamFunction:
     tilt: float = 0.6
     strength: float = 0.0
     moves: int = 0
+    turns: Literal["tight", "cut"] = "tight"
 
     amount: ClassVar[Amount] = Amount("coverage", most=0.85, least=0.1)
     flat_layers_only: ClassVar[bool] = True
@@ -141,6 +141,7 @@ class StreamFunction:
         "border": {"inset": 0.0, "evaluations": 5},
         "groups": {"groups": 2, "evaluations": 5},
         "moves": {"moves": 2, "evaluations": 5},
+        "cut": {"turns": "cut", "evaluations": 5},
     }
 
     def __post_init__(self) -> None:
@@ -193,12 +194,13 @@ class StreamFunction:
         InputError
             As `for_part`.
         """
-        return _to_lengths(
+        return designed_to_lengths(
             self._filled(),
             layers,
             machine,
             lengths,
             lambda one, some: one._cut(stress, layers, machine, some),
+            again=self.turns == "tight",
         )
 
     def for_cases(
@@ -221,12 +223,13 @@ class StreamFunction:
         if len(cases) == 1:
             return self.to_lengths(cases.fields[0], layers, machine, lengths)
         refuse_strength("stream_function", self.strength)
-        return _to_lengths(
+        return designed_to_lengths(
             replace(self, overfill=max(self.overfill, _CASES_OVERFILL)),
             layers,
             machine,
             lengths,
             lambda one, some: one._cut_cases(cases, layers, machine, some),
+            again=self.turns == "tight",
         )
 
     def _filled(self) -> "StreamFunction":
@@ -247,7 +250,8 @@ class StreamFunction:
         strained = ((1.0, found.objective.solution.displacement),)
         drawn = self.extraction(problem, (found.field,), strained, machine)
         in_all, strand = [length * len(layers) for length in lengths], Strand(self.rho)
-        part, cut_by = problem.part.specimen, (_ROUNDS, self.strength, self.moves)
+        part = problem.part.specimen
+        cut_by = (_ROUNDS, self.strength, self.moves, TIGHT_SHARES[self.turns])
         return [
             prune_and_move(some, layers, part, length, machine, strand, *cut_by)
             for some, length in zip(drawn.candidates(layers, group, in_all), in_all, strict=True)
@@ -265,8 +269,9 @@ class StreamFunction:
             problem.signed(field, group) for field in fields for group in range(problem.groups)
         ]
         mesh, widths = problem.part.mesh, (self.inset, self.link_limit)
+        radius = kept_radius(machine, TIGHT_SHARES[self.turns])
         return Extraction(
-            tuple(blocks), problem.grid, mesh, strains_of, machine, self.phases, *widths
+            tuple(blocks), problem.grid, mesh, strains_of, machine, self.phases, *widths, radius
         )
 
     def designed(
@@ -327,6 +332,7 @@ class StreamFunction:
             width=machine.fibre_width,
             axial_stiffness=self.rho * part.modulus,
             budget=self.overfill * self.coverage * float(mesh.volumes @ capacity),
+            radius=_WIDE[self.turns] * machine.minimum_radius,
         )
         return problem, group
 
@@ -352,49 +358,8 @@ class StreamFunction:
         specimens = [part.specimen for part in problem.parts]
         judged = (specimens, cases.weights, bounds)
         how: dict[str, Any] = {"objective": self.objective, "moves": self.moves}
+        how["tight"] = TIGHT_SHARES[self.turns]
         return [
             prune_and_move_cases(some, layers, *judged, length, machine, strand, **how)
             for some, length in zip(drawn.candidates(layers, field, in_all), in_all, strict=True)
         ]
-
-
-def _to_lengths(
-    strategy: StreamFunction,
-    layers: Sequence[Layer],
-    machine: Machine,
-    lengths: Sequence[float],
-    cut: Callable[[StreamFunction, Sequence[float]], list[Toolpaths]],
-) -> list[tuple[StreamFunction, LayerPlanner]]:
-    """Design for the largest length and much shorter ones, again where that lays too little.
-
-    `cut` designs for the coverage of a strategy and cuts to each length, mm per layer.
-    """
-    full = full_length(layers, machine)
-    most = max(strategy.amount.most, strategy.coverage) * full
-    lengths = [min(length, most) for length in lengths]
-    longest = max(lengths)
-    short = [k for k, length in enumerate(lengths) if length < _NEAR * longest]
-    if short:
-        anew = _to_lengths(strategy, layers, machine, [lengths[k] for k in short], cut)
-        near = [length for length in lengths if length >= _NEAR * longest]
-        rest = iter(_to_lengths(strategy, layers, machine, near, cut))
-        of = dict(zip(short, anew, strict=True))
-        return [of[k] if k in of else next(rest) for k in range(len(lengths))]
-    told = replace(strategy, coverage=longest / full)
-    found = cut(told, lengths)
-    laid = max(float(paths.lengths.sum()) for paths in found) / len(layers)
-    if 0.0 < laid < _ENOUGH * longest and strategy.overfill * told.coverage < DENSEST:
-        more = replace(told, overfill=min(_MORE * longest / laid, 2.0) * strategy.overfill)
-        again = cut(more, lengths)
-        if max(float(paths.lengths.sum()) for paths in again) > laid * len(layers):
-            told, found = more, again
-    designed = told.overfill * told.coverage
-    return [
-        (_designed_for(told, length / full, designed), WholePart(paths))
-        for length, paths in zip(lengths, found, strict=True)
-    ]
-
-
-def _designed_for(strategy: StreamFunction, coverage: float, designed: float) -> StreamFunction:
-    """Strategy that lays a coverage of what is designed for another, overfill included."""
-    return replace(strategy, coverage=coverage, overfill=max(designed / coverage, 1.0))

@@ -22,7 +22,7 @@ from ccfem.layers.layer import Layer
 from ccfem.layers.layer_stress import LayerStress, stress_on
 from ccfem.linking.single_path import link_tracks
 from ccfem.machine.machine import Machine
-from ccfem.planning.infill import SPACING, check_fill, long_enough
+from ccfem.planning.infill import SPACING, Turns, check_fill, long_enough, with_turns
 from ccfem.planning.strategy import Amount, LayerPlanner
 from ccfem.stress_tracing.alike import alike
 from ccfem.stress_tracing.band import band
@@ -96,6 +96,8 @@ class Svt:
         Most that the widest member of a main path has over its narrowest.
     minimum_length : float, mm, optional
         Shorter paths are dropped; by default the shortest that the machine can cut.
+    turns : {"tight", "printable", "cut"}, default "tight"
+        As in `Zigzag`.
     """
 
     mode: Literal["graph", "points"] = "graph"
@@ -109,6 +111,7 @@ class Svt:
     turn: float = 75.0
     width_ratio: float = 2.0
     minimum_length: float | None = None
+    turns: Turns = "tight"
 
     amount: ClassVar[Amount] = SPACING
     flat_layers_only: ClassVar[bool] = True
@@ -117,6 +120,7 @@ class Svt:
         "points": {"mode": "points"},
         "plain": {"links": "none", "crossings": False, "aligned": False, "filled": False},
         "cut": {"longest_inside": 0.0, "longest_over_void": 0.0},
+        "cut_turns": {"turns": "cut"},
     }
 
     def __post_init__(self) -> None:
@@ -137,8 +141,9 @@ class Svt:
 
     def _on(self, layer: Layer, lines: list[_Marked], machine: Machine) -> Toolpaths:
         """Paths on a layer, the short ones dropped."""
-        points = [each for each, _ in lines]
-        paths = Toolpaths.from_plane(points, layer, link=[mask for _, mask in lines])
+        points, marks = [each for each, _ in lines], [mask for _, mask in lines]
+        cut = with_turns(self, points, machine, marks)
+        paths = Toolpaths.from_plane(cut.lines, layer, link=cut.link)
         return long_enough(paths, self.minimum_length, machine)
 
     def _lines(self, layer: Layer, stress: LayerStress, machine: Machine) -> list[_Marked]:

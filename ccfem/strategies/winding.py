@@ -26,7 +26,7 @@ from ccfem.guidance.joints import joints_of
 from ccfem.layers.layer import Layer
 from ccfem.layers.layer_stress import LayerStress
 from ccfem.machine.machine import Machine
-from ccfem.planning.infill import SPACING, check_fill, long_enough
+from ccfem.planning.infill import SPACING, Turns, check_fill, long_enough, with_turns
 from ccfem.planning.strategy import Amount, LayerPlanner
 from ccfem.principal_lines.critical import Keep
 from ccfem.principal_lines.strongest import strongest_stress
@@ -96,6 +96,8 @@ class Winding:
         does, which are the layers that the paper lays fibre on.
     minimum_length : float, mm, optional
         Shorter strands are dropped; by default the shortest that the machine can cut.
+    turns : {"tight", "printable", "cut"}, default "tight"
+        As in `Zigzag`.
     """
 
     joints: tuple[str, ...] = ()
@@ -114,6 +116,7 @@ class Winding:
     sharpest: float = 0.115
     joined: int | None = None
     minimum_length: float | None = None
+    turns: Turns = "tight"
 
     amount: ClassVar[Amount] = SPACING
     variants: ClassVar[Mapping[str, Mapping[str, Any]]] = {
@@ -122,6 +125,7 @@ class Winding:
         "uncut": {"cut": False},
         "spaced": {"even": True},
         "paper": {"energy": "paper", "weight": "stress"},
+        "cut": {"turns": "cut"},
     }
 
     def __post_init__(self) -> None:
@@ -199,6 +203,7 @@ class _Planner:
         lines: list[FloatArray] = []
         for one in self.fields(layer):
             lines += self.strands(one, machine)
+        lines = with_turns(self.strategy, lines, machine).lines
         normals = []
         for k, line in enumerate(lines):
             found = nearest_on_triangles(layer.points, layer.triangles, line)
@@ -212,7 +217,7 @@ class _Planner:
 
     def fields(self, layer: Layer) -> "list[_Wound]":
         """Fields of the pieces of a layer; the layer keeps the last, for another spacing."""
-        same = replace(self.strategy, spacing=1.0, even=False, minimum_length=None)
+        same = replace(self.strategy, spacing=1.0, even=False, minimum_length=None, turns="tight")
         known: tuple[_Planner, list[_Wound]] | None = vars(layer).get(_KNOWN)
         if known is not None:
             last, found = known

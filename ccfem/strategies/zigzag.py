@@ -2,7 +2,7 @@
 
 from collections.abc import Mapping
 from dataclasses import dataclass
-from typing import Any, ClassVar, Literal
+from typing import Any, ClassVar
 
 import numpy as np
 
@@ -11,7 +11,7 @@ from ccfem.geometry.hatch import zigzag
 from ccfem.layers.layer import Layer
 from ccfem.layers.layer_stress import LayerStress
 from ccfem.machine.machine import Machine
-from ccfem.planning.infill import SPACING, check_fill, long_enough, with_turns
+from ccfem.planning.infill import SPACING, Turns, check_fill, long_enough, with_turns
 from ccfem.planning.strategy import Amount
 from ccfem.toolpaths import Toolpaths
 
@@ -34,21 +34,25 @@ class Zigzag:
     turn : float, degrees, default 90
         Turn from each layer to the next; 90 alternates between two directions as the published
         paths of Chen et al. 2021 do, 45 goes round four.
-    turns : {"tight", "printable"}, default "tight"
+    turns : {"tight", "printable", "cut"}, default "tight"
         Whether strands go round all turns; or are cut where they turn more tightly than the
-        machine's fibre follows, if both sides are long enough for its cutter.
+        machine's fibre follows, if both sides are long enough for its cutter; or are cut wherever
+        they bend so tightly, and what is too short goes.
     """
 
     spacing: float = 1.0
     angle: float = 45.0
     turn: float = 90.0
-    turns: Literal["tight", "printable"] = "tight"
+    turns: Turns = "tight"
 
     amount: ClassVar[Amount] = SPACING
     ignores_stress: ClassVar[bool] = True
     in_plane: ClassVar[bool] = True
     direction: ClassVar[str] = "angle"
-    variants: ClassVar[Mapping[str, Mapping[str, Any]]] = {"printable": {"turns": "printable"}}
+    variants: ClassVar[Mapping[str, Mapping[str, Any]]] = {
+        "printable": {"turns": "printable"},
+        "cut": {"turns": "cut"},
+    }
 
     def __post_init__(self) -> None:
         check_fill(self)

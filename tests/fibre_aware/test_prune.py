@@ -8,7 +8,8 @@ from hypothesis import strategies as st
 
 from ccfem.errors import InputError
 from ccfem.fibre_aware.path_profile import Profile
-from ccfem.fibre_aware.prune import profiles, prune, shorten
+from ccfem.fibre_aware.prune import profiles, prune
+from ccfem.fibre_aware.shortening import shorten
 from ccfem.machine import Machine
 from ccfem.planning import plan
 from ccfem.strategies.isocurve import Isocurve

@@ -134,3 +134,49 @@ def test_what_neighbours_push_over_the_border_lies_on_it(bent_beam):
 def test_an_inset_that_leaves_no_room_leaves_no_paths(eye):
     stress, layers = eye
     assert not len(plan(StreamFunction(evaluations=1, inset=50.0), layers, stress, MACHINE))
+
+
+def circle_through(a, b, c):
+    """Radius of the circle through three points, by its sides and its area."""
+    sides = [np.linalg.norm(p - q) for p, q in ((a, b), (b, c), (c, a))]
+    (x, y), (u, v) = b - a, c - a
+    return np.prod(sides) / max(2.0 * abs(x * v - y * u), 1e-9)
+
+
+@pytest.mark.parametrize("turn", [0.9, -0.9])
+def test_gentle_bends_become_wider(bent_beam, turn):
+    """A bend of 3 mm between straight legs, and a neighbour that has to give way."""
+    layer = bent_beam[1][0]
+    angle = np.linspace(0.0, turn, 19)
+    sign = np.sign(turn)
+    arc = np.column_stack([3.0 * np.sin(angle) * sign, 3.0 * sign * (1.0 - np.cos(angle))])
+    leg = np.array([np.cos(turn), np.sin(turn)])
+    line = np.array([[-20.0, 0.0], *arc, arc[-1] + 20.0 * leg]) + np.array(
+        [28.0, 12.0 - 8.0 * sign]
+    )
+    paths = Toolpaths.from_plane([line], layer)
+
+    def tightest(found):
+        even = shapely.segmentize(strings(found, layer), 0.05)[0]
+        at = np.arange(4.0, even.length - 4.0, 0.25)
+        p, q, r = (
+            shapely.get_coordinates(shapely.line_interpolate_point(even, at + off))
+            for off in (-1.0, 0.0, 1.0)
+        )
+        return min(circle_through(*three) for three in zip(p, q, r, strict=True))
+
+    assert tightest(paths) < 3.2
+    assert tightest(slid_in(paths, layer, MACHINE, 0.5)) < 3.3
+    found = slid_in(paths, layer, MACHINE, 0.5, radius=1.15 * MACHINE.minimum_radius)
+    assert tightest(found) > MACHINE.minimum_radius
+    away = shapely.hausdorff_distance(strings(found, layer), strings(paths, layer))
+    assert away[0] < 0.5
+
+
+def test_corners_stay(bent_beam):
+    layer = bent_beam[1][0]
+    line = np.array([[10.0, 8.0], [40.0, 8.0], [40.0, 10.0], [10.0, 10.0]])
+    paths = Toolpaths.from_plane([line], layer)
+    found = slid_in(paths, layer, MACHINE, 0.5, radius=4.0)
+    away = shapely.hausdorff_distance(strings(found, layer), strings(paths, layer))
+    assert away[0] < 0.02

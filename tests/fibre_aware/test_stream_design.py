@@ -42,9 +42,11 @@ def started(stress, layers, **options):
 
 @pytest.mark.parametrize("groups", [1, 2])
 @pytest.mark.parametrize("scale", [0.6, 1.6])
-def test_gradient_agrees_with_finite_differences(bent_beam, rng, groups, scale):
+@pytest.mark.parametrize("radius", [0.0, 20.0])
+def test_gradient_agrees_with_finite_differences(bent_beam, rng, groups, scale, radius):
     # Scale 1.6: over budget and steeper than allowed, so that every penalty takes part.
     problem, field = started(*bent_beam, groups=groups)
+    problem = replace(problem, radius=radius)
     field = scale * field
     found = problem.evaluate(field, tolerance=1e-12)
     smooth = np.linalg.inv(np.eye(len(field)) + 4.0 * problem.laplacian.toarray())

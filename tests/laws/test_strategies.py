@@ -31,6 +31,9 @@ ALL = NAMES + VARIANTS
 QUICK = {"stream_function": {"evaluations": 5, "phases": 2}}
 """Parameters that none of the laws depends on, of strategies that are slow with their defaults."""
 
+ALLOWED = {"pruned": 0.01, "stream_function": 0.01}
+"""Share of the fibre that strategies may lay round tight turns where turns are cut."""
+
 
 def made(name, **parameters):
     return create(name, QUICK.get(name, {}) | parameters)
@@ -234,6 +237,14 @@ def test_paths_cross_neither_each_other_nor_themselves(label):
         segments = strands(paths_of(label).on_layer(k))
         crossing = shapely.STRtree(segments).query(segments, predicate="crosses")
         assert crossing.shape[1] == 0
+
+
+@pytest.mark.parametrize("name", [name for name in NAMES if hasattr(named()[name], "turns")])
+def test_nothing_turns_too_tightly_where_turns_are_cut(name):
+    layers, paths = planned_again(made(name, turns="cut"))
+    stress, sections = planned_on()
+    total = evaluate(paths, [sections[k] for k in layers], stress, MACHINE).total
+    assert total["curvature_ok"] >= 1.0 - ALLOWED.get(name, 0.0)
 
 
 @pytest.mark.parametrize("label", ALL)

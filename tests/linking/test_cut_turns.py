@@ -6,8 +6,9 @@ import numpy as np
 import pytest
 import shapely
 
-from ccfem.geometry.polylines import along_line, line_length
-from ccfem.geometry.tight_bends import tight_bends
+from ccfem.geometry.even_steps import OFF, even_steps
+from ccfem.geometry.polylines import along_line, is_closed, line_length
+from ccfem.geometry.tight_bends import tight_bends, tight_samples
 from ccfem.linking.cut_turns import cut_turns
 from ccfem.linking.joining import Joined
 
@@ -35,8 +36,17 @@ def circle(radius, count=400):
     return ring
 
 
-def cut(*lines, least=LEAST):
-    return cut_turns(unmarked(*lines), RADIUS, WIDTH, least).lines
+def cut(*lines, least=LEAST, every=False):
+    return cut_turns(unmarked(*lines), RADIUS, WIDTH, least, every=every).lines
+
+
+def wandering(seed):
+    """A line of 200 mm in steps of a millimetre, that turns now and then."""
+    random = np.random.default_rng(seed)
+    turns = np.where(random.random(200) < 0.08, random.normal(0.0, 0.8, 200), 0.0)
+    heading = np.cumsum(turns + random.normal(0.0, 0.02, 200))
+    steps = np.column_stack([np.cos(heading), np.sin(heading)])
+    return np.concatenate([np.zeros((1, 2)), np.cumsum(steps, axis=0)])
 
 
 @pytest.mark.parametrize("radius", [3.0, 3.8, 3.9, 8.0])
@@ -98,3 +108,62 @@ def test_marks_of_links_stay_with_their_steps():
         up = np.append(np.abs(np.diff(piece[:, 0])) < 1e-9, False)
         np.testing.assert_array_equal(mark, up)
     assert [mark.any() for mark in found.link] == [False, False, True]
+
+
+def test_where_every_bend_is_cut_short_pieces_go():
+    """Lines of 50, 20 and 50 mm, a millimetre apart: the one between is too short alone."""
+    line = [(0, 0), (50, 0), (50, 1), (30, 1), (30, 2), (80, 2)]
+    first, last = cut(line, every=True)
+    np.testing.assert_allclose(first[[0, -1]], [(0, 0), (50, 0)], atol=1e-6)
+    np.testing.assert_allclose(last[[0, -1]], [(30, 2), (80, 2)], atol=1e-6)
+    assert cut(zigzag(20.0, 7), every=True) == []
+    assert sum(map(line_length, cut(zigzag(50.0, 5), every=True))) == pytest.approx(250.0)
+
+
+def test_rings_that_are_bent_all_the_way_round_go():
+    assert cut(circle(3.0), least=5.0, every=True) == []
+    (same,) = cut(circle(20.0), every=True)
+    np.testing.assert_array_equal(same, circle(20.0))
+
+
+@pytest.mark.parametrize("way", [1, -1])
+def test_bends_longer_than_a_turn_are_cut_out(way):
+    """A stadium of straights of 60 mm and bends of 2 mm radius: only the straights stay."""
+    angle = np.linspace(-0.5, 0.5, 60) * np.pi
+    bend = 2.0 * np.column_stack([np.cos(angle), np.sin(angle)])
+    ring = np.concatenate([bend + np.array([60.0, 0.0]), -bend])[::way]
+    pieces = cut(np.concatenate([ring, ring[:1]]), every=True)
+    assert len(pieces) == 2
+    for piece in pieces:
+        assert 60.0 <= line_length(piece) <= 62.2  # up to a width into the bends
+        np.testing.assert_allclose(np.abs(piece[:, 1]), 2.0, atol=0.3)
+
+
+def test_no_piece_begins_or_ends_with_a_link():
+    """Strands of 60 mm, and a link of 10 mm between them that turns at its end."""
+    line = np.array([(0.0, 0.0), (60.0, 0.0), (70.0, 0.0), (70.0, 60.0)])
+    marks = np.array([False, True, False, False])
+    found = cut_turns(Joined([line], [marks]), RADIUS, WIDTH, LEAST, every=True)
+    assert [line_length(piece) for piece in found.lines] == pytest.approx([60.0, 60.0])
+    assert not np.concatenate(found.link).any()
+
+
+@pytest.mark.parametrize("seed", range(12))
+def test_what_is_kept_is_long_and_bent_nowhere(seed):
+    """On the line, no shorter than allowed, and as the evaluator looks at it; mirrored alike."""
+    line = wandering(seed)
+    pieces = cut(line, least=12.0, every=True)
+    assert 0.0 < sum(map(line_length, pieces)) < line_length(line)
+    whole = shapely.LineString(line)
+    for piece in pieces:
+        assert line_length(piece) >= 12.0 - 1e-9
+        assert shapely.distance(whole, shapely.points(piece)).max() < 1e-9
+        ends, free = np.array([0, len(piece)]), np.zeros(len(piece), dtype=bool)
+        laid, _, _, _ = even_steps(piece, ends, free, WIDTH, OFF * WIDTH)
+        assert not len(tight_samples(laid, is_closed(piece), RADIUS, WIDTH))
+    c, s = np.cos(np.radians(37.0)), np.sin(np.radians(37.0))
+    for move in (np.array([[c, s], [-s, c]]), np.diag([1.0, -1.0])):
+        moved = cut(line @ move, least=12.0, every=True)
+        assert len(moved) == len(pieces)
+        for one, other in zip(moved, pieces, strict=True):
+            np.testing.assert_allclose(one, other @ move, atol=0.01)
