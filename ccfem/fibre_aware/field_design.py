@@ -7,14 +7,17 @@ from ccfem.arrays import FloatArray
 from ccfem.fibre_aware.border_levels import BorderLevels
 from ccfem.fibre_aware.field_descent import TOLERANCE, FieldMetric, improved
 
-__all__ = ["designed_fields"]
+__all__ = ["designed_fields", "drawn_to_borders"]
 
 _AT_BORDERS = 0.4
 """Share of the evaluations in which levels are drawn to the border."""
 
 
 class _Posed(Protocol):
-    """What fields are designed for: `StreamProblem` of one load case, `CasesProblem` of several."""
+    """What fields are designed for.
+
+    `StreamProblem` of one load case, `CasesProblem` of several, `StrengthProblem`.
+    """
 
     @property
     def laplacian(self) -> Any: ...
@@ -67,10 +70,20 @@ def designed_fields(
     if not last:
         return found
     field, objective, ratios = found
-    solution = objective.solution
+    field, objective, more = drawn_to_borders(problem, field, objective.solution, last)
+    return field, objective, (*ratios, *more)
+
+
+def drawn_to_borders(
+    problem: _Posed, field: FloatArray, solution: Any, evaluations: int
+) -> tuple[FloatArray, Any, tuple[Any, ...]]:
+    """Improve fields (c,) further, and draw their whole numbers to the border.
+
+    Parameters and results as of `designed_fields`, with the solution at the fields.
+    """
     levels = problem.levels(field, solution)
     lifted = levels.lifted(field)
     metric = FieldMetric.of(problem.curvature(lifted, solution) + levels.curvature())
     posed = _AtBorders(problem, levels)
-    field, drawn, more = improved(posed, lifted, last, metric, solution)
-    return field, problem.evaluate(field, drawn.solution, TOLERANCE), (*ratios, *more)
+    field, drawn, ratios = improved(posed, lifted, evaluations, metric, solution)
+    return field, problem.evaluate(field, drawn.solution, TOLERANCE), ratios

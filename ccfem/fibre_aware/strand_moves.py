@@ -19,6 +19,7 @@ from ccfem.fibre_aware.prune import prune
 from ccfem.fibre_aware.strand_lines import StrandLines, strand_lines
 from ccfem.fibre_aware.strand_pull import fibre_energy, plane_strain
 from ccfem.fibre_aware.strand_spacing import spacing
+from ccfem.fibre_aware.strength_cut import cut_for_strength
 from ccfem.layers.layer import Layer
 from ccfem.machine.machine import Machine
 from ccfem.mesh.tet_mesh import TetMesh
@@ -185,14 +186,16 @@ def prune_and_move(
 ) -> Toolpaths:
     """Cut fibre to a length, mm in all, move what is left, and cut what has become longer.
 
-    Of several candidates each is cut, and the stiffest moved; with strength the first is taken.
-    Parameters as of `ccfem.fibre_aware.prune.prune` and `moved`; moves follow the stiffness.
+    Of several candidates each is cut, and the stiffest moved; with strength that of most worth is
+    taken as it is (`ccfem.fibre_aware.strength_cut`). Parameters as of
+    `ccfem.fibre_aware.prune.prune` and `moved`; moves follow the stiffness.
     """
-    tried = candidates[:1] if strength else candidates
+    if strength:
+        asked = (length, machine, strand, rounds, strength, tight)
+        return cut_for_strength(candidates, layers, part, *asked)
     judge = stiffness_judge(part, machine, strand)
-    kept = stiffest(
-        [prune(one, part, length, machine, strand, rounds, strength, tight) for one in tried], judge
-    )
+    cuts = [prune(one, part, length, machine, strand, rounds, tight=tight) for one in candidates]
+    kept = stiffest(cuts, judge)
     radius = kept_radius(machine, tight)
     mesh = part.unreinforced.mesh
     found = moved(kept, layers, mesh, machine, judge, moves, radius=radius)

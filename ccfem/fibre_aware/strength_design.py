@@ -12,7 +12,8 @@ import numpy as np
 
 from ccfem.arrays import FloatArray, in_brief
 from ccfem.elasticity.volume_loads import strain_forces
-from ccfem.fibre_aware.field_descent import improved
+from ccfem.fibre_aware.border_levels import BorderLevels
+from ccfem.fibre_aware.field_design import drawn_to_borders
 from ccfem.fibre_aware.smeared import SmearedSolution
 from ccfem.fibre_aware.stream_design import (
     OVER_BUDGET,
@@ -110,6 +111,14 @@ class StrengthProblem:
         gradient = problem.gradient(field, laid, (x, y), over)
         return Objective(float(value), gradient, ratio, length, solution)
 
+    def curvature(self, field: FloatArray, solution: SmearedSolution) -> Any:
+        """Curvature (c, c) of the stiffness alone."""
+        return self.problem.curvature(field, solution)
+
+    def levels(self, field: FloatArray, solution: SmearedSolution) -> BorderLevels:
+        """Weigh what levels cost that keep farther from borders than they need."""
+        return self.problem.levels(field, solution)
+
     def _peaks(
         self, laid: Laid, solution: SmearedSolution
     ) -> tuple[dict[str, Peak], FloatArray, FloatArray]:
@@ -191,5 +200,5 @@ def design_for_strength(
     limits = Limits.of(problem.part.specimen.system.problem.material, Strand())
     start = first.field
     whole = StrengthProblem.at(problem, limits, strength, start, first.objective.solution)
-    field, found, ratios = improved(whole, start, evaluations)
+    field, found, ratios = drawn_to_borders(whole, start, first.objective.solution, evaluations)
     return StreamDesign(field, found, (*first.ratios, *ratios))

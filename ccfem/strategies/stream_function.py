@@ -247,14 +247,23 @@ class StreamFunction:
         check_tension((stress,), layers)
         field = solved(stress, "stream_function")
         problem, group, found = self.designed(field, layers, machine)
-        strained = ((1.0, found.objective.solution.displacement),)
-        drawn = self.extraction(problem, (found.field,), strained, machine)
         in_all, strand = [length * len(layers) for length in lengths], Strand(self.rho)
+
+        def candidates(found: StreamDesign) -> list[list[Toolpaths]]:
+            strained = ((1.0, found.objective.solution.displacement),)
+            drawn = self.extraction(problem, (found.field,), strained, machine)
+            return drawn.candidates(layers, group, in_all)
+
+        tried = candidates(found)
+        if self.strength:  # and the plan for stiffness alone stays in the test
+            strong = design_for_strength(problem, found, self.strength, self.evaluations)
+            both = zip(candidates(strong), tried, strict=True)
+            tried = [[one[0], other[0]] for one, other in both]
         part = problem.part.specimen
         cut_by = (_ROUNDS, self.strength, self.moves, TIGHT_SHARES[self.turns])
         return [
             prune_and_move(some, layers, part, length, machine, strand, *cut_by)
-            for some, length in zip(drawn.candidates(layers, group, in_all), in_all, strict=True)
+            for some, length in zip(tried, in_all, strict=True)
         ]
 
     def extraction(
@@ -277,12 +286,11 @@ class StreamFunction:
     def designed(
         self, stress: StressField, layers: Sequence[Layer], machine: Machine
     ) -> tuple[StreamProblem, IntArray, StreamDesign]:
-        """Design the fields: the problem, the group of each layer, and the design."""
+        """Design the fields for stiffness: the problem, the group of each layer, and the design."""
         part = SmearedPart.of(stress, layers[0].plane.frame)
         problem, group = self._problem((part,), layers, machine)
         start = start_field(problem, stress, middle_layers(layers, group), self.cap)
-        found = design(problem, start, self.evaluations)
-        return problem, group, design_for_strength(problem, found, self.strength, self.evaluations)
+        return problem, group, design(problem, start, self.evaluations)
 
     def designed_for_cases(
         self, cases: WeightedCases, layers: Sequence[Layer], machine: Machine, bounds: FloatArray

@@ -13,6 +13,7 @@ from ccfem.fibre_aware.smeared import SmearedPart
 from ccfem.fibre_aware.spline_grid import SplineGrid
 from ccfem.fibre_aware.stream_design import StreamProblem, design
 from ccfem.fibre_aware.stream_start import start_field
+from ccfem.fibre_aware.strength_cut import cut_for_strength
 from ccfem.fibre_aware.strength_design import StrengthProblem, design_for_strength
 from ccfem.fibre_aware.strength_value import Worth, raised
 from ccfem.machine import Machine
@@ -188,6 +189,26 @@ def test_a_plan_for_strength_keeps_its_length_and_says_what_it_overfilled(strong
     assert told.overfill >= 1.25
     laid = plan_layers(planner, layers, layers, stress, SHORT).lengths.sum()
     assert 0.9 * 800.0 < laid <= 800.0
+
+
+@pytest.mark.parametrize("weight", [0.2, 0.6])
+@pytest.mark.parametrize("strategy", [StreamFunction(evaluations=4, overfill=1.25), Pruned()])
+def test_planning_for_strength_is_worth_no_less_than_for_stiffness(strong_beam, strategy, weight):
+    stress, layers = strong_beam
+    worth = []
+    for strength in (0.0, weight):
+        planned = replace(strategy, strength=strength)
+        ((_, planner),) = planned.to_lengths(stress, layers, SHORT, (150.0,))
+        tested = virtual_test(planner.toolpaths, stress, span=(), machine=SHORT)
+        load = first_failure(tested, layers=layers).load
+        worth.append((1.0 - weight) * np.log(tested.ratio) + weight * np.log(load))
+    assert worth[1] >= worth[0] - 1e-6
+
+
+def test_of_no_fibre_nothing_is_cut_for_strength(strong_beam):
+    stress, layers = strong_beam
+    asked = (100.0, SHORT, Strand(), 2, 0.5, 1.0)
+    assert not len(cut_for_strength((Toolpaths.empty(),), layers, Specimen.of(stress), *asked))
 
 
 def test_the_strength_of_the_matrix_has_to_be_known(bent_beam):

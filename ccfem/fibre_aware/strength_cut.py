@@ -1,0 +1,68 @@
+"""Cuts for stiffness and strength, of which a test says which is worth most.
+
+What fibre is worth for the load at first failure is known for small changes only, and a cut is a
+large one. So fibre is cut for the stiffness alone, for the strength as asked for, and half of that.
+"""
+
+from collections.abc import Sequence
+
+import numpy as np
+
+from ccfem.fibre_aware.prune import prune
+from ccfem.layers.layer import Layer
+from ccfem.machine.machine import Machine
+from ccfem.toolpaths import Toolpaths
+from ccfem.virtual_testing.specimen import Specimen
+from ccfem.virtual_testing.strand import Strand
+from ccfem.virtual_testing.strength import first_failure
+from ccfem.virtual_testing.virtual_test import virtual_test
+
+__all__ = ["cut_for_strength", "stiff_and_strong"]
+
+_SHARES = (0.0, 0.5, 1.0)
+"""Of the strength asked for, with which fibre is cut."""
+
+
+def cut_for_strength(
+    candidates: Sequence[Toolpaths],
+    layers: Sequence[Layer],
+    part: Specimen,
+    length: float,
+    machine: Machine,
+    strand: Strand,
+    rounds: int,
+    strength: float,
+    tight: float,
+) -> Toolpaths:
+    """Cut candidates to a length, mm in all, in several ways, and return what is worth most.
+
+    Parameters as of `ccfem.fibre_aware.prune.prune`; paths are worth `stiff_and_strong`.
+    """
+    laid = [one for one in candidates if len(one)]
+    cuts = [
+        prune(one, part, length, machine, strand, rounds, share * strength, tight)
+        for one in laid
+        for share in _SHARES
+    ]
+    cuts = [one for one in cuts if len(one)]
+    if not cuts:
+        return candidates[0] if not laid else Toolpaths.empty()
+    worth = [stiff_and_strong(one, layers, part, machine, strand, strength) for one in cuts]
+    return cuts[int(np.argmax(worth))]
+
+
+def stiff_and_strong(
+    toolpaths: Toolpaths,
+    layers: Sequence[Layer],
+    part: Specimen,
+    machine: Machine,
+    strand: Strand,
+    strength: float,
+) -> float:
+    """Logarithm of the stiffness and that of the load at first failure, which counts `strength`.
+
+    A share of the one is worth as much as one of the other where `strength` is a half.
+    """
+    tested = virtual_test(toolpaths, part, strand, span=(), machine=machine)
+    failed = first_failure(tested, strand, layers=layers)
+    return float((1.0 - strength) * np.log(tested.ratio) + strength * np.log(failed.load))
