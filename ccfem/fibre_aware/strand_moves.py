@@ -19,7 +19,7 @@ from ccfem.fibre_aware.prune import prune
 from ccfem.fibre_aware.strand_lines import StrandLines, strand_lines
 from ccfem.fibre_aware.strand_pull import fibre_energy, plane_strain
 from ccfem.fibre_aware.strand_spacing import spacing
-from ccfem.fibre_aware.strength_cut import cut_for_strength
+from ccfem.fibre_aware.strength_cut import cut_for_strength, stiff_and_strong
 from ccfem.layers.layer import Layer
 from ccfem.machine.machine import Machine
 from ccfem.mesh.tet_mesh import TetMesh
@@ -31,7 +31,6 @@ from ccfem.virtual_testing.strands import cut_strands
 
 __all__ = [
     "Judged",
-    "check_moves",
     "kept_radius",
     "moved",
     "prune_and_move",
@@ -186,20 +185,28 @@ def prune_and_move(
 ) -> Toolpaths:
     """Cut fibre to a length, mm in all, move what is left, and cut what has become longer.
 
-    Of several candidates each is cut, and the stiffest moved; with strength that of most worth is
-    taken as it is (`ccfem.fibre_aware.strength_cut`). Parameters as of
-    `ccfem.fibre_aware.prune.prune` and `moved`; moves follow the stiffness.
+    Of several candidates each is cut, and the stiffest moved; with strength that of most worth
+    (`ccfem.fibre_aware.strength_cut`). Parameters as of `ccfem.fibre_aware.prune.prune` and
+    `moved`. Moves follow the stiffness; what they are worth with strength is tested.
     """
+
+    def strong(toolpaths: Toolpaths) -> Judged:
+        worth, u = stiff_and_strong(toolpaths, layers, part, machine, strand, strength)
+        return Judged(worth, ((1.0, u),))
+
+    asked = (length, machine, strand)
+    judge: Callable[[Toolpaths], Judged] = strong
     if strength:
-        asked = (length, machine, strand, rounds, strength, tight)
-        return cut_for_strength(candidates, layers, part, *asked)
-    judge = stiffness_judge(part, machine, strand)
-    cuts = [prune(one, part, length, machine, strand, rounds, tight=tight) for one in candidates]
-    kept = stiffest(cuts, judge)
-    radius = kept_radius(machine, tight)
-    mesh = part.unreinforced.mesh
+        kept = cut_for_strength(candidates, layers, part, *asked, rounds, strength, tight)
+    else:
+        judge = stiffness_judge(part, machine, strand)
+        kept = stiffest([prune(x, part, *asked, rounds, tight=tight) for x in candidates], judge)
+    radius, mesh = kept_radius(machine, tight), part.unreinforced.mesh
     found = moved(kept, layers, mesh, machine, judge, moves, radius=radius)
-    return found if found is kept else prune(found, part, length, machine, strand, 1, tight=tight)
+    if found is kept:
+        return kept
+    cut = prune(found, part, *asked, 1, tight=tight)
+    return stiffest((cut, kept), judge) if strength else cut
 
 
 def kept_radius(machine: Machine, tight: float) -> float:
@@ -213,21 +220,6 @@ def stiffest(candidates: Sequence[Toolpaths], judge: Callable[[Toolpaths], Judge
     if len(laid) < 2:
         return laid[0] if laid else candidates[0]
     return laid[int(np.argmax([judge(one).value for one in laid]))]
-
-
-def check_moves(strategy: str, moves: int, strength: float) -> None:
-    """Refuse moves where strength counts beside the stiffness.
-
-    Raises
-    ------
-    InputError
-    """
-    check_number(f"{strategy}.moves", moves, at_least=0)
-    if moves and strength:
-        raise InputError(
-            f"{strategy}.moves follow the stiffness alone; got moves {moves} and strength "
-            f"{strength:g}: set one of them to 0"
-        )
 
 
 def _direction(

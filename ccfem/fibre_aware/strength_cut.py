@@ -8,6 +8,7 @@ from collections.abc import Sequence
 
 import numpy as np
 
+from ccfem.arrays import FloatArray
 from ccfem.fibre_aware.prune import prune
 from ccfem.layers.layer import Layer
 from ccfem.machine.machine import Machine
@@ -47,7 +48,7 @@ def cut_for_strength(
     cuts = [one for one in cuts if len(one)]
     if not cuts:
         return candidates[0] if not laid else Toolpaths.empty()
-    worth = [stiff_and_strong(one, layers, part, machine, strand, strength) for one in cuts]
+    worth = [stiff_and_strong(one, layers, part, machine, strand, strength)[0] for one in cuts]
     return cuts[int(np.argmax(worth))]
 
 
@@ -58,11 +59,17 @@ def stiff_and_strong(
     machine: Machine,
     strand: Strand,
     strength: float,
-) -> float:
-    """Logarithm of the stiffness and that of the load at first failure, which counts `strength`.
+) -> tuple[float, FloatArray]:
+    """Weigh the stiffness and the load at first failure of paths, and return their displacement.
 
-    A share of the one is worth as much as one of the other where `strength` is a half.
+    Returns
+    -------
+    worth : float
+        ``ratio^(1 - strength) load^strength``: a share of the one is worth as much as one of the
+        other where strength is a half.
+    displacement : (n, 3) array, mm
     """
     tested = virtual_test(toolpaths, part, strand, span=(), machine=machine)
     failed = first_failure(tested, strand, layers=layers)
-    return float((1.0 - strength) * np.log(tested.ratio) + strength * np.log(failed.load))
+    worth = tested.ratio ** (1.0 - strength) * failed.load**strength
+    return float(worth), tested.solution.displacement

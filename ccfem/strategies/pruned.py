@@ -18,7 +18,7 @@ from ccfem.fibre_aware.cases_bound import single_bounds
 from ccfem.fibre_aware.plan_cases import plan_by_layers
 from ccfem.fibre_aware.prune_cases import prune_and_move_cases
 from ccfem.fibre_aware.shortening import TIGHT_SHARES
-from ccfem.fibre_aware.strand_moves import check_moves, prune_and_move
+from ccfem.fibre_aware.strand_moves import prune_and_move
 from ccfem.fibre_aware.strength_value import refuse_strength
 from ccfem.layers.layer import Layer
 from ccfem.machine.machine import Machine
@@ -67,7 +67,7 @@ class Pruned:
     moves : int, default 0
         Steps by which what is left is moved sideways, each tested
         (`ccfem.fibre_aware.strand_moves`): 6 make a part stiffer by 1 to 2 %, for two to three
-        times the time. Not with strength.
+        times the time.
     turns : {"tight", "cut"}
         Whether more than 1 % of the fibre may turn more tightly than the machine's radius.
     """
@@ -100,7 +100,7 @@ class Pruned:
         check_fields(self, "overfill", "rounds", at_least=1)
         check_fields(self, "rho", above=0.0, unit="mm^2")
         check_fields(self, "strength", at_least=0.0, at_most=1.0)
-        check_moves("pruned", self.moves, self.strength)
+        check_fields(self, "moves", at_least=0)
 
     def _planner(self) -> Strategy:
         """Strategy that plans, with its parameters."""

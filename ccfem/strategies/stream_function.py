@@ -37,7 +37,7 @@ from ccfem.fibre_aware.prune_cases import case_counts, prune_and_move_cases
 from ccfem.fibre_aware.shortening import TIGHT_SHARES
 from ccfem.fibre_aware.smeared import SmearedPart, smeared_cases
 from ccfem.fibre_aware.spline_grid import SplineGrid
-from ccfem.fibre_aware.strand_moves import check_moves, kept_radius, prune_and_move
+from ccfem.fibre_aware.strand_moves import kept_radius, prune_and_move
 from ccfem.fibre_aware.stream_design import StreamDesign, StreamProblem, design
 from ccfem.fibre_aware.stream_paths import Extraction, refined
 from ccfem.fibre_aware.stream_start import plane_axes, start_field
@@ -113,7 +113,7 @@ class StreamFunction:
         How much the load at first failure counts, in [0, 1]; the stiffness counts the rest. A
         share of the one is then worth as much as one of the other. Of one load case only.
     moves : int, default 0
-        Steps by which strands are moved sideways (`moved`), each tested; not with strength.
+        Steps by which strands are moved sideways (`moved`), each tested.
     turns : {"tight", "cut"}
         Whether more than 1 % of the fibre may turn more tightly than the machine's radius. What
         cannot be laid without is left out: "cut" may lay less than it was asked for.
@@ -153,7 +153,7 @@ class StreamFunction:
         check_fields(self, "groups", "link_limit", "inset", at_least=0)
         check_fields(self, "tilt", above=0.0, at_most=1.0)
         check_fields(self, "strength", at_least=0.0, at_most=1.0)
-        check_moves("stream_function", self.moves, self.strength)
+        check_fields(self, "moves", at_least=0)
         check_choices(self)
 
     def natural_length(self, layers: Sequence[Layer], machine: Machine) -> float:

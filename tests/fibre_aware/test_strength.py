@@ -196,13 +196,14 @@ def test_a_plan_for_strength_keeps_its_length_and_says_what_it_overfilled(strong
 def test_planning_for_strength_is_worth_no_less_than_for_stiffness(strong_beam, strategy, weight):
     stress, layers = strong_beam
     worth = []
-    for strength in (0.0, weight):
-        planned = replace(strategy, strength=strength)
+    for strength, moves in ((0.0, 0), (weight, 0), (weight, 3)):
+        planned = replace(strategy, strength=strength, moves=moves)
         ((_, planner),) = planned.to_lengths(stress, layers, SHORT, (150.0,))
         tested = virtual_test(planner.toolpaths, stress, span=(), machine=SHORT)
         load = first_failure(tested, layers=layers).load
         worth.append((1.0 - weight) * np.log(tested.ratio) + weight * np.log(load))
     assert worth[1] >= worth[0] - 1e-6
+    assert worth[2] >= worth[1] - 1e-6
 
 
 def test_of_no_fibre_nothing_is_cut_for_strength(strong_beam):
