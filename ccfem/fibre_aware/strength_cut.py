@@ -23,6 +23,9 @@ __all__ = ["cut_for_strength", "stiff_and_strong"]
 _SHARES = (0.0, 0.5, 1.0)
 """Of the strength asked for, with which fibre is cut."""
 
+_ALL_WAYS = 2
+"""Candidates that are cut in all these ways; the others are cut for the stiffness alone."""
+
 
 def cut_for_strength(
     candidates: Sequence[Toolpaths],
@@ -37,13 +40,14 @@ def cut_for_strength(
 ) -> Toolpaths:
     """Cut candidates to a length, mm in all, in several ways, and return what is worth most.
 
-    Parameters as of `ccfem.fibre_aware.prune.prune`; paths are worth `stiff_and_strong`.
+    Those beyond the second are cut for the stiffness alone. Parameters as of
+    `ccfem.fibre_aware.prune.prune`; paths are worth `stiff_and_strong`.
     """
     laid = [one for one in candidates if len(one)]
     cuts = [
         prune(one, part, length, machine, strand, rounds, share * strength, tight)
-        for one in laid
-        for share in _SHARES
+        for k, one in enumerate(laid)
+        for share in (_SHARES if k < _ALL_WAYS else _SHARES[:1])
     ]
     cuts = [one for one in cuts if len(one)]
     if not cuts:

@@ -34,10 +34,7 @@ from ccfem.virtual_testing.near_failure import (
 from ccfem.virtual_testing.strand import Strand
 from ccfem.virtual_testing.strengths import Limits
 
-__all__ = ["LEAST_OVERFILL", "StrengthProblem", "design_for_strength"]
-
-LEAST_OVERFILL = 1.25
-"""Length that is designed over that kept, at least: the cut has to have a choice."""
+__all__ = ["StrengthProblem", "design_for_strength"]
 
 _TOLERANCE = 1e-3
 """Relative residual of the adjoint solve."""

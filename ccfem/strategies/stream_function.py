@@ -41,7 +41,7 @@ from ccfem.fibre_aware.strand_moves import kept_radius, prune_and_move
 from ccfem.fibre_aware.stream_design import StreamDesign, StreamProblem, design
 from ccfem.fibre_aware.stream_paths import Extraction, refined
 from ccfem.fibre_aware.stream_start import plane_axes, start_field
-from ccfem.fibre_aware.strength_design import LEAST_OVERFILL, design_for_strength
+from ccfem.fibre_aware.strength_design import design_for_strength
 from ccfem.fibre_aware.strength_value import refuse_strength
 from ccfem.fibre_aware.tension_check import check_tension
 from ccfem.layers.layer import Layer
@@ -83,7 +83,7 @@ class StreamFunction:
         Fibre length times strand width over area of the layers, in (0, 1].
     overfill : float, default 1.1
         Fibre length of the design over that kept, at least 1; with several load cases no less than
-        1.15, with strength no less than 1.25.
+        1.15.
     rho : float, mm^2, default 4
         Axial stiffness of a strand over Young's modulus of the matrix.
     evaluations : int, default 80
@@ -173,7 +173,7 @@ class StreamFunction:
             When no layer has a tensile direction.
         """
         length = self.natural_length(layers, machine)
-        return WholePart(self._filled()._cut(stress, layers, machine, (length,))[0])
+        return WholePart(self._cut(stress, layers, machine, (length,))[0])
 
     def to_lengths(
         self,
@@ -195,7 +195,7 @@ class StreamFunction:
             As `for_part`.
         """
         return designed_to_lengths(
-            self._filled(),
+            self,
             layers,
             machine,
             lengths,
@@ -232,10 +232,6 @@ class StreamFunction:
             again=self.turns == "tight",
         )
 
-    def _filled(self) -> "StreamFunction":
-        """Return the strategy with as much overfill as strength asks for."""
-        return replace(self, overfill=max(self.overfill, LEAST_OVERFILL if self.strength else 1.0))
-
     def _cut(
         self,
         stress: PartStress,
@@ -255,10 +251,10 @@ class StreamFunction:
             return drawn.candidates(layers, group, in_all)
 
         tried = candidates(found)
-        if self.strength:  # and the plan for stiffness alone stays in the test
+        if self.strength:  # and what is planned for stiffness alone stays in the test
             strong = design_for_strength(problem, found, self.strength, self.evaluations)
             both = zip(candidates(strong), tried, strict=True)
-            tried = [[one[0], other[0]] for one, other in both]
+            tried = [[one[0], *others] for one, others in both]
         part = problem.part.specimen
         cut_by = (_ROUNDS, self.strength, self.moves, TIGHT_SHARES[self.turns])
         return [

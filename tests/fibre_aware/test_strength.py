@@ -186,13 +186,13 @@ def test_a_plan_for_strength_keeps_its_length_and_says_what_it_overfilled(strong
     strategy = StreamFunction(strength=0.5, evaluations=2, phases=1)
     told, planner = strategy.to_lengths(stress, layers, SHORT, (200.0,))[0]
     assert told.strength == 0.5
-    assert told.overfill >= 1.25
+    assert told.overfill >= 1.1
     laid = plan_layers(planner, layers, layers, stress, SHORT).lengths.sum()
     assert 0.9 * 800.0 < laid <= 800.0
 
 
 @pytest.mark.parametrize("weight", [0.2, 0.6])
-@pytest.mark.parametrize("strategy", [StreamFunction(evaluations=4, overfill=1.25), Pruned()])
+@pytest.mark.parametrize("strategy", [StreamFunction(evaluations=4, overfill=1.3), Pruned()])
 def test_planning_for_strength_is_worth_no_less_than_for_stiffness(strong_beam, strategy, weight):
     stress, layers = strong_beam
     worth = []
