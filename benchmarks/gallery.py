@@ -1,4 +1,4 @@
-"""Draw the pictures of the documentation: every case, every strategy on the loop, and a trade.
+"""Draw the pictures of the documentation: cases, strategies on the loop, turns, and a trade.
 
 Run ``python -m benchmarks.gallery`` whenever a case or a strategy changes; it takes minutes. Names
 after it draw only those: ``python -m benchmarks.gallery loop isocurve``.
@@ -11,11 +11,13 @@ from pathlib import Path
 from PIL import Image
 
 import ccfem
+from benchmarks.studies.confirmed_gain import LAYERS, posed
 from ccfem.cases import named_cases
 from ccfem.comparison.fibre_front import fibre_front
 from ccfem.errors import InputError
 from ccfem.layers.layer_stress import stress_on
 from ccfem.layers.slicing.planar import Planar
+from ccfem.machine.machine import Machine
 from ccfem.planning import plan
 from ccfem.plot.canvas import png
 from ccfem.plot.fields import tension_picture
@@ -61,6 +63,20 @@ def draw_strategies(chosen: set[str]) -> None:
         write(figure, PICTURES / "strategies" / f"{name}.png")
 
 
+def draw_turns(chosen: set[str]) -> None:
+    """Draw a bracket's fibre with tight turns, and where these are cut."""
+    if chosen and "turns" not in chosen:
+        return
+    stress, machine = ccfem.solve(posed("bracket"))["planned"], Machine()
+    layers = Planar(count=LAYERS).cut(stress.mesh)
+    for turns in ("tight", "cut"):
+        strategy = create("stream_function", {"turns": turns})
+        paths = plan(strategy, layers, stress, machine).on_layer(0)
+        on_layer = stress_on(layers[0], stress)
+        figure = layer_picture(layers[0], on_layer, paths, machine.fibre_width)
+        write(figure, PICTURES / "turns" / f"{turns}.png")
+
+
 def draw_trade(chosen: set[str]) -> None:
     """Draw what strength costs in stiffness on the loop; takes longest of all."""
     if chosen and "trade" not in chosen:
@@ -81,4 +97,5 @@ def draw_trade(chosen: set[str]) -> None:
 if __name__ == "__main__":
     draw_cases(set(sys.argv[1:]))
     draw_strategies(set(sys.argv[1:]))
+    draw_turns(set(sys.argv[1:]))
     draw_trade(set(sys.argv[1:]))
