@@ -98,18 +98,24 @@ def shorten_bent(
         Share of the fibre's length; 1 for any.
     """
     least = machine.minimum_length
+    if tight >= 1.0:
+        return shorten(toolpaths, along, length, least)
+    best = max((float(np.abs(one.value).max()) for one in along), default=0.0) or 1.0
+    along = [
+        replace(one, value=np.where(one.value < 0.0, one.value, one.value + _TRIFLE * best))
+        for one in along
+    ]
     found = shorten(toolpaths, along, length, least)
-    if tight >= 1.0 or tight_share(found, machine) <= tight:
+    if tight_share(found, machine) <= tight:
         return found
     shares = _tight_pieces(toolpaths, along, machine)
-    best = max(float(one.value.max()) for one in along)
     low, high = (np.log(price * best) for price in _PRICES)
-    found = Toolpaths.empty()
+    found = toolpaths.select(toolpaths.kind != FIBRE)
     for _ in range(_BISECTIONS):
         middle = 0.5 * (low + high)
         price = float(np.exp(middle))
         priced = [
-            replace(one, value=np.maximum(one.value, _TRIFLE * best) - price * share)
+            replace(one, value=one.value - price * share)
             for one, share in zip(along, shares, strict=True)
         ]
         trial = shorten(toolpaths, priced, length, least)

@@ -87,6 +87,22 @@ def test_share_is_that_of_the_evaluator(bent_beam):
     assert tight_share(Toolpaths.empty(), MACHINE) == 0.0
 
 
+def test_fibre_that_carries_nothing_loses_its_bends_alone(bent_beam):
+    layer = bent_beam[1][0]
+    paths = Toolpaths.from_plane([hairpin((10.0, y)) for y in (4.0, 10.0)], layer)
+    left = shorten_bent(paths, even(paths, (0.0, 0.0)), 1e3, MACHINE, 0.0)
+    assert tight_share(left, MACHINE) == 0.0
+    assert len(left) == 4
+
+
+def test_fibre_that_does_harm_goes_with_its_bends(bent_beam):
+    layer = bent_beam[1][0]
+    paths = Toolpaths.from_plane([hairpin((10.0, y)) for y in (4.0, 10.0)], layer)
+    left = shorten_bent(paths, even(paths, (-1.0, 2.0)), 1e3, MACHINE, 0.0)
+    assert len(left) == 2
+    assert left.points[:, 1].min() > 8.0
+
+
 @pytest.mark.parametrize("share", [0.5, 1.0])
 def test_pruned_fibre_keeps_to_the_share(bent_beam, share):
     stress, layers = bent_beam
