@@ -19,10 +19,10 @@ import ccfem
 from benchmarks.studies import confirmed_gain
 from ccfem.arrays import FloatArray
 from ccfem.elasticity.stress_field import StressField, solved
+from ccfem.fibre_aware.cut_and_move import prune_and_move
 from ccfem.fibre_aware.heights import nearest_layer
 from ccfem.fibre_aware.prune import prune
 from ccfem.fibre_aware.smeared import SmearedPart
-from ccfem.fibre_aware.strand_moves import prune_and_move
 from ccfem.fibre_aware.stream_design import design
 from ccfem.fibre_aware.stream_paths import CLEARANCE, SHORTEST
 from ccfem.fibre_aware.stream_start import start_field

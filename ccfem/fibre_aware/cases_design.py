@@ -7,7 +7,7 @@ of all fields. What each case makes of that fibre is one solve; L-BFGS moves all
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
 from functools import cached_property
-from typing import Any
+from typing import Any, TypeAlias
 
 import numpy as np
 import scipy.sparse as sp
@@ -17,7 +17,7 @@ from ccfem.fibre_aware.border_levels import BorderLevels
 from ccfem.fibre_aware.cases_bound import SUM, WORST
 from ccfem.fibre_aware.field_design import designed_fields
 from ccfem.fibre_aware.smeared import SmearedPart, SmearedSolution
-from ccfem.fibre_aware.stream_design import OVER_BUDGET, StreamProblem
+from ccfem.fibre_aware.stream_design import OVER_BUDGET, Laid, StreamProblem
 from ccfem.fibre_aware.stream_start import field_along, mixed_tension
 from ccfem.fields.layer_tension import layer_tension
 from ccfem.layers.layer import Layer
@@ -28,12 +28,16 @@ __all__ = [
     "CasesDesign",
     "CasesObjective",
     "CasesProblem",
+    "Pull",
     "design_cases",
     "start_fields",
 ]
 
 DESIGN_POWERS = {WORST: 4.0, SUM: 1.0}
 """Power of ``bound / ratio`` in the sum over the cases, by the objective that is planned for."""
+
+Pull: TypeAlias = tuple[FloatArray, FloatArray]
+"""Derivatives (m,) each by the components of a field's slope in the cells."""
 
 
 @dataclass(frozen=True)
@@ -93,6 +97,12 @@ class CasesProblem:
     def __post_init__(self) -> None:
         freeze(self, weights=float, bounds=float, shares=float)
 
+    @classmethod
+    def alone(cls, problem: StreamProblem) -> "CasesProblem":
+        """Problem of one load case, of one field in all layers: the same objective."""
+        one = np.ones(1)
+        return cls(problem, (problem.part,), one, one, one)
+
     @cached_property
     def laplacian(self) -> Any:
         """Graph Laplacian of all fields."""
@@ -115,49 +125,88 @@ class CasesProblem:
         tolerance : float
             Relative residual of the solves.
         """
-        problem, fields = self.problem, field.reshape(len(self.shares), -1)
-        laid = [problem.laid(one) for one in fields]
+        laid = self.laid(field)
+        found = self.solve(laid, start, tolerance)
+        value, counts = self.worth(self.ratios(found))
+        return self.objective(field, laid, found, value, self.pulls(laid, found, counts))
 
-        def stiffness(strain: FloatArray) -> FloatArray:
-            parts = (
-                share * one.stiffness(strain) for share, one in zip(self.shares, laid, strict=True)
-            )
-            return sum(parts, np.zeros((len(strain), 3, 3)))
+    def laid(self, field: FloatArray) -> tuple[Laid, ...]:
+        """Fibre that each field lays."""
+        return tuple(self.problem.laid(one) for one in field.reshape(len(self.shares), -1))
 
+    def stiffness(self, laid: Sequence[Laid], strain: FloatArray) -> FloatArray:
+        """Stiffness (m, 3, 3), MPa, of the fibre of all fields at strains (m, 3)."""
+        found = np.zeros((len(strain), 3, 3))
+        for share, one in zip(self.shares, laid, strict=True):
+            found += share * one.stiffness(strain)
+        return found
+
+    def solve(
+        self,
+        laid: Sequence[Laid],
+        start: tuple[SmearedSolution, ...] | None = None,
+        tolerance: float = 1e-5,
+    ) -> tuple[SmearedSolution, ...]:
+        """Solve each case; parameters as in `evaluate`."""
         starts = start if start is not None else (None,) * len(self.parts)
-        found = tuple(
-            part.solve(stiffness, one, tolerance)
+        return tuple(
+            part.solve(lambda strain: self.stiffness(laid, strain), one, tolerance)
             for part, one in zip(self.parts, starts, strict=True)
         )
-        ratio = np.array(
-            [part.ratio(one.work) for part, one in zip(self.parts, found, strict=True)]
-        )
-        worth, counts = self._worth(ratio)
-        length = sum(
-            share * problem.length(one) for share, one in zip(self.shares, laid, strict=True)
-        )
-        over = max(length / problem.budget - 1.0, 0.0)
-        value, gradient = worth + OVER_BUDGET * over**2, []
-        for share, one, own in zip(self.shares, laid, fields, strict=True):
-            value += share * sum(problem.penalties(own, one))
-            pulls = [problem.pull(one, solution) for solution in found]
-            pull = tuple(
-                np.einsum("i,im->m", counts, np.stack([each[axis] for each in pulls]))
-                for axis in (0, 1)
-            )
-            gradient.append(share * problem.gradient(own, one, (pull[0], pull[1]), over))
-        return CasesObjective(value, np.concatenate(gradient), ratio, float(length), found)
 
-    def _worth(self, ratios: FloatArray) -> tuple[float, FloatArray]:
+    def ratios(self, solutions: Sequence[SmearedSolution]) -> FloatArray:
+        """Stiffness (n,) of each case over that of the part without fibre."""
+        found = [part.ratio(one.work) for part, one in zip(self.parts, solutions, strict=True)]
+        return np.array(found)
+
+    def worth(self, ratios: FloatArray) -> tuple[float, FloatArray]:
         """Objective of stiffness ratios (n,) without penalties, and how much each counts in it."""
         terms = self.bounds / ratios
         powers = self.weights * (terms / terms.max()) ** self.power
         return float(np.log(terms.max()) + np.log(powers.sum()) / self.power), powers / powers.sum()
 
+    def pulls(
+        self, laid: Sequence[Laid], solutions: Sequence[SmearedSolution], counts: FloatArray
+    ) -> list[Pull]:
+        """Derive -log(stiffness), the cases counting (n,), by each field, were it in all layers."""
+        found = []
+        for one in laid:
+            x, y = zip(*(self.problem.pull(one, each) for each in solutions), strict=True)
+            found.append((counts @ np.stack(x), counts @ np.stack(y)))
+        return found
+
+    def objective(
+        self,
+        field: FloatArray,
+        laid: Sequence[Laid],
+        solutions: tuple[SmearedSolution, ...],
+        value: float,
+        pulls: Sequence[Pull],
+    ) -> CasesObjective:
+        """Objective of a value that has no penalties yet.
+
+        Parameters
+        ----------
+        field : (n * c,) array
+        laid, solutions
+            Its fibre, and what each case makes of that.
+        value : float
+        pulls : sequence of two (m,) arrays
+            Derivatives of the value by the slope of each field, were it in all layers.
+        """
+        problem, fields, shares = self.problem, field.reshape(len(self.shares), -1), self.shares
+        length = sum(share * problem.length(one) for share, one in zip(shares, laid, strict=True))
+        over = max(length / problem.budget - 1.0, 0.0)
+        value, gradient = value + OVER_BUDGET * over**2, []
+        for share, one, own, pull in zip(shares, laid, fields, pulls, strict=True):
+            value += share * sum(problem.penalties(own, one))
+            gradient.append(share * problem.gradient(own, one, pull, over))
+        ratios = self.ratios(solutions)
+        return CasesObjective(value, np.concatenate(gradient), ratios, float(length), solutions)
+
     def _counts(self, solutions: Sequence[SmearedSolution]) -> FloatArray:
         """How much each case counts (n,)."""
-        ratios = [part.ratio(one.work) for part, one in zip(self.parts, solutions, strict=True)]
-        return self._worth(np.array(ratios))[1]
+        return self.worth(self.ratios(solutions))[1]
 
     def curvature(self, field: FloatArray, solutions: tuple[SmearedSolution, ...]) -> Any:
         """Block of each field: the mean of `StreamProblem.curvature` by how much cases count."""

@@ -13,6 +13,7 @@ import numpy as np
 from ccfem.elasticity.weighted_cases import WeightedCases
 from ccfem.errors import InputError
 from ccfem.fibre_aware.cases_bound import WORST, single_bounds
+from ccfem.fibre_aware.cases_judges import CasesGoal
 from ccfem.fibre_aware.layer_shares import layers_by_case
 from ccfem.fibre_aware.prune_cases import prune_cases
 from ccfem.layers.layer import Layer
@@ -90,8 +91,8 @@ def plan_cases(
     too_much = plan_by_layers(strategy, layers, cases, machine, _TOO_MUCH * wanted)
     in_all = wanted * len(layers)
     bounds = single_bounds(cases, layers, in_all, machine, strand)
-    parts = specimens(cases)
-    paths = prune_cases(too_much, parts, cases.weights, bounds, in_all, machine, strand, objective)
+    goal = CasesGoal(specimens(cases), cases.weights, bounds, objective)
+    paths = prune_cases(too_much, goal, in_all, machine, strand)
     return _told(strategy, paths, layers, machine, wanted)
 
 

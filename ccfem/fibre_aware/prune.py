@@ -22,7 +22,7 @@ from ccfem.virtual_testing.specimen import Specimen
 from ccfem.virtual_testing.strand import Strand
 from ccfem.virtual_testing.strands import Strands, cut_strands
 
-__all__ = ["fibre_length", "profiles", "prune"]
+__all__ = ["fibre_length", "profiles", "prune", "taken_off"]
 
 _STATION = 1.0
 """Length of path, mm, that is kept or taken off as a whole."""
@@ -97,7 +97,7 @@ def prune(
         return toolpaths
     specimen = Specimen.of(part) if isinstance(part, StressField) else part
     axial = (Strand() if strand is None else strand).stiffness(specimen.modulus)
-    worth = Worth.of(specimen, strand, strength) if strength else None
+    worth = Worth.of((specimen,), strand, strength) if strength else None
     known: tuple[FloatArray, ...] = ()
     for k in range(rounds):
         strands = cut_strands(toolpaths, specimen.unreinforced.mesh)
@@ -105,16 +105,42 @@ def prune(
         known = (found.displacement,)
         value = np.where(found.carries, found.strain, 0.0) ** 2
         if worth is not None:
-            value = worth(strands, found, layer_normal(toolpaths))
+            value = worth(strands, (found,), layer_normal(toolpaths))
         wanted = length if k == rounds - 1 else length + max(0.5 * (laid - length), 0.0)
-        before, how = toolpaths, (wanted, machine, tight)
-        toolpaths = shorten_bent(before, profiles(before, strands, value), *how)
-        if worth is not None and fibre_length(toolpaths) < _ENOUGH * wanted:
-            toolpaths = shorten_bent(before, profiles(before, strands, raised(value)), *how)
+        toolpaths = taken_off(toolpaths, strands, value, wanted, machine, tight)
         laid = fibre_length(toolpaths)
         if laid <= length:
             break
     return toolpaths
+
+
+def taken_off(
+    toolpaths: Toolpaths,
+    strands: Strands,
+    value: FloatArray,
+    length: float,
+    machine: Machine,
+    tight: float = 1.0,
+) -> Toolpaths:
+    """Take the fibre of least value off.
+
+    Fibre of negative value goes, too, but no more of it than leaves 95 % of the wanted length.
+
+    Parameters
+    ----------
+    toolpaths : Toolpaths
+    strands : Strands
+        Of these toolpaths.
+    value : (s,) array
+        Of each piece of strand, per length.
+    length, machine, tight
+        As of `prune`.
+    """
+    found = shorten_bent(toolpaths, profiles(toolpaths, strands, value), length, machine, tight)
+    if fibre_length(found) >= _ENOUGH * length or not value.min(initial=0.0) < 0.0:
+        return found
+    along = profiles(toolpaths, strands, raised(value))
+    return shorten_bent(toolpaths, along, length, machine, tight)
 
 
 def fibre_length(toolpaths: Toolpaths) -> float:

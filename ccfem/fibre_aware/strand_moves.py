@@ -5,38 +5,25 @@ strain of one virtual test says which way that is. A step along that slope is sp
 keep their distances again, and tested: only what makes the part stiffer stays.
 """
 
-from collections.abc import Callable, Sequence
-from dataclasses import dataclass
+from collections.abc import Sequence
 from typing import Any
 
 import numpy as np
 from scipy.sparse.linalg import splu
 
-from ccfem.arrays import FloatArray, in_brief
+from ccfem.arrays import FloatArray
 from ccfem.checks import check_number
 from ccfem.errors import InputError
-from ccfem.fibre_aware.prune import prune
+from ccfem.fibre_aware.judges import Judge, Judged
 from ccfem.fibre_aware.strand_lines import StrandLines, strand_lines
 from ccfem.fibre_aware.strand_pull import fibre_energy, plane_strain
 from ccfem.fibre_aware.strand_spacing import spacing
-from ccfem.fibre_aware.strength_cut import cut_for_strength, stiff_and_strong
 from ccfem.layers.layer import Layer
 from ccfem.machine.machine import Machine
 from ccfem.mesh.tet_mesh import TetMesh
 from ccfem.toolpaths import FIBRE, Toolpaths
-from ccfem.virtual_testing.equilibrium import equilibrium
-from ccfem.virtual_testing.specimen import Specimen
-from ccfem.virtual_testing.strand import Strand
-from ccfem.virtual_testing.strands import cut_strands
 
-__all__ = [
-    "Judged",
-    "kept_radius",
-    "moved",
-    "prune_and_move",
-    "stiffest",
-    "stiffness_judge",
-]
+__all__ = ["kept_radius", "moved"]
 
 _STEP = 0.2
 """First step, in widths: 95 % of the points move by no more, and none by more than twice that."""
@@ -56,53 +43,13 @@ _CHEAPEST = 0.1
 _KEPT = 1.15
 """Radius of bends after slides, over the machine's least: slides come only near to it."""
 
-_TOLERANCE = 1e-4
-"""Relative residual of the tests; the error of the stiffness is of its square."""
-
-
-@dataclass(frozen=True)
-class Judged:
-    """What a test of paths says.
-
-    Attributes
-    ----------
-    value : float
-        What is to grow.
-    strains_of : tuple of (float, (n, 3) array)
-        What a squared strain is worth, and the displacement, mm, that strains the fibre; one for
-        each load case.
-    """
-
-    value: float
-    strains_of: tuple[tuple[float, FloatArray], ...]
-
-    __repr__ = in_brief
-
-
-def stiffness_judge(
-    part: Specimen, machine: Machine, strand: Strand | None = None
-) -> Callable[[Toolpaths], Judged]:
-    """Judge of paths by the stiffness of the part, as in `ccfem.virtual_test` with the machine."""
-    axial = (Strand() if strand is None else strand).stiffness(part.modulus)
-    known: list[FloatArray] = []
-
-    def judge(toolpaths: Toolpaths) -> Judged:
-        strands = cut_strands(toolpaths, part.unreinforced.mesh, machine=machine)
-        found = equilibrium(part, strands, axial, known=known[-1:], tolerance=_TOLERANCE)
-        u = found.displacement
-        known[:] = [u]
-        energy = 0.5 * float(u.reshape(-1) @ (found.matrix @ u.reshape(-1)))
-        return Judged(part.stiffness(u, energy), ((1.0, u),))
-
-    return judge
-
 
 def moved(
     toolpaths: Toolpaths,
     layers: Sequence[Layer],
     mesh: TetMesh,
     machine: Machine,
-    judge: Callable[[Toolpaths], Judged],
+    judge: Judge,
     moves: int,
     inset: float = 0.5,
     radius: float = 0.0,
@@ -123,7 +70,7 @@ def moved(
         Of the part.
     machine : Machine
     judge : callable
-        Tests toolpaths: `stiffness_judge`, or `ccfem.fibre_aware.prune_cases.cases_judge`.
+        Tests toolpaths: one of `ccfem.fibre_aware.judges` or `ccfem.fibre_aware.cases_judges`.
     moves : int
         Steps that are tested, at least 0.
     inset : float, default 0.5
@@ -171,55 +118,9 @@ def moved(
     return Toolpaths.concatenate([lines.slid(slide), others])
 
 
-def prune_and_move(
-    candidates: Sequence[Toolpaths],
-    layers: Sequence[Layer],
-    part: Specimen,
-    length: float,
-    machine: Machine,
-    strand: Strand,
-    rounds: int,
-    strength: float,
-    moves: int,
-    tight: float = 1.0,
-) -> Toolpaths:
-    """Cut fibre to a length, mm in all, move what is left, and cut what has become longer.
-
-    Of several candidates each is cut, and the stiffest moved; with strength that of most worth
-    (`ccfem.fibre_aware.strength_cut`). Parameters as of `ccfem.fibre_aware.prune.prune` and
-    `moved`. Moves follow the stiffness; what they are worth with strength is tested.
-    """
-
-    def strong(toolpaths: Toolpaths) -> Judged:
-        worth, u = stiff_and_strong(toolpaths, layers, part, machine, strand, strength)
-        return Judged(worth, ((1.0, u),))
-
-    asked = (length, machine, strand)
-    judge: Callable[[Toolpaths], Judged] = strong
-    if strength:
-        kept = cut_for_strength(candidates, layers, part, *asked, rounds, strength, tight)
-    else:
-        judge = stiffness_judge(part, machine, strand)
-        kept = stiffest([prune(x, part, *asked, rounds, tight=tight) for x in candidates], judge)
-    radius, mesh = kept_radius(machine, tight), part.unreinforced.mesh
-    found = moved(kept, layers, mesh, machine, judge, moves, radius=radius)
-    if found is kept:
-        return kept
-    cut = prune(found, part, *asked, 1, tight=tight)
-    return stiffest((cut, kept), judge) if strength else cut
-
-
 def kept_radius(machine: Machine, tight: float) -> float:
     """Radius, mm, that slides keep where only a share of the fibre may turn too tightly."""
     return _KEPT * machine.minimum_radius if tight < 1.0 else 0.0
-
-
-def stiffest(candidates: Sequence[Toolpaths], judge: Callable[[Toolpaths], Judged]) -> Toolpaths:
-    """Return the toolpaths of most value to a judge, the first of equal ones; one is not judged."""
-    laid = [one for one in candidates if len(one)]
-    if len(laid) < 2:
-        return laid[0] if laid else candidates[0]
-    return laid[int(np.argmax([judge(one).value for one in laid]))]
 
 
 def _direction(

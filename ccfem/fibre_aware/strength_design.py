@@ -1,11 +1,11 @@
 """Design of stream functions for stiffness and the load at first failure together.
 
-As `ccfem.fibre_aware.stream_design`, with a share of the objective in how near the part is to its
-first failure (`ccfem.virtual_testing.near_failure`). An adjoint solve at every evaluation gives the
-gradient.
+As `ccfem.fibre_aware.cases_design`, with a share of the objective in how near the part is to its
+first failure (`ccfem.virtual_testing.near_failure`), under one load case or under any of several,
+one at a time. An adjoint solve for each case at every evaluation gives the gradient.
 """
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import Any
 
 import numpy as np
@@ -13,21 +13,16 @@ import numpy as np
 from ccfem.arrays import FloatArray, in_brief
 from ccfem.elasticity.volume_loads import strain_forces
 from ccfem.fibre_aware.border_levels import BorderLevels
+from ccfem.fibre_aware.cases_design import CasesDesign, CasesObjective, CasesProblem, Pull
 from ccfem.fibre_aware.field_design import drawn_to_borders
 from ccfem.fibre_aware.smeared import SmearedSolution
-from ccfem.fibre_aware.stream_design import (
-    OVER_BUDGET,
-    SLACK,
-    Laid,
-    Objective,
-    StreamDesign,
-    StreamProblem,
-)
+from ccfem.fibre_aware.stream_design import SLACK, Laid
 from ccfem.tensor import to_voigt
 from ccfem.virtual_testing.near_failure import (
     POWER,
     MatrixPeaks,
     Peak,
+    check_stretched,
     nearness,
     stretched_index,
 )
@@ -39,151 +34,223 @@ __all__ = ["StrengthProblem", "design_for_strength"]
 _TOLERANCE = 1e-3
 """Relative residual of the adjoint solve."""
 
+_NONE = 1e-300
+"""Share in place of none: a field without layers counts for nothing over it."""
+
+
+@dataclass(frozen=True)
+class _CasePeaks:
+    """Indices under one load case, and how the fibre of each field (f, m) counts in that of it.
+
+    Where no fibre is stretched it has no index, and `counted` is zero.
+    """
+
+    peaks: dict[str, Peak]
+    stretch: FloatArray
+    counted: FloatArray
+
 
 @dataclass(frozen=True)
 class StrengthProblem:
     """What a stream function is designed for where strength counts.
 
-    Minimised is what `StreamProblem` minimises, with ``w log(nearness to failure) - (1 - w)
-    log(stiffness)`` in place of ``-log(stiffness)``.
+    Minimised is what `CasesProblem` minimises, with ``w log(nearness to failure) + (1 - w) x`` in
+    place of its x, which comes from the stiffness. How near the part is to failure is the largest
+    index of all load cases.
 
     Attributes
     ----------
-    problem : StreamProblem
+    problem : CasesProblem
     limits : Limits
     strength : float in [0, 1]
         The share w.
-    judge : MatrixPeaks
-    factors : mapping of str to float
-        Index over norm of fibre, matrix and bond, from `factors_at`.
+    judges : tuple of MatrixPeaks
+        One for each load case.
+    factors : mapping of (int, str) to float
+        Index over norm of fibre, matrix and bond in each case, by `at`.
     """
 
-    problem: StreamProblem
+    problem: CasesProblem
     limits: Limits
     strength: float
-    judge: MatrixPeaks
-    factors: dict[str, float]
+    judges: tuple[MatrixPeaks, ...]
+    factors: dict[tuple[int, str], float]
 
     __repr__ = in_brief
 
     @classmethod
     def at(
         cls,
-        problem: StreamProblem,
+        problem: CasesProblem,
         limits: Limits,
         strength: float,
         field: FloatArray,
-        solution: SmearedSolution,
+        solutions: tuple[SmearedSolution, ...],
     ) -> "StrengthProblem":
-        """Problem whose indices are the true ones at a field, and follow their norms from there."""
-        judge = MatrixPeaks(problem.part.specimen.unreinforced)
-        bare = cls(problem, limits, strength, judge, {})
-        peaks = bare._peaks(problem.laid(field), solution)[0]
-        return cls(
-            problem, limits, strength, judge, {k: one.index / one.norm for k, one in peaks.items()}
-        )
+        """Problem whose indices are the true ones at fields, and follow their norms from there.
+
+        Raises
+        ------
+        InputError
+            Where no fibre is stretched.
+        """
+        judges = tuple(MatrixPeaks(part.specimen.unreinforced) for part in problem.parts)
+        bare = cls(problem, limits, strength, judges, {})
+        found = bare._peaks(problem.laid(field), solutions)
+        check_stretched([one.stretch for one in found])
+        factors = {
+            (k, name): peak.index / peak.norm
+            for k, one in enumerate(found)
+            for name, peak in one.peaks.items()
+        }
+        return replace(bare, factors=factors)
 
     @property
     def laplacian(self) -> Any:
-        """Graph Laplacian (c, c) of all fields."""
+        """Graph Laplacian of all fields."""
         return self.problem.laplacian
 
     def evaluate(
-        self, field: FloatArray, start: SmearedSolution | None = None, tolerance: float = 1e-5
-    ) -> Objective:
-        """Evaluate the objective and its gradient; parameters as in `StreamProblem.evaluate`."""
+        self,
+        field: FloatArray,
+        start: tuple[SmearedSolution, ...] | None = None,
+        tolerance: float = 1e-5,
+    ) -> CasesObjective:
+        """Evaluate the objective and its gradient; parameters as in `CasesProblem.evaluate`."""
         problem, w = self.problem, self.strength
         laid = problem.laid(field)
-        solution = problem.part.solve(laid.stiffness, start, tolerance)
-        ratio, length = problem.part.ratio(solution.work), problem.length(laid)
-        over = max(length / problem.budget - 1.0, 0.0)
-        near, nearer = self._near(laid, solution)
-        softer = problem.pull(laid, solution)
-        if not problem.part.forced:  # the load falls with the stiffness where supports move
-            near -= np.log(ratio)
-            nearer = (nearer[0] + softer[0], nearer[1] + softer[1])
-        value = w * near - (1.0 - w) * np.log(ratio) + OVER_BUDGET * over**2
-        value += sum(problem.penalties(field, laid))
-        x, y = (w * a + (1.0 - w) * b for a, b in zip(nearer, softer, strict=True))
-        gradient = problem.gradient(field, laid, (x, y), over)
-        return Objective(float(value), gradient, ratio, length, solution)
+        solutions = problem.solve(laid, start, tolerance)
+        near, nearer = self._near(laid, solutions)
+        soft, counts = problem.worth(problem.ratios(solutions))
+        softer = problem.pulls(laid, solutions, counts)
+        pulls = [
+            (w * a[0] + (1.0 - w) * b[0], w * a[1] + (1.0 - w) * b[1])
+            for a, b in zip(nearer, softer, strict=True)
+        ]
+        return problem.objective(field, laid, solutions, w * near + (1.0 - w) * soft, pulls)
 
-    def curvature(self, field: FloatArray, solution: SmearedSolution) -> Any:
-        """Curvature (c, c) of the stiffness alone."""
-        return self.problem.curvature(field, solution)
+    def curvature(self, field: FloatArray, solutions: tuple[SmearedSolution, ...]) -> Any:
+        """Curvature of the stiffness alone."""
+        return self.problem.curvature(field, solutions)
 
-    def levels(self, field: FloatArray, solution: SmearedSolution) -> BorderLevels:
+    def levels(self, field: FloatArray, solutions: tuple[SmearedSolution, ...]) -> BorderLevels:
         """Weigh what levels cost that keep farther from borders than they need."""
-        return self.problem.levels(field, solution)
+        return self.problem.levels(field, solutions)
 
     def _peaks(
-        self, laid: Laid, solution: SmearedSolution
-    ) -> tuple[dict[str, Peak], FloatArray, FloatArray]:
-        """All indices, how much each cell counts in the norm of the fibre, and its stretch."""
-        problem = self.problem
-        stretch = np.einsum("ci,ci->c", laid.along, solution.strain)
-        limit = self.limits.fibre / problem.axial_stiffness
-        length = problem.room * laid.size
-        index, norm, counted = stretched_index(stretch / laid.size**2, length, limit)
-        by_stretch = counted / np.where(stretch > 0.0, stretch, 1.0)
-        fibre = Peak(index, norm, self._forces(by_stretch[:, None] * laid.along))
-        normal = problem.part.frame[2]
-        peaks = self.judge.peaks(solution.displacement, fibre, self.limits, normal)
-        return peaks, counted, stretch
+        self, laid: tuple[Laid, ...], solutions: tuple[SmearedSolution, ...]
+    ) -> list[_CasePeaks]:
+        """Find the indices under each load case, of the load on the part without fibre."""
+        problem, alone = self.problem, self.problem.problem
+        limit = self.limits.fibre / alone.axial_stiffness
+        size = np.stack([one.size for one in laid])
+        length = (problem.shares[:, None] * alone.room * size).ravel()
+        found = []
+        for part, judge, solution in zip(problem.parts, self.judges, solutions, strict=True):
+            stretch = np.stack([np.einsum("ci,ci->c", one.along, solution.strain) for one in laid])
+            fibre, counted = None, np.zeros_like(stretch)
+            if stretch.max() > 0.0:
+                strain = (stretch / size**2).ravel()
+                index, norm, share = stretched_index(strain, length, limit)
+                counted = share.reshape(stretch.shape)
+                by_stretch = counted / np.where(stretch > 0.0, stretch, 1.0)
+                along = np.stack([one.along for one in laid])
+                forces = self._forces(np.einsum("fc,fci->ci", by_stretch, along))
+                fibre = Peak(index, norm, forces)
+            normal = part.frame[2]
+            peaks = judge.peaks(solution.displacement, fibre, self.limits, normal)
+            # Of the same load: it falls with the stiffness where supports move.
+            load = 1.0 if part.forced else part.ratio(solution.work)
+            scaled = {name: peak.over(load) for name, peak in peaks.items()}
+            found.append(_CasePeaks(scaled, stretch, counted))
+        return found
 
     def _forces(self, by_strain: FloatArray) -> FloatArray:
         """Turn a derivative by the strains (m, 3) in the plane into one by the displacement."""
-        part = self.problem.part
+        part = self.problem.problem.part
         a, b, _ = part.frame
         pairs = np.stack([np.outer(a, a), np.outer(b, b), np.outer(a, b) + np.outer(b, a)])
         tensor = np.einsum("ci,ijk->cjk", by_strain / part.mesh.volumes[:, None], pairs)
         return strain_forces(part.mesh, to_voigt(tensor))
 
     def _near(
-        self, laid: Laid, solution: SmearedSolution
-    ) -> tuple[float, tuple[FloatArray, FloatArray]]:
-        """Logarithm of the index that fails first, and its derivatives by the components of g."""
+        self, laid: tuple[Laid, ...], solutions: tuple[SmearedSolution, ...]
+    ) -> tuple[float, list[Pull]]:
+        """Logarithm of the index that fails first, and its derivatives by each field's slope."""
         problem = self.problem
-        peaks, counted, stretch = self._peaks(laid, solution)
+        found = self._peaks(laid, solutions)
+        peaks = {(k, name): p for k, one in enumerate(found) for name, p in one.peaks.items()}
         near, counts = nearness(peaks, self.factors)
-        load = np.sum([counts[name] * one.by_displacement for name, one in peaks.items()], axis=0)
-        stiffness = laid.stiffness(solution.strain)
-        adjoint = problem.part.respond(stiffness, load, _TOLERANCE)
-        other = np.einsum("ci,ci->c", laid.along, adjoint)
+        pulls = [(np.zeros(len(one.size)), np.zeros(len(one.size))) for one in laid]
+        cases = zip(problem.parts, found, solutions, strict=True)
+        for k, (part, one, solution) in enumerate(cases):
+            failing = {name: counts[k, name] for name in one.peaks}
+            load = sum(count * one.peaks[name].by_displacement for name, count in failing.items())
+            stiffness = problem.stiffness(laid, solution.strain)
+            adjoint = part.respond(stiffness, np.asarray(load), _TOLERANCE)
+            own = failing.get("fibre", 0.0) * one.counted
+            moved = 0.0 if part.forced else sum(failing.values())
+            for f, fibre in enumerate(laid):
+                share = max(float(problem.shares[f]), _NONE)
+                dx, dy = self._nearer(fibre, solution.strain, adjoint, own[f] / share)
+                if moved:
+                    softer = problem.problem.pull(fibre, solution)
+                    dx, dy = dx + moved * softer[0], dy + moved * softer[1]
+                pulls[f] = (pulls[f][0] + dx, pulls[f][1] + dy)
+        return near, pulls
+
+    def _nearer(self, laid: Laid, strain: FloatArray, adjoint: FloatArray, own: FloatArray) -> Pull:
+        """Derive the logarithm of the indices of one case by the slope of one field.
+
+        Parameters
+        ----------
+        laid : Laid
+            Its fibre, in all layers.
+        strain, adjoint : (m, 3) array
+            Of the part with its fibre, and of the adjoint solution.
+        own : (m,) array
+            How much the fibre of each cell itself counts.
+        """
+        alone = self.problem.problem
+        stretch, other = (np.einsum("ci,ci->c", laid.along, one) for one in (strain, adjoint))
         gx, gy, size = laid.gx, laid.gy, laid.size
         share = np.where(stretch > 0.0, 1.0, SLACK)
         # Fibre takes the work stretch * other / size^3 of both displacements in each other.
-        factor = -problem.axial_stiffness * problem.room * share / size**3
+        factor = -alone.axial_stiffness * alone.room * share / size**3
         fall = 3.0 * stretch * other / size**2
         # Its norm's power is room * stretch^p / size^(2 p - 1) a cell.
-        own = counts["fibre"] * counted
         power = own / np.where(stretch > 0.0, stretch, 1.0)
         thin = (2.0 - 1.0 / POWER) * own / size**2
-        (ux, uy), (ax, ay) = _turned(laid, solution.strain), _turned(laid, adjoint)
+        (ux, uy), (ax, ay) = _turned(laid, strain), _turned(laid, adjoint)
         dx = factor * (ux * other + ax * stretch - fall * gx) + power * ux - thin * gx
         dy = factor * (uy * other + ay * stretch - fall * gy) + power * uy - thin * gy
-        return near, (dx, dy)
+        return dx, dy
 
 
-def _turned(laid: Laid, strain: FloatArray) -> tuple[FloatArray, FloatArray]:
+def _turned(laid: Laid, strain: FloatArray) -> Pull:
     """Derive the stretch by the components of g: (m,) each."""
     e1, e2, e12 = strain.T
     return 2.0 * laid.gx * e2 - laid.gy * e12, 2.0 * laid.gy * e1 - laid.gx * e12
 
 
 def design_for_strength(
-    problem: StreamProblem, first: StreamDesign, strength: float, evaluations: int = 50
-) -> StreamDesign:
+    problem: CasesProblem,
+    field: FloatArray,
+    solutions: tuple[SmearedSolution, ...],
+    strength: float,
+    evaluations: int = 50,
+) -> CasesDesign:
     """Improve a design for stiffness, so that the load at first failure counts too.
 
     Parameters
     ----------
-    problem : StreamProblem
-    first : StreamDesign
-        For stiffness alone.
+    problem : CasesProblem
+    field : (n * c,) array
+        Designed for stiffness alone, field after field.
+    solutions : tuple of SmearedSolution
+        Of each case at that.
     strength : float in [0, 1]
-        How much a share of the load at first failure counts; one of stiffness counts the rest. At 0
-        the design stays as it is.
+        How much a share of the load at first failure counts; one of stiffness counts the rest.
     evaluations : int, default 50
         Of stiffness and strength, at least 1.
 
@@ -192,10 +259,7 @@ def design_for_strength(
     InputError
         When the strength of the matrix is not known, or no fibre is stretched.
     """
-    if not strength:
-        return first
-    limits = Limits.of(problem.part.specimen.system.problem.material, Strand())
-    start = first.field
-    whole = StrengthProblem.at(problem, limits, strength, start, first.objective.solution)
-    field, found, ratios = drawn_to_borders(whole, start, first.objective.solution, evaluations)
-    return StreamDesign(field, found, (*first.ratios, *ratios))
+    limits = Limits.of(problem.parts[0].specimen.system.problem.material, Strand())
+    whole = StrengthProblem.at(problem, limits, strength, field, solutions)
+    field, found, ratios = drawn_to_borders(whole, field, solutions, evaluations)
+    return CasesDesign(field.reshape(len(problem.shares), -1), found, tuple(ratios))

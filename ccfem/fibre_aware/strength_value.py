@@ -2,9 +2,11 @@
 
 One adjoint solve, with the derivative of the indices by the displacement as its load, says what
 every piece of fibre changes: ``-EA eps eps_adjoint`` per length, and what it itself adds to the
-index of the fibre (`ccfem.virtual_testing.near_failure`).
+index of the fibre (`ccfem.virtual_testing.near_failure`). Of several load cases, one at a time, the
+one counts that fails first, at the least multiple of its load; each has its own adjoint solve.
 """
 
+from collections.abc import Sequence
 from dataclasses import dataclass
 
 import numpy as np
@@ -12,7 +14,6 @@ import numpy as np
 from ccfem.arrays import FloatArray, in_brief
 from ccfem.checks import check_number
 from ccfem.elasticity.solvers import preconditioned_cg
-from ccfem.errors import InputError
 from ccfem.toolpaths import Toolpaths
 from ccfem.virtual_testing.bars import Bars, bars
 from ccfem.virtual_testing.equilibrium import Equilibrium
@@ -20,6 +21,7 @@ from ccfem.virtual_testing.near_failure import (
     POWER,
     MatrixPeaks,
     Peak,
+    check_stretched,
     nearness,
     stretched_index,
 )
@@ -29,7 +31,7 @@ from ccfem.virtual_testing.strand import Strand
 from ccfem.virtual_testing.strands import Strands
 from ccfem.virtual_testing.strengths import Limits
 
-__all__ = ["Worth", "layer_normal", "raised", "refuse_strength"]
+__all__ = ["Worth", "layer_normal", "raised"]
 
 _LITTLE = 1e-3
 """Share of the largest value below which values that are negative are raised."""
@@ -44,21 +46,6 @@ def layer_normal(toolpaths: Toolpaths) -> FloatArray | None:
     return (
         normals[0] if len(normals) and (np.abs(normals @ normals[0]) > 1.0 - 1e-9).all() else None
     )
-
-
-def refuse_strength(strategy: str, strength: float) -> None:
-    """Say that strength is planned for under one load case only.
-
-    Raises
-    ------
-    InputError
-        Where `strength` is not zero.
-    """
-    if strength:
-        raise InputError(
-            f"{strategy} plans for strength under one load case; got strength = {strength:g} and "
-            "several cases: name one of them, or set strength = 0"
-        )
 
 
 def raised(value: FloatArray) -> FloatArray:
@@ -79,25 +66,27 @@ class Worth:
 
     Attributes
     ----------
-    specimen : Specimen
+    parts : tuple of Specimen
+        The part without fibre under each load case.
     strand : Strand
     limits : Limits
     strength : float in [0, 1]
         How much a share of the load at first failure counts; a share of stiffness counts the rest.
-    judge : MatrixPeaks
+    judges : tuple of MatrixPeaks
+        One for each load case.
     """
 
-    specimen: Specimen
+    parts: tuple[Specimen, ...]
     strand: Strand
     limits: Limits
     strength: float
-    judge: MatrixPeaks
+    judges: tuple[MatrixPeaks, ...]
 
     __repr__ = in_brief
 
     @classmethod
-    def of(cls, specimen: Specimen, strand: Strand | None, strength: float) -> "Worth":
-        """Worth of strands in a part of one material.
+    def of(cls, parts: Sequence[Specimen], strand: Strand | None, strength: float) -> "Worth":
+        """Worth of strands in a part of one material, under one or several load cases.
 
         Raises
         ------
@@ -106,11 +95,16 @@ class Worth:
         """
         check_number("strength", strength, at_least=0.0, at_most=1.0)
         strand = Strand() if strand is None else strand
-        limits = Limits.of(specimen.system.problem.material, strand)
-        return cls(specimen, strand, limits, strength, MatrixPeaks(specimen.unreinforced))
+        limits = Limits.of(parts[0].system.problem.material, strand)
+        judges = tuple(MatrixPeaks(part.unreinforced) for part in parts)
+        return cls(tuple(parts), strand, limits, strength, judges)
 
     def __call__(
-        self, strands: Strands, found: Equilibrium, normal: FloatArray | None = None
+        self,
+        strands: Strands,
+        found: Sequence[Equilibrium],
+        normal: FloatArray | None = None,
+        counts: FloatArray | None = None,
     ) -> FloatArray:
         """Value of each piece of fibre, (s,), per mm; negative where the part is better without.
 
@@ -120,41 +114,75 @@ class Worth:
         Parameters
         ----------
         strands : Strands
-        found : Equilibrium
-            Of the part with them.
+        found : sequence of Equilibrium
+            Of the part with them, under each load case.
         normal : (3,) array, optional
             Of all layers. Without it the bond between layers does not count.
+        counts : (n,) array, optional
+            How much each load case counts in the stiffness, 1 in all; default equally.
         """
-        specimen, u = self.specimen, found.displacement
-        axial = self.strand.stiffness(specimen.modulus)
-        pieces = bars(strands, specimen.system.problem.mesh)
-        limit = self.limits.fibre / axial
-        fibre, own = _fibre(pieces, strands.length * strands.share, u, limit)
-        peaks = self.judge.peaks(u, fibre, self.limits, normal)
-        factors = {name: one.index / one.norm for name, one in peaks.items()}
-        counts = nearness(peaks, factors)[1]
-        load = np.sum([counts[name] * one.by_displacement for name, one in peaks.items()], axis=0)
-        held = specimen.held.touching(u)
-        part = specimen.solver.matrix if held.presses is None else held.reduce(specimen.matrix)
-        reduced = Reduced(part, found.matrix, held)
-        solved = preconditioned_cg(
-            reduced, held.project(load), specimen.solver, tolerance=_TOLERANCE
-        )
-        adjoint = pieces.strain(held.motion(solved.values))
-        work = float(np.vdot(u, (found.matrix @ u.reshape(-1)).reshape(u.shape)))
-        stiff = np.where(found.carries, axial * found.strain**2, 0.0) / work
-        strong = np.where(found.carries, axial * found.strain * adjoint, 0.0)
-        strong -= counts["fibre"] * own
-        if specimen.held.value.any():  # the load grows with the stiffness where supports move
-            strong += stiff
-        return np.asarray((1.0 - self.strength) * stiff + self.strength * strong)
+        each = np.full(len(found), 1.0 / len(found)) if counts is None else counts
+        axial = self.strand.stiffness(self.parts[0].modulus)
+        pieces = bars(strands, self.parts[0].system.problem.mesh)
+        length = strands.length * strands.share
+        strains = [pieces.strain(one.displacement) for one in found]
+        check_stretched(strains)
+        works = [_work(one) for one in found]
+        peaks: dict[tuple[int, str], Peak] = {}
+        thinned: list[FloatArray] = []
+        for k, (judge, one, strain) in enumerate(zip(self.judges, found, strains, strict=True)):
+            fibre, own = _fibre(pieces, length, strain, one.displacement, self.limits.fibre / axial)
+            thinned.append(own)
+            of_case = judge.peaks(one.displacement, fibre, self.limits, normal)
+            load = _load_share(self.parts[k], works[k])
+            peaks |= {(k, name): peak.over(load) for name, peak in of_case.items()}
+        factors = {key: one.index / one.norm for key, one in peaks.items()}
+        failing = nearness(peaks, factors)[1]
+        value = np.zeros(len(strands.length))
+        for k, (part, one, work) in enumerate(zip(self.parts, found, works, strict=True)):
+            own_peaks = {name: failing[i, name] for i, name in failing if i == k}
+            loads = [count * peaks[k, name].by_displacement for name, count in own_peaks.items()]
+            adjoint = pieces.strain(_respond(part, one, np.sum(loads, axis=0)))
+            stiff = np.where(one.carries, axial * one.strain**2, 0.0) / work
+            strong = np.where(one.carries, axial * one.strain * adjoint, 0.0)
+            strong -= own_peaks.get("fibre", 0.0) * thinned[k]
+            if part.held.value.any():  # the load grows with the stiffness where supports move
+                strong += sum(own_peaks.values()) * stiff
+            value += (1.0 - self.strength) * each[k] * stiff + self.strength * strong
+        return value
+
+
+def _work(found: Equilibrium) -> float:
+    """Twice the strain energy, N mm."""
+    u = found.displacement
+    return float(np.vdot(u, (found.matrix @ u.reshape(-1)).reshape(u.shape)))
+
+
+def _load_share(part: Specimen, work: float) -> float:
+    """Load over that of the part without fibre: 1 where forces load it."""
+    if not part.held.value.any():
+        return 1.0
+    return work / (2.0 * part.unreinforced.strain_energy)
+
+
+def _respond(part: Specimen, found: Equilibrium, load: FloatArray) -> FloatArray:
+    """Displacement (n, 3) under nodal forces (n, 3) of a part with its fibre, supports at rest."""
+    held = part.held.touching(found.displacement)
+    matrix = part.solver.matrix if held.presses is None else held.reduce(part.matrix)
+    reduced = Reduced(matrix, found.matrix, held)
+    solved = preconditioned_cg(reduced, held.project(load), part.solver, tolerance=_TOLERANCE)
+    return np.asarray(held.motion(solved.values))
 
 
 def _fibre(
-    pieces: Bars, length: FloatArray, displacement: FloatArray, limit: float
-) -> tuple[Peak, FloatArray]:
-    """Index of the fibre, and the derivative (s,) of its norm's logarithm by the length."""
-    strain = pieces.strain(displacement)
+    pieces: Bars, length: FloatArray, strain: FloatArray, displacement: FloatArray, limit: float
+) -> tuple[Peak | None, FloatArray]:
+    """Index of the fibre, and the derivative (s,) of its norm's logarithm by the length.
+
+    Where no fibre is stretched there is no index, and nothing to derive.
+    """
+    if not strain.max(initial=0.0) > 0.0:
+        return None, np.zeros(len(strain))
     index, norm, counted = stretched_index(strain, length, limit)
     squared = np.where(strain > 0.0, strain, 1.0) ** 2 * pieces.length
     forces = pieces.forces(counted / squared, displacement)

@@ -3,6 +3,7 @@
 import dataclasses
 import inspect
 import math
+import re
 import tomllib
 import types
 import typing
@@ -14,6 +15,9 @@ from ccfem.errors import InputError, Mistakes, known_names, shown
 __all__ = ["assignment", "described", "from_table"]
 
 T = TypeVar("T")
+
+_POINTED = re.compile(r"[+-]?(\.\d+|\d+\.)([eE][+-]?\d+)?")
+"""A number with no digit on one side of its point, which TOML does not know."""
 
 _WORDS: dict[Any, str] = {
     float: "a number",
@@ -149,11 +153,14 @@ def described(hint: Any) -> str:
 
 
 def assignment(text: str) -> tuple[str, Any]:
-    """Split ``name=value``; the value is read as TOML, or else as a plain string."""
+    """Split ``name=value``; the value is read as TOML, or else as a plain string.
+
+    Numbers may leave the nought before or after their point out, as in ``.5``.
+    """
     name, equals, value = (part.strip() for part in text.partition("="))
     if not equals or not name:
         raise InputError(f"expected NAME=VALUE; got '{text}': write for example cap=90")
     try:
         return name, tomllib.loads(f"value = {value}")["value"]
     except tomllib.TOMLDecodeError:
-        return name, value
+        return name, float(value) if _POINTED.fullmatch(value) else value

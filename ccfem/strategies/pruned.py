@@ -15,11 +15,10 @@ from ccfem.elasticity.stress_field import solved
 from ccfem.elasticity.weighted_cases import WeightedCases
 from ccfem.errors import InputError
 from ccfem.fibre_aware.cases_bound import single_bounds
+from ccfem.fibre_aware.cases_judges import CasesGoal
+from ccfem.fibre_aware.cut_and_move import prune_and_move, prune_and_move_cases
 from ccfem.fibre_aware.plan_cases import plan_by_layers
-from ccfem.fibre_aware.prune_cases import prune_and_move_cases
 from ccfem.fibre_aware.shortening import TIGHT_SHARES
-from ccfem.fibre_aware.strand_moves import prune_and_move
-from ccfem.fibre_aware.strength_value import refuse_strength
 from ccfem.layers.layer import Layer
 from ccfem.machine.machine import Machine
 from ccfem.planning.equal_fibre import plan_to_length
@@ -62,8 +61,8 @@ class Pruned:
     rho : float, mm^2, default 4
         Axial stiffness of a strand over Young's modulus of the matrix.
     strength : float, default 0
-        How much the load at first failure counts, in [0, 1]; the stiffness counts the rest. Of one
-        load case only.
+        How much the load at first failure counts, in [0, 1]; the stiffness counts the rest. Of
+        several load cases the one counts that fails first, at the least multiple of its load.
     moves : int, default 0
         Steps by which what is left is moved sideways, each tested
         (`ccfem.fibre_aware.strand_moves`): 6 make a part stiffer by 1 to 2 %, for two to three
@@ -178,24 +177,18 @@ class Pruned:
         """
         if len(cases) == 1:
             return self.to_lengths(cases.fields[0], layers, machine, lengths)
-        refuse_strength("pruned", self.strength)
         full, strand = full_length(layers, machine), Strand(self.rho)
         most = max(self.amount.most, self.coverage) * full
         lengths = [min(length, most) for length in lengths]
         planned = self.overfill * max(lengths)
         paths = plan_by_layers(self._planner(), layers, cases, machine, planned)
         bounds = single_bounds(cases, layers, max(lengths) * len(layers), machine, strand)
-        parts, rounds = specimens(cases), max(self.rounds, 3)
+        goal = CasesGoal(specimens(cases), cases.weights, bounds)
+        cut_by = (max(self.rounds, 3), self.strength, self.moves, TIGHT_SHARES[self.turns])
         found: list[tuple[Pruned, LayerPlanner]] = []
         for length in lengths:
             wanted = length * len(layers)
-            judged = (cases.weights, bounds)
-            kept = prune_and_move_cases(
-                *((paths,), layers, parts, *judged, wanted, machine, strand),
-                rounds=rounds,
-                moves=self.moves,
-                tight=TIGHT_SHARES[self.turns],
-            )
+            kept = prune_and_move_cases((paths,), layers, goal, wanted, machine, strand, *cut_by)
             coverage = length / full
             overfill = max(planned / full / coverage, 1.0)
             found.append((replace(self, coverage=coverage, overfill=overfill), WholePart(kept)))

@@ -24,6 +24,8 @@ from ccfem.fibre_aware.cases_design import (
     design_cases,
     start_fields,
 )
+from ccfem.fibre_aware.cases_judges import CasesGoal
+from ccfem.fibre_aware.cut_and_move import prune_and_move, prune_and_move_cases
 from ccfem.fibre_aware.design_lengths import designed_to_lengths
 from ccfem.fibre_aware.heights import (
     alike_share,
@@ -33,16 +35,14 @@ from ccfem.fibre_aware.heights import (
     nearest_layer,
 )
 from ccfem.fibre_aware.layer_shares import layer_counts, layers_by_case
-from ccfem.fibre_aware.prune_cases import case_counts, prune_and_move_cases
 from ccfem.fibre_aware.shortening import TIGHT_SHARES
-from ccfem.fibre_aware.smeared import SmearedPart, smeared_cases
+from ccfem.fibre_aware.smeared import SmearedPart, SmearedSolution, smeared_cases
 from ccfem.fibre_aware.spline_grid import SplineGrid
-from ccfem.fibre_aware.strand_moves import kept_radius, prune_and_move
+from ccfem.fibre_aware.strand_moves import kept_radius
 from ccfem.fibre_aware.stream_design import StreamDesign, StreamProblem, design
 from ccfem.fibre_aware.stream_paths import Extraction, refined
 from ccfem.fibre_aware.stream_start import plane_axes, start_field
 from ccfem.fibre_aware.strength_design import design_for_strength
-from ccfem.fibre_aware.strength_value import refuse_strength
 from ccfem.fibre_aware.tension_check import check_tension
 from ccfem.layers.layer import Layer
 from ccfem.machine.machine import Machine
@@ -111,7 +111,8 @@ class StreamFunction:
         there are several; the others share the rest.
     strength : float, default 0
         How much the load at first failure counts, in [0, 1]; the stiffness counts the rest. A
-        share of the one is then worth as much as one of the other. Of one load case only.
+        share of the one is then worth as much as one of the other. Of several load cases the one
+        counts that fails first, at the least multiple of its load.
     moves : int, default 0
         Steps by which strands are moved sideways (`moved`), each tested.
     turns : {"tight", "cut"}
@@ -222,7 +223,6 @@ class StreamFunction:
         """
         if len(cases) == 1:
             return self.to_lengths(cases.fields[0], layers, machine, lengths)
-        refuse_strength("stream_function", self.strength)
         return designed_to_lengths(
             replace(self, overfill=max(self.overfill, _CASES_OVERFILL)),
             layers,
@@ -245,16 +245,16 @@ class StreamFunction:
         problem, group, found = self.designed(field, layers, machine)
         in_all, strand = [length * len(layers) for length in lengths], Strand(self.rho)
 
-        def candidates(found: StreamDesign) -> list[list[Toolpaths]]:
-            strained = ((1.0, found.objective.solution.displacement),)
-            drawn = self.extraction(problem, (found.field,), strained, machine)
+        def candidates(field: FloatArray, solution: SmearedSolution) -> list[list[Toolpaths]]:
+            drawn = self.extraction(problem, (field,), ((1.0, solution.displacement),), machine)
             return drawn.candidates(layers, group, in_all)
 
-        tried = candidates(found)
-        if self.strength:  # and what is planned for stiffness alone stays in the test
-            strong = design_for_strength(problem, found, self.strength, self.evaluations)
-            both = zip(candidates(strong), tried, strict=True)
-            tried = [[one[0], *others] for one, others in both]
+        tried = candidates(found.field, found.objective.solution)
+        if self.strength:
+            alone, solutions = CasesProblem.alone(problem), (found.objective.solution,)
+            how = (self.strength, self.evaluations)
+            strong = design_for_strength(alone, found.field, solutions, *how)
+            tried = _with_first(candidates(strong.fields[0], strong.objective.solution[0]), tried)
         part = problem.part.specimen
         cut_by = (_ROUNDS, self.strength, self.moves, TIGHT_SHARES[self.turns])
         return [
@@ -352,18 +352,37 @@ class StreamFunction:
         in_all, strand = [length * len(layers) for length in lengths], Strand(self.rho)
         bounds = single_bounds(cases, layers, max(in_all), machine, strand)
         problem, group, found = self.designed_for_cases(cases, layers, machine, bounds)
-        counts = case_counts(cases.weights, bounds, found.objective.ratio, self.objective)
-        strained = [
-            (float(share) / one.work, one.displacement)
-            for share, one in zip(counts, found.objective.solution, strict=True)
-        ]
-        drawn = self.extraction(problem.problem, tuple(found.fields), strained, machine)
-        field = layers_by_case(cases.weights, layers) * problem.problem.groups + group
-        specimens = [part.specimen for part in problem.parts]
-        judged = (specimens, cases.weights, bounds)
-        how: dict[str, Any] = {"objective": self.objective, "moves": self.moves}
-        how["tight"] = TIGHT_SHARES[self.turns]
+        specimens = tuple(part.specimen for part in problem.parts)
+        goal = CasesGoal(specimens, cases.weights, bounds, self.objective)
+        each = layers_by_case(cases.weights, layers) * problem.problem.groups + group
+
+        def candidates(found: CasesDesign) -> list[list[Toolpaths]]:
+            counts, solutions = goal.counts(found.objective.ratio), found.objective.solution
+            strained = [
+                (float(share) / one.work, one.displacement)
+                for share, one in zip(counts, solutions, strict=True)
+            ]
+            drawn = self.extraction(problem.problem, tuple(found.fields), strained, machine)
+            return drawn.candidates(layers, each, in_all)
+
+        tried = candidates(found)
+        if self.strength:
+            fields, solutions = found.fields.ravel(), found.objective.solution
+            how = (self.strength, self.evaluations)
+            strong = design_for_strength(problem, fields, solutions, *how)
+            tried = _with_first(candidates(strong), tried)
+        cut_by = (_ROUNDS, self.strength, self.moves, TIGHT_SHARES[self.turns])
         return [
-            prune_and_move_cases(some, layers, *judged, length, machine, strand, **how)
-            for some, length in zip(drawn.candidates(layers, field, in_all), in_all, strict=True)
+            prune_and_move_cases(some, layers, goal, length, machine, strand, *cut_by)
+            for some, length in zip(tried, in_all, strict=True)
         ]
+
+
+def _with_first(
+    strong: Sequence[Sequence[Toolpaths]], stiff: Sequence[Sequence[Toolpaths]]
+) -> list[list[Toolpaths]]:
+    """Candidates of designs for strength and for stiffness: the first of those, and all of these.
+
+    Each sequence has the candidates of one length.
+    """
+    return [[one[0], *others] for one, others in zip(strong, stiff, strict=True)]

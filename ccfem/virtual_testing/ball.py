@@ -1,11 +1,13 @@
-"""Averages over a ball about each of many points."""
+"""Averages over a ball about each of many points, and the transpose of that."""
+
+from typing import NamedTuple
 
 import numpy as np
 from numba import njit
 
 from ccfem.arrays import FloatArray, IntArray
 
-__all__ = ["BALL", "ball_averages"]
+__all__ = ["BALL", "ball_averages", "ball_shares"]
 
 BALL = 2.0
 """Radius, mm, of the ball over which stress is averaged."""
@@ -29,35 +31,103 @@ def ball_averages(
     -------
     (k, c) array
     """
+    boxes = _boxes(points, radius)
+    order, result = boxes.order, np.zeros((len(judged), values.shape[1]))
+    _average(
+        points[order], values[order], weights[order], points[judged], boxes.number[judged],
+        boxes.offsets, boxes.shape, radius, result,
+    )  # fmt: skip
+    return result
+
+
+def ball_shares(
+    points: FloatArray, values: FloatArray, weights: FloatArray, judged: IntArray, radius: float
+) -> FloatArray:
+    """Derive by the values of all points what averages are given by: transposed `ball_averages`.
+
+    Parameters
+    ----------
+    points, weights, judged, radius
+        As there.
+    values : (k, c) array
+        Of the judged points: derivatives by their averages.
+
+    Returns
+    -------
+    (n, c) array
+        Derivatives by the values of all points.
+    """
+    boxes = _boxes(points, radius)
+    order, spread = boxes.order, np.zeros((len(points), values.shape[1]))
+    _share(
+        points[order], weights[order], points[judged], boxes.number[judged], boxes.offsets,
+        boxes.shape, radius, values, spread,
+    )  # fmt: skip
+    result = np.empty_like(spread)
+    result[order] = spread
+    return result
+
+
+class _Boxes(NamedTuple):
+    """Points in boxes of a grid: order, number of the box of each, where each box begins."""
+
+    order: IntArray
+    number: IntArray
+    offsets: IntArray
+    shape: IntArray
+
+
+def _boxes(points: FloatArray, size: float) -> _Boxes:
+    """Put points into boxes of a size, with an empty one on every side."""
     first = points.min(axis=0)
-    box = np.floor((points - first) / radius).astype(np.int64) + 1
+    box = np.floor((points - first) / size).astype(np.int64) + 1
     shape = box.max(axis=0) + 2
     number = (box[:, 0] * shape[1] + box[:, 1]) * shape[2] + box[:, 2]
     order = np.argsort(number, kind="stable")
     offsets = np.searchsorted(number[order], np.arange(int(np.prod(shape)) + 1))
-    return np.asarray(
-        _ball(points[order], values[order], weights[order], points[judged], number[judged], offsets,
-              shape, radius)
-    )  # fmt: skip
+    return _Boxes(order, number, offsets, shape)
 
 
 @njit(cache=True)
-def _ball(points, values, weights, centres, box, offsets, shape, radius):  # type: ignore[no-untyped-def]  # pragma: no cover
+def _average(points, values, weights, centres, box, offsets, shape, radius, result):  # type: ignore[no-untyped-def]  # pragma: no cover
     columns = values.shape[1]
-    result = np.zeros((len(centres), columns))
     for k in range(len(centres)):
         weight = 0.0
         for i in range(-1, 2):
             for j in range(-1, 2):
                 row = box[k] + (i * shape[1] + j) * shape[2]
                 for p in range(offsets[row - 1], offsets[row + 2]):
-                    x = points[p, 0] - centres[k, 0]
-                    y = points[p, 1] - centres[k, 1]
-                    z = points[p, 2] - centres[k, 2]
-                    if x * x + y * y + z * z <= radius * radius:
+                    if _near(points, p, centres, k, radius):
                         for c in range(columns):
                             result[k, c] += weights[p] * values[p, c]
                         weight += weights[p]
         for c in range(columns):
             result[k, c] /= weight
-    return result
+
+
+@njit(cache=True)
+def _share(points, weights, centres, box, offsets, shape, radius, values, result):  # type: ignore[no-untyped-def]  # pragma: no cover
+    columns = values.shape[1]
+    inside = np.empty(len(points), np.int64)
+    for k in range(len(centres)):
+        weight, count = 0.0, 0
+        for i in range(-1, 2):
+            for j in range(-1, 2):
+                row = box[k] + (i * shape[1] + j) * shape[2]
+                for p in range(offsets[row - 1], offsets[row + 2]):
+                    if _near(points, p, centres, k, radius):
+                        inside[count] = p
+                        count += 1
+                        weight += weights[p]
+        for q in range(count):
+            share = weights[inside[q]] / weight
+            for c in range(columns):
+                result[inside[q], c] += share * values[k, c]
+
+
+@njit(cache=True)
+def _near(points, p, centres, k, radius):  # type: ignore[no-untyped-def]  # pragma: no cover
+    x = points[p, 0] - centres[k, 0]
+    y = points[p, 1] - centres[k, 1]
+    z = points[p, 2] - centres[k, 2]
+    return x * x + y * y + z * z <= radius * radius

@@ -7,12 +7,12 @@ counts (Le, Norato, Bruns, Ha and Tortorelli, Structural and Multidisciplinary O
 2010, 605-620: the p-norm, and its factor that follows the true peak).
 """
 
-from collections.abc import Mapping
-from dataclasses import dataclass
+from collections.abc import Hashable, Mapping, Sequence
+from dataclasses import dataclass, replace
 from functools import cached_property
+from typing import TypeVar
 
 import numpy as np
-from scipy.spatial import cKDTree
 
 from ccfem.arrays import FloatArray, IntArray, in_brief
 from ccfem.elasticity.recovery import cell_strain, times
@@ -20,12 +20,14 @@ from ccfem.elasticity.stress_field import StressField
 from ccfem.elasticity.volume_loads import strain_forces
 from ccfem.errors import InputError
 from ccfem.tensor import from_voigt, to_voigt, von_mises
-from ccfem.virtual_testing.ball import BALL, ball_averages
+from ccfem.virtual_testing.ball import BALL, ball_averages, ball_shares
 from ccfem.virtual_testing.strength import FIBRE_SHARE
 from ccfem.virtual_testing.strengths import Limits
 from ccfem.virtual_testing.zone import ZONE, distance_from_patches
 
-__all__ = ["POWER", "MatrixPeaks", "Peak", "nearness", "stretched_index"]
+__all__ = ["POWER", "MatrixPeaks", "Peak", "check_stretched", "nearness", "stretched_index"]
+
+Key = TypeVar("Key", bound=Hashable)
 
 POWER = 16.0
 """Of the norm over cells or pieces of fibre."""
@@ -59,24 +61,49 @@ class Peak:
 
     __repr__ = in_brief
 
+    def over(self, ratio: float) -> "Peak":
+        """Peak under a load so many times smaller."""
+        return replace(self, index=self.index / ratio, norm=self.norm / ratio)
+
 
 def nearness(
-    peaks: Mapping[str, Peak], factors: Mapping[str, float]
-) -> tuple[float, dict[str, float]]:
+    peaks: Mapping[Key, Peak], factors: Mapping[Key, float]
+) -> tuple[float, dict[Key, float]]:
     """Logarithm of about the largest index, and how much each counts in it: the sum is 1.
 
     Parameters
     ----------
-    peaks : mapping of str to Peak
-    factors : mapping of str to float
-        Index over norm, where it was taken last.
+    peaks : mapping of key to Peak
+    factors : mapping of key to float
+        Index over norm, where it was taken last; what has none, or nought, does not count.
     """
-    logs = {name: float(np.log(factors[name] * one.norm)) for name, one in peaks.items()}
+    known = {key: factors.get(key, 0.0) * one.norm for key, one in peaks.items()}
+    logs = {key: float(np.log(index)) for key, index in known.items() if index > 0.0}
     largest = max(logs.values())
-    terms = {name: float(np.exp(_BETWEEN * (log - largest))) for name, log in logs.items()}
+    terms = {key: float(np.exp(_BETWEEN * (log - largest))) for key, log in logs.items()}
     whole = sum(terms.values())
-    counts = {name: term / whole for name, term in terms.items()}
+    counts = {key: terms.get(key, 0.0) / whole for key in peaks}
     return largest + float(np.log(whole)) / _BETWEEN, counts
+
+
+def check_stretched(strains: Sequence[FloatArray]) -> None:
+    """Check that fibre is stretched somewhere, in one load case at least.
+
+    Parameters
+    ----------
+    strains : sequence of (s,) array
+        Along the fibre, of each load case.
+
+    Raises
+    ------
+    InputError
+        Where it is not.
+    """
+    if not any(strain.max(initial=0.0) > 0.0 for strain in strains):
+        raise InputError(
+            "strength is planned for where fibre is stretched; it is so nowhere: turn the load "
+            "round, or plan with strength = 0"
+        )
 
 
 def stretched_index(
@@ -87,23 +114,13 @@ def stretched_index(
     Parameters
     ----------
     strain : (s,) array
-        Along pieces of fibre; those that are not stretched do not count.
+        Along pieces of fibre, stretched in one at least; others do not count.
     length : (s,) array, mm
         Of fibre that each stands for.
     limit : float
         Strain at which a strand breaks.
-
-    Raises
-    ------
-    InputError
-        Where no fibre is stretched.
     """
-    most = float(strain.max(initial=0.0))
-    if not most > 0.0:
-        raise InputError(
-            "strength is planned for where fibre is stretched; it is so nowhere: turn the load "
-            "round, or plan with strength = 0"
-        )
+    most = float(strain.max())
     order = np.argsort(strain, kind="stable")
     reached = np.cumsum(length[order])
     at = order[min(np.searchsorted(reached, FIBRE_SHARE * reached[-1]), len(order) - 1)]
@@ -144,10 +161,6 @@ class MatrixPeaks:
         stiffness = problem.cell_stiffness
         return stiffness if problem.density is None else problem.density[:, None, None] * stiffness
 
-    @cached_property
-    def _tree(self) -> cKDTree:
-        return cKDTree(self._centroids)
-
     def _averages(self, values: FloatArray) -> FloatArray:
         """Averages (k, c) of the values (m, c) of all cells over a ball round each judged cell."""
         volumes = self.part.mesh.volumes
@@ -157,14 +170,8 @@ class MatrixPeaks:
         """Transpose of `_averages`: (m, c) of derivatives (k, c) by the averages."""
         size = np.abs(slopes).max(axis=1)
         hot = np.flatnonzero(size > _HOT * size.max())
-        near = self._tree.query_ball_point(self._centroids[self.judged[hot]], BALL)
-        count = np.array([len(cells) for cells in near])
-        row, cell = np.repeat(np.arange(len(hot)), count), np.concatenate(near).astype(np.int64)
-        volume = self.part.mesh.volumes[cell]
-        share = volume / np.bincount(row, volume)[row]
-        columns = slopes[hot][row] * share[:, None]
-        m = len(self._centroids)
-        return np.stack([np.bincount(cell, column, m) for column in columns.T], axis=1)
+        volumes = self.part.mesh.volumes
+        return ball_shares(self._centroids, slopes[hot], volumes, self.judged[hot], BALL)
 
     def _norm(self, index: FloatArray) -> tuple[float, float, FloatArray]:
         """Peak and norm of an index (k,), and the derivative of the norm's logarithm by it."""
@@ -216,19 +223,25 @@ class MatrixPeaks:
         return Peak(peak, norm, self._forces(self._back(to_voigt(tensor) * _ENGINEERING)))
 
     def peaks(
-        self, displacement: FloatArray, fibre: Peak, limits: Limits, normal: FloatArray | None
+        self,
+        displacement: FloatArray,
+        fibre: Peak | None,
+        limits: Limits,
+        normal: FloatArray | None,
     ) -> dict[str, Peak]:
         """All indices: that of the fibre, of the matrix, and where it can be judged of the bond.
 
         Parameters
         ----------
         displacement : (n, 3) array, mm
-        fibre : Peak
+        fibre : Peak, optional
+            None where no fibre is stretched.
         limits : Limits
         normal : (3,) array, optional
             Of all layers.
         """
-        found = {"fibre": fibre, "matrix": self.matrix(displacement, limits.matrix)}
+        found = {} if fibre is None else {"fibre": fibre}
+        found["matrix"] = self.matrix(displacement, limits.matrix)
         if limits.bond is not None and normal is not None:
             bond = self.bond(displacement, normal, limits.bond)
             found |= {} if bond is None else {"interlayer": bond}

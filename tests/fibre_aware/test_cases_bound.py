@@ -14,6 +14,7 @@ from ccfem.fibre_aware.cases_bound import (
     cases_certificate,
     largest_gathered,
 )
+from ccfem.fibre_aware.cases_judges import CasesGoal
 from ccfem.fibre_aware.heights import fibre_capacity
 from ccfem.fibre_aware.prune_cases import prune_cases
 from ccfem.fibre_aware.smeared import SmearedPart, SmearedSolution, smeared_cases
@@ -193,7 +194,8 @@ def test_strands_are_cut_alike_for_forces_and_moving_supports(pulled_and_moved, 
     machine, half, bounds = Machine(minimum_length=5.0), np.full(2, 0.5), np.full(2, 2.0)
     worst = []
     for cases in (moved, forced):
-        kept = prune_cases(paths, specimens(cases), half, bounds, 480.0, machine)
+        goal = CasesGoal(specimens(cases), half, bounds)
+        kept = prune_cases(paths, goal, 480.0, machine)
         assert 470.0 < kept.lengths.sum() <= 480.0 + 1e-6
         worst.append(virtual_tests(kept, cases).ratios.min())
     # All of 736 mm would give each 1.63.

@@ -5,8 +5,9 @@ import pytest
 
 from ccfem.elasticity.weighted_cases import WeightedCases
 from ccfem.errors import InputError
+from ccfem.fibre_aware.cases_judges import CasesGoal
 from ccfem.fibre_aware.plan_cases import plan_by_layers, plan_cases
-from ccfem.fibre_aware.prune_cases import case_counts, prune_cases
+from ccfem.fibre_aware.prune_cases import prune_cases
 from ccfem.machine import Machine
 from ccfem.planning import plan
 from ccfem.planning.equal_fibre import plan_to_length
@@ -42,9 +43,8 @@ def test_cut_leaves_both_cases_as_much_where_they_are_alike(two_pulls, objective
     cases, layers = two_pulls
     paths = crossed(layers)
     length = 0.75 * paths.lengths.sum()
-    kept = prune_cases(
-        paths, specimens(cases), cases.weights, np.full(2, 2.0), length, MACHINE, None, objective
-    )
+    goal = CasesGoal(specimens(cases), cases.weights, np.full(2, 2.0), objective)
+    kept = prune_cases(paths, goal, length, MACHINE)
     x, y = along_x(kept)
     assert length - 24.0 < x + y <= length * (1.0 + 1e-9)
     assert x == pytest.approx(y, rel=0.1)
@@ -55,9 +55,8 @@ def test_cut_spares_the_case_that_is_farthest_from_its_bound(two_pulls):
     cases, layers = two_pulls
     paths = crossed(layers)
     length = 0.75 * paths.lengths.sum()
-    x, y = along_x(
-        prune_cases(paths, specimens(cases), cases.weights, np.array([1.0, 4.0]), length, MACHINE)
-    )
+    goal = CasesGoal(specimens(cases), cases.weights, np.array([1.0, 4.0]))
+    x, y = along_x(prune_cases(paths, goal, length, MACHINE))
     assert y == pytest.approx(0.5 * paths.lengths.sum(), rel=1e-6)
     assert x <= length - y + 1e-6
 
@@ -65,10 +64,14 @@ def test_cut_spares_the_case_that_is_farthest_from_its_bound(two_pulls):
 def test_what_cases_count():
     weights, bounds, ratios = np.array([0.75, 0.25]), np.array([2.0, 3.0]), np.array([1.0, 2.0])
     # Terms 2 and 1.5.
-    np.testing.assert_allclose(case_counts(weights, bounds, ratios, "sum"), [1.5 / 1.875, 0.2])
+    goal = CasesGoal((), weights, bounds, "sum")
+    np.testing.assert_allclose(goal.counts(ratios), [1.5 / 1.875, 0.2])
+    assert goal.merit(ratios) == pytest.approx(1.0 / 1.875)
     power = (1.5 / 2.0) ** 20
     expected = np.array([0.75, 0.25 * power]) / (0.75 + 0.25 * power)
-    np.testing.assert_allclose(case_counts(weights, bounds, ratios, "worst"), expected)
+    goal = CasesGoal((), weights, bounds)
+    np.testing.assert_allclose(goal.counts(ratios), expected)
+    assert goal.merit(ratios) == pytest.approx(0.5 * 0.75**-0.05, rel=1e-4)
 
 
 def test_one_case_is_planned_as_ever(two_bends):

@@ -7,9 +7,10 @@ import pytest
 import shapely
 
 from ccfem.errors import InputError
-from ccfem.fibre_aware.prune_cases import cases_judge
+from ccfem.fibre_aware.cases_judges import CasesGoal, cases_judge
+from ccfem.fibre_aware.judges import stiffness_judge
 from ccfem.fibre_aware.strand_lines import strand_lines
-from ccfem.fibre_aware.strand_moves import moved, stiffness_judge
+from ccfem.fibre_aware.strand_moves import moved
 from ccfem.fibre_aware.strand_pull import fibre_energy, plane_strain
 from ccfem.fibre_aware.strand_spacing import spacing
 from ccfem.machine.machine import Machine
@@ -185,7 +186,7 @@ def test_all_load_cases_move_strands_together(two_bends):
     parts = specimens(cases)
     bounds = np.array([2.0, 2.0])
     paths = straight(layers, 6.0, 8.0, 16.0, 18.0)
-    judge = cases_judge(parts, cases.weights, bounds, MACHINE)
+    judge = cases_judge(CasesGoal(parts, cases.weights, bounds), MACHINE)
     found = moved(paths, layers, parts[0].unreinforced.mesh, MACHINE, judge, 3)
 
     def worst(each):
@@ -202,7 +203,7 @@ def test_worth_of_strain_in_several_cases_is_the_slope_of_the_value(two_bends):
     paths = straight(layers, 4.0, 12.0)
     values = []
     for rho in (4.0, 4.001):
-        judge = cases_judge(parts, cases.weights, bounds, MACHINE, Strand(rho), "sum")
+        judge = cases_judge(CasesGoal(parts, cases.weights, bounds, "sum"), MACHINE, Strand(rho))
         values.append(judge(paths))
     strands = cut_strands(paths, parts[0].unreinforced.mesh)
     pieces = bars(strands, parts[0].unreinforced.mesh)

@@ -7,13 +7,15 @@ import pytest
 
 from ccfem.elasticity.solve import solve
 from ccfem.errors import InputError
+from ccfem.fibre_aware import strength_value
+from ccfem.fibre_aware.cases_design import CasesProblem
+from ccfem.fibre_aware.cut_and_move import best_cut
 from ccfem.fibre_aware.heights import fibre_capacity
 from ccfem.fibre_aware.prune import prune
 from ccfem.fibre_aware.smeared import SmearedPart
 from ccfem.fibre_aware.spline_grid import SplineGrid
 from ccfem.fibre_aware.stream_design import StreamProblem, design
 from ccfem.fibre_aware.stream_start import start_field
-from ccfem.fibre_aware.strength_cut import cut_for_strength
 from ccfem.fibre_aware.strength_design import StrengthProblem, design_for_strength
 from ccfem.fibre_aware.strength_value import Worth, raised
 from ccfem.machine import Machine
@@ -52,15 +54,25 @@ def lines(bent_beam):
 
 
 def near_of(worth, strands, found, factors=None):
-    """Nearness to failure in a solution, with the factors of the first, and these."""
-    from ccfem.fibre_aware.strength_value import _fibre
-
-    pieces = bars(strands, worth.specimen.system.problem.mesh)
-    limit = worth.limits.fibre / worth.strand.stiffness(worth.specimen.modulus)
-    fibre, _ = _fibre(pieces, strands.length * strands.share, found.displacement, limit)
-    peaks = worth.judge.peaks(found.displacement, fibre, worth.limits, np.array([0.0, 0.0, 1.0]))
-    factors = factors or {name: one.index / one.norm for name, one in peaks.items()}
+    """Nearness to failure in solutions, with the factors of the first, and these."""
+    pieces = bars(strands, worth.parts[0].system.problem.mesh)
+    limit = worth.limits.fibre / worth.strand.stiffness(worth.parts[0].modulus)
+    length, normal, peaks = strands.length * strands.share, np.array([0.0, 0.0, 1.0]), {}
+    for k, (part, judge, one) in enumerate(zip(worth.parts, worth.judges, found, strict=True)):
+        strain = pieces.strain(one.displacement)
+        fibre, _ = strength_value._fibre(pieces, length, strain, one.displacement, limit)
+        of_case = judge.peaks(one.displacement, fibre, worth.limits, normal)
+        moved = not part.forces.any()
+        load = work_of(one) / (2.0 * part.unreinforced.strain_energy) if moved else 1.0
+        peaks |= {(k, name): peak.over(load) for name, peak in of_case.items()}
+    factors = factors or {key: one.index / one.norm for key, one in peaks.items()}
     return nearness(peaks, factors)[0], factors
+
+
+def work_of(found):
+    """Twice the strain energy, N mm."""
+    u = found.displacement
+    return float(np.vdot(u, (found.matrix @ u.reshape(-1)).reshape(u.shape)))
 
 
 @pytest.mark.parametrize("limits", [(86.0, 50.0), (1.0, 1e4), (1e4, 1.0)])
@@ -68,25 +80,25 @@ def test_value_agrees_with_finite_differences(strong_beam, lines, limits):
     """More fibre in some pieces, solved anew: both logarithms change as the values say."""
     specimen = Specimen.of(strong_beam[0])
     strands = cut_strands(lines, specimen.unreinforced.mesh)
-    worth = Worth.of(specimen, Strand(), 1.0)
+    worth = Worth.of((specimen,), Strand(), 1.0)
     worth = replace(worth, limits=Limits(*limits, (18.0, 18.0)))
     axial = Strand().stiffness(specimen.modulus)
     found = equilibrium(specimen, strands, axial, tolerance=1e-12)
-    factors = near_of(worth, strands, found)[1]
+    factors = near_of(worth, strands, (found,))[1]
     chosen = np.random.default_rng(2).random(len(strands)) * (found.strain > 1e-6)
 
     def changed(step):
         other = replace(strands, share=1.0 + step * chosen)
         after = equilibrium(specimen, other, axial, known=(found.displacement,), tolerance=1e-12)
         work = float(np.vdot(specimen.forces, after.displacement))
-        return -near_of(worth, other, after, factors)[0], -np.log(work)
+        return -near_of(worth, other, (after,), factors)[0], -np.log(work)
 
     up, down = changed(1e-4), changed(-1e-4)
     strong, stiff = ((a - b) / 2e-4 for a, b in zip(up, down, strict=True))
     weight, normal = chosen * strands.length, np.array([0.0, 0.0, 1.0])
-    assert weight @ worth(strands, found, normal) == pytest.approx(strong, rel=1e-3)
+    assert weight @ worth(strands, (found,), normal) == pytest.approx(strong, rel=1e-3)
     for share in (0.0, 0.3):
-        mixed = replace(worth, strength=share)(strands, found, normal)
+        mixed = replace(worth, strength=share)(strands, (found,), normal)
         assert weight @ mixed == pytest.approx((1.0 - share) * stiff + share * strong, rel=1e-3)
 
 
@@ -124,7 +136,7 @@ def test_without_strength_values_are_those_of_the_strain_energy(strong_beam, lin
 @pytest.mark.parametrize("strength", [-0.1, 1.1, float("nan")])
 def test_shares_outside_zero_to_one_are_refused(strong_beam, strength):
     with pytest.raises(InputError, match="strength must be"):
-        Worth.of(Specimen.of(strong_beam[0]), None, strength)
+        Worth.of((Specimen.of(strong_beam[0]),), None, strength)
 
 
 @pytest.fixture(scope="module")
@@ -150,8 +162,9 @@ def problem(strong_beam):
 def test_gradient_agrees_with_finite_differences(problem, rng, limits, monkeypatch):
     alone, field = problem
     monkeypatch.setattr("ccfem.fibre_aware.strength_design._TOLERANCE", 1e-10)
-    solution = alone.evaluate(field, tolerance=1e-12).solution
-    whole = StrengthProblem.at(alone, Limits(*limits, (18.0, 18.0)), 0.7, field, solution)
+    one = CasesProblem.alone(alone)
+    solution = one.evaluate(field, tolerance=1e-12).solution
+    whole = StrengthProblem.at(one, Limits(*limits, (18.0, 18.0)), 0.7, field, solution)
     found = whole.evaluate(field, solution, 1e-12)
     smooth = np.linalg.inv(np.eye(len(field)) + 4.0 * whole.laplacian.toarray())
     direction = smooth @ rng.standard_normal(len(field))
@@ -164,21 +177,19 @@ def test_gradient_agrees_with_finite_differences(problem, rng, limits, monkeypat
 def test_a_design_for_strength_takes_the_part_farther_from_failure(problem):
     alone, start = problem
     first = design(alone, start, 6)
-    second = design_for_strength(alone, first, 0.8, 8)
+    one, solutions = CasesProblem.alone(alone), (first.objective.solution,)
+    second = design_for_strength(one, first.field, solutions, 0.8, 8)
     limits = Limits.of(alone.part.specimen.system.problem.material)
-    judged = StrengthProblem.at(alone, limits, 1.0, first.field, first.objective.solution)
-    before, after = (judged.evaluate(one.field).value for one in (first, second))
+    judged = StrengthProblem.at(one, limits, 1.0, first.field, solutions)
+    before, after = (judged.evaluate(each).value for each in (first.field, second.fields[0]))
     assert after < before - 0.01
     assert second.objective.ratio > 1.0
 
 
 @pytest.mark.parametrize("strategy", [StreamFunction, Pruned])
-def test_strategies_take_strength_under_one_load_case(two_bends, strategy):
+def test_shares_of_strength_outside_zero_to_one_are_refused(strategy):
     with pytest.raises(InputError, match="strength must be at least 0 and at most 1"):
         strategy(strength=2.0)
-    cases, layers = two_bends
-    with pytest.raises(InputError, match="plans for strength under one load case"):
-        strategy(strength=0.5).for_cases(cases, layers, SHORT, (100.0,))
 
 
 def test_a_plan_for_strength_keeps_its_length_and_says_what_it_overfilled(strong_beam):
@@ -206,10 +217,12 @@ def test_planning_for_strength_is_worth_no_less_than_for_stiffness(strong_beam, 
     assert worth[2] >= worth[1] - 1e-6
 
 
-def test_of_no_fibre_nothing_is_cut_for_strength(strong_beam):
-    stress, layers = strong_beam
-    asked = (100.0, SHORT, Strand(), 2, 0.5, 1.0)
-    assert not len(cut_for_strength((Toolpaths.empty(),), layers, Specimen.of(stress), *asked))
+def test_of_no_fibre_nothing_is_cut():
+    def never(*_):
+        raise AssertionError("there is nothing to cut or to test")
+
+    for strength in (0.0, 0.5):
+        assert not len(best_cut((Toolpaths.empty(),), never, never, strength, 2))
 
 
 def test_the_strength_of_the_matrix_has_to_be_known(bent_beam):

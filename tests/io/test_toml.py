@@ -6,7 +6,7 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from ccfem.errors import InputError
-from ccfem.io.toml import from_table
+from ccfem.io.toml import assignment, from_table
 
 
 @dataclass(frozen=True)
@@ -88,3 +88,17 @@ def test_any_table_gives_a_value_or_an_input_error(table):
     assert set(table) <= set(Sample.__dataclass_fields__)
     assert isinstance(found.number, float)
     assert type(found.count) is int
+
+
+@pytest.mark.parametrize(
+    ("text", "value"),
+    [
+        ("a=0.5", 0.5), ("a=.5", 0.5), ("a=-.5e-2", -0.005), ("a=5.", 5.0), ("a= 5 ", 5),
+        ("a=.", "."), ("a=..5", "..5"), ("a=x.5", "x.5"), ("a=1.2.3", "1.2.3"),
+    ],
+)  # fmt: skip
+def test_assignments_take_numbers_as_people_write_them(text, value):
+    name, found = assignment(text)
+    assert name == "a"
+    assert type(found) is type(value)
+    assert found == value

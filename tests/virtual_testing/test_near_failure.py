@@ -10,8 +10,15 @@ from ccfem.errors import InputError
 from ccfem.layers.slicing.planar import Planar
 from ccfem.materials import isotropic
 from ccfem.mesh.box import box_mesh
+from ccfem.virtual_testing.ball import ball_averages, ball_shares
 from ccfem.virtual_testing.interlayer import interlayer
-from ccfem.virtual_testing.near_failure import MatrixPeaks, Peak, nearness, stretched_index
+from ccfem.virtual_testing.near_failure import (
+    MatrixPeaks,
+    Peak,
+    check_stretched,
+    nearness,
+    stretched_index,
+)
 from ccfem.virtual_testing.strand import Strand
 from ccfem.virtual_testing.strength import matrix_peak
 from ccfem.virtual_testing.strengths import Limits
@@ -80,9 +87,32 @@ def test_fibre_index_is_the_strain_that_all_but_a_hundredth_stays_below():
     assert norm > 1.0 * 0.4 ** (1.0 / 16.0)
 
 
-def test_unstretched_fibre_has_no_index():
+def test_fibre_has_to_be_stretched_under_one_load_case_at_least():
+    pushed, pulled = np.array([-1e-3, 0.0]), np.array([-1e-3, 1e-9])
     with pytest.raises(InputError, match="stretched"):
-        stretched_index(np.array([-1e-3]), np.array([5.0]), 0.006)
+        check_stretched([pushed, pushed])
+    with pytest.raises(InputError, match="stretched"):
+        check_stretched([np.zeros(0)])
+    check_stretched([pushed, pulled])
+
+
+def test_what_has_no_factor_does_not_count():
+    zero = np.zeros((1, 3))
+    peaks = {"fibre": Peak(0.4, 0.2, zero), "matrix": Peak(0.3, 0.3, zero)}
+    for factors in ({"matrix": 1.0}, {"matrix": 1.0, "fibre": 0.0}):
+        near, counts = nearness(peaks, factors)
+        assert counts == {"fibre": 0.0, "matrix": 1.0}
+        assert np.exp(near) == pytest.approx(0.3)
+
+
+def test_shares_of_balls_are_the_transpose_of_their_averages():
+    rng = np.random.default_rng(5)
+    points, weights = 8.0 * rng.random((300, 3)), 0.1 + rng.random(300)
+    judged = rng.choice(300, 120, replace=False)
+    values, slopes = rng.standard_normal((300, 2)), rng.standard_normal((120, 2))
+    averages = ball_averages(points, values, weights, judged, 1.5)
+    shares = ball_shares(points, slopes, weights, judged, 1.5)
+    assert (slopes * averages).sum() == pytest.approx((shares * values).sum(), rel=1e-12)
 
 
 def test_the_largest_index_counts_most_and_equal_ones_alike():

@@ -1,0 +1,87 @@
+"""What a test says of paths: how good they are, and what strains their fibre."""
+
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass
+from typing import TypeAlias
+
+import numpy as np
+
+from ccfem.arrays import FloatArray, in_brief
+from ccfem.layers.layer import Layer
+from ccfem.machine.machine import Machine
+from ccfem.toolpaths import Toolpaths
+from ccfem.virtual_testing.equilibrium import equilibrium
+from ccfem.virtual_testing.specimen import Specimen
+from ccfem.virtual_testing.strand import Strand
+from ccfem.virtual_testing.strands import cut_strands
+from ccfem.virtual_testing.strength import first_failure
+from ccfem.virtual_testing.virtual_test import virtual_test
+
+__all__ = ["Judge", "Judged", "stiffest", "stiffness_judge", "strength_judge"]
+
+_TOLERANCE = 1e-4
+"""Relative residual of the tests; the error of the stiffness is of its square."""
+
+
+@dataclass(frozen=True)
+class Judged:
+    """What a test of paths says.
+
+    Attributes
+    ----------
+    value : float
+        What is to grow.
+    strains_of : tuple of (float, (n, 3) array)
+        What a squared strain is worth, and the displacement, mm, that strains the fibre; one for
+        each load case.
+    """
+
+    value: float
+    strains_of: tuple[tuple[float, FloatArray], ...]
+
+    __repr__ = in_brief
+
+
+Judge: TypeAlias = Callable[[Toolpaths], Judged]
+
+
+def stiffness_judge(part: Specimen, machine: Machine, strand: Strand | None = None) -> Judge:
+    """Judge of paths by the stiffness of the part, as in `ccfem.virtual_test` with the machine."""
+    axial = (Strand() if strand is None else strand).stiffness(part.modulus)
+    known: list[FloatArray] = []
+
+    def judge(toolpaths: Toolpaths) -> Judged:
+        strands = cut_strands(toolpaths, part.unreinforced.mesh, machine=machine)
+        found = equilibrium(part, strands, axial, known=known[-1:], tolerance=_TOLERANCE)
+        u = found.displacement
+        known[:] = [u]
+        energy = 0.5 * float(u.reshape(-1) @ (found.matrix @ u.reshape(-1)))
+        return Judged(part.stiffness(u, energy), ((1.0, u),))
+
+    return judge
+
+
+def strength_judge(
+    part: Specimen, layers: Sequence[Layer], machine: Machine, strand: Strand, strength: float
+) -> Judge:
+    """Judge of paths by the stiffness and the load at first failure.
+
+    The value is ``ratio^(1 - strength) load^strength``: a share of the one is worth as much as one
+    of the other where `strength` is a half.
+    """
+
+    def judge(toolpaths: Toolpaths) -> Judged:
+        tested = virtual_test(toolpaths, part, strand, span=(), machine=machine)
+        failed = first_failure(tested, strand, layers=layers)
+        worth = tested.ratio ** (1.0 - strength) * failed.load**strength
+        return Judged(float(worth), ((1.0, tested.solution.displacement),))
+
+    return judge
+
+
+def stiffest(candidates: Sequence[Toolpaths], judge: Judge) -> Toolpaths:
+    """Return the toolpaths of most value to a judge, the first of equal ones; one is not judged."""
+    laid = [one for one in candidates if len(one)]
+    if len(laid) < 2:
+        return laid[0] if laid else candidates[0]
+    return laid[int(np.argmax([judge(one).value for one in laid]))]
