@@ -118,7 +118,7 @@ def test_faces_of_a_cad_file_are_numbered_as_listed(parts):
 def test_a_file_that_is_no_cad_file_is_one_line(parts, tmp_path):
     path = tmp_path / "junk.step"
     path.write_text("ISO-10303-21;\nnothing\n")
-    with pytest.raises(ccfem.errors.InputError, match=r"junk.step .*(can read|no solid)") as caught:
+    with pytest.raises(ccfem.errors.InputError, match="export it again") as caught:
         mesh_body(path, 2.0)
     assert "\n" not in str(caught.value)
 

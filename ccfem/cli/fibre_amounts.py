@@ -108,15 +108,20 @@ def front(
     print(f"\n{where}: front.png, {trade}front.csv")
 
 
+def _newtons(load: float) -> str:
+    return f"{load:.0f} N" if load == load else "not known"
+
+
 def _say(found: "FibreFront") -> None:
-    """Print the plans as a table; marked are those that none with as little fibre exceeds."""
+    """Print a table: the part without fibre, then the plans; marked are those of the fronts."""
     print(
         f"{'layers':>6}{'strength':>10}{'fibre, m':>10}{'stiffness':>11}"
         f"{'bound':>8}{'first failure':>17}"
     )
+    print(f"{'-':>6}{'-':>10}{0.0:>10.2f}{1.0:>10.3f} {1.0:>8.3f}{_newtons(found.bare):>15}")
     rows = zip(found.points, found.stiffest.tolist(), found.strongest.tolist(), strict=True)
     for each, stiffest, strongest in rows:
-        failure = f"{each.failure:.0f} N" if each.failure == each.failure else "not known"
+        failure = _newtons(each.failure)
         print(
             f"{each.layers:>6}{each.strength:>10g}{1e-3 * each.length:>10.2f}"
             f"{each.ratio:>10.3f}{'*' * stiffest:<1}{each.bound:>8.3f}"

@@ -110,21 +110,22 @@ class FibreFront:
 
     @property
     def stiffest(self) -> BoolArray:
-        """Printable plans that none with as little fibre exceeds in stiffness."""
-        return self._front([each.ratio for each in self.points])
+        """Printable plans that nothing with as little fibre, or none, exceeds in stiffness."""
+        return self._front(1.0, [each.ratio for each in self.points])
 
     @property
     def strongest(self) -> BoolArray:
-        """Printable plans that none with as little fibre exceeds in first-failure load."""
-        return self._front([each.failure for each in self.points])
+        """Printable plans that nothing with as little fibre, or none, exceeds in first failure."""
+        return self._front(self.bare, [each.failure for each in self.points])
 
-    def _front(self, values: Sequence[float]) -> BoolArray:
+    def _front(self, bare: float, values: Sequence[float]) -> BoolArray:
         # Plans to one length differ by what the shortest strand leaves: these count as equal.
         laid = np.array([each.length for each in self.points])
         asked = np.array([each.asked * each.layers for each in self.points])
         lengths = np.where(np.abs(laid - asked) <= TOLERANCE * asked, asked, laid)
         printable = np.array([not each.why_not for each in self.points])
-        return on_front(np.where(printable, lengths, np.nan), np.array(values))
+        across = np.append(0.0, np.where(printable, lengths, np.nan))
+        return on_front(across, np.append(bare, values))[1:]
 
     def plot(self) -> "Figure":
         """Draw stiffness and first-failure load over the length of fibre, with the bound."""

@@ -28,6 +28,9 @@ from ccfem.mesh.facets import positions
 
 __all__ = ["check_load", "load_case", "load_cases", "nodal_forces"]
 
+_SMALLEST, _LARGEST = 1e-12, 1e12
+"""Numbers of a load below which it is zero, and above which it is a mistake."""
+
 
 def _outward(mesh: LoadedBody, name: str) -> tuple[IntArray, FloatArray, FloatArray]:
     """Facets of a patch with their areas and outward unit normals."""
@@ -118,13 +121,20 @@ _KINDS: dict[type, Callable[..., FloatArray]] = {
 
 
 def check_load(load: Load) -> None:
-    """Raise for a load that is not finite, or zero; a displacement may be zero."""
+    """Raise for a load that is not finite, beyond any size, or zero; displacements may be zero."""
     for value in vars(load).values():
-        if value is not None and not isinstance(value, str) and not np.isfinite(value).all():
+        if value is None or isinstance(value, str):
+            continue
+        if not np.isfinite(value).all():
             raise InputError(f"a load must be finite; got {load}: correct its numbers")
+        if np.max(np.abs(value)) > _LARGEST:
+            raise InputError(
+                f"numbers of a load must be at most {_LARGEST:g} (N, MPa, mm); got {load}: correct "
+                "its numbers"
+            )
     sizes = ("vector", "magnitude", "acceleration", "change")
     size = next(getattr(load, name) for name in sizes if hasattr(load, name))
-    if not np.any(size) and not isinstance(load, Displacement):
+    if np.max(np.abs(size)) < _SMALLEST and not isinstance(load, Displacement):
         raise InputError(f"a load must not be zero; got {load}: give it a size or leave it out")
 
 

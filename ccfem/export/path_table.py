@@ -19,6 +19,10 @@ FRAMES = ("mesh", "tool")
 _COLUMNS = ("x", "y", "z", "path", "layer")
 _CLOSED = 1e-3
 """Largest distance, mm, between the ends of a closed path."""
+_LARGEST_NUMBER = 1e15
+"""Of paths and layers: larger ones are not told apart from their neighbours."""
+_FARTHEST = 1e5
+"""Coordinate, mm, beyond which a unit is wrong."""
 
 
 def read_paths(path: str | Path, frame: FloatArray, named: str | None = None) -> Toolpaths:
@@ -36,7 +40,8 @@ def read_paths(path: str | Path, frame: FloatArray, named: str | None = None) ->
     Raises
     ------
     InputError
-        When the file cannot be read, or the frame is unknown.
+        When the file cannot be read, the frame is unknown, a coordinate is beyond 100 m, or a path
+        has no length.
     """
     if named is not None and named not in FRAMES:
         raise InputError(f"paths are in the frame 'mesh' or 'tool'; got '{named}': name one")
@@ -44,13 +49,35 @@ def read_paths(path: str | Path, frame: FloatArray, named: str | None = None) ->
     tool = (named or ("mesh" if table else "tool")) == "tool"
     axes = frame if tool else np.eye(3)
     if table:
-        return read_path_table(path, axes, frame[2])
+        found = read_path_table(path, axes, frame[2])
+        _check_sizes(found, str(path))
+        return found
     found = read_waypoints(path, axes)
+    _check_sizes(found, str(path))
     # The normals are those of the layers, whatever the points are in.
     return Toolpaths(
         found.points, np.broadcast_to(frame[2], found.points.shape), found.offsets, found.layer,
         found.kind, found.closed,
     )  # fmt: skip
+
+
+def _check_sizes(paths: Toolpaths, name: str) -> None:
+    """Raise on coordinates that no printer reaches, and on paths without length."""
+    if not len(paths):
+        return
+    farthest = float(np.abs(paths.points).max())
+    if farthest > _FARTHEST:
+        raise InputError(
+            f"{name}: the points of paths must lie within {_FARTHEST:g} mm; got a coordinate of "
+            f"{farthest:.3g} mm: repair the file, or give it in mm"
+        )
+    short = np.flatnonzero(paths.lengths == 0.0)
+    if len(short):
+        where = ", ".join(f"{x:.4g}" for x in paths.points[paths.offsets[short[0]]])
+        raise InputError(
+            f"{name}: {len(short)} of {len(paths)} paths have no length, the first at ({where}) "
+            "mm: remove them"
+        )
 
 
 def read_path_table(path: str | Path, axes: FloatArray, normal: FloatArray) -> Toolpaths:
@@ -93,7 +120,9 @@ def read_path_table(path: str | Path, axes: FloatArray, normal: FloatArray) -> T
         try:
             values.append([float(row[k]) for k in place])
             whole = values[-1][3:]
-            if not np.isfinite(values[-1]).all() or any(v != int(v) for v in whole):
+            if not np.isfinite(values[-1]).all() or any(
+                v != int(v) or abs(v) > _LARGEST_NUMBER for v in whole
+            ):
                 raise ValueError
         except (ValueError, IndexError):
             raise InputError(

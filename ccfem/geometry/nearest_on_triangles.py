@@ -10,8 +10,13 @@ from ccfem.arrays import FloatArray, IntArray, seen_only
 
 __all__ = ["Nearest", "nearest_on_triangles"]
 
-_CANDIDATES = 40
-"""Triangles whose middles are nearest are looked at."""
+_FIRST = (40,)
+_ROUNDS = (1, *(8 * 4**k for k in range(14)))
+"""Triangles that are looked at: of all sizes at first, then of one size after the other."""
+_EXACT = 0.01
+"""Share of the distance by which another triangle may be nearer."""
+_AT_ONCE = 4_000_000
+"""Pairs of a query and a triangle that are kept at a time."""
 
 
 @dataclass(frozen=True)
@@ -36,8 +41,8 @@ class Nearest:
 def nearest_on_triangles(points: FloatArray, triangles: IntArray, queries: FloatArray) -> Nearest:
     """Find the points of a surface that are nearest to given ones.
 
-    Of the 40 triangles whose middles are nearest the nearest one counts, which is exact as long as
-    no triangle is many times larger than those round it.
+    Triangles may be of any sizes. Points of the surface are found exactly; of two triangles whose
+    distances from a query differ by less than 1 % it may be either.
 
     Parameters
     ----------
@@ -45,14 +50,77 @@ def nearest_on_triangles(points: FloatArray, triangles: IntArray, queries: Float
     triangles : (t, 3) int array
     queries : (q, 3) array, mm
     """
-    tree = cKDTree(points[triangles].mean(axis=1))
-    count = min(_CANDIDATES, len(triangles))
-    _, near = tree.query(queries, k=count)
-    corners = np.asarray(triangles, dtype=np.int64)
-    given = (seen_only(each) for each in (points, corners, queries))
-    triangle, weights = _nearest(*given, near.reshape(len(queries), count))
-    found = np.einsum("qk,qkd->qd", weights, points[triangles[triangle]])
-    return Nearest(triangle, weights, found, np.linalg.norm(found - queries, axis=1))
+    middles = points[triangles].mean(axis=1)
+    reach = np.linalg.norm(points[triangles] - middles[:, None], axis=2).max(axis=1)
+    found = Nearest(
+        np.zeros(len(queries), dtype=np.int64),
+        np.zeros((len(queries), 3)),
+        np.zeros((len(queries), 3)),
+        np.full(len(queries), np.inf),
+    )
+    surface = _Surface(np.asarray(points), np.asarray(triangles, dtype=np.int64), middles, reach)
+    left = _look(
+        surface, np.arange(len(triangles)), queries, np.arange(len(queries)), _FIRST, found
+    )
+    if len(left):
+        size = np.frexp(reach)[1]
+        for each in np.unique(size)[::-1]:  # the largest first: they are few and reach far
+            _look(surface, np.flatnonzero(size == each), queries, left, _ROUNDS, found)
+    return found
+
+
+@dataclass(frozen=True)
+class _Surface:
+    """A triangulated surface, and how far its triangles reach from their middles, mm."""
+
+    points: FloatArray
+    triangles: IntArray
+    middles: FloatArray
+    reach: FloatArray
+
+
+def _look(
+    surface: _Surface,
+    members: IntArray,
+    queries: FloatArray,
+    rows: IntArray,
+    rounds: tuple[int, ...],
+    found: Nearest,
+) -> IntArray:
+    """Look at some triangles for some queries; of which the nearest one is not yet sure.
+
+    `found` takes what is nearer than what it holds. Each round looks at so many triangles whose
+    middles are nearest.
+    """
+    tree = cKDTree(surface.middles[members])
+    reach = float(surface.reach[members].max())
+    for most in rounds:
+        count = min(most, len(members))
+        unsure = []
+        for part in np.array_split(rows, 1 + len(rows) * count // _AT_ONCE):
+            away, near = tree.query(queries[part], k=count)
+            away, near = away.reshape(len(part), count), near.reshape(len(part), count)
+            _take_nearer(surface, members[near], queries, part, found)
+            sure = away[:, -1] - reach >= (1.0 - _EXACT) * found.distance[part]
+            unsure.append(part[~sure])
+        rows = np.concatenate(unsure)
+        if count == len(members) or not len(rows):
+            return rows[:0]
+    return rows
+
+
+def _take_nearer(
+    surface: _Surface, near: IntArray, queries: FloatArray, rows: IntArray, found: Nearest
+) -> None:
+    """Put the nearest of the triangles (r, k) into `found` where it is nearer."""
+    given = (seen_only(each) for each in (surface.points, surface.triangles, queries[rows]))
+    triangle, weights = _nearest(*given, near)
+    feet = np.einsum("qk,qkd->qd", weights, surface.points[surface.triangles[triangle]])
+    distance = np.linalg.norm(feet - queries[rows], axis=1)
+    better = distance < found.distance[rows]
+    to = rows[better]
+    found.triangle[to], found.weights[to] = triangle[better], weights[better]
+    found.points[to], found.distance[to] = feet[better], distance[better]
 
 
 @njit(cache=True, nogil=True)

@@ -66,7 +66,7 @@ class Check(Shown):
     def __str__(self) -> str:
         lines = [self.case.title, *(f"  {fact}" for fact in self.facts), ""]
         for frame in (self.to_frame(), self.load_frame()):
-            lines += [*frame.to_string(index=False).splitlines(), ""]
+            lines += [] if frame.empty else [*frame.to_string(index=False).splitlines(), ""]
         lines += [f"warning: {line}" for line in self.warnings]
         lines += [f"mistake: {line}" for line in self.mistakes]
         if not self.mistakes:

@@ -107,7 +107,10 @@ def _solids(gmsh: Any, path: str) -> tuple[dict[int, str], list[int]]:
         gmsh.model.occ.importShapes(path, highestDimOnly=False)
         gmsh.model.occ.synchronize()
     except Exception as error:
-        raise InputError(f"{path} is not a CAD file that Gmsh can read ({error})") from None
+        raise InputError(
+            f"{path} is not a CAD file that Gmsh can read ({error}): it may be cut short; export "
+            "it again as STEP, or give STL"
+        ) from None
     solids = gmsh.model.getEntities(3)
     if not solids:
         raise InputError(

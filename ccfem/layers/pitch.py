@@ -4,11 +4,12 @@ from collections.abc import Sequence
 
 import numpy as np
 
+from ccfem.arrays import FloatArray
 from ccfem.errors import InputError
 from ccfem.layers.layer import Layer
 from ccfem.machine.machine import Machine
 
-__all__ = ["check_pitch"]
+__all__ = ["check_heights", "check_pitch"]
 
 _ROUNDING = 1e-6
 """Layers nearer than the height of a strand by no more than this share of it keep it."""
@@ -23,7 +24,18 @@ def check_pitch(layers: Sequence[Layer], machine: Machine) -> None:
     ------
     InputError
     """
-    heights = np.sort([layer.flat.height for layer in layers if layer.flat is not None])
+    check_heights(
+        np.sort([layer.flat.height for layer in layers if layer.flat is not None]), machine
+    )
+
+
+def check_heights(heights: FloatArray, machine: Machine) -> None:
+    """Refuse rising heights, mm, of flat layers that are nearer than a strand is high.
+
+    Raises
+    ------
+    InputError
+    """
     if len(heights) < 2:
         return
     gaps, least = np.diff(heights), machine.strand_height

@@ -18,8 +18,8 @@ from ccfem.mesh.tet_mesh import TetMesh
 
 __all__ = ["cache_folder", "kept"]
 
-_FORMAT = 1
-"""Raised when meshing changes, so that meshes of before are made anew."""
+_FORMAT = 2
+"""Raised when meshing changes, or what is said of it: meshes of before are made anew."""
 _MOST = 100
 """Meshes that are kept; the ones not used for longest go."""
 _PATCH = "patch:"

@@ -13,6 +13,8 @@ __all__ = ["Fidelity", "fidelity"]
 
 _VOLUME = 0.02
 """Share of the volume that may be lost or gained."""
+_FINEST = 0.001
+"""Distance, mm, below which none is told from zero."""
 
 
 @dataclass(frozen=True)
@@ -40,7 +42,7 @@ class Fidelity:
         word = "more" if self.volume > 0.0 else "less"
         text = (
             f"meshed by {mesher}: volume {abs(self.volume):.2%} {word} than the surface's, "
-            f"boundaries within {self.deviation:.3g} mm"
+            f"boundaries within {max(self.deviation, _FINEST):.3g} mm"
         )
         return text if self.good else f"{text}: shorten edge_length to keep the shape"
 
@@ -55,24 +57,5 @@ def fidelity(surface: Surface, mesh: TetMesh) -> Fidelity:
 
 
 def _distance(points: FloatArray, triangles: IntArray, queries: FloatArray) -> float:
-    """Farthest that queries (q, 3) lie from a surface, mm; its large triangles are cut first."""
-    size = float(np.median(np.linalg.norm(np.ptp(points[triangles], axis=1), axis=1)))
-    corners = points[triangles]
-    for _ in range(12):
-        sides = np.linalg.norm(corners - np.roll(corners, 1, axis=1), axis=2)
-        large = sides.max(axis=1) > 4.0 * size
-        if not large.any() or len(corners) > 400_000:
-            break
-        corners = np.concatenate([corners[~large], _halved(corners[large], sides[large])])
-    rows = np.arange(3 * len(corners)).reshape(-1, 3)
-    found = nearest_on_triangles(corners.reshape(-1, 3), rows, queries)
-    return float(found.distance.max())
-
-
-def _halved(corners: FloatArray, sides: FloatArray) -> FloatArray:
-    """Triangles (t, 3, 3) cut in two across their longest side; side k ends at corner k."""
-    end = sides.argmax(axis=1)
-    row = np.arange(len(corners))
-    a, b, c = (corners[row, (end + k) % 3] for k in (0, 1, 2))  # the longest side joins c and a
-    middle = 0.5 * (a + c)
-    return np.concatenate([np.stack([a, b, middle], 1), np.stack([middle, b, c], 1)])
+    """Farthest that queries (q, 3) lie from a surface, mm."""
+    return float(nearest_on_triangles(points, triangles, queries).distance.max())

@@ -124,7 +124,7 @@ def cut_strands(
     if outside > most_outside * own.sum():
         raise InputError(
             f"fibre must lie inside the mesh; {outside:.4g} mm of {own.sum():.4g} mm lie "
-            f"outside ({100 * outside / own.sum():.2g} %, allowed {100 * most_outside:g} %): "
+            f"outside ({100 * outside / own.sum():.3g} %, allowed {100 * most_outside:g} %): "
             "give paths and mesh in the same frame and unit"
         )
     before = np.cumsum(length) - length

@@ -334,3 +334,14 @@ def test_an_edge_longer_than_the_part_is_thick_is_pointed_out(folder, height, sa
     assert len(about) == said
     if said:
         assert about[0].startswith("edge_length 2 mm is longer than the part is thick, 1.5 mm: ")
+
+
+@pytest.mark.parametrize(("modulus", "said"), [(3500.0, False), (3.5, True), (3.5e9, True)])
+def test_a_modulus_in_another_unit_is_pointed_out(folder, modulus, said):
+    material = f"\n[material]\nmodulus = {modulus}\npoisson = 0.35\n"
+    case = read(folder, PART.replace('material = "pla"\n', "") + material)
+    about = [line for line in case.findings if "modulus" in line]
+    assert len(about) == said
+    if said:
+        assert f"a modulus of {modulus:.4g} MPa" in about[0]
+        assert about[0].endswith("give it in MPa (1 GPa = 1000 MPa)")

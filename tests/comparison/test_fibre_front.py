@@ -78,6 +78,13 @@ def test_marked_are_those_that_none_with_as_little_fibre_exceeds():
     assert front.strongest.tolist() == [True, False, True, False, False]
 
 
+def test_plans_that_fail_before_the_part_without_fibre_are_not_marked():
+    points = (point(1, 500.0, 500.0, 1.4, 80.0), point(1, 900.0, 900.0, 2.0, 120.0))
+    front = FibreFront("bar", "zigzag", points, {}, bare=100.0)
+    assert front.strongest.tolist() == [False, True]
+    assert front.stiffest.tolist() == [True, True]
+
+
 def test_table_and_picture_show_every_plan(front, tmp_path):
     front.to_frame().to_csv(tmp_path / "front.csv", index=False)
     with (tmp_path / "front.csv").open() as file:

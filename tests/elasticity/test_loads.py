@@ -140,6 +140,8 @@ def test_total_of_a_force_is_its_vector(vector):
     ("load", "message"),
     [
         (Force("x_max", (0.0, 0.0, 0.0)), "must not be zero"),
+        (Force("x_max", (1e-300, 0.0, 0.0)), "must not be zero"),
+        (Force("x_max", (1e300, 0.0, 0.0)), "must be at most 1e[+]12"),
         (Pressure("x_max", 0.0), "must not be zero"),
         (Force("x_max", (NAN, 0.0, 0.0)), "must be finite"),
         (PointForce((NAN, 0.0, 0.0), (1.0, 0.0, 0.0)), "must be finite"),

@@ -69,6 +69,7 @@ def test_the_frame_is_named(written):
         ("x,y,z,path,layer\n0,0,zero,1,0\n", r"line 2: expected numbers .*; got '0,0,zero,1,0'"),
         ("x,y,z,path,layer\n0,0,0,1.5,0\n", "the last two whole"),
         ("x,y,z,path,layer\n0,0,nan,1,0\n", "line 2"),
+        ("x,y,z,path,layer\n0,0,0,1e300,0\n", "line 2"),
         ("x,y,z,path,layer\n0,0\n", "line 2"),
         ("x,y,z,path,layer\n0,0,0,1,0\n", "path 1 has one point"),
         ("x,y,z,path,layer\n0,0,0,1,0\n1,0,0,1,1\n", "a path lies on one layer"),
@@ -79,6 +80,21 @@ def test_a_bad_table_is_one_line(written, text, said):
     with pytest.raises(InputError, match=said) as found:
         read_path_table(written(text), np.eye(3), UP)
     assert "\n" not in str(found.value)
+
+
+def test_points_beyond_any_printer_are_refused(written):
+    table = written("x,y,z,path,layer\n0,0,0,1,0\n1e30,0,0,1,0\n")
+    with pytest.raises(InputError, match=r"within 100000 mm; got a coordinate of 1e\+30 mm"):
+        read_paths(table, np.eye(3))
+    waypoints = written(";Layer_CCF: 0\nS\nX0 Y1e9 Z2\nX10 Y1 Z2\nE\n", "way.txt")
+    with pytest.raises(InputError, match=r"got a coordinate of 1e\+09 mm"):
+        read_paths(waypoints, np.eye(3))
+
+
+def test_paths_without_length_are_refused(written):
+    table = written(TABLE + "3,4,3,11,1\n3,4,3,11,1\n")
+    with pytest.raises(InputError, match=r"1 of 4 paths have no length, the first at \(3, 4, 3\)"):
+        read_paths(table, np.eye(3))
 
 
 def test_a_missing_file_is_one_line(tmp_path):

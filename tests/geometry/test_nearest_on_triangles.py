@@ -33,3 +33,28 @@ def test_no_sample_of_the_surface_is_nearer():
     assert (sampled - found.distance).max() < 0.35
     np.testing.assert_allclose(found.weights.sum(axis=1), 1.0)
     assert found.weights.min() >= 0.0
+
+
+def test_large_triangles_beside_many_small_ones_are_found():
+    """A wall of two triangles, and a fine patch beside it whose middles are all nearer."""
+    small, corners = wavy(4000)
+    small = small * [0.1, 0.1, 0.0] + [0.0, 0.0, 1.0]
+    wall = np.array([[-500.0, -500, 0], [500, -500, 0], [500, 500, 0], [-500, 500, 0]])
+    points = np.concatenate([small, wall])
+    triangles = np.concatenate([corners, len(small) + np.array([[0, 1, 2], [0, 2, 3]])])
+    queries = np.random.default_rng(8).uniform([0.1, 0.1, 0.0], [1.9, 1.9, 1.0], (300, 3))
+    found = nearest_on_triangles(points, triangles, queries)
+    np.testing.assert_allclose(found.distance, np.minimum(queries[:, 2], 1.0 - queries[:, 2]))
+    assert (found.triangle >= len(corners)).any()
+
+
+def test_a_fan_of_many_slivers_has_its_nearest_one_found():
+    """Five hundred slivers meet in a corner far away: their middles say little of what is near."""
+    rim = np.linspace(0.0, 10.0, 501)
+    points = np.concatenate(
+        [[[200.0, 5.0, 0.0]], np.column_stack([np.zeros(501), rim, np.zeros(501)])]
+    )
+    triangles = np.column_stack([np.zeros(500, int), np.arange(1, 501), np.arange(2, 502)])
+    queries = np.column_stack([np.full(50, 1.0), np.linspace(0.5, 9.5, 50), np.zeros(50)])
+    found = nearest_on_triangles(points, triangles, queries)
+    np.testing.assert_allclose(found.distance, 0.0, atol=1e-9)

@@ -122,6 +122,12 @@ def test_all_mistakes_come_at_once():
     assert "a load must not be zero" in found.mistakes[1]
 
 
+def test_a_table_without_rows_is_left_out():
+    said = str(checked([Force("x_max", (0.0, 0.0, 0.0))]))
+    assert "a load must not be zero" in said
+    assert "DataFrame" not in said
+
+
 def test_a_part_file_names_all_its_mistakes(tmp_path):
     path = tmp_path / "part.toml"
     path.write_text(

@@ -11,7 +11,7 @@ from ccfem.elasticity.part_stress import PartStress
 from ccfem.errors import InputError, shown
 from ccfem.layers.layer import Layer
 from ccfem.layers.level_cut import border_edges, chain, cut_at_zero, patch_edges
-from ccfem.layers.pitch import check_pitch
+from ccfem.layers.pitch import check_heights, check_pitch
 from ccfem.layers.plane import Plane, plane_frame
 from ccfem.layers.slicer import Vector
 from ccfem.machine.machine import Machine
@@ -94,6 +94,10 @@ class Planar:
         InputError
             As of `cut`, and when layers are nearer than a strand of the machine is high.
         """
+        if self.heights is None:  # before thousands of layers are cut
+            check_heights(
+                self._stack(stress.mesh, plane_frame(_AXES.get(self.axis, build))), machine
+            )
         layers = self.cut(stress.mesh, build)
         check_pitch(layers, machine)
         return layers
@@ -120,10 +124,7 @@ class Planar:
         frame = plane_frame(_AXES.get(self.axis, build))
         level = mesh.points @ frame[2]
         lowest, highest = float(level[mesh.corners].min()), float(level[mesh.corners].max())
-        if self.heights is None:
-            stack = slice_heights(lowest, highest, self.count, self.thickness)
-        else:
-            stack = np.array(self.heights)
+        stack = self._stack(mesh, frame)
         if stack[0] < lowest or stack[-1] > highest:
             outside = stack[0] if stack[0] < lowest else stack[-1]
             raise InputError(
@@ -136,6 +137,13 @@ class Planar:
             for k, h in enumerate(stack)
         )
         return tuple(layer for layer in layers if layer is not None)
+
+    def _stack(self, mesh: TetMesh, frame: FloatArray) -> FloatArray:
+        """Heights of the layers along the build direction, rising, mm."""
+        if self.heights is not None:
+            return np.array(self.heights)
+        level = mesh.points[mesh.corners] @ frame[2]
+        return slice_heights(float(level.min()), float(level.max()), self.count, self.thickness)
 
 
 def slice_heights(

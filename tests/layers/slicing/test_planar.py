@@ -144,3 +144,13 @@ def test_layers_are_no_nearer_than_their_fibre_is_high() -> None:
     layers = Planar(count=50).cut(mesh)
     with pytest.raises(InputError, match="use fewer layers"):
         plan(create("zigzag"), layers, stress, machine)
+
+
+def test_far_too_many_layers_are_refused_before_any_is_cut(monkeypatch) -> None:
+    mesh = box_mesh((20.0, 20.0, 5.0), (4, 4, 2))
+    stress = GivenStress(
+        mesh, np.zeros((len(mesh.cells), 3, 3)), np.zeros((len(mesh.points), 3, 3))
+    )
+    monkeypatch.setattr("ccfem.layers.slicing.planar._cut", None)
+    with pytest.raises(InputError, match=r"got 5e-05 mm between those at .* use fewer layers"):
+        Planar(count=100_000)(stress, (0.0, 0.0, 1.0), Machine())
