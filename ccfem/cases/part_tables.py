@@ -36,6 +36,7 @@ RULES: dict[str, Callable[..., PatchRule]] = {
     "holes": Holes,
 }
 """Rules of patches by their name."""
+
 _SOFTEST, _STIFFEST = 5.0, 1e6
 """Moduli, MPa, of the softest elastomers and the stiffest fibres; in GPa plastics are below."""
 
