@@ -9,6 +9,8 @@ from ccfem.arrays import FloatArray, freeze, in_brief
 from ccfem.checks import check_known
 from ccfem.fibre_aware.cases_bound import OBJECTIVES, WORST
 from ccfem.fibre_aware.judges import Judge, Judged
+from ccfem.fibre_aware.strain_worth import StrainWorth
+from ccfem.fibre_aware.strength_value import Worth, layer_normal
 from ccfem.layers.layer import Layer
 from ccfem.machine.machine import Machine
 from ccfem.toolpaths import Toolpaths
@@ -119,23 +121,30 @@ def cases_judge(goal: CasesGoal, machine: Machine, strand: Strand | None = None)
     def judge(toolpaths: Toolpaths) -> Judged:
         mesh = goal.parts[0].unreinforced.mesh
         tested = test(cut_strands(toolpaths, mesh, machine=machine))
-        worth = goal.counts(tested.ratios) / tested.work
-        strains = [one.displacement for one in tested.found]
-        return Judged(goal.merit(tested.ratios), tuple(zip(worth.tolist(), strains, strict=True)))
+        counts = goal.counts(tested.ratios) / tested.work
+        worths = _stiff_worths(counts, [one.displacement for one in tested.found])
+        return Judged(goal.merit(tested.ratios), lambda: worths)
 
     return judge
 
 
 def cases_strength_judge(
-    goal: CasesGoal, layers: Sequence[Layer], machine: Machine, strand: Strand, strength: float
+    goal: CasesGoal,
+    layers: Sequence[Layer],
+    machine: Machine,
+    strand: Strand,
+    strength: float,
+    for_both: bool = True,
 ) -> Judge:
     """Judge of paths by the stiffness in all load cases, and by the one that fails first.
 
     The value is ``merit^(1 - strength) factor^strength``, the factor being the least load at first
     failure over the load of its case. Where supports move that load is the one which they ask of
-    the part without fibre.
+    the part without fibre. What fibre is worth by its strain is said for both, or else for the
+    stiffness alone.
     """
     known: list[FloatArray] = []
+    worth, axial = Worth.of(goal.parts, strand, strength), strand.stiffness(goal.parts[0].modulus)
     bare = [part.force(part.unreinforced.reactions) for part in goal.parts]
 
     def judge(toolpaths: Toolpaths) -> Judged:
@@ -145,11 +154,30 @@ def cases_strength_judge(
         loads = [one.load for one in cases_failure(tested, strand, layers=layers).each]
         factor = min(load / size for load, size in zip(loads, bare, strict=True))
         value = goal.merit(tested.ratios) ** (1.0 - strength) * factor**strength
-        work = [2.0 * one.solution.strain_energy for one in tested.tests]
-        worth = goal.counts(tested.ratios) / work
-        return Judged(value, tuple(zip(worth.tolist(), tuple(known), strict=True)))
+        strands, displaced = tested.tests[0].strands, tuple(known)
+        normal, counts = layer_normal(toolpaths), goal.counts(tested.ratios)
+
+        def strain_worths() -> tuple[StrainWorth, ...]:
+            if not for_both:
+                work = [2.0 * one.solution.strain_energy for one in tested.tests]
+                return _stiff_worths(counts / work, displaced)
+            found = [
+                equilibrium(part, strands, axial, known=(u,), tolerance=_TOLERANCE)
+                for part, u in zip(goal.parts, displaced, strict=True)
+            ]
+            return worth.strain_worths(strands, found, normal, counts)
+
+        return Judged(value, strain_worths)
 
     return judge
+
+
+def _stiff_worths(
+    counts: FloatArray, displacements: Sequence[FloatArray]
+) -> tuple[StrainWorth, ...]:
+    """Worth of fibre by its strain that counts so much in the stiffness of each load case."""
+    pairs = zip(counts.tolist(), displacements, strict=True)
+    return tuple(StrainWorth(count, displacement) for count, displacement in pairs)
 
 
 def _work(part: Specimen, found: Equilibrium) -> float:

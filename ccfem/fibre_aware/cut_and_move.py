@@ -27,6 +27,9 @@ _SHARES = (0.0, 0.5, 1.0)
 _ALL_WAYS = 2
 """Candidates that are cut in all these ways; the others are cut for the stiffness alone."""
 
+_FOR_BOTH = (False, True)
+"""Whether moves follow stiffness and strength, or else the stiffness alone."""
+
 _Cut = Callable[[Toolpaths, float, int], Toolpaths]
 """Cuts toolpaths to a length, with how much strength counts, by a number of tests."""
 
@@ -45,19 +48,21 @@ def prune_and_move(
 ) -> Toolpaths:
     """Cut fibre to a length, mm in all, move what is left, and cut what has become longer.
 
-    Of several candidates each is cut, and the stiffest moved; with strength that of most worth.
-    Parameters as of `ccfem.fibre_aware.prune.prune` and `ccfem.fibre_aware.strand_moves.moved`.
-    Moves follow the stiffness; what they are worth with strength is tested.
+    Of several candidates each is cut, and the stiffest moved; with strength that of most worth,
+    once for the stiffness and once for both: a test chooses. Parameters as of
+    `ccfem.fibre_aware.prune.prune` and `ccfem.fibre_aware.strand_moves.moved`.
     """
 
     def cut(toolpaths: Toolpaths, share: float, tests: int) -> Toolpaths:
         return prune(toolpaths, part, length, machine, strand, tests, share, tight)
 
-    judge = stiffness_judge(part, machine, strand)
+    mesh = part.unreinforced.mesh
+    judges: tuple[Judge, ...] = (stiffness_judge(part, machine, strand),)
     if strength:
-        judge = strength_judge(part, layers, machine, strand, strength)
-    kept = best_cut(candidates, cut, judge, strength, rounds)
-    return _moved(kept, layers, part.unreinforced.mesh, machine, cut, judge, strength, moves, tight)
+        how = (part, layers, machine, strand, strength)
+        judges = tuple(strength_judge(*how, for_both) for for_both in _FOR_BOTH)
+    kept = best_cut(candidates, cut, judges[0], strength, rounds)
+    return _moved(kept, layers, mesh, machine, cut, judges, moves, tight)
 
 
 def prune_and_move_cases(
@@ -81,11 +86,13 @@ def prune_and_move_cases(
     def cut(toolpaths: Toolpaths, share: float, tests: int) -> Toolpaths:
         return prune_cases(toolpaths, goal, length, machine, strand, tests, share, tight)
 
-    judge, mesh = cases_judge(goal, machine, strand), goal.parts[0].unreinforced.mesh
+    mesh = goal.parts[0].unreinforced.mesh
+    judges: tuple[Judge, ...] = (cases_judge(goal, machine, strand),)
     if strength:
-        judge = cases_strength_judge(goal, layers, machine, strand, strength)
-    kept = best_cut(candidates, cut, judge, strength, rounds)
-    return _moved(kept, layers, mesh, machine, cut, judge, strength, moves, tight)
+        how = (goal, layers, machine, strand, strength)
+        judges = tuple(cases_strength_judge(*how, for_both) for for_both in _FOR_BOTH)
+    kept = best_cut(candidates, cut, judges[0], strength, rounds)
+    return _moved(kept, layers, mesh, machine, cut, judges, moves, tight)
 
 
 def best_cut(
@@ -123,14 +130,18 @@ def _moved(
     mesh: TetMesh,
     machine: Machine,
     cut: _Cut,
-    judge: Judge,
-    strength: float,
+    judges: Sequence[Judge],
     moves: int,
     tight: float,
 ) -> Toolpaths:
-    """Move what was kept, and cut what has become longer."""
-    found = moved(kept, layers, mesh, machine, judge, moves, radius=kept_radius(machine, tight))
-    if found is kept:
+    """Move what was kept, once as each judge says, and cut what has become longer.
+
+    Of several judges the first says which is worth most, or that what was kept is.
+    """
+    radius, found = kept_radius(machine, tight), []
+    for judge in judges:
+        slid = moved(kept, layers, mesh, machine, judge, moves, radius=radius)
+        found += [] if slid is kept else [cut(slid, 0.0, 1)]
+    if not found:
         return kept
-    shorter = cut(found, 0.0, 1)
-    return stiffest((shorter, kept), judge) if strength else shorter
+    return stiffest([*found, kept], judges[0]) if len(judges) > 1 else found[0]

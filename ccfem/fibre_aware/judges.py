@@ -7,6 +7,8 @@ from typing import TypeAlias
 import numpy as np
 
 from ccfem.arrays import FloatArray, in_brief
+from ccfem.fibre_aware.strain_worth import StrainWorth
+from ccfem.fibre_aware.strength_value import Worth, layer_normal
 from ccfem.layers.layer import Layer
 from ccfem.machine.machine import Machine
 from ccfem.toolpaths import Toolpaths
@@ -31,13 +33,13 @@ class Judged:
     ----------
     value : float
         What is to grow.
-    strains_of : tuple of (float, (n, 3) array)
-        What a squared strain is worth, and the displacement, mm, that strains the fibre; one for
-        each load case.
+    strain_worths : callable
+        Says what fibre is worth by its strain, for each load case. With strength that takes further
+        solves, so nobody is told who does not ask.
     """
 
     value: float
-    strains_of: tuple[tuple[float, FloatArray], ...]
+    strain_worths: Callable[[], tuple[StrainWorth, ...]]
 
     __repr__ = in_brief
 
@@ -56,25 +58,41 @@ def stiffness_judge(part: Specimen, machine: Machine, strand: Strand | None = No
         u = found.displacement
         known[:] = [u]
         energy = 0.5 * float(u.reshape(-1) @ (found.matrix @ u.reshape(-1)))
-        return Judged(part.stiffness(u, energy), ((1.0, u),))
+        return Judged(part.stiffness(u, energy), lambda: (StrainWorth(1.0, u),))
 
     return judge
 
 
 def strength_judge(
-    part: Specimen, layers: Sequence[Layer], machine: Machine, strand: Strand, strength: float
+    part: Specimen,
+    layers: Sequence[Layer],
+    machine: Machine,
+    strand: Strand,
+    strength: float,
+    for_both: bool = True,
 ) -> Judge:
     """Judge of paths by the stiffness and the load at first failure.
 
     The value is ``ratio^(1 - strength) load^strength``: a share of the one is worth as much as one
-    of the other where `strength` is a half.
+    of the other where `strength` is a half. What fibre is worth by its strain is said for both, or
+    else for the stiffness alone.
     """
+    worth = Worth.of((part,), strand, strength)
 
     def judge(toolpaths: Toolpaths) -> Judged:
         tested = virtual_test(toolpaths, part, strand, span=(), machine=machine)
         failed = first_failure(tested, strand, layers=layers)
-        worth = tested.ratio ** (1.0 - strength) * failed.load**strength
-        return Judged(float(worth), ((1.0, tested.solution.displacement),))
+        value = tested.ratio ** (1.0 - strength) * failed.load**strength
+        strands, normal = tested.strands, layer_normal(toolpaths)
+
+        def strain_worths() -> tuple[StrainWorth, ...]:
+            if not for_both:
+                return (StrainWorth(1.0, tested.solution.displacement),)
+            axial, near = strand.stiffness(part.modulus), (tested.solution.displacement,)
+            found = equilibrium(part, strands, axial, known=near, tolerance=_TOLERANCE)
+            return worth.strain_worths(strands, (found,), normal)
+
+        return Judged(float(value), strain_worths)
 
     return judge
 

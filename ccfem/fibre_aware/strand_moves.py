@@ -1,8 +1,9 @@
 """Strands moved sideways to where they make the part stiffer.
 
 The stiffness that a strand lends grows where it slides to fibre that is stretched more, and the
-strain of one virtual test says which way that is. A step along that slope is spread until strands
-keep their distances again, and tested: only what makes the part stiffer stays.
+strain of one virtual test says which way that is; with the load at first failure an adjoint solve
+does. A step along that slope is spread until strands keep their distances again, and tested: only
+what makes the part better stays.
 """
 
 from collections.abc import Sequence
@@ -130,17 +131,17 @@ def _direction(
     judged: Judged,
     smooth: Any,
 ) -> FloatArray:
-    """Direction (P,) of slides that ascends the energy in the fibre less the price of its length.
+    """Direction (P,) of slides that ascends the worth of the fibre less the price of its length.
 
     95 % of the points move by at most 1, and none by more than 2.
     """
     points = lines.points(slide)
-    strain = plane_strain(mesh, judged.strains_of, lines.frame)
+    strain = plane_strain(mesh, judged.strain_worths(), lines.frame)
     energy, length, slope = fibre_energy(points, lines.heights, lines.offsets, strain)
     squared = energy / np.where(length > 0.0, length, 1.0)
     order = np.argsort(squared, kind="stable")
     along = np.cumsum(length[order])
-    price = squared[order][np.searchsorted(along, _CHEAPEST * along[-1])]
+    price = max(float(squared[order][np.searchsorted(along, _CHEAPEST * along[-1])]), 0.0)
     step = np.diff(points, axis=0) * (lines.path[1:] == lines.path[:-1])[:, None]
     size = np.linalg.norm(step, axis=1)
     step *= price / np.where(size > 0.0, size, 1.0)[:, None]

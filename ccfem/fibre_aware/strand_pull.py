@@ -1,7 +1,8 @@
-"""Where the strain pulls strands: the energy in stretched fibre, and its gradient by their points.
+"""Where the strain pulls strands: what stretched fibre is worth, and its gradient by their points.
 
 Sliding a piece of fibre with the strain held makes the part stiffer, to first order, by what the
-energy of that piece grows. The strain of linear cells jumps from cell to cell and has no slope in
+energy of that piece grows; where the load at first failure counts, too, what it is worth for both
+grows (`StrainWorth`). The strain of linear cells jumps from cell to cell and has no slope in
 them; it is averaged at the corners of the cells and linear between them.
 """
 
@@ -14,10 +15,12 @@ from numba import njit
 from ccfem.arrays import FloatArray, IntArray, freeze, in_brief
 from ccfem.elasticity.assembly import cell_gradients
 from ccfem.elasticity.recovery import strain_at_nodes
+from ccfem.fibre_aware.strain_worth import StrainWorth
 from ccfem.geometry.locate import locate
 from ccfem.geometry.polylines import starts_segment
 from ccfem.mesh.tet_mesh import TetMesh
 from ccfem.tensor import in_plane, strain_from_voigt
+from ccfem.virtual_testing.near_failure import POWER
 
 __all__ = ["PlaneStrain", "fibre_energy", "plane_strain"]
 
@@ -35,8 +38,12 @@ class PlaneStrain:
     frame : (3, 3) array
         Axes of the layers: two in their planes, and the normal.
     values : (cases, n, 3) array
-        At the nodes, e11, e22 and e12 in the plane, times the square root of what the case counts.
-        Zero at nodes that are no corner of a cell.
+        At the nodes, e11, e22 and e12 in the plane, times the square root of what it is worth
+        squared. Zero at nodes that are no corner of a cell.
+    pairs : (k, 2, n, 3) array
+        The same, as it is and of the adjoint displacement, of cases where strength counts.
+    terms : (k, 3) array
+        Their `StrainWorth.mixed`, `peak` and `most`.
     slopes : (m, 4, 2) array, 1/mm
         Gradients of the barycentric coordinates of each cell in the plane.
     """
@@ -44,38 +51,46 @@ class PlaneStrain:
     mesh: TetMesh
     frame: FloatArray
     values: FloatArray
+    pairs: FloatArray
+    terms: FloatArray
     slopes: FloatArray
 
     __repr__ = in_brief
 
     def __post_init__(self) -> None:
-        freeze(self, frame=float, values=float, slopes=float)
+        freeze(self, frame=float, values=float, pairs=float, terms=float, slopes=float)
 
 
-def plane_strain(
-    mesh: TetMesh, strains_of: Sequence[tuple[float, FloatArray]], frame: FloatArray
-) -> PlaneStrain:
+def plane_strain(mesh: TetMesh, worths: Sequence[StrainWorth], frame: FloatArray) -> PlaneStrain:
     """Average the strain of displacements at the corners of the cells, weighted by volume.
 
     Parameters
     ----------
     mesh : TetMesh
-    strains_of : sequence of (float, (n, 3) array)
-        What a squared strain is worth, and the displacement, mm, that strains the part; one for
-        each load case.
+    worths : sequence of StrainWorth
+        One for each load case.
     frame : (3, 3) array
         Axes of the layers.
     """
     corners, n = mesh.corners, len(mesh.points)
     weight = np.repeat(mesh.volumes, 4)
     total = np.bincount(corners.ravel(), weight, n)
-    values = []
-    for worth, displacement in strains_of:
+
+    def at_nodes(displacement: FloatArray, factor: float = 1.0) -> FloatArray:
         tensor = strain_from_voigt(strain_at_nodes(mesh, displacement)[:, :4])
-        strain = np.sqrt(worth) * in_plane(tensor, frame).reshape(-1, 3)
-        at_nodes = [np.bincount(corners.ravel(), weight * part, n) for part in strain.T]
-        values.append(np.stack(at_nodes, axis=1) / np.where(total > 0.0, total, 1.0)[:, None])
-    return PlaneStrain(mesh, frame, np.array(values), cell_gradients(mesh) @ frame[:2].T)
+        strain = factor * in_plane(tensor, frame).reshape(-1, 3)
+        sums = [np.bincount(corners.ravel(), weight * part, n) for part in strain.T]
+        return np.stack(sums, axis=1) / np.where(total > 0.0, total, 1.0)[:, None]
+
+    values = [at_nodes(one.displacement, float(np.sqrt(one.squared))) for one in worths]
+    pairs, terms = np.zeros((0, 2, n, 3)), np.zeros((0, 3))
+    for one in worths:
+        if one.adjoint is not None:
+            pair = np.stack([at_nodes(one.displacement), at_nodes(one.adjoint)])
+            pairs = np.concatenate([pairs, pair[None]])
+            terms = np.concatenate([terms, [[one.mixed, one.peak, one.most]]])
+    slopes = cell_gradients(mesh) @ frame[:2].T
+    return PlaneStrain(mesh, frame, np.array(values), pairs, terms, slopes)
 
 
 def fibre_energy(
@@ -84,7 +99,8 @@ def fibre_energy(
     """Energy in the stretched segments of polylines, and how it changes with their points.
 
     A segment d has the energy ``max(d . eps d, 0)^2 / |d|^3``, eps being the strain at its middle:
-    its length times the square of the strain along it. All load cases add.
+    its length times the square of the strain along it. All load cases add. Where strength counts it
+    is the length times `StrainWorth.value`.
 
     Parameters
     ----------
@@ -111,18 +127,10 @@ def fibre_energy(
     cell, weights = locate(strain.mesh.points, strain.mesh.corners, places, _REACH)
     energy, length = np.zeros(len(first)), np.zeros(len(first))
     gradient = np.zeros(points.shape)
-    _energy(
-        points,
-        first,
-        cell,
-        weights,
-        strain.mesh.corners,
-        strain.slopes,
-        strain.values,
-        energy,
-        length,
-        gradient,
-    )
+    at = (points, first, cell, weights, strain.mesh.corners, strain.slopes)
+    _energy(*at, strain.values, energy, length, gradient)
+    if len(strain.pairs):
+        _strength(*at, strain.pairs, strain.terms, POWER, energy, gradient)
     return energy, length, gradient
 
 
@@ -160,3 +168,47 @@ def _energy(points, first, cell, weights, corners, slopes, values, energy, lengt
             gradient[i, 1] += slide * qy - turn * ey + fall * dy
             gradient[i + 1, 0] += slide * qx + turn * ex - fall * dx
             gradient[i + 1, 1] += slide * qy + turn * ey - fall * dy
+
+
+@njit(cache=True)
+def _strength(points, first, cell, weights, corners, slopes, pairs, terms, power, energy, gradient):  # type: ignore[no-untyped-def]  # pragma: no cover
+    for s in range(len(first)):
+        i, c = first[s], cell[s]
+        dx, dy = points[i + 1, 0] - points[i, 0], points[i + 1, 1] - points[i, 1]
+        size = np.sqrt(dx * dx + dy * dy)
+        if c < 0 or size == 0.0:
+            continue
+        square = size * size
+        for k in range(len(pairs)):
+            # Strain along the segment, its slopes with the place and with the segment: of both.
+            strain, px, py, tx, ty = np.zeros(2), np.zeros(2), np.zeros(2), np.zeros(2), np.zeros(2)
+            for j in range(2):
+                e1, e2, e12 = 0.0, 0.0, 0.0
+                for a in range(4):
+                    n = corners[c, a]
+                    v1, v2, v12 = pairs[k, j, n, 0], pairs[k, j, n, 1], pairs[k, j, n, 2]
+                    e1 += weights[s, a] * v1
+                    e2 += weights[s, a] * v2
+                    e12 += weights[s, a] * v12
+                    along = (v1 * dx * dx + v2 * dy * dy + 2.0 * v12 * dx * dy) / square
+                    px[j] += along * slopes[c, a, 0]
+                    py[j] += along * slopes[c, a, 1]
+                ex, ey = e1 * dx + e12 * dy, e12 * dx + e2 * dy
+                strain[j] = (dx * ex + dy * ey) / square
+                tx[j] = 2.0 * (ex - strain[j] * dx) / square
+                ty[j] = 2.0 * (ey - strain[j] * dy) / square
+            if strain[0] <= 0.0:
+                continue
+            mixed, peak, most = terms[k, 0], terms[k, 1], terms[k, 2]
+            near = peak * (strain[0] / most) ** power
+            worth = mixed * strain[0] * strain[1] - near
+            by, by_adjoint = mixed * strain[1] - power * near / strain[0], mixed * strain[0]
+            energy[s] += size * worth
+            slide_x = 0.5 * size * (by * px[0] + by_adjoint * px[1])
+            slide_y = 0.5 * size * (by * py[0] + by_adjoint * py[1])
+            turn_x = size * (by * tx[0] + by_adjoint * tx[1]) + worth * dx / size
+            turn_y = size * (by * ty[0] + by_adjoint * ty[1]) + worth * dy / size
+            gradient[i, 0] += slide_x - turn_x
+            gradient[i, 1] += slide_y - turn_y
+            gradient[i + 1, 0] += slide_x + turn_x
+            gradient[i + 1, 1] += slide_y + turn_y

@@ -14,6 +14,7 @@ import numpy as np
 from ccfem.arrays import FloatArray, in_brief
 from ccfem.checks import check_number
 from ccfem.elasticity.solvers import preconditioned_cg
+from ccfem.fibre_aware.strain_worth import StrainWorth
 from ccfem.toolpaths import Toolpaths
 from ccfem.virtual_testing.bars import Bars, bars
 from ccfem.virtual_testing.equilibrium import Equilibrium
@@ -38,6 +39,9 @@ _LITTLE = 1e-3
 
 _TOLERANCE = 1e-4
 """Relative residual of the adjoint solve."""
+
+_NONE = 1e-300
+"""In place of nothing, where it is divided by."""
 
 
 def layer_normal(toolpaths: Toolpaths) -> FloatArray | None:
@@ -109,7 +113,23 @@ class Worth:
         """Value of each piece of fibre, (s,), per mm; negative where the part is better without.
 
         It is the first-order change of ``(1 - w) log(stiffness) + w log(load at first failure)``
-        with the length of the piece.
+        with the length of the piece. Parameters and errors as of `strain_worths`.
+        """
+        pieces = bars(strands, self.parts[0].system.problem.mesh)
+        value = np.zeros(len(strands.length))
+        for one in self.strain_worths(strands, found, normal, counts):
+            assert one.adjoint is not None
+            value += one.value(pieces.strain(one.displacement), pieces.strain(one.adjoint))
+        return value
+
+    def strain_worths(
+        self,
+        strands: Strands,
+        found: Sequence[Equilibrium],
+        normal: FloatArray | None = None,
+        counts: FloatArray | None = None,
+    ) -> tuple[StrainWorth, ...]:
+        """Find what fibre is worth by its strain in each load case: these worths add up.
 
         Parameters
         ----------
@@ -120,36 +140,44 @@ class Worth:
             Of all layers. Without it the bond between layers does not count.
         counts : (n,) array, optional
             How much each load case counts in the stiffness, 1 in all; default equally.
+
+        Raises
+        ------
+        InputError
+            Where no fibre is stretched.
         """
-        each = np.full(len(found), 1.0 / len(found)) if counts is None else counts
-        axial = self.strand.stiffness(self.parts[0].modulus)
+        share = np.full(len(found), 1.0 / len(found)) if counts is None else counts
+        axial, w = self.strand.stiffness(self.parts[0].modulus), self.strength
         pieces = bars(strands, self.parts[0].system.problem.mesh)
         length = strands.length * strands.share
         strains = [pieces.strain(one.displacement) for one in found]
         check_stretched(strains)
         works = [_work(one) for one in found]
         peaks: dict[tuple[int, str], Peak] = {}
-        thinned: list[FloatArray] = []
         for k, (judge, one, strain) in enumerate(zip(self.judges, found, strains, strict=True)):
-            fibre, own = _fibre(pieces, length, strain, one.displacement, self.limits.fibre / axial)
-            thinned.append(own)
+            fibre = _fibre(pieces, length, strain, one.displacement, self.limits.fibre / axial)
             of_case = judge.peaks(one.displacement, fibre, self.limits, normal)
             load = _load_share(self.parts[k], works[k])
             peaks |= {(k, name): peak.over(load) for name, peak in of_case.items()}
-        factors = {key: one.index / one.norm for key, one in peaks.items()}
-        failing = nearness(peaks, factors)[1]
-        value = np.zeros(len(strands.length))
-        for k, (part, one, work) in enumerate(zip(self.parts, found, works, strict=True)):
-            own_peaks = {name: failing[i, name] for i, name in failing if i == k}
-            loads = [count * peaks[k, name].by_displacement for name, count in own_peaks.items()]
-            adjoint = pieces.strain(_respond(part, one, np.sum(loads, axis=0)))
-            stiff = np.where(one.carries, axial * one.strain**2, 0.0) / work
-            strong = np.where(one.carries, axial * one.strain * adjoint, 0.0)
-            strong -= own_peaks.get("fibre", 0.0) * thinned[k]
-            if part.held.value.any():  # the load grows with the stiffness where supports move
-                strong += sum(own_peaks.values()) * stiff
-            value += (1.0 - self.strength) * each[k] * stiff + self.strength * strong
-        return value
+        failing = nearness(peaks, {key: one.index / one.norm for key, one in peaks.items()})[1]
+        worths = []
+        for k, (part, one, strain) in enumerate(zip(self.parts, found, strains, strict=True)):
+            own = {name: failing[case, name] for case, name in failing if case == k}
+            loads = [count * peaks[k, name].by_displacement for name, count in own.items()]
+            adjoint = _respond(part, one, np.sum(loads, axis=0))
+            # The load grows with the stiffness where supports move.
+            stiff = (1.0 - w) * share[k] + w * (sum(own.values()) if _moved(part) else 0.0)
+            most = max(float(strain.max(initial=0.0)), _NONE)
+            whole = float(length @ (np.maximum(strain, 0.0) / most) ** POWER)
+            peak = w * own.get("fibre", 0.0) / (POWER * max(whole, _NONE))
+            squared = float(stiff) * axial / works[k]
+            worths.append(StrainWorth(squared, one.displacement, w * axial, adjoint, peak, most))
+        return tuple(worths)
+
+
+def _moved(part: Specimen) -> bool:
+    """Whether supports that move load the part, and no forces."""
+    return bool(part.held.value.any())
 
 
 def _work(found: Equilibrium) -> float:
@@ -160,7 +188,7 @@ def _work(found: Equilibrium) -> float:
 
 def _load_share(part: Specimen, work: float) -> float:
     """Load over that of the part without fibre: 1 where forces load it."""
-    if not part.held.value.any():
+    if not _moved(part):
         return 1.0
     return work / (2.0 * part.unreinforced.strain_energy)
 
@@ -176,15 +204,10 @@ def _respond(part: Specimen, found: Equilibrium, load: FloatArray) -> FloatArray
 
 def _fibre(
     pieces: Bars, length: FloatArray, strain: FloatArray, displacement: FloatArray, limit: float
-) -> tuple[Peak | None, FloatArray]:
-    """Index of the fibre, and the derivative (s,) of its norm's logarithm by the length.
-
-    Where no fibre is stretched there is no index, and nothing to derive.
-    """
+) -> Peak | None:
+    """Index of the fibre; none where no fibre is stretched."""
     if not strain.max(initial=0.0) > 0.0:
-        return None, np.zeros(len(strain))
+        return None
     index, norm, counted = stretched_index(strain, length, limit)
     squared = np.where(strain > 0.0, strain, 1.0) ** 2 * pieces.length
-    forces = pieces.forces(counted / squared, displacement)
-    own = np.divide(counted, POWER * length, out=np.zeros_like(counted), where=length > 0.0)
-    return Peak(index, norm, forces), own
+    return Peak(index, norm, pieces.forces(counted / squared, displacement))

@@ -9,6 +9,7 @@ import shapely
 from ccfem.errors import InputError
 from ccfem.fibre_aware.cases_judges import CasesGoal, cases_judge
 from ccfem.fibre_aware.judges import stiffness_judge
+from ccfem.fibre_aware.strain_worth import StrainWorth
 from ccfem.fibre_aware.strand_lines import strand_lines
 from ccfem.fibre_aware.strand_moves import moved
 from ccfem.fibre_aware.strand_pull import fibre_energy, plane_strain
@@ -48,7 +49,7 @@ def test_energy_of_even_strain_is_length_times_strain_squared(bent_beam):
     stress, layers = bent_beam
     mesh, frame = stress.mesh, layers[0].plane.frame
     slope = np.array([[2e-3, 1e-3, 0.0], [4e-4, -1e-3, 0.0], [0.0, 0.0, 5e-4]])
-    strain = plane_strain(mesh, [(2.0, mesh.points @ slope.T)], frame)
+    strain = plane_strain(mesh, [StrainWorth(2.0, mesh.points @ slope.T)], frame)
     points = np.array([[10.0, 3.0], [25.0, 7.0]]) @ frame[:2, :2].T
     energy, length, _ = fibre_energy(points, np.full(2, 1.5), np.array([0, 2]), strain)
     direction = np.array([15.0, 4.0, 0.0]) / np.hypot(15.0, 4.0)
@@ -57,17 +58,38 @@ def test_energy_of_even_strain_is_length_times_strain_squared(bent_beam):
     assert energy[0] == pytest.approx(2.0 * along**2 * length[0], rel=1e-9)
 
 
-def test_slope_of_the_energy_is_its_difference(bent_beam):
+def test_energy_of_even_strain_with_strength_is_length_times_its_worth(bent_beam):
+    stress, layers = bent_beam
+    mesh, frame = stress.mesh, layers[0].plane.frame
+    slope = np.array([[2e-3, 1e-3, 0.0], [4e-4, -1e-3, 0.0], [0.0, 0.0, 5e-4]])
+    adjoint = np.array([[-3e-3, 0.0, 0.0], [0.0, 5e-4, 0.0], [0.0, 0.0, 0.0]])
+    points = np.array([[10.0, 3.0], [25.0, 7.0]]) @ frame[:2, :2].T
+    direction = np.array([15.0, 4.0, 0.0]) / np.hypot(15.0, 4.0)
+    along, other = direction @ slope @ direction, direction @ adjoint @ direction
+    one = StrainWorth(2.0, mesh.points @ slope.T, 3.0, mesh.points @ adjoint.T, 1e-6, 1.1 * along)
+    strain = plane_strain(mesh, [one], frame)
+    energy, length, _ = fibre_energy(points, np.full(2, 1.5), np.array([0, 2]), strain)
+    worth = 2.0 * along**2 + 3.0 * along * other - 1e-6 / 1.1**16
+    assert energy[0] == pytest.approx(worth * length[0], rel=1e-9)
+    assert one.value(np.array([along]), np.array([other]))[0] == pytest.approx(worth, rel=1e-9)
+    assert one.value(np.array([-along]), np.array([other]))[0] == 0.0
+
+
+@pytest.mark.parametrize("strength", [False, True])
+def test_slope_of_the_energy_is_its_difference(bent_beam, strength):
     stress, layers = bent_beam
     mesh, frame = stress.mesh, layers[0].plane.frame
     rng = np.random.default_rng(3)
     # Several load cases add; shortened segments have no energy and no slope.
-    cases = [(1.5, rng.normal(size=mesh.points.shape)), (0.5, stress.displacement)]
+    one, other, adjoint = rng.normal(size=(3, *mesh.points.shape))
+    cases = [StrainWorth(1.5, one), StrainWorth(0.5, stress.displacement)]
+    if strength:
+        cases += [StrainWorth(0.7, other, 2.0, adjoint, 0.3, 1.5), StrainWorth(0.0, one, 0.0, one)]
     strain = plane_strain(mesh, cases, frame)
     points = np.column_stack([np.linspace(5.0, 55.0, 40), rng.uniform(2.0, 22.0, 40)])
     heights, offsets = np.full(40, 1.3), np.array([0, 17, 40])
     energy, _, slope = fibre_energy(points, heights, offsets, strain)
-    assert 0 < (energy > 0.0).sum() <= 38
+    assert 0 < (energy != 0.0).sum() <= 38
     step = 1e-6
     for p, axis in [(0, 0), (5, 1), (16, 0), (17, 1), (30, 0), (39, 1)]:
         values = []
@@ -208,8 +230,8 @@ def test_worth_of_strain_in_several_cases_is_the_slope_of_the_value(two_bends):
     strands = cut_strands(paths, parts[0].unreinforced.mesh)
     pieces = bars(strands, parts[0].unreinforced.mesh)
     energy = sum(
-        worth * (strands.length @ np.maximum(pieces.strain(u), 0.0) ** 2)
-        for worth, u in values[0].strains_of
+        one.squared * (strands.length @ np.maximum(pieces.strain(one.displacement), 0.0) ** 2)
+        for one in values[0].strain_worths()
     )
     slope = (np.log(values[1].value) - np.log(values[0].value)) / (0.001 * parts[0].modulus)
     assert slope == pytest.approx(energy, rel=1e-3)

@@ -1,0 +1,50 @@
+"""What fibre is worth by its strain."""
+
+from dataclasses import dataclass
+
+import numpy as np
+
+from ccfem.arrays import FloatArray, freeze, in_brief
+from ccfem.virtual_testing.near_failure import POWER
+
+__all__ = ["StrainWorth"]
+
+
+@dataclass(frozen=True)
+class StrainWorth:
+    """What a mm of stretched fibre is worth by its strain e under one load case.
+
+    ``squared e^2 + mixed e a - peak (e / most)^16``, a being its strain in an adjoint displacement:
+    for the stiffness the first term alone; for the load at first failure also what it takes off the
+    places that fail first, and how near to failure it is itself. Fibre that is not stretched is
+    worth nothing.
+
+    Attributes
+    ----------
+    squared : float
+    displacement : (n, 3) array, mm
+    mixed : float
+    adjoint : (n, 3) array, mm, optional
+        None where nothing but the squared strain counts.
+    peak : float
+    most : float
+        The largest strain of the fibre.
+    """
+
+    squared: float
+    displacement: FloatArray
+    mixed: float = 0.0
+    adjoint: FloatArray | None = None
+    peak: float = 0.0
+    most: float = 1.0
+
+    __repr__ = in_brief
+
+    def __post_init__(self) -> None:
+        freeze(self, displacement=float, adjoint=float)
+
+    def value(self, strain: FloatArray, adjoint: FloatArray) -> FloatArray:
+        """Value (s,) of pieces of fibre, per mm, at strains (s,) of both displacements."""
+        stretch = np.maximum(strain, 0.0)
+        own = self.peak * (stretch / self.most) ** POWER
+        return np.asarray(self.squared * stretch**2 + self.mixed * stretch * adjoint - own)
