@@ -134,20 +134,19 @@ class Extraction:
             price = self._price(tried, counts, length)
             found = [(phases, 0.0) for phases in self.best_phases(tried, counts, length)]
             best = found[0][0]
-            most = sum(
-                count * self._gain(one[phase], price)
-                for one, count, phase in zip(tried, counts, best, strict=True)
-            )
-            gains = [
-                sum(
+
+            def gain(phases: tuple[int, ...], r: float) -> float:
+                return sum(
                     len(numbers)
                     * self._gain(self.profiles(paths(middle(numbers), phase, r)), price)
-                    for numbers, phase in zip(alike, best, strict=True)
+                    for numbers, phase in zip(alike, phases, strict=True)
                 )
-                for r in _REACHES
-            ]
-            if max(gains) > (1.0 + _BETTER) * most:
-                found.append((best, _REACHES[int(np.argmax(gains))]))
+
+            whole = len(best) * (0,)  # drawn to the border: their links may be all they lack
+            linked = [(phases, r) for phases in dict.fromkeys((best, whole)) for r in _REACHES]
+            gains = [gain(*way) for way in linked]
+            if max(gains) > (1.0 + _BETTER) * gain(best, 0.0):
+                found.append(linked[int(np.argmax(gains))])
             return found
 
         planned: dict[tuple[tuple[int, ...], float], Toolpaths] = {}

@@ -8,6 +8,7 @@ from ccfem.fibre_aware.smeared import SmearedPart
 from ccfem.fibre_aware.spline_grid import SplineGrid
 from ccfem.fibre_aware.stream_paths import Extraction, refined
 from ccfem.machine import Machine
+from ccfem.toolpaths import Toolpaths
 
 SIDE, HEIGHT = 24.0, 4.0
 """Of the plate, mm."""
@@ -38,3 +39,29 @@ def test_inside_is_what_is_left_of_a_plate_without_its_outer_cells(two_pulls, in
     assert set(np.unique(share)) == {0.0, 1.0}
     left = (SIDE - 2.0 * inset) ** 2 * HEIGHT
     assert part.mesh.volumes @ share == pytest.approx(left, rel=1e-9)
+
+
+def test_links_by_worth_are_tried_at_whole_numbers_too(two_pulls, monkeypatch):
+    mesh, layers = two_pulls[0].fields[0].mesh, two_pulls[1][:1]
+    points = refined(layers[0])[0]
+    grid = SplineGrid.over(points, points.mean(axis=0), np.eye(2), 2.0)
+    extraction = Extraction((np.zeros(len(grid)),), grid, mesh, (), Machine(), 5, 0.5, 10.0)
+    gains = {(0.2, 0.0): 1.0, (0.2, 0.5): 1.1, (0.0, 1.0): 1.3}  # by levels and reach of links
+
+    def linked(self, layer, lines, reach=0.0):
+        line = [[lines[0], reach], [lines[0] + 50.0, reach]]
+        return Toolpaths.from_plane([np.array(line)], layer, [False])
+
+    def placed(self, paths):
+        return tuple(np.round(paths.points[0] @ layers[0].plane.frame[:2].T, 6).tolist())
+
+    def gain(self, along, price):
+        return gains.get(along, 0.5)
+
+    monkeypatch.setattr(Extraction, "strands", lambda self, layer, field, shift: [shift])
+    monkeypatch.setattr(Extraction, "linked", linked)
+    monkeypatch.setattr(Extraction, "profiles", placed)
+    monkeypatch.setattr(Extraction, "_price", lambda self, *_: 0.0)
+    monkeypatch.setattr(Extraction, "_gain", gain)
+    ((_, *_, best),) = extraction.candidates(layers, np.zeros(1, dtype=int), [100.0])
+    assert placed(extraction, best) == (0.0, 1.0)

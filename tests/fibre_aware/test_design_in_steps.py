@@ -1,0 +1,55 @@
+"""Fields for much fibre, designed for less of it first."""
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+
+from benchmarks.studies import confirmed_gain
+from ccfem.elasticity.solve import solve
+from ccfem.fibre_aware.design_in_steps import designed_in_steps
+from ccfem.fibre_aware.heights import middle_layers
+from ccfem.fibre_aware.stream_design import design
+from ccfem.fibre_aware.stream_start import start_field
+from ccfem.layers.slicing.planar import Planar
+from ccfem.machine import Machine
+from ccfem.strategies.stream_function import StreamFunction
+
+MACHINE = Machine()
+
+
+@pytest.fixture(scope="module")
+def lever():
+    problem = confirmed_gain.posed("lever")
+    return solve(problem)["planned"], Planar(count=2).cut(problem.mesh)
+
+
+def posed(part, coverage):
+    """Problem of the lever for a coverage, and what makes the first field of such a problem."""
+    stress, layers = part
+    problem, group, _ = StreamFunction(evaluations=1).designed(stress, layers, MACHINE)
+    room = float(problem.room.sum())
+    chosen = middle_layers(layers, group)
+
+    def start(one):
+        return start_field(one, stress, chosen, 90.0)
+
+    return replace(problem, budget=1.1 * coverage * room), start
+
+
+def test_a_field_for_much_fibre_is_stiffer_by_way_of_less(lever):
+    problem, start = posed(lever, 0.75)
+    at_once = design(problem, start(problem), 80)
+    found = designed_in_steps(problem, start, 50, 0.75)
+    assert 50 < len(found.ratios) <= 50 + 30
+    assert found.objective.ratio > 1.005 * at_once.objective.ratio
+
+
+def test_usual_amounts_are_designed_in_one_step(lever):
+    problem, start = posed(lever, 0.45)
+    found = designed_in_steps(problem, start, 4, 0.45)
+    once = design(problem, start(problem), 4)
+    np.testing.assert_array_equal(found.field, once.field)
+    # However much of it is to be cut off.
+    much = replace(problem, budget=2.0 * problem.budget)
+    assert len(designed_in_steps(much, start, 4, 0.45).ratios) <= 4
