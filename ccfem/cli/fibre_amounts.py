@@ -114,6 +114,8 @@ def _newtons(load: float) -> str:
 
 def _say(found: "FibreFront") -> None:
     """Print a table: the part without fibre, then the plans; marked are those of the fronts."""
+    from ccfem.planning.equal_fibre import TOLERANCE
+
     print(
         f"{'layers':>6}{'strength':>10}{'fibre, m':>10}{'stiffness':>11}"
         f"{'bound':>8}{'first failure':>17}"
@@ -144,3 +146,9 @@ def _say(found: "FibreFront") -> None:
         f"ccfem plan ... --strategy {found.strategy} --layers {best.layers} "
         f"--fibre-per-layer {best.asked:.0f}{weight}"
     )
+    laid = best.length / best.layers
+    if laid < (1.0 - TOLERANCE) * best.asked:
+        print(
+            f"of which it lays {laid:.0f} mm a layer, its most, as that plan will say; asked for "
+            f"{laid:.0f} it may lay less"
+        )
