@@ -184,3 +184,21 @@ def test_a_machine_that_no_fibre_of_the_part_suits_is_warned_of(machine, said):
     about = [line for line in found.warnings if line.startswith("machine.")]
     assert [line.startswith(said) for line in about] == [True] * (said is not None)
     assert found.mistakes == ()
+
+
+def test_a_picture_shows_what_is_held_from_its_side_alone():
+    flat = checked([Force("x_max", (5.0, 0.0, 0.0))], (Support("z_min"),))
+    figure = part_picture(flat)
+    above, below = figure.axes
+    marks = [
+        [each for each in axes.collections if each.get_sizes().size] for axes in (above, below)
+    ]
+    assert [sum(len(each.get_offsets()) for each in those) for those in marks] == [0, 12]
+    width, height = figure.get_size_inches()
+    assert height < 0.4 * width
+    for axes in (above, below):
+        (word,) = (each for each in axes.texts if "pull" in each.get_text())
+        (shaft,) = (each for each in axes.texts if not each.get_text())
+        forward = np.subtract(shaft.xy, shaft.xyann)
+        assert np.dot(forward, word.xyann) < 0.0
+        assert word.get_ha() == ("right" if forward[0] > 0.0 else "left")
