@@ -10,7 +10,7 @@ import typer
 from ccfem.cli.arguments import numbers_of, parameters_by_strategy
 from ccfem.cli.fibre_choice import SetFibre, fibre_choice
 from ccfem.cli.machines import MachineName, SetMachine, machine_choice
-from ccfem.cli.options import Backend, CasePath, Force, LoadCase, Out, SetCase
+from ccfem.cli.options import Backend, CasePath, Force, OneLoadCase, Out, SetCase
 
 if TYPE_CHECKING:
     from ccfem.comparison.front_points import FibreFront
@@ -47,7 +47,7 @@ def front(
             "stiffness, as 0,0.25,0.5; trade.png shows what one costs in the other.",
         ),
     ] = None,
-    load_case: LoadCase = None,
+    load_case: OneLoadCase = None,
     machine: MachineName = None,
     set_machine: SetMachine = None,
     set_fibre: SetFibre = None,
