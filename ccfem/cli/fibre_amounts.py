@@ -10,7 +10,7 @@ import typer
 from ccfem.cli.arguments import numbers_of, parameters_by_strategy
 from ccfem.cli.fibre_choice import SetFibre, fibre_choice
 from ccfem.cli.machines import MachineName, SetMachine, machine_choice
-from ccfem.cli.options import Backend, CasePath, Force, LoadCase, Out, SetCase
+from ccfem.cli.options import Backend, CasePath, Force, OneLoadCase, Out, SetCase
 
 if TYPE_CHECKING:
     from ccfem.comparison.front_points import FibreFront
@@ -47,7 +47,7 @@ def front(
             "stiffness, as 0,0.25,0.5; trade.png shows what one costs in the other.",
         ),
     ] = None,
-    load_case: LoadCase = None,
+    load_case: OneLoadCase = None,
     machine: MachineName = None,
     set_machine: SetMachine = None,
     set_fibre: SetFibre = None,
@@ -114,6 +114,8 @@ def _newtons(load: float) -> str:
 
 def _say(found: "FibreFront") -> None:
     """Print a table: the part without fibre, then the plans; marked are those of the fronts."""
+    from ccfem.planning.equal_fibre import TOLERANCE
+
     print(
         f"{'layers':>6}{'strength':>10}{'fibre, m':>10}{'stiffness':>11}"
         f"{'bound':>8}{'first failure':>17}"
@@ -144,3 +146,9 @@ def _say(found: "FibreFront") -> None:
         f"ccfem plan ... --strategy {found.strategy} --layers {best.layers} "
         f"--fibre-per-layer {best.asked:.0f}{weight}"
     )
+    laid = best.length / best.layers
+    if laid < (1.0 - TOLERANCE) * best.asked:
+        print(
+            f"of which it lays {laid:.0f} mm a layer, its most, as that plan will say; asked for "
+            f"{laid:.0f} it may lay less"
+        )

@@ -38,6 +38,9 @@ def fit_material(
         From `ccfem.cli.run.options_of`, and ``natural``.
     out : Path
     """
+    curves = [each.resolve() for each in (unreinforced, reinforced) if each is not None]
+    if out.resolve() in curves:
+        raise InputError(f"--out {out} is the curve of a test: name another file for the material")
     check_writable(out)
     without = read_curve(unreinforced)
     with_fibre = None if reinforced is None else read_curve(reinforced)

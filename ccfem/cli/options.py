@@ -17,6 +17,7 @@ __all__ = [
     "Heights",
     "Layers",
     "LoadCase",
+    "OneLoadCase",
     "Out",
     "Pictures",
     "PrintedSupport",
@@ -133,6 +134,10 @@ LoadCase = Annotated[
         metavar="NAME",
         help='Load case to plan for; default the first. "all" plans for all at once, by [weights].',
     ),
+]
+OneLoadCase = Annotated[
+    str | None,
+    typer.Option("--load-case", metavar="NAME", help="Load case to take; default the first."),
 ]
 Calibration = Annotated[
     Path | None,

@@ -29,6 +29,8 @@ def _new(
     from ccfem.inspection.beginning import new_part
 
     written = new_part(body, out, force)
+    if "\nscale = " in written.read_text(encoding="utf-8"):
+        print(f"{written}: the lengths of {body} look like metres: it says scale = 1000")
     print(f"{written}: change what is marked, then: ccfem check {written}")
 
 

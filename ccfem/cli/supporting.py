@@ -6,7 +6,7 @@ from typing import Annotated
 import typer
 
 from ccfem.cli.arguments import path_of
-from ccfem.cli.options import Backend, CasePath, Layers, LoadCase, SetCase, Slicing
+from ccfem.cli.options import Backend, CasePath, Layers, OneLoadCase, SetCase, Slicing
 
 __all__ = ["support"]
 
@@ -32,7 +32,7 @@ def support(
             "layers, which become flat in it.",
         ),
     ] = None,
-    load_case: LoadCase = None,
+    load_case: OneLoadCase = None,
     backend: Backend = "auto",
     out: Annotated[
         Path | None,

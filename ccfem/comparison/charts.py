@@ -21,7 +21,7 @@ _QUANTILES = np.linspace(0.0, 1.0, 101)
 
 _COSTS = (
     ("fibre_mass", 1.0, "fibre, g", "low"),
-    ("print_time_nearest", 1.0 / 60.0, "print time, min", "low"),
+    ("print_time_nearest", 1.0 / 60.0, "time to lay the fibre, min", "low"),
     ("first_failure_load", 1.0, "first failure, N", "high"),
 )
 """Against which indices stiffness is drawn: factor, title, and which end is better."""
@@ -30,7 +30,7 @@ _STIFFNESS = "times unreinforced stiffness"
 
 
 def fronts(runs: Sequence[Run], colours: Mapping[str, str]) -> list[dict[str, Any]]:
-    """Charts of stiffness over fibre, print time and first-failure load, with their fronts.
+    """Charts of stiffness over fibre, time to lay it and first-failure load, with their fronts.
 
     The front joins the runs that can be printed and that no other such run equals or beats in both.
     """

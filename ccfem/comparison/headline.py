@@ -200,7 +200,7 @@ HEADLINE = (
     Headline("interlayer_load", "layers come apart, N", "", "{:.0f}"),
     Headline("fibre_per_layer", "fibre, mm a layer", "", "{:.0f}"),
     Headline("fibre_mass", "fibre, g", "", "{:.3g}"),
-    Headline("print_time_nearest", "print time, min", "low", "{:.0f}"),
+    Headline("print_time_nearest", "laying fibre, min", "low", "{:.0f}"),
     Headline("efficiency", "efficiency", "high", "{:.3f}"),
     Headline("aligned_stress_10", "within 10°, by stress", "high", "{:.1%}"),
     Headline("coverage_top_20", "coverage of top 20 % stress", "high", "{:.1%}"),

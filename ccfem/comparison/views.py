@@ -24,7 +24,7 @@ __all__ = ["FRONTS", "front_picture", "layer_view", "shown_layer", "told"]
 
 FRONTS: Mapping[str, tuple[str, str]] = {
     "fibre_length": ("fibre, mm", "low"),
-    "print_time_nearest": ("print time, s", "low"),
+    "print_time_nearest": ("time to lay the fibre, s", "low"),
     "first_failure_load": ("first failure, N", "high"),
 }
 """What stiffness is drawn over: its title, and which end of it is better."""

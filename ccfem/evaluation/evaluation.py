@@ -22,6 +22,7 @@ from ccfem.evaluation import (
     matching,
     room,
     sinuosity,
+    skin,
     space,
     spacing,
     stiffness_alignment,
@@ -40,6 +41,7 @@ from ccfem.evaluation.plane_paths import PlanePaths, plane_paths, pool
 from ccfem.evaluation.room import RoomSamples
 from ccfem.evaluation.sensitivity import strand_lamina
 from ccfem.evaluation.sinuosity import SinuositySamples
+from ccfem.evaluation.skin import SkinSamples
 from ccfem.evaluation.space import SpaceSamples
 from ccfem.evaluation.spacing import SpacingSamples
 from ccfem.evaluation.tension_across import TensionSamples
@@ -69,6 +71,7 @@ COLUMNS: tuple[Column, ...] = (
     *room.COLUMNS,
     *coverage.COLUMNS,
     *containment.COLUMNS,
+    *skin.COLUMNS,
     *links.COLUMNS,
     *crossings.COLUMNS,
     *space.COLUMNS,
@@ -271,6 +274,7 @@ class _Samples(NamedTuple):
     room: RoomSamples
     coverage: CoverageSamples
     containment: ContainmentSamples
+    skin: SkinSamples
     links: LinkSamples
     crossings: CrossingSamples
     space: SpaceSamples
@@ -298,6 +302,7 @@ def _sample(
     on_layer = stress_on(view, stress)
     made = manufacture.sample_manufacture(paths, toolpaths, machine)
     fibre = toolpaths.select(toolpaths.kind == FIBRE)
+    out = skin.sample_skin(fibre, layer, stress.mesh, machine)
     if layer.flat is None:
         made = replace(made, length=fibre.lengths[fibre.lengths > 0.0])
     else:
@@ -312,6 +317,7 @@ def _sample(
         room.sample_room(paths, machine, below, late),
         coverage.sample_coverage(paths, on_layer, width),
         containment.sample_containment(paths, width),
+        out,
         links.sample_links(paths),
         crossings.sample_crossings(paths),
         in_space,
@@ -354,6 +360,7 @@ def _indices(samples: _Samples, machine: Machine, material: Material) -> dict[st
         **room.room_indices(samples.room),
         **coverage.coverage_indices(samples.coverage),
         **containment.containment_indices(samples.containment),
+        **skin.skin_indices(samples.skin),
         **links.link_indices(samples.links),
         **crossings.crossing_indices(samples.crossings),
         **space.space_indices(samples.space),

@@ -23,6 +23,11 @@ _RULES = (
     _Rule("on_fibre", "{found} of the fibre lies on other fibre of its direction"),
     _Rule("across_fibre", "{found} of the fibre lies across other fibre"),
     _Rule("outside", "{found} of the strands, by their width, lies outside the part"),
+    _Rule(
+        "outside_height",
+        "{found} of the fibre stands out of the part's top or bottom, with strands "
+        "{machine.strand_height:.2g} mm high",
+    ),
     _Rule("free_span", "fibre hangs free over {found}", "{:.3g} mm"),
     _Rule("links", "{found} of the fibre is marked as links"),
     _Rule("fraction", "a fibre volume fraction of {found}", "{:.2f}"),
@@ -77,6 +82,7 @@ def _found(total: Mapping[str, float]) -> dict[str, float]:
         "on_fibre": total["on_fibre"],
         "across_fibre": total["across_fibre"],
         "outside": total["outside_width"],
+        "outside_height": total["outside_height"],
         "free_span": total["free_span"],
         "links": links / length if length > 0.0 else 0.0,
         "fraction": total["fibre_fraction_99"],

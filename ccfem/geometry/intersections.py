@@ -38,7 +38,9 @@ def find_crossings(points: FloatArray, offsets: IntArray, closed: BoolArray) -> 
     if total == 0.0:
         return np.zeros((0, 2), dtype=np.int64)
     extent = points.max(axis=0) - points.min(axis=0)
-    longest = max(2.0 * float(extent[0] * extent[1]) / total, 2.0 * total / len(points))
+    # At most a cell a point, so that few points share one however near they lie along a line.
+    spread = float(np.sqrt(extent[0] * extent[1] / len(points)))
+    longest = max(spread, 2.0 * total / len(points))
     pieces, ends, segment = subdivide(points, offsets, longest)
     first = np.flatnonzero(starts_segment(ends))
     a, b = pieces[first], pieces[first + 1]
@@ -55,8 +57,8 @@ def _near(
 ) -> IntArray:
     """Pairs of segments of a cell, not neighbours in their polyline, that meet or nearly do.
 
-    Neither segment has both its ends clearly on one side of the other. A pair comes once for every
-    cell that it shares.
+    Their boxes overlap, and neither has both its ends clearly on one side of the other. A pair
+    comes once for every cell that it shares.
     """
     found = 0
     pairs = np.empty((64, 2), np.int64)
@@ -66,6 +68,17 @@ def _near(
             for n in range(m + 1, starts[cell + 1]):
                 i, j = segment[items[m]], segment[items[n]]
                 if abs(i - j) < 2:
+                    continue
+                apart = False
+                for d in range(2):
+                    low = max(
+                        min(points[i, d], points[i + 1, d]), min(points[j, d], points[j + 1, d])
+                    )
+                    high = min(
+                        max(points[i, d], points[i + 1, d]), max(points[j, d], points[j + 1, d])
+                    )
+                    apart = apart or low > high + touch
+                if apart:
                     continue
                 for k in range(4):
                     a, p = (i, j + k) if k < 2 else (j, i + k - 2)

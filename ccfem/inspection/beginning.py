@@ -27,7 +27,8 @@ def new_part(
     """Write a part file for a body: its faces listed, a support and a load to be changed.
 
     The largest plane that faces down is held, and the face farthest from it is pulled away from it
-    with 100 N. Cells are a twenty-fifth of the diagonal long.
+    with 100 N. Cells are a twenty-fifth of the diagonal long. Where the lengths look like metres
+    (`BodyFaces.doubt`), the file scales them by 1000.
 
     Parameters
     ----------
@@ -57,6 +58,9 @@ def new_part(
     out = Path(f"{body.stem}.toml" if out is None else out)
     _refuse_present(out, force)
     found = faces_of(body)
+    doubt = found.doubt
+    if doubt:
+        found = faces_of(body, scale=1000.0)
     points, faces, names = found.points, found.faces, found.names
     edge = float(np.linalg.norm(np.ptp(points, axis=0))) / 25.0
     held = max(
@@ -69,7 +73,8 @@ def new_part(
     pull = 100.0 * pull / max(float(np.linalg.norm(pull)), 1e-300)
     meshed = is_surface(body) or is_cad(body)
     with whole_file(out) as temporary:
-        text = _text(body, edge if meshed else None, faces, names, held, pulled, pull.tolist())
+        cells = edge if meshed else None
+        text = _text(body, cells, faces, names, held, pulled, pull.tolist(), doubt)
         temporary.write_text(text, encoding="utf-8")
     return out
 
@@ -91,12 +96,15 @@ def _text(
     held: int,
     pulled: int,
     pull: Sequence[float],
+    doubt: str,
 ) -> str:
     """Text of the part file."""
     path = str(body).replace("\\", "/")
     given = [f'mesh = "{path}"']
     if edge is not None:
         given = [f'surface = "{path}"', f"edge_length = {edge:.3g}           # mm; of the cells"]
+    if doubt:
+        given.append(f"scale = 1000                 # CHANGE: {doubt.partition(': scale')[0]}")
     listed = [
         f"#   {k:>3}  {face.about}" + (f"  ({names[k - 1]})" if any(names) else "")
         for k, face in enumerate(faces[:_LISTED], 1)

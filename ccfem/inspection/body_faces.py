@@ -21,6 +21,9 @@ if TYPE_CHECKING:
 
 __all__ = ["BodyFaces", "faces"]
 
+_SMALL = 1.0
+"""Diagonal, mm, below which lengths look like metres: a strand is about as wide."""
+
 
 @dataclass(frozen=True)
 class BodyFaces:
@@ -53,6 +56,14 @@ class BodyFaces:
 
     def _repr_html_(self) -> str:
         return str(self.to_frame().to_html(index=False))
+
+    @property
+    def doubt(self) -> str:
+        """What to say of a body so small that its lengths look like metres; else nothing."""
+        across = float(np.linalg.norm(np.ptp(self.points, axis=0)))
+        if across >= _SMALL:
+            return ""
+        return f"the body measures {across:.3g} mm across: looks like metres: scale = 1000"
 
     def to_frame(self) -> "pd.DataFrame":
         """One row a face: its number, area, what it is, and its name where it has one."""

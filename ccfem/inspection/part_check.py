@@ -276,7 +276,26 @@ def _warnings(case: Case, rows: Sequence[LoadRow]) -> list[str]:
     unused = sorted(set(problem.mesh.patches) - set(problem.held_or_loaded))
     if unused and len(unused) <= 6:
         lines.append(f"patches without load and support: {', '.join(unused)}")
-    return lines
+    return lines + _no_room(case)
+
+
+def _no_room(case: Case) -> list[str]:
+    """Say which measures of the machine leave no room for fibre on any layer of the part."""
+    machine = case.machine
+    _, side, longest = np.sort(np.ptp(case.problem.mesh.bounds, axis=0)).tolist()
+    width, least = machine.fibre_width, machine.minimum_length
+    if width > side:
+        return [
+            f"machine.fibre_width = {width:g} mm is wider than the part, {side:.4g} mm: no fibre "
+            "fits; are all lengths in mm?"
+        ]
+    most = side * longest / width
+    if least > most:
+        return [
+            f"machine.minimum_length = {least:g} mm: no layer has room for a strand that long, at "
+            f"most {most:.4g} mm of {width:g} mm width; are all lengths in mm?"
+        ]
+    return []
 
 
 def _shared(problem: Problem) -> list[str]:

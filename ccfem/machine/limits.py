@@ -27,6 +27,8 @@ class Limits:
         Share of the fibre that lies on fibre that it crosses.
     outside : float
         Share of the strands, by their width, that lies outside the part.
+    outside_height : float
+        Share of the fibre's length at which strands stand out of the part's top or bottom.
     free_span : float, mm
         Longest run of fibre that has nothing to lie on.
     links : float
@@ -40,11 +42,12 @@ class Limits:
     on_fibre: float = 0.1
     across_fibre: float = 0.15
     outside: float = 0.1
+    outside_height: float = 0.03
     free_span: float = 8.0
     links: float = 0.3
     fraction: float = 1.0
 
     def __post_init__(self) -> None:
         shares = ("short", "tight", "on_fibre", "across_fibre", "outside", "links", "fraction")
-        check_fields(self, *shares, at_least=0.0)
+        check_fields(self, *shares, "outside_height", at_least=0.0)
         check_fields(self, "free_span", at_least=0.0, unit="mm")

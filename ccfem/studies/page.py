@@ -12,7 +12,7 @@ __all__ = ["study_page"]
 
 _HEADINGS = {
     "fibre_length": "Stiffness over fibre",
-    "print_time_nearest": "Stiffness over print time",
+    "print_time_nearest": "Stiffness over the time to lay the fibre",
     "first_failure_load": "Stiffness over failure load",
 }
 

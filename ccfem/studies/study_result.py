@@ -26,7 +26,7 @@ _OWNERS = ("part", "load_case", "slicing", "study", "strategy")
 _SAID = ("printable", "why_not", "failure", "untested", "note", "fails_in", "empty_layers")
 _TITLES = {
     "fibre_length": "fibre, mm",
-    "print_time_nearest": "print time, min",
+    "print_time_nearest": "time to lay the fibre, min",
     "first_failure_load": "first failure, N",
     GAIN: "stiffness, N/mm",
 }

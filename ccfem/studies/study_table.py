@@ -14,7 +14,7 @@ _COLUMNS = {
     "stiffness_ratio_tension": "times unreinforced",
     "first_failure_load": "first failure, N",
     "fibre_length": "fibre, mm",
-    "print_time_nearest": "print time, s",
+    "print_time_nearest": "laying fibre, s",
     "efficiency": "efficiency",
 }
 

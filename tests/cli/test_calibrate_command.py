@@ -87,6 +87,17 @@ def test_bad_input_is_one_line(calibrated: Path, arguments: list[str], message: 
     assert not (calibrated / "x.toml").exists()
 
 
+def test_a_curve_is_not_replaced_by_the_material(calibrated: Path) -> None:
+    before = (calibrated / "none.csv").read_text()
+    run = ccfem(
+        "calibrate", "bar", *QUICK, "--unreinforced", "none.csv", "--out", "./none.csv",
+        folder=calibrated,
+    )  # fmt: skip
+    assert run.returncode == 2
+    assert "is the curve of a test: name another file for the material" in run.stderr
+    assert (calibrated / "none.csv").read_text() == before
+
+
 @pytest.mark.parametrize("out", ["nofolder/x.toml", "."])
 def test_a_file_that_cannot_be_written_is_refused_before_the_solve(
     calibrated: Path, out: str, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]

@@ -465,3 +465,10 @@ def test_a_parameter_that_is_a_table_takes_its_entries_one_by_one():
         parameters_by_strategy(["pruned.base=3", "pruned.base.angle=30"])
     with pytest.raises(InputError, match="expects STRATEGY"):
         parameters_by_strategy(["angle=30"])
+
+
+@pytest.mark.parametrize("command", ["support", "calibrate", "front"])
+def test_what_takes_one_load_case_does_not_offer_all(ccfem, command):
+    said = " ".join(ccfem(command, "--help")[1].split())
+    assert "Load case to take; default the first." in said
+    assert "plans for all at once" not in said

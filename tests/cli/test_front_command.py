@@ -2,6 +2,10 @@
 
 import pytest
 
+from ccfem.cli import fibre_amounts
+from ccfem.comparison.front_points import FibreFront, FrontPoint
+from ccfem.toolpaths import Toolpaths
+
 QUICK = ["bar", "--set-case", "element_size=4.0", "--strategy", "zigzag", "--layers", "2"]
 
 
@@ -22,3 +26,15 @@ def test_words_that_make_no_sense_are_answered_in_one_line(ccfem, tmp_path, word
     assert answer in said
     assert said.count("ccfem: error: ") == 1
     assert not (tmp_path / "results").exists() or not any((tmp_path / "results").iterdir())
+
+
+@pytest.mark.parametrize(
+    ("asked", "said"), [(2229.0, "of which it lays 1895 mm a layer"), (1900.0, "")]
+)
+def test_a_plan_that_lays_less_than_asked_is_said_to(capsys, asked, said):
+    point = FrontPoint(3, asked, 5685.0, 3.07, 2788.0, "fibre", 3.29, "", Toolpaths.empty())
+    fibre_amounts._say(FibreFront("bar", "stream_function", (point,), {}, 1999.0))
+    lines = capsys.readouterr().out.splitlines()
+    command = f"ccfem plan ... --strategy stream_function --layers 3 --fibre-per-layer {asked:.0f}"
+    after = lines[lines.index(command) + 1 :]
+    assert after[0].startswith(said) if said else not after

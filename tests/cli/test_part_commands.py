@@ -60,3 +60,16 @@ def test_cite_prints_bibtex(ccfem, tmp_path):
     assert "is no record of ccfem compare" in ccfem("cite", ".")[2]
     assert "holds no results.json" in ccfem("cite", "none.json")[2]
     assert "no method or folder of results named 'isocurv'" in ccfem("cite", "isocurv")[2]
+
+
+def test_a_body_in_metres_is_seen_to_be_one(ccfem, tmp_path):
+    write_mesh(box_mesh((0.06, 0.024, 0.004), (6, 3, 2)), tmp_path / "lever.npz")
+    said = " ".join(ccfem("faces", "lever.npz")[1].split())
+    assert "0.0647 mm across: looks like metres: scale = 1000 (here --scale 1000)" in said
+    assert "looks like" not in ccfem("faces", "lever.npz", "--scale", "1000")[1]
+    code, out, _ = ccfem("new", "lever.npz")
+    assert (code, "look like metres" in out) == (0, True)
+    checked = check(read_part(tmp_path / "lever.toml"))
+    assert checked.mistakes == ()
+    areas = {row.name: row.area for row in checked.patches}
+    assert areas["held"] == pytest.approx(60.0 * 24.0)

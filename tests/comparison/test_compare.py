@@ -471,3 +471,8 @@ def test_captions_of_pictures_count_paths(compared):
         paths = Toolpaths.from_plane(lines, layer)
         found = evaluate(paths, compared.layers, compared.stress, machine)
         assert caption(replace(compared.runs[0], evaluation=found), layer).startswith(said)
+
+
+def test_the_time_of_the_fibre_is_not_called_that_of_the_print():
+    (title,) = (head.title for head in HEADLINE if head.column == "print_time_nearest")
+    assert title == "laying fibre, min"

@@ -1,5 +1,7 @@
 """Crossings against shapely and on exact degenerate shapes."""
 
+import tracemalloc
+
 import numpy as np
 import pytest
 import shapely
@@ -91,3 +93,17 @@ def test_random_polylines_cross_where_shapely_says(seed: int, lines: int, size: 
     # The other way round there are as many.
     points, offsets = pack([size * line[::-1] for line in made[::-1]])
     assert len(find_crossings(points, offsets, np.zeros(lines, dtype=bool))) == len(found)
+
+
+def test_memory_grows_with_the_number_of_points_alone() -> None:
+    """Many points on straight lines: those of one line near each other are no pairs to look at."""
+    along = np.linspace(0.0, 50.0, 5001)
+    lines = [np.column_stack([along, np.full(len(along), 2.0 * k)]) for k in range(4)]
+    across = np.array([[20.001, -1.0], [20.001, 7.0]])
+    points, offsets = pack([*lines, across])
+    tracemalloc.start()
+    found = find_crossings(points, offsets, np.zeros(5, dtype=bool))
+    _, most = tracemalloc.get_traced_memory()
+    tracemalloc.stop()
+    assert len(found) == 4
+    assert most < 2000 * len(points)

@@ -9,6 +9,7 @@ from ccfem.elasticity import BodyForce, Force, Pressure, Problem, Support, Tract
 from ccfem.elasticity.problem import PointForce
 from ccfem.errors import InputError
 from ccfem.inspection.cost import solve_costs
+from ccfem.machine import Machine
 from ccfem.materials import isotropic
 from ccfem.mesh import box_mesh
 from ccfem.plot.part_picture import part_page, part_picture
@@ -19,11 +20,11 @@ PLA = isotropic(3500.0, 0.35)
 HELD = (Support("x_min"),)
 
 
-def checked(loads, supports=HELD, patches=None):
+def checked(loads, supports=HELD, patches=None, **machine):
     mesh = box_mesh((40.0, 20.0, 10.0), (8, 4, 2))
     mesh = mesh.with_patches(patches(mesh) if patches else {})
     problem = Problem(mesh, PLA, supports, {"pull": tuple(loads)}, order=1)
-    return ccfem.check(Case("box", "A box", problem))
+    return ccfem.check(Case("box", "A box", problem, machine=Machine(**machine)))
 
 
 def test_patches_of_a_box_are_as_long_as_it_is():
@@ -168,3 +169,36 @@ def test_the_picture_shows_patches_loads_and_supports():
     assert '"x_max"' in page
     assert "http" not in page
     assert "</script>" not in page.split("<script>")[1].split("</script></body>")[0]
+
+
+@pytest.mark.parametrize(
+    ("machine", "said"),
+    [
+        ({"fibre_width": 1e6}, "machine.fibre_width = 1e+06 mm is wider than the part, 20 mm"),
+        ({"minimum_length": 1e9}, "machine.minimum_length = 1e+09 mm: no layer has room"),
+        ({"minimum_length": 42.0}, None),
+    ],
+)
+def test_a_machine_that_no_fibre_of_the_part_suits_is_warned_of(machine, said):
+    found = checked([Force("x_max", (0.0, 0.0, 5.0))], **machine)
+    about = [line for line in found.warnings if line.startswith("machine.")]
+    assert [line.startswith(said) for line in about] == [True] * (said is not None)
+    assert found.mistakes == ()
+
+
+def test_a_picture_shows_what_is_held_from_its_side_alone():
+    flat = checked([Force("x_max", (5.0, 0.0, 0.0))], (Support("z_min"),))
+    figure = part_picture(flat)
+    above, below = figure.axes
+    marks = [
+        [each for each in axes.collections if each.get_sizes().size] for axes in (above, below)
+    ]
+    assert [sum(len(each.get_offsets()) for each in those) for those in marks] == [0, 12]
+    width, height = figure.get_size_inches()
+    assert height < 0.4 * width
+    for axes in (above, below):
+        (word,) = (each for each in axes.texts if "pull" in each.get_text())
+        (shaft,) = (each for each in axes.texts if not each.get_text())
+        forward = np.subtract(shaft.xy, shaft.xyann)
+        assert np.dot(forward, word.xyann) < 0.0
+        assert word.get_ha() == ("right" if forward[0] > 0.0 else "left")

@@ -200,6 +200,15 @@ def test_no_cheat_exceeds_the_bound(judged):
     assert max(ratios.values()) <= judged.bound.ratio
 
 
+def test_fibre_on_the_skin_is_not_printable():
+    case = ccfem.read("bar", element_size=5.0)
+    asked = {"natural": True, "strand": None}
+    (on_skin,) = ccfem.compare(case, ["zigzag"], layers=[0.0, 2.5], **asked).runs
+    assert "50% of the fibre stands out of the part's top or bottom" in on_skin.why_not
+    (inside,) = ccfem.compare(case, ["zigzag"], layers=[0.05, 2.5], **asked).runs
+    assert inside.printable
+
+
 @pytest.mark.parametrize(
     ("layers", "said"),
     [
