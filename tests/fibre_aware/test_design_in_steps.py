@@ -41,7 +41,7 @@ def test_a_field_for_much_fibre_is_stiffer_by_way_of_less(lever):
     problem, start = posed(lever, 0.75)
     at_once = design(problem, start(problem), 80)
     found = designed_in_steps(problem, start, 50, 0.75)
-    assert 50 < len(found.ratios) <= 50 + 30
+    assert len(found.ratios) < 1.1 * 80
     assert found.objective.ratio > 1.005 * at_once.objective.ratio
 
 
@@ -52,4 +52,5 @@ def test_usual_amounts_are_designed_in_one_step(lever):
     np.testing.assert_array_equal(found.field, once.field)
     # However much of it is to be cut off.
     much = replace(problem, budget=2.0 * problem.budget)
-    assert len(designed_in_steps(much, start, 4, 0.45).ratios) <= 4
+    found, once = designed_in_steps(much, start, 4, 0.45), design(much, start(much), 4)
+    np.testing.assert_array_equal(found.field, once.field)
