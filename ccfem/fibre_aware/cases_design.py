@@ -213,7 +213,8 @@ class CasesProblem:
         counts, blocks = self._counts(solutions), []
         for share, own in zip(self.shares, field.reshape(len(self.shares), -1), strict=True):
             each = [self.problem.curvature(own, one) for one in solutions]
-            blocks.append(share * sum(count * one for count, one in zip(counts, each, strict=True)))
+            mean = sum(count * one for count, one in zip(counts, each, strict=True))
+            blocks.append((share or 1.0) * mean)  # a field without layers changes nothing
         return sp.block_diag(blocks, format="csc")
 
     def levels(self, field: FloatArray, solutions: tuple[SmearedSolution, ...]) -> BorderLevels:

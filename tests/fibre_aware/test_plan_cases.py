@@ -3,6 +3,7 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
+from ccfem.elasticity.solve import solve
 from ccfem.elasticity.weighted_cases import WeightedCases
 from ccfem.errors import InputError
 from ccfem.fibre_aware.cases_judges import CasesGoal
@@ -178,3 +179,14 @@ def test_stream_function_plans_for_a_force_and_a_support_that_moves(pulled_and_m
     assert x == pytest.approx(y, rel=0.3)
     # As much fibre, straight and half of it each way, would add 4 x 400 / 2304 = .69.
     assert 1.5 < ratios.min() <= ratios.max() < 1.75
+
+
+@pytest.mark.parametrize("strength", [0.0, 0.5])
+def test_with_fewer_layers_than_cases_those_of_most_weight_get_a_field(two_bends, strength):
+    cases, layers = two_bends
+    material = replace(cases.fields[0].problem.material, tensile_strength=50.0)
+    strong = WeightedCases.of(solve(replace(cases.fields[0].problem, material=material)))
+    strategy = StreamFunction(evaluations=4, phases=1, strength=strength)
+    planned = plan_cases(strategy, layers[:1], strong, MACHINE, 400.0)
+    assert 380.0 < planned.length_per_layer <= 400.0
+    assert set(planned.toolpaths.layer) == {layers[0].index}
