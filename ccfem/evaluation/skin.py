@@ -71,10 +71,9 @@ def sample_skin(fibre: Toolpaths, layer: Layer, mesh: TetMesh, machine: Machine)
     if not len(middle):
         return SkinSamples(np.zeros(0), np.zeros(0, dtype=bool))
     normal, beside = _over(layer, middle)
-    out = np.zeros(len(middle), dtype=bool)
-    reach = (0.5 - _TOLERANCE) * machine.strand_height
-    for side in (-reach, reach):
-        out |= ~_in_part(mesh, middle + side * normal)
+    reach = (0.5 - _TOLERANCE) * machine.strand_height * normal
+    inside = _in_part(mesh, np.concatenate([middle - reach, middle + reach]))
+    out = ~inside.reshape(2, -1).all(axis=0)
     return SkinSamples(length, out & ~beside)
 
 
