@@ -19,6 +19,8 @@ from ccfem.mesh.tet_mesh import TetMesh
 
 __all__ = ["Planar", "slice_heights"]
 
+_TOP = 1e-3
+"""Share of the part's height below its top where a height that cuts nothing lies on it."""
 _SNAP = 2e-6
 """Nodes nearer to the plane than this share of the part's size are taken to lie on it [Chen et al.
 2021, section 5]: a plane through mesh nodes would otherwise cut slivers."""
@@ -119,7 +121,7 @@ class Planar:
         Raises
         ------
         InputError
-            When a height lies outside the part, or a slab is higher than the part.
+            When a height lies outside the part or on its top, or a slab is higher than the part.
         """
         frame = plane_frame(_AXES.get(self.axis, build))
         level = mesh.points @ frame[2]
@@ -132,10 +134,15 @@ class Planar:
                 f"{lowest:g} to {highest:g} mm along the build direction"
             )
         edges = np.concatenate([[lowest], 0.5 * (stack[1:] + stack[:-1]), [highest]])
-        layers = (
+        layers = [
             _cut(mesh, Plane(frame, float(h)), level, k, float(edges[k + 1] - edges[k]))
             for k, h in enumerate(stack)
-        )
+        ]
+        if layers[-1] is None and highest - stack[-1] < _TOP * (highest - lowest):
+            raise InputError(
+                f"layer height {stack[-1]:g} mm lies on the top of the part, where nothing is cut: "
+                "lay it at least half a strand height lower"
+            )
         return tuple(layer for layer in layers if layer is not None)
 
     def _stack(self, mesh: TetMesh, frame: FloatArray) -> FloatArray:

@@ -104,6 +104,7 @@ def test_heights_lie_at_the_middle_of_slabs() -> None:
     ("arguments", "message"),
     [
         ({"heights": [3.0]}, "outside the part"),
+        ({"heights": [0.5, 1.0]}, "1 mm lies on the top of the part"),
         ({"count": 0}, "at least 1"),
         ({"thickness": 5.0}, "at most the part's height"),
         ({"count": 2, "heights": [0.5]}, "one of count, thickness and heights; got count and"),
