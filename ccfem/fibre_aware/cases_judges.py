@@ -99,7 +99,7 @@ def cases_tests(goal: CasesGoal, strand: Strand | None) -> Callable[[Strands], C
     parts = goal.parts
     axial = (Strand() if strand is None else strand).stiffness(parts[0].modulus)
     before = np.array([2.0 * part.unreinforced.strain_energy for part in parts])
-    pulled = np.array([part.forces.any() for part in parts])
+    pulled = np.array([part.forced for part in parts])
     known: list[tuple[FloatArray, ...]] = [()] * len(parts)
 
     def test(strands: Strands) -> CasesTested:
@@ -182,7 +182,4 @@ def _stiff_worths(
 
 def _work(part: Specimen, found: Equilibrium) -> float:
     """Work of the forces, or of the supports that move, N mm: twice the strain energy."""
-    u = found.displacement
-    if part.forces.any():
-        return float(np.vdot(part.forces, u))
-    return float(u.reshape(-1) @ (found.matrix @ u.reshape(-1)))
+    return float(np.vdot(part.forces, found.displacement)) if part.forced else found.work

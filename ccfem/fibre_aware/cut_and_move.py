@@ -28,7 +28,7 @@ _ALL_WAYS = 2
 """Candidates that are cut in all these ways; the others are cut for the stiffness alone."""
 
 _FOR_BOTH = (False, True)
-"""Whether moves follow stiffness and strength, or else the stiffness alone."""
+"""Whether moves follow stiffness and strength: once the stiffness alone, and once both."""
 
 _Cut = Callable[[Toolpaths, float, int], Toolpaths]
 """Cuts toolpaths to a length, with how much strength counts, by a number of tests."""

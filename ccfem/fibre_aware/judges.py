@@ -57,8 +57,7 @@ def stiffness_judge(part: Specimen, machine: Machine, strand: Strand | None = No
         found = equilibrium(part, strands, axial, known=known[-1:], tolerance=_TOLERANCE)
         u = found.displacement
         known[:] = [u]
-        energy = 0.5 * float(u.reshape(-1) @ (found.matrix @ u.reshape(-1)))
-        return Judged(part.stiffness(u, energy), lambda: (StrainWorth(1.0, u),))
+        return Judged(part.stiffness(u, 0.5 * found.work), lambda: (StrainWorth(1.0, u),))
 
     return judge
 

@@ -135,10 +135,10 @@ class SmearedPart:
         work = 2.0 * field.strain_energy
         return SmearedSolution(field.displacement, strain, work, field.record.residual, 0)
 
-    @cached_property
+    @property
     def forced(self) -> bool:
         """Whether forces load the part; otherwise supports move."""
-        return not self.specimen.held.value.any()
+        return self.specimen.forced
 
     def ratio(self, work: float) -> float:
         """Stiffness over that of the part without fibre, where the load does so much work."""

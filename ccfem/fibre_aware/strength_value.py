@@ -152,7 +152,7 @@ class Worth:
         length = strands.length * strands.share
         strains = [pieces.strain(one.displacement) for one in found]
         check_stretched(strains)
-        works = [_work(one) for one in found]
+        works = [one.work for one in found]
         peaks: dict[tuple[int, str], Peak] = {}
         for k, (judge, one, strain) in enumerate(zip(self.judges, found, strains, strict=True)):
             fibre = _fibre(pieces, length, strain, one.displacement, self.limits.fibre / axial)
@@ -166,7 +166,7 @@ class Worth:
             loads = [count * peaks[k, name].by_displacement for name, count in own.items()]
             adjoint = _respond(part, one, np.sum(loads, axis=0))
             # The load grows with the stiffness where supports move.
-            stiff = (1.0 - w) * share[k] + w * (sum(own.values()) if _moved(part) else 0.0)
+            stiff = (1.0 - w) * share[k] + w * (0.0 if part.forced else sum(own.values()))
             most = max(float(strain.max(initial=0.0)), _NONE)
             whole = float(length @ (np.maximum(strain, 0.0) / most) ** POWER)
             peak = w * own.get("fibre", 0.0) / (POWER * max(whole, _NONE))
@@ -175,20 +175,9 @@ class Worth:
         return tuple(worths)
 
 
-def _moved(part: Specimen) -> bool:
-    """Whether supports that move load the part, and no forces."""
-    return bool(part.held.value.any())
-
-
-def _work(found: Equilibrium) -> float:
-    """Twice the strain energy, N mm."""
-    u = found.displacement
-    return float(np.vdot(u, (found.matrix @ u.reshape(-1)).reshape(u.shape)))
-
-
 def _load_share(part: Specimen, work: float) -> float:
     """Load over that of the part without fibre: 1 where forces load it."""
-    if not _moved(part):
+    if part.forced:
         return 1.0
     return work / (2.0 * part.unreinforced.strain_energy)
 

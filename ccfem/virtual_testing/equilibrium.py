@@ -63,6 +63,12 @@ class Equilibrium:
     def __post_init__(self) -> None:
         freeze(self, displacement=float, strain=float, carries=bool)
 
+    @property
+    def work(self) -> float:
+        """Twice the strain energy of part and fibres, N mm."""
+        u = self.displacement.reshape(-1)
+        return float(u @ (self.matrix @ u))
+
 
 def equilibrium(
     specimen: Specimen,

@@ -105,6 +105,11 @@ class Specimen:
         return self.system.forces_in(self.unreinforced.case)
 
     @cached_property
+    def forced(self) -> bool:
+        """Whether forces load the part; otherwise supports move."""
+        return not self.held.value.any()
+
+    @cached_property
     def held(self) -> Held:
         """The supports where the load case has them, in contact as without fibres."""
         before = self.unreinforced

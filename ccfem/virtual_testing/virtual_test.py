@@ -170,11 +170,9 @@ def virtual_test(
             known=[*known, found.displacement],
             tolerance=_SPAN_TOLERANCE,
         )
-        energy = 0.5 * float(
-            other.displacement.reshape(-1) @ (other.matrix @ other.displacement.reshape(-1))
-        )
         known.append(other.displacement)
-        ratios.append((float(rho), specimen.stiffness(other.displacement, energy) / unreinforced))
+        stiffness = specimen.stiffness(other.displacement, 0.5 * other.work)
+        ratios.append((float(rho), stiffness / unreinforced))
     force = np.where(found.carries, axial * found.strain, 0.0)
     return VirtualTest(
         mode=mode,
