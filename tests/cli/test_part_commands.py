@@ -65,7 +65,7 @@ def test_cite_prints_bibtex(ccfem, tmp_path):
 def test_a_body_in_metres_is_seen_to_be_one(ccfem, tmp_path):
     write_mesh(box_mesh((0.06, 0.024, 0.004), (6, 3, 2)), tmp_path / "lever.npz")
     said = " ".join(ccfem("faces", "lever.npz")[1].split())
-    assert "0.0647 mm across: looks like metres: scale = 1000 (here --scale 1000)" in said
+    assert "0.0647 mm across: looks like metres: scale = 1000 (or --scale 1000)" in said
     assert "looks like" not in ccfem("faces", "lever.npz", "--scale", "1000")[1]
     code, out, _ = ccfem("new", "lever.npz")
     assert (code, "look like metres" in out) == (0, True)
@@ -73,3 +73,24 @@ def test_a_body_in_metres_is_seen_to_be_one(ccfem, tmp_path):
     assert checked.mistakes == ()
     areas = {row.name: row.area for row in checked.patches}
     assert areas["held"] == pytest.approx(60.0 * 24.0)
+
+
+def test_a_surface_in_metres_is_meshed_with_a_hint(ccfem, tmp_path):
+    pyvista = pytest.importorskip("pyvista")
+    box = box_mesh((0.06, 0.024, 0.004), (1, 1, 1))
+    used, facets = np.unique(box.boundary, return_inverse=True)
+    surface = pyvista.PolyData.from_regular_faces(box.points[used], facets.reshape(-1, 3))
+    surface.save(tmp_path / "lever.stl")
+    hint = "0.0647 mm across: looks like metres: scale = 1000 (or --scale 1000)"
+    code, out, err = ccfem("mesh", "lever.stl", "--size", "6", "-o", "lever.npz")
+    assert (code, out, err.count("\n"), hint in err) == (2, "", 1, True)
+    assert not (tmp_path / "lever.npz").exists()
+    code, out, err = ccfem("mesh", "lever.stl", "--size", "0.006", "-o", "lever.npz")
+    assert (code, hint in out, err) == (0, True, "")
+    assert "metres" not in "".join(
+        ccfem("mesh", "lever.stl", "--size", "6", "--scale", "1000", "-o", "lever.npz")[1:]
+    )
+    ccfem("new", "lever.stl")
+    part = (tmp_path / "lever.toml").read_text()
+    (tmp_path / "lever.toml").write_text(part.replace("\nscale = 1000", "\n"))
+    assert hint in ccfem("check", "lever.toml")[2]
