@@ -2,11 +2,14 @@
 
 import numpy as np
 import pytest
+import shapely
 
 from ccfem.cases.part_file import read_part
 from ccfem.inspection import check
 from ccfem.io import write_mesh
+from ccfem.mesh import TetMesh
 from ccfem.mesh.box import box_mesh
+from ccfem.meshing import extrude
 
 
 def test_a_body_is_no_part_and_a_new_part_file_is_one(ccfem, tmp_path):
@@ -34,6 +37,21 @@ def test_a_body_is_no_part_and_a_new_part_file_is_one(ccfem, tmp_path):
     assert ccfem("new", "lever.npz", "--force")[0] == 0
     assert "name its file" in ccfem("new", "loop")[2]
     assert "does not exist" in ccfem("new", "none.stl")[2]
+
+
+def test_a_part_on_feet_is_held_by_all_of_them(ccfem, tmp_path):
+    """A table of 60 x 40 mm on bars 10, 18 and 20 mm wide."""
+    outline = shapely.box(0.0, 0.0, 60.0, 20.0)
+    for x in (10.0, 34.0):
+        outline = outline.difference(shapely.box(x, -1.0, x + 6.0, 12.0))
+    upright = extrude(outline, 40.0, 8.0)
+    x, y, z = upright.points.T
+    write_mesh(TetMesh(np.column_stack([x, -z, y]), upright.cells), tmp_path / "table.npz")
+    assert ccfem("new", "table.npz")[0] == 0
+    checked = check(read_part(tmp_path / "table.toml"))
+    assert checked.mistakes == ()
+    areas = {row.name: row.area for row in checked.patches}
+    assert areas["held"] == pytest.approx((10.0 + 18.0 + 20.0) * 40.0)
 
 
 def test_examples_are_listed_written_and_without_mistake(ccfem, tmp_path):
