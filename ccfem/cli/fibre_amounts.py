@@ -10,7 +10,7 @@ import typer
 from ccfem.cli.arguments import numbers_of, parameters_by_strategy
 from ccfem.cli.fibre_choice import SetFibre, fibre_choice
 from ccfem.cli.machines import MachineName, SetMachine, machine_choice
-from ccfem.cli.options import Backend, CasePath, Force, OneLoadCase, Out, SetCase
+from ccfem.cli.options import Backend, CasePath, Force, LoadCase, Out, SetCase
 
 if TYPE_CHECKING:
     from ccfem.comparison.front_points import FibreFront
@@ -47,7 +47,7 @@ def front(
             "stiffness, as 0,0.25,0.5; trade.png shows what one costs in the other.",
         ),
     ] = None,
-    load_case: OneLoadCase = None,
+    load_case: LoadCase = None,
     machine: MachineName = None,
     set_machine: SetMachine = None,
     set_fibre: SetFibre = None,
@@ -56,7 +56,7 @@ def front(
     force: Force = False,
 ) -> None:
     """Show how stiff and strong a part gets with how much fibre, beside what no paths exceed."""
-    from ccfem.cases.load_cases import asks_for_all
+    from ccfem.cases.load_cases import asks_for_all, weighted_cases
     from ccfem.checks import check_known
     from ccfem.cli.run import load
     from ccfem.comparison.compare import create_all
@@ -77,18 +77,19 @@ def front(
     part = load(case, set_case, machine=chosen_machine, fibre=fibre)
     chosen = create_all(part, (strategy,), parameters)[strategy]
     names = part.problem.cases
-    if asks_for_all(part, load_case):
-        raise InputError("a front is of one load case: name it in place of all")
-    if load_case is not None:
+    for_all = asks_for_all(part, load_case)
+    if load_case is not None and not for_all:
         check_known("load case", load_case, names)
     where = out if out is not None else Path("results") / f"{part.name}-front"
     with whole_folder(where, force) as folder, progress_bar(lines=True) as progress:
         progress(f"solving {part.name}", 0.0)
-        stress = solve(part.problem, backend=backend)[load_case or names[0]]
+        fields = solve(part.problem, backend=backend)
+        cases = weighted_cases(part, fields) if for_all else None
+        stress = fields[load_case or names[0]] if cases is None else cases.heaviest
         several = counts_to_try(part, stress) if counts is None else [int(each) for each in counts]
         found = fibre_front(
             part,
-            stress,
+            stress if cases is None else cases,
             strategy,
             chosen,
             several,
@@ -108,28 +109,12 @@ def front(
     print(f"\n{where}: front.png, {trade}front.csv")
 
 
-def _newtons(load: float) -> str:
-    return f"{load:.0f} N" if load == load else "not known"
-
-
 def _say(found: "FibreFront") -> None:
     """Print a table: the part without fibre, then the plans; marked are those of the fronts."""
+    from ccfem.cli.front_table import front_table
     from ccfem.planning.equal_fibre import TOLERANCE
 
-    print(
-        f"{'layers':>6}{'strength':>10}{'fibre, m':>10}{'stiffness':>11}"
-        f"{'bound':>8}{'first failure':>17}"
-    )
-    print(f"{'-':>6}{'-':>10}{0.0:>10.2f}{1.0:>10.3f} {1.0:>8.3f}{_newtons(found.bare):>15}")
-    rows = zip(found.points, found.stiffest.tolist(), found.strongest.tolist(), strict=True)
-    for each, stiffest, strongest in rows:
-        failure = _newtons(each.failure)
-        print(
-            f"{each.layers:>6}{each.strength:>10g}{1e-3 * each.length:>10.2f}"
-            f"{each.ratio:>10.3f}{'*' * stiffest:<1}{each.bound:>8.3f}"
-            f"{failure:>15}{'*' * strongest:<2}"
-            + (f" not printable: {each.why_not}" if each.why_not else "")
-        )
+    print("\n".join(front_table(found)))
     for count, reason in found.refused.items():
         print(f"{count:>6} no plan: {reason}")
     if found.stiffest.any():
@@ -138,12 +123,13 @@ def _say(found: "FibreFront") -> None:
         print("None can be printed as planned. The one with most fibre again:")
     best = max(
         (each for each, kept in zip(found.points, found.stiffest.tolist(), strict=True) if kept),
-        key=lambda each: each.ratio,
+        key=lambda each: each.least_ratio,
         default=found.points[-1],
     )
     weight = f" --set strength={best.strength:g}" if best.strength else ""
+    loads = " --load-case all" if found.cases_bounds else ""
     print(
-        f"ccfem plan ... --strategy {found.strategy} --layers {best.layers} "
+        f"ccfem plan ...{loads} --strategy {found.strategy} --layers {best.layers} "
         f"--fibre-per-layer {best.asked:.0f}{weight}"
     )
     laid = best.length / best.layers

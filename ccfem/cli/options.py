@@ -161,7 +161,7 @@ Stiffness = Annotated[
         "--stiffness",
         metavar="RATIO",
         help="Lay the least fibre that makes the part so stiff: as 2.5, over the part without "
-        "fibre, or as 1200N/mm.",
+        "fibre, or as 1200N/mm. With all load cases every one of them, as a ratio.",
     ),
 ]
 StressFile = Annotated[

@@ -218,9 +218,11 @@ def run(
     chosen = create_all(case, strategies, parameters) if strategies or not paths else {}
     chosen |= _given(case, paths, frame, chosen)
     if options.get("stiffness") is not None:
-        from ccfem.cli.wanted_stiffness import least_fibre_options
+        from ccfem.cli.wanted_stiffness import least_fibre_options, planned_for
 
-        options = least_fibre_options(case, next(iter(chosen.values())), options)
+        first = next(iter(chosen))
+        chosen[first] = planned_for(case, chosen[first], options)
+        options = least_fibre_options(case, chosen[first], options)
     where = out if out is not None else Path("results") / f"{case.name}{suffix}"
     part_file = _text_of(name)
     slicer = member_name(_slicer_of(case, options.get("layers")))

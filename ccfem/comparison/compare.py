@@ -10,8 +10,6 @@ from dataclasses import dataclass, replace
 from itertools import count
 from typing import Any, overload
 
-import numpy as np
-
 from ccfem.cases.case import Case
 from ccfem.cases.load_cases import asks_for_all, weighted_cases
 from ccfem.cases.reading import read
@@ -355,7 +353,7 @@ def _solved(
         seconds: dict[str, float] = {}
         with timed(seconds, "solve"):
             cases = weighted_cases(case, solve(case.problem, backend=backend))
-        first = cases.fields[int(np.argmax(cases.weights))]
+        first = cases.heaviest
         with timed(seconds, "specimens"):
             specimens(cases, backend)
             tests = Tests.of(first, None, strand, backend)

@@ -1,14 +1,15 @@
 """Planning a part with how much fibre on how many layers: what stiffness and strength follow."""
 
 import itertools
-from collections.abc import Mapping, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import replace
-from typing import Any
+from typing import Any, TypeVar
 
 import numpy as np
 
 from ccfem.cases.case import Case
 from ccfem.checks import check_number
+from ccfem.comparison.front_cases import PointCases
 from ccfem.comparison.front_points import FibreFront, FrontPoint
 from ccfem.comparison.judging import Solved
 from ccfem.comparison.runs import Run
@@ -23,7 +24,10 @@ from ccfem.comparison.stages import (
     with_plan,
 )
 from ccfem.elasticity.stress_field import StressField
+from ccfem.elasticity.weighted_cases import WeightedCases
 from ccfem.errors import InputError
+from ccfem.fibre_aware.cases_bound import CasesBound, cases_bound
+from ccfem.fibre_aware.plan_cases import plan_cases_to_lengths
 from ccfem.fibre_aware.upper_bound import upper_bound
 from ccfem.layers.slicing.planar import Planar
 from ccfem.planning.equal_fibre import plan_to_lengths
@@ -31,6 +35,7 @@ from ccfem.planning.strategy import Strategy
 from ccfem.planning.whole_part import full_length
 from ccfem.progress import Progress, silent
 from ccfem.toolpaths import Toolpaths
+from ccfem.virtual_testing.several_cases import specimens
 from ccfem.virtual_testing.specimen import Specimen
 from ccfem.virtual_testing.strand import Strand
 from ccfem.virtual_testing.strength import matrix_peak
@@ -43,8 +48,11 @@ _ALIKE = 0.005
 _LEAST = 1.0 / 16.0
 """Least length over the largest: twice as much fibre says the same at every length."""
 
-_SAME_BOUND = 1.002
-"""Largest length over the shortest for which one bound is taken, that of the largest."""
+_SAME_BOUND, _SAME_CASES_BOUND = 1.002, 1.01
+"""Largest length over the shortest for which one bound is taken, that of the largest; a bound of
+several load cases takes several times as long as one of one."""
+
+_Bound = TypeVar("_Bound")
 
 
 def counts_to_try(case: Case, stress: StressField) -> tuple[int, ...]:
@@ -64,7 +72,7 @@ def counts_to_try(case: Case, stress: StressField) -> tuple[int, ...]:
 
 def fibre_front(
     case: Case,
-    stress: StressField,
+    stress: StressField | WeightedCases,
     name: str,
     strategy: Strategy,
     counts: Sequence[int],
@@ -80,11 +88,14 @@ def fibre_front(
     a sixteenth of it. Fewer layers carry more on each at the same length, and reach less at their
     most: a plan that lays its most is one point, however much more was asked for.
 
+    Several load cases are planned for at once and each plan is tested under all. What counts is the
+    case that is farthest below what no paths of that length exceed in it alone.
+
     Parameters
     ----------
     case : Case
-    stress : StressField
-        Its solution under the load case that counts.
+    stress : StressField or WeightedCases
+        Its solution under the load case that counts, or under several.
     name : str
         Of the strategy.
     strategy : Strategy
@@ -113,10 +124,11 @@ def fibre_front(
     for count in counts:
         check_number("number of layers", count, at_least=1)
     strand = Strand() if strand is None else strand
-    solved = Solved(case, stress, None, Tests.of(stress, None, strand, backend))
-    slices = {
-        count: case.fibre_layers(stress, Planar(count=count)) for count in sorted(set(counts))
-    }
+    field, cases = (stress, None) if isinstance(stress, StressField) else (stress.heaviest, stress)
+    if cases is not None:
+        specimens(cases, backend)  # one factorisation for all
+    solved = Solved(case, field, None, Tests.of(field, None, strand, backend), cases)
+    slices = {count: case.fibre_layers(field, Planar(count=count)) for count in sorted(set(counts))}
     parts = {count: solved.part(layers) for count, layers in slices.items()}
     most = max(count * full_length(part.layers, case.machine) for count, part in parts.items())
     lengths = np.geomspace(_LEAST * most, most, points)
@@ -146,11 +158,17 @@ def fibre_front(
     if not runs:
         why = "; ".join(f"{count} layers: {reason}" for count, reason in refused.items())
         raise InputError(f"{name} finds no plan of '{case.name}': {why}")
-    bounds = _bounds([run.length for *_, run in runs], stress, parts[max(parts)], tell)
-    found = [_point(*one, bounds) for one in runs]
-    return FibreFront(
-        case.name, name, tuple(found), refused, _bare(stress), tuple(sorted(bounds.items()))
+    laid, finest = [run.length for *_, run in runs], parts[max(parts)]
+    if cases is None:
+        ratios = _bounds(laid, _SAME_BOUND, lambda length: _most(field, finest, length), tell)
+        found, bounds = _points(runs, ratios), tuple(sorted(ratios.items()))
+        return FibreFront(case.name, name, found, refused, _bare(field), bounds)
+    together = _bounds(
+        laid, _SAME_CASES_BOUND, lambda length: _most_of_cases(cases, finest, length), tell
     )
+    found, several = _points(runs, together), tuple(sorted(together.items()))
+    factor = min(_bare(each) / Specimen.of(each).force(each.reactions) for each in cases.fields)
+    return FibreFront(case.name, name, found, refused, factor, cases_bounds=several)
 
 
 def _kinds(name: str, strategy: Strategy, strengths: Sequence[float]) -> dict[float, Strategy]:
@@ -168,19 +186,21 @@ def _kinds(name: str, strategy: Strategy, strengths: Sequence[float]) -> dict[fl
 
 
 def _bounds(
-    lengths: Sequence[float], stress: StressField, finest: Part, tell: Tell
-) -> dict[float, float]:
-    """Ratios that no paths exceed by length, mm: of every plan, and between them for the curve."""
+    lengths: Sequence[float], alike: float, bound: Callable[[float], _Bound], tell: Tell
+) -> dict[float, _Bound]:
+    """Bound what no paths exceed, by length, mm: of every plan, and between them for the curve.
+
+    Lengths within the factor `alike` share a bound, that of the largest.
+    """
     taken: list[float] = []
     for length in sorted(lengths, reverse=True):
-        if not taken or _SAME_BOUND * length < taken[-1]:
+        if not taken or alike * length < taken[-1]:
             taken.append(length)
     between = [0.5 * (a + b) for a, b in itertools.pairwise([*taken, 0.0])]
     found = {}
     for length in sorted([*taken, *between]):
         tell(f"bounding {length / 1000.0:.3g} m")
-        bound = upper_bound(stress, finest.layers, length, finest.machine, finest.strand)
-        found[length] = bound.ratio
+        found[length] = bound(length)
     return found
 
 
@@ -190,6 +210,16 @@ def _bare(stress: StressField) -> float:
     if strength is None:
         return float("nan")
     return Specimen.of(stress).force(stress.reactions) * strength / matrix_peak(stress)[0]
+
+
+def _most(stress: StressField, part: Part, length: float) -> float:
+    """Ratio that no paths of a length, mm, exceed."""
+    return upper_bound(stress, part.layers, length, part.machine, part.strand).ratio
+
+
+def _most_of_cases(cases: WeightedCases, part: Part, length: float) -> CasesBound:
+    """Return what no paths of a length, mm, exceed under several load cases."""
+    return cases_bound(cases, part.layers, length, part.machine, part.strand)
 
 
 def _of(solved: Solved) -> Tests:
@@ -202,9 +232,12 @@ def _planned(bare: Run, part: Part, lengths: Sequence[float]) -> list[tuple[floa
     found = []
 
     def work() -> Run:
-        found.extend(
-            plan_to_lengths(bare.strategy, part.layers, part.stress, part.machine, lengths)
-        )
+        strategy, layers, machine, cases = bare.strategy, part.layers, part.machine, part.cases
+        if cases is None:
+            found.extend(plan_to_lengths(strategy, layers, part.stress, machine, lengths))
+        else:
+            several = plan_cases_to_lengths(strategy, layers, cases, machine, lengths, part.strand)
+            found.extend(several)
         return bare
 
     done = attempted(bare, work)
@@ -218,21 +251,39 @@ def _planned(bare: Run, part: Part, lengths: Sequence[float]) -> list[tuple[floa
     return kept or [(lengths[0], with_plan(bare, found[0]))]
 
 
+def _points(
+    runs: Sequence[tuple[int, float, float, Run]], bounds: Mapping[float, float | CasesBound]
+) -> tuple[FrontPoint, ...]:
+    """Points of runs, each with the bound of the least length that is no less than its own."""
+    least = (min(each for each in bounds if each >= run.length) for *_, run in runs)
+    return tuple(_point(*one, bounds[length]) for one, length in zip(runs, least, strict=True))
+
+
 def _point(
-    count: int, strength: float, asked: float, run: Run, bounds: Mapping[float, float]
+    count: int, strength: float, asked: float, run: Run, bound: float | CasesBound
 ) -> FrontPoint:
     """Keep what the front shows of a run."""
-    assert run.tested is not None
-    failure = run.tested.failure
+    tested = run.tested
+    assert tested is not None
+    failure, ratio, cases = tested.failure, tested.bracket.tension.ratio, None
+    if isinstance(bound, CasesBound):
+        assert tested.cases is not None
+        cases = PointCases.of(tested.cases, bound)
+        ratio, most = float(cases.ratios[cases.worst]), float(bound.singles[cases.worst])
+        every = tested.cases.failure
+        failure = None if every is None else every.each[int(np.argmin(every.factors))]
+    else:
+        most = bound
     return FrontPoint(
         layers=count,
         asked=asked,
         length=run.length,
-        ratio=run.tested.bracket.tension.ratio,
+        ratio=ratio,
         failure=float("nan") if failure is None else failure.load,
-        fails_in=run.fails_in,
-        bound=bounds[min(length for length in bounds if length >= run.length)],
+        fails_in="" if failure is None else failure.what,
+        bound=most,
         why_not=run.why_not,
         toolpaths=run.toolpaths,
         strength=strength,
+        cases=cases,
     )

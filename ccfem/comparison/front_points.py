@@ -8,7 +8,9 @@ import numpy as np
 
 from ccfem.arrays import BoolArray, freeze
 from ccfem.comparison.front import on_front
+from ccfem.comparison.front_cases import WORST, PointCases, stiffness_panels
 from ccfem.errors import InputError
+from ccfem.fibre_aware.cases_bound import CasesBound
 from ccfem.planning.equal_fibre import TOLERANCE
 from ccfem.plot.amount_curves import AmountPoint, TradePoint, amount_curves, trade_curves
 from ccfem.toolpaths import Toolpaths
@@ -20,6 +22,7 @@ if TYPE_CHECKING:
 __all__ = ["FibreFront", "FrontPoint"]
 
 _STIFFNESS, _FAILURE = "times unreinforced stiffness", "first failure, kN"
+_FACTOR = "first failure, times the load"
 
 
 def _layers(count: int) -> str:
@@ -39,18 +42,23 @@ class FrontPoint:
     length : float, mm
         Of fibre in all layers.
     ratio : float
-        Stiffness over that of the part without fibre, fibres in tension only.
+        Stiffness over that of the part without fibre, fibres in tension only; of several load
+        cases of the one that is farthest below its bound.
     failure : float, N
-        Load at which something fails first; NaN where that is not known.
+        Load at which something fails first; NaN where that is not known. Of several load cases
+        that of the one which fails at the least multiple of its load.
     fails_in : str
         "matrix", "fibre" or "interlayer"; empty where that is not known.
     bound : float
-        Ratio that no paths of this length exceed, on the largest number of layers of the front.
+        Ratio that no paths of this length exceed, on the largest number of layers of the front; of
+        several load cases in that case alone.
     why_not : str
         What keeps the paths from being printed as they are; empty where they can be.
     toolpaths : Toolpaths
     strength : float, default 0
         How much the load at first failure counted when it was planned.
+    cases : PointCases, optional
+        What it does in every load case, where it is planned for several.
     """
 
     layers: int
@@ -63,12 +71,18 @@ class FrontPoint:
     why_not: str
     toolpaths: Toolpaths
     strength: float = 0.0
+    cases: PointCases | None = None
 
     @property
     def kind(self) -> str:
         """Name of the curve that it belongs to."""
         name = _layers(self.layers)
         return f"{name}, strength {self.strength:g}" if self.strength else name
+
+    @property
+    def least_ratio(self) -> float:
+        """The ratio, or the least of all load cases."""
+        return self.ratio if self.cases is None else float(self.cases.ratios.min())
 
 
 @dataclass(frozen=True)
@@ -85,9 +99,14 @@ class FibreFront:
     refused : mapping of int to str
         Numbers of layers on which the strategy found no plan, with the reason.
     bare : float, N
-        Load at which the part without fibre fails; NaN where that is not known.
+        Load at which the part without fibre fails; NaN where that is not known. Of several load
+        cases the least multiple of their loads.
     bounds : tuple of (float, float)
-        Lengths, mm, and the ratios that no paths of that length exceed.
+        Lengths, mm, and the ratios that no paths of that length exceed; empty for several load
+        cases.
+    cases_bounds : tuple of (float, CasesBound)
+        Lengths, mm, and what no paths of that length exceed under several load cases; empty for
+        one.
     """
 
     case: str
@@ -96,27 +115,41 @@ class FibreFront:
     refused: Mapping[int, str]
     bare: float = float("nan")
     bounds: tuple[tuple[float, float], ...] = ()
+    cases_bounds: tuple[tuple[float, CasesBound], ...] = ()
 
     def __post_init__(self) -> None:
         freeze(self, refused=dict)
 
     def __repr__(self) -> str:
-        best = max(self.points, key=lambda each: each.ratio)
+        cases = self.points[0].cases
+        best = max(self.points, key=lambda each: each.least_ratio)
+        said = "" if cases is None else f" in every one of {len(cases.names)} load cases"
         return (
             f"FibreFront of '{self.case}' by {self.strategy}: {len(self.points)} plans, up to "
-            f"{best.ratio:.3g} times as stiff with {best.length / 1000.0:.4g} m on {best.layers} "
-            "layers"
+            f"{best.least_ratio:.3g} times as stiff{said} with {best.length / 1000.0:.4g} m on "
+            f"{best.layers} layers"
         )
 
     @property
     def stiffest(self) -> BoolArray:
-        """Printable plans that nothing with as little fibre, or none, exceeds in stiffness."""
-        return self._front(1.0, [each.ratio for each in self.points])
+        """Printable plans that nothing with as little fibre, or none, exceeds in stiffness.
+
+        With several load cases every plan is measured by what no paths of its own length exceed in
+        each: no plan with as little fibre reaches a larger share of that in its worst case.
+        """
+        cases = [each.cases for each in self.points if each.cases is not None]
+        if not cases:
+            return self._front(1.0, [each.ratio for each in self.points])
+        marks = []
+        for k, own in enumerate(cases):
+            shares = [own.share_of(other.ratios) for other in cases]
+            marks.append(self._front(own.share_of(np.ones(len(own.names))), shares)[k])
+        return np.array(marks)
 
     @property
     def strongest(self) -> BoolArray:
         """Printable plans that nothing with as little fibre, or none, exceeds in first failure."""
-        return self._front(self.bare, [each.failure for each in self.points])
+        return self._front(self.bare, [_failure(each) for each in self.points])
 
     def _front(self, bare: float, values: Sequence[float]) -> BoolArray:
         # Plans to one length differ by what the shortest strand leaves: these count as equal.
@@ -128,17 +161,38 @@ class FibreFront:
         return on_front(across, np.append(bare, values))[1:]
 
     def plot(self) -> "Figure":
-        """Draw stiffness and first-failure load over the length of fibre, with the bound."""
-        panels: dict[str, dict[str, list[AmountPoint]]] = {_STIFFNESS: {}, _FAILURE: {}}
-        rows = zip(self.points, self.stiffest.tolist(), self.strongest.tolist(), strict=True)
-        for each, stiffest, strongest in rows:
-            length, printable = 1e-3 * each.length, not each.why_not
-            found = (each.ratio, stiffest), (1e-3 * each.failure, strongest)
-            for curves, (value, best) in zip(panels.values(), found, strict=True):
-                curves.setdefault(each.kind, []).append(AmountPoint(length, value, best, printable))
-        bound = [(1e-3 * length, ratio) for length, ratio in self.bounds]
-        heading = f"{self.case}, {self.strategy}"
-        return amount_curves(panels, [(0.0, 1.0), *bound], (1.0, 1e-3 * self.bare), heading)
+        """Draw stiffness and first-failure load over the length of fibre, with the bound.
+
+        With several load cases: of the worst case the share of its bound, beside the most of any
+        paths; the stiffness in each case, beside what no paths exceed in that case alone, and what
+        none exceed in all at once; and the multiple of the loads at which one of them fails.
+        """
+        stiffest, strongest = self.stiffest.tolist(), self.strongest.tolist()
+        cases = [each.cases for each in self.points if each.cases is not None]
+        if cases:
+            values, bounds, together = stiffness_panels(cases, self.cases_bounds)
+        else:
+            values = {_STIFFNESS: [each.ratio for each in self.points]}
+            bounds, together = {_STIFFNESS: [(0.0, 1.0), *self.bounds]}, {}
+        panels = {label: self._curves(some, stiffest) for label, some in values.items()}
+        scale, label = (1.0, _FACTOR) if cases else (1e-3, _FAILURE)
+        panels[label] = self._curves([scale * _failure(each) for each in self.points], strongest)
+        return amount_curves(
+            panels,
+            _in_metres(bounds),
+            (*(1.0 for _ in values), scale * self.bare),
+            f"{self.case}, {self.strategy}",
+            _in_metres(together),
+        )
+
+    def _curves(
+        self, values: Sequence[float], best: Sequence[bool]
+    ) -> dict[str, list[AmountPoint]]:
+        curves: dict[str, list[AmountPoint]] = {}
+        for each, value, marked in zip(self.points, values, best, strict=True):
+            point = AmountPoint(1e-3 * each.length, value, marked, not each.why_not)
+            curves.setdefault(each.kind, []).append(point)
+        return curves
 
     def plot_trade(self) -> "Figure":
         """Draw first-failure load over stiffness, a curve a length of fibre.
@@ -161,12 +215,14 @@ class FibreFront:
         on = f", {_layers(*counts)}" if alike else ""
         named = {
             f"{1e-3 * some[0].length:.3g} m" + ("" if alike else f", {_layers(some[0].layers)}"): [
-                TradePoint(each.ratio, 1e-3 * each.failure, each.strength, not each.why_not)
-                for each in some
+                _traded(each) for each in some
             ]
             for some in several
         }
-        return trade_curves(named, f"{self.case}, {self.strategy}{on}: what strength costs")
+        heading = f"{self.case}, {self.strategy}{on}: what strength costs"
+        one_case = self.points[0].cases is None
+        labels = (_STIFFNESS, _FAILURE) if one_case else (WORST, _FACTOR)
+        return trade_curves(named, heading, *labels)
 
     def to_frame(self) -> "pd.DataFrame":
         """One row a plan."""
@@ -178,10 +234,7 @@ class FibreFront:
                 "strength": each.strength,
                 "fibre": each.length,
                 "fibre_per_layer": each.asked,
-                "stiffness_ratio_tension": each.ratio,
-                "bound": each.bound,
-                "share_of_gain": (each.ratio - 1.0) / (each.bound - 1.0),
-                "first_failure_load": each.failure,
+                **_columns(each),
                 "fails_in": each.fails_in,
                 "printable": not each.why_not,
                 "why_not": each.why_not,
@@ -193,3 +246,39 @@ class FibreFront:
             )
         ]
         return pd.DataFrame(rows)
+
+
+def _in_metres(
+    curves: Mapping[str, Sequence[tuple[float, float]]],
+) -> dict[str, list[tuple[float, float]]]:
+    return {label: [(1e-3 * x, y) for x, y in curve] for label, curve in curves.items()}
+
+
+def _failure(point: FrontPoint) -> float:
+    """Load at first failure, N, or the least multiple of several."""
+    return point.failure if point.cases is None else float(point.cases.factors.min())
+
+
+def _traded(point: FrontPoint) -> TradePoint:
+    """Point of what strength costs in stiffness."""
+    printable = not point.why_not
+    if point.cases is None:
+        return TradePoint(point.ratio, 1e-3 * point.failure, point.strength, printable)
+    return TradePoint(point.cases.share, _failure(point), point.strength, printable)
+
+
+def _columns(point: FrontPoint) -> dict[str, float | str]:
+    """Columns of the table: what a plan reaches."""
+    if point.cases is not None:
+        factor = _failure(point)
+        return {
+            **point.cases.values(),
+            "first_failure_factor": factor,
+            "fails_first": point.cases.fails_first,
+        }
+    return {
+        "stiffness_ratio_tension": point.ratio,
+        "bound": point.bound,
+        "share_of_gain": (point.ratio - 1.0) / (point.bound - 1.0),
+        "first_failure_load": point.failure,
+    }

@@ -7,7 +7,7 @@ import numpy as np
 from ccfem.comparison.ranking import merit, off_length, order_of, ranking
 from ccfem.comparison.runs import Run, Wanted
 from ccfem.elasticity.weighted_cases import WeightedCases
-from ccfem.fibre_aware.cases_bound import CasesBound
+from ccfem.fibre_aware.cases_bound import LEAST, CasesBound
 from ccfem.fibre_aware.upper_bound import LOOSE
 from ccfem.virtual_testing.stiffer import FIRST, RESOLUTION, SAME
 
@@ -80,6 +80,12 @@ def cases_remarks(
     ]
     if others:
         found.append("alternative supports are not tested with several load cases")
+    found += [
+        f"{run.name}: planned for the case that gains least over the part without fibre, not for "
+        "the shares of bounds"
+        for run in runs
+        if getattr(run.strategy, "objective", None) == LEAST
+    ]
     tested = [
         run
         for run in ranking(runs, wanted)

@@ -99,6 +99,11 @@ class WeightedCases:
         return tuple(field.case for field in self.fields)
 
     @property
+    def heaviest(self) -> StressField:
+        """Case of the largest weight, the first one of several."""
+        return self.fields[int(np.argmax(self.weights))]
+
+    @property
     def mesh(self) -> TetMesh:
         """Mesh of all cases."""
         return self.fields[0].mesh

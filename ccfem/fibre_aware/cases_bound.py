@@ -10,9 +10,9 @@ where S is the most that fibre of that length can gather: the cells of the large
 known for several strains: 360 angles are tried, with a margin for those between. A case that moves
 supports in place of forces has a compliance too: see `SmearedPart.pull`.
 
-What counts of a case is C_i over the least that any paths could make of it alone. The factors that
-raise the bound of the largest of these are found by growing those of the cases that are worst off;
-whatever they are, the bound holds.
+What counts of a case is C_i over the least that any paths could make of it alone, or over that of
+the part without fibre. The factors that raise the bound of the largest of these are found by
+growing those of the cases that are worst off; whatever they are, the bound holds.
 """
 
 from collections.abc import Sequence
@@ -34,6 +34,7 @@ from ccfem.machine.machine import Machine
 from ccfem.virtual_testing.strand import Strand
 
 __all__ = [
+    "LEAST",
     "OBJECTIVES",
     "SUM",
     "WORST",
@@ -41,12 +42,14 @@ __all__ = [
     "cases_bound",
     "cases_certificate",
     "largest_gathered",
+    "measures",
     "objective_value",
     "single_bounds",
 ]
 
-WORST, SUM = OBJECTIVES = ("worst", "sum")
-"""What is made small: the largest of ``bound_i / ratio_i``, or their weighted mean."""
+WORST, SUM, LEAST = OBJECTIVES = ("worst", "sum", "least")
+"""What is made small: the largest of ``bound_i / ratio_i``, their weighted mean, or the largest of
+``1 / ratio_i``: the least ratio is made large."""
 
 _SINGLE_ITERATIONS = 30
 """Of the bounds of each case alone, at most."""
@@ -63,9 +66,10 @@ class CasesBound:
     Attributes
     ----------
     objective : str
-        "worst": the largest of ``singles / ratios``; "sum": their weighted mean.
+        "worst": the largest of ``singles / ratios``; "sum": their weighted mean; "least": the
+        largest of ``1 / ratios``.
     singles : (n,) array
-        For each case alone the stiffness ratio that no paths exceed.
+        For each case alone the stiffness ratio that no paths exceed; 1 with "least".
     case_weights : (n,) array
         Weights of the cases; their sum is 1.
     least : float
@@ -108,7 +112,7 @@ class CasesBound:
 
 def objective_value(terms: FloatArray, weights: FloatArray, objective: str) -> float:
     """Largest of the terms of the cases, or their weighted mean."""
-    return float(terms.max()) if objective == WORST else float(weights @ terms)
+    return float(weights @ terms) if objective == SUM else float(terms.max())
 
 
 def cases_bound(
@@ -134,7 +138,7 @@ def cases_bound(
         Its strand width.
     strand : Strand, optional
         Stiffness of a strand; default rho = EA/E = 4 mm^2.
-    objective : {"worst", "sum"}
+    objective : {"worst", "sum", "least"}
     iterations : int, optional
         Maximum number, a solve a case each; at least 1. Default as `upper_bound`.
     gap : float, default 0.01
@@ -151,7 +155,7 @@ def cases_bound(
     check_number("iterations", iterations, at_least=1)
     check_number("number of layers", len(layers), at_least=1)
     parts = smeared_cases(cases.fields, layers[0].plane.frame)
-    singles = single_bounds(cases, layers, length, machine, strand, _SINGLE_ITERATIONS)
+    singles = measures(objective, cases, layers, length, machine, strand, _SINGLE_ITERATIONS)
     axial = (Strand() if strand is None else strand).stiffness(parts[0].modulus)
     most = fibre_capacity(parts[0], layers, machine)
     volume = parts[0].mesh.volumes
@@ -183,7 +187,7 @@ def cases_bound(
         if reached <= (1.0 + gap) * max(bounds):
             break
         merit = -float(factors @ terms)
-        if objective == WORST:
+        if objective != SUM:
             factors = factors * (terms / terms.max()) ** min(1.0, _FULL_STEPS / (k + 1))
             factors = factors / factors.sum()
         stretch = np.sqrt(
@@ -194,6 +198,21 @@ def cases_bound(
         )
         ascent = ascent.step(stretch, merit)
     return CasesBound(objective, singles, cases.weights, max(bounds), reached, best)
+
+
+def measures(
+    objective: str,
+    cases: WeightedCases,
+    layers: Sequence[Layer],
+    length: float,
+    machine: Machine,
+    strand: Strand | None = None,
+    iterations: int = 7,
+) -> FloatArray:
+    """Stiffness ratio (n,) that each case is measured by: its own bound, or 1 with "least"."""
+    if objective == LEAST:
+        return np.ones(len(cases))
+    return single_bounds(cases, layers, length, machine, strand, iterations)
 
 
 def single_bounds(

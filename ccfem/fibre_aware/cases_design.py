@@ -14,7 +14,7 @@ import scipy.sparse as sp
 
 from ccfem.arrays import FloatArray, freeze
 from ccfem.fibre_aware.border_levels import BorderLevels
-from ccfem.fibre_aware.cases_bound import SUM, WORST
+from ccfem.fibre_aware.cases_bound import LEAST, SUM, WORST
 from ccfem.fibre_aware.field_design import designed_fields
 from ccfem.fibre_aware.smeared import SmearedPart, SmearedSolution
 from ccfem.fibre_aware.stream_design import OVER_BUDGET, Laid, StreamProblem
@@ -33,7 +33,7 @@ __all__ = [
     "start_fields",
 ]
 
-DESIGN_POWERS = {WORST: 4.0, SUM: 1.0}
+DESIGN_POWERS = {WORST: 4.0, SUM: 1.0, LEAST: 4.0}
 """Power of ``bound / ratio`` in the sum over the cases, by the objective that is planned for."""
 
 Pull: TypeAlias = tuple[FloatArray, FloatArray]

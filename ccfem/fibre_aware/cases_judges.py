@@ -7,7 +7,7 @@ import numpy as np
 
 from ccfem.arrays import FloatArray, freeze, in_brief
 from ccfem.checks import check_known
-from ccfem.fibre_aware.cases_bound import OBJECTIVES, WORST
+from ccfem.fibre_aware.cases_bound import LEAST, OBJECTIVES, SUM, WORST
 from ccfem.fibre_aware.judges import Judge, Judged
 from ccfem.fibre_aware.strain_worth import StrainWorth
 from ccfem.fibre_aware.strength_value import Worth, layer_normal
@@ -22,7 +22,7 @@ from ccfem.virtual_testing.strands import Strands, cut_strands
 
 __all__ = ["CasesGoal", "CasesTested", "cases_judge", "cases_strength_judge", "cases_tests"]
 
-_POWERS = {WORST: 20.0, "sum": 1.0}
+_POWERS = {WORST: 20.0, SUM: 1.0, LEAST: 20.0}
 _TOLERANCE = 1e-5
 """Relative residual of the tests; the error of the stiffness is of its square."""
 
@@ -38,9 +38,10 @@ class CasesGoal:
     weights : (n,) array
         Of the cases.
     bounds : (n,) array
-        Stiffness ratio of each case that no paths exceed.
-    objective : {"worst", "sum"}
-        What counts: the case that is farthest from its bound, or the weighted mean.
+        Stiffness ratio of each case that it is measured by, one that no paths exceed
+        (`ccfem.fibre_aware.cases_bound.measures`).
+    objective : {"worst", "sum", "least"}
+        What counts: the case that is farthest below what it is measured by, or the weighted mean.
 
     Raises
     ------
@@ -68,7 +69,7 @@ class CasesGoal:
     def merit(self, ratios: FloatArray) -> float:
         """Mean of ratio over bound that counts each case as `counts` does.
 
-        With the objective "worst" it is near to the worst.
+        With the objectives "worst" and "least" it is near to the worst.
         """
         power, shares = _POWERS[self.objective], self.weights / self.weights.sum()
         return float(shares @ (self.bounds / np.asarray(ratios)) ** power) ** (-1.0 / power)

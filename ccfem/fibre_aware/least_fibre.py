@@ -1,25 +1,31 @@
 """How much fibre a wanted stiffness takes: the least length of a strategy that reaches it."""
 
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass, replace
+from typing import Any
 
 import numpy as np
 
-from ccfem.arrays import in_brief
+from ccfem.arrays import FloatArray, freeze, in_brief
 from ccfem.checks import check_number
 from ccfem.elasticity.stress_field import StressField
+from ccfem.elasticity.weighted_cases import WeightedCases
 from ccfem.errors import InputError
+from ccfem.fibre_aware.cases_bound import LEAST, WORST
+from ccfem.fibre_aware.plan_cases import plan_cases
 from ccfem.layers.layer import Layer
 from ccfem.machine.machine import Machine
 from ccfem.planning.equal_fibre import plan_to_length
 from ccfem.planning.planned import Planned
 from ccfem.planning.strategy import Strategy
 from ccfem.planning.whole_part import full_length
+from ccfem.toolpaths import Toolpaths
+from ccfem.virtual_testing.several_cases import specimens, virtual_tests
 from ccfem.virtual_testing.specimen import Specimen
 from ccfem.virtual_testing.strand import Strand
 from ccfem.virtual_testing.virtual_test import virtual_test
 
-__all__ = ["LeastFibre", "least_fibre"]
+__all__ = ["LeastFibre", "for_every_case", "least_fibre"]
 
 _FIRST = 0.3
 """Share of the layers that the first plan covers."""
@@ -49,7 +55,10 @@ class LeastFibre:
     asked : float, mm
         Length per layer that this plan was asked for: asked again, the strategy lays the same.
     ratio : float
-        Its stiffness over that of the part without fibre, fibres in tension only.
+        Its stiffness over that of the part without fibre, fibres in tension only; of several load
+        cases the least.
+    ratios : (n,) array
+        The same in each load case.
     tried : tuple of (float, float)
         Length per layer, mm, and stiffness ratio of every plan, in the order of the search.
     """
@@ -57,15 +66,19 @@ class LeastFibre:
     planned: Planned
     asked: float
     ratio: float
+    ratios: FloatArray
     tried: tuple[tuple[float, float], ...]
 
     __repr__ = in_brief
+
+    def __post_init__(self) -> None:
+        freeze(self, ratios=float)
 
 
 def least_fibre(
     strategy: Strategy,
     layers: Sequence[Layer],
-    stress: StressField,
+    stress: StressField | WeightedCases,
     machine: Machine,
     ratio: float,
     strand: Strand | None = None,
@@ -75,13 +88,16 @@ def least_fibre(
     The gain in stiffness grows about as a power of the length; two plans say which, and the next
     length follows. Every plan is tested virtually.
 
+    Several load cases are planned for at once, and every one of them is to be so stiff, over the
+    part without fibre in that case: what counts is the one that gains least (`for_every_case`).
+
     Parameters
     ----------
     strategy : Strategy
     layers : sequence of Layer
         All layers of the part.
-    stress : StressField
-        The part without fibre, under the load that counts.
+    stress : StressField or WeightedCases
+        The part without fibre, under the load that counts, or under several.
     machine : Machine
     ratio : float
         Wanted stiffness over that of the part without fibre, above 1.
@@ -94,17 +110,23 @@ def least_fibre(
         When the ratio is not above 1, or the most fibre that the strategy lays does not reach it.
     """
     check_number("stiffness over that without fibre", ratio, above=1.0)
-    specimen, most = Specimen.of(stress), _MOST * full_length(layers, machine)
+    if not isinstance(stress, StressField):
+        strategy = for_every_case(strategy)
+    test, most = _test(stress, machine, strand), _MOST * full_length(layers, machine)
     found: dict[float, LeastFibre] = {}
     tried: list[tuple[float, float]] = []
     length = _FIRST * most
     for _ in range(_PLANS):
-        planned = plan_to_length(strategy, layers, stress, machine, length)
-        reached = virtual_test(planned.toolpaths, specimen, strand, span=(), machine=machine).ratio
+        if isinstance(stress, StressField):
+            planned = plan_to_length(strategy, layers, stress, machine, length)
+        else:
+            planned = plan_cases(strategy, layers, stress, machine, length, strand)
+        ratios = test(planned.toolpaths)
+        reached = float(ratios.min())
         laid = planned.length_per_layer
         if laid in found:  # no other length lies between
             break
-        found[laid] = LeastFibre(planned, length, reached, ())
+        found[laid] = LeastFibre(planned, length, reached, ratios, ())
         tried.append((laid, reached))
         if 0.0 <= reached - ratio <= _CLOSE * (ratio - 1.0):
             break
@@ -116,13 +138,50 @@ def least_fibre(
         length = min(following, most)
     enough = [laid for laid, one in found.items() if one.ratio >= ratio]
     if not enough:
-        laid, best = max(tried, key=lambda one: one[1])
+        best = max(found.values(), key=lambda one: one.ratio)
         raise InputError(
-            f"{ratio:.4g} times the stiffness without fibre was asked for; {best:.4g} is the most "
-            f"of {len(tried)} plans, with {laid:.0f} mm per layer: ask for less, or give the part "
+            f"{ratio:.4g} times the stiffness without fibre was asked for{_of_every(stress)}; "
+            f"{_reached(best, stress)} is the most of {len(tried)} plans, with "
+            f"{best.planned.length_per_layer:.0f} mm per layer: ask for less, or give the part "
             "more layers"
         )
     return replace(found[min(enough)], tried=tuple(tried))
+
+
+def for_every_case(strategy: Strategy) -> Strategy:
+    """Let a strategy plan for the load case that gains least, where it knows that objective.
+
+    One that was told another objective than its default, "worst", keeps it.
+    """
+    changed: Any = strategy
+    told = getattr(strategy, "objective", None) == WORST
+    return replace(changed, objective=LEAST) if told else strategy
+
+
+def _test(
+    stress: StressField | WeightedCases, machine: Machine, strand: Strand | None
+) -> Callable[[Toolpaths], FloatArray]:
+    """Return what finds the stiffness ratio of paths in each load case, (n,)."""
+    if isinstance(stress, StressField):
+        part = Specimen.of(stress)
+
+        def test(paths: Toolpaths) -> FloatArray:
+            return np.array([virtual_test(paths, part, strand, span=(), machine=machine).ratio])
+
+        return test
+    parts = specimens(stress)
+    return lambda paths: virtual_tests(paths, parts, strand, machine=machine).ratios
+
+
+def _of_every(stress: StressField | WeightedCases) -> str:
+    return "" if isinstance(stress, StressField) else " in every load case"
+
+
+def _reached(found: LeastFibre, stress: StressField | WeightedCases) -> str:
+    """Ratio of a plan, and the load case that it is of where there are several."""
+    if isinstance(stress, StressField):
+        return f"{found.ratio:.4g}"
+    return f"{found.ratio:.4g} in '{stress.names[int(np.argmin(found.ratios))]}'"
 
 
 def _next(tried: list[tuple[float, float]], ratio: float) -> float | None:

@@ -8,11 +8,9 @@ stress is planned as it is.
 
 from collections.abc import Sequence
 
-import numpy as np
-
 from ccfem.elasticity.weighted_cases import WeightedCases
 from ccfem.errors import InputError
-from ccfem.fibre_aware.cases_bound import WORST, single_bounds
+from ccfem.fibre_aware.cases_bound import WORST, measures
 from ccfem.fibre_aware.cases_judges import CasesGoal
 from ccfem.fibre_aware.layer_shares import layers_by_case
 from ccfem.fibre_aware.prune_cases import prune_cases
@@ -27,7 +25,7 @@ from ccfem.toolpaths import Toolpaths
 from ccfem.virtual_testing.several_cases import specimens
 from ccfem.virtual_testing.strand import Strand
 
-__all__ = ["plan_by_layers", "plan_cases"]
+__all__ = ["plan_by_layers", "plan_cases", "plan_cases_to_lengths"]
 
 _TOO_MUCH = 1.15
 """Length that is planned over that kept."""
@@ -59,7 +57,7 @@ def plan_cases(
         nothing is taken off.
     strand : Strand, optional
         Of the tests; default rho = EA/E = 4 mm^2.
-    objective : {"worst", "sum"}
+    objective : {"worst", "sum", "least"}
         What the fibre is cut for, by strategies that do not say it themselves.
 
     Raises
@@ -71,11 +69,9 @@ def plan_cases(
     if wanted is None and isinstance(strategy, LengthStrategy):
         wanted = strategy.natural_length(layers, machine)
     if isinstance(strategy, CasesStrategy) and wanted is not None:
-        told, planner = strategy.for_cases(cases, layers, machine, (wanted,))[0]
-        paths = plan_layers(planner, layers, layers, cases.fields[0], machine)
-        return _told(told, paths, layers, machine, wanted)
+        return _by_itself(strategy, layers, cases, machine, (wanted,))[0]
     if len(cases) == 1 or getattr(strategy, "ignores_stress", False):
-        field = cases.fields[int(np.argmax(cases.weights))]
+        field = cases.heaviest
         if wanted is not None:
             return plan_to_length(strategy, layers, field, machine, wanted)
         paths = plan(strategy, layers, field, machine)
@@ -90,10 +86,45 @@ def plan_cases(
         return _told(strategy, plan_by_layers(strategy, layers, cases, machine), layers, machine)
     too_much = plan_by_layers(strategy, layers, cases, machine, _TOO_MUCH * wanted)
     in_all = wanted * len(layers)
-    bounds = single_bounds(cases, layers, in_all, machine, strand)
+    bounds = measures(objective, cases, layers, in_all, machine, strand)
     goal = CasesGoal(specimens(cases), cases.weights, bounds, objective)
     paths = prune_cases(too_much, goal, in_all, machine, strand)
     return _told(strategy, paths, layers, machine, wanted)
+
+
+def plan_cases_to_lengths(
+    strategy: Strategy,
+    layers: Sequence[Layer],
+    cases: WeightedCases,
+    machine: Machine,
+    lengths: Sequence[float],
+    strand: Strand | None = None,
+) -> list[Planned]:
+    """Plan for several load cases to several lengths of fibre, mm per layer.
+
+    A strategy that plans for all cases does so for all lengths together (`CasesStrategy`); of any
+    other each length is planned on its own. Parameters and errors as in `plan_cases`.
+    """
+    if isinstance(strategy, CasesStrategy):
+        check_layers(strategy, layers, machine)
+        return _by_itself(strategy, layers, cases, machine, lengths)
+    return [plan_cases(strategy, layers, cases, machine, each, strand) for each in lengths]
+
+
+def _by_itself(
+    strategy: CasesStrategy,
+    layers: Sequence[Layer],
+    cases: WeightedCases,
+    machine: Machine,
+    lengths: Sequence[float],
+) -> list[Planned]:
+    """Plans of a strategy that plans for all cases, of several lengths per layer."""
+    found = []
+    planners = strategy.for_cases(cases, layers, machine, lengths)
+    for (told, planner), wanted in zip(planners, lengths, strict=True):
+        paths = plan_layers(planner, layers, layers, cases.fields[0], machine)
+        found.append(_told(told, paths, layers, machine, wanted))
+    return found
 
 
 def plan_by_layers(

@@ -14,6 +14,15 @@ if TYPE_CHECKING:
 __all__ = ["AmountPoint", "TradePoint", "amount_curves", "trade_curves"]
 
 
+_ABREAST = 3
+"""Panels side by side at most."""
+
+_PANEL, _BETWEEN, _MARGINS = 2.368, 0.55, 1.332
+"""Height of a panel, of what is between two, and of what is above and below all, inches."""
+
+_ALONE, _TOGETHER = (0, (4, 3)), (0, (1, 2))
+"""Dashes of bounds, of one panel and of several at once."""
+
 _APART = 0.04
 """Least distance, in sizes of the axes, of points whose strengths are written beside them."""
 
@@ -60,35 +69,46 @@ class TradePoint(NamedTuple):
 
 def amount_curves(
     panels: Mapping[str, Mapping[str, Sequence[AmountPoint]]],
-    bound: Sequence[tuple[float, float]],
+    bounds: Mapping[str, Sequence[tuple[float, float]]],
     bare: Sequence[float] = (),
     heading: str = "",
+    together: Mapping[str, Sequence[tuple[float, float]]] | None = None,
 ) -> "Figure":
-    """Draw values over the length of fibre, a panel each.
+    """Draw values over the length of fibre, a panel each, three at most side by side.
 
     Parameters
     ----------
     panels : mapping of label of the upright axis to mapping of name to points
         Points by length.
-    bound : sequence of (float, float)
-        Lengths, m, and what no paths exceed, drawn into the first panel.
+    bounds : mapping of label to sequence of (float, float)
+        Lengths, m, and what no paths exceed, of the panels that have a bound.
     bare : sequence of float, optional
         Value without fibre, for each panel: where its curves begin; NaN where it is not known.
     heading : str
+    together : mapping of label to sequence of (float, float), optional
+        Lengths, m, and what no paths exceed in all panels of this mapping at once.
     """
     from matplotlib.backends.backend_agg import FigureCanvasAgg
     from matplotlib.figure import Figure
     from matplotlib.lines import Line2D
 
-    figure = Figure(figsize=(4.4 * len(panels), 3.7), dpi=150.0, facecolor="white")
+    rows = -(-len(panels) // _ABREAST)
+    columns = -(-len(panels) // rows)
+    tall = _MARGINS + _PANEL * rows + _BETWEEN * (rows - 1)
+    figure = Figure(figsize=(4.4 * columns, tall), dpi=150.0, facecolor="white")
     FigureCanvasAgg(figure)
     figure.subplots_adjust(
-        left=0.55 / (4.4 * len(panels)), right=0.985, bottom=0.24, top=0.88, wspace=0.2
+        left=0.55 / (4.4 * columns),
+        right=0.985,
+        bottom=0.888 / tall,
+        top=1.0 - 0.444 / tall,
+        wspace=0.2,
+        hspace=_BETWEEN / _PANEL,
     )
-    figure.text(0.012, 0.94, heading, size=10, weight="bold", color=INK)
+    figure.text(0.012, 1.0 - 0.222 / tall, heading, size=10, weight="bold", color=INK)
     names = list(dict.fromkeys(name for curves in panels.values() for name in curves))
     colours = palette(names)
-    all_axes = [figure.add_subplot(1, len(panels), k + 1) for k in range(len(panels))]
+    all_axes = [figure.add_subplot(rows, columns, k + 1) for k in range(len(panels))]
     for k, (axes, (label, curves)) in enumerate(zip(all_axes, panels.items(), strict=True)):
         style_axes(axes, "fibre, m", label)
         begin = bare[k] if bare else float("nan")
@@ -96,12 +116,17 @@ def amount_curves(
             _draw(axes, points, colours[name], begin)
         axes.plot([0.0], [begin], "x", ms=5.0, color=OUTLINE, clip_on=False, zorder=3.0)
         axes.set_xlim(left=0.0)
-    above = sorted(bound)
-    all_axes[0].plot(*zip(*above, strict=True), color=OUTLINE, lw=1.0, ls=(0, (4, 3)), zorder=1.0)
+        for curve, dashes in ((bounds, _ALONE), (together or {}, _TOGETHER)):
+            if label in curve:
+                above = zip(*sorted(curve[label]), strict=True)
+                axes.plot(*above, color=OUTLINE, lw=1.0, ls=dashes, zorder=1.0)
     marks = [
         Line2D([], [], color=colours[name], lw=1.6, marker="o", ms=4, label=name) for name in names
     ]
-    marks.append(Line2D([], [], color=OUTLINE, lw=1.0, ls=(0, (4, 3)), label="no paths exceed"))
+    marks.append(Line2D([], [], color=OUTLINE, lw=1.0, ls=_ALONE, label="no paths exceed"))
+    if together:
+        said = "none exceed in all cases at once"
+        marks.append(Line2D([], [], color=OUTLINE, lw=1.0, ls=_TOGETHER, label=said))
     marks += _hollow(p for curves in panels.values() for points in curves.values() for p in points)
     figure.legend(
         handles=marks,
@@ -114,7 +139,12 @@ def amount_curves(
     return figure
 
 
-def trade_curves(curves: Mapping[str, Sequence[TradePoint]], heading: str = "") -> "Figure":
+def trade_curves(
+    curves: Mapping[str, Sequence[TradePoint]],
+    heading: str = "",
+    across: str = "times unreinforced stiffness",
+    up: str = "first failure, kN",
+) -> "Figure":
     """Draw first failure over stiffness: what one costs in the other.
 
     Parameters
@@ -122,6 +152,8 @@ def trade_curves(curves: Mapping[str, Sequence[TradePoint]], heading: str = "") 
     curves : mapping of name to sequence of TradePoint
         Plans with as much fibre, by how much strength counts.
     heading : str
+    across, up : str
+        What the axes are.
     """
     from matplotlib.backends.backend_agg import FigureCanvasAgg
     from matplotlib.figure import Figure
@@ -131,11 +163,11 @@ def trade_curves(curves: Mapping[str, Sequence[TradePoint]], heading: str = "") 
     FigureCanvasAgg(figure)
     axes = figure.add_axes((0.09, 0.23, 0.88, 0.68))
     figure.text(0.02, 0.945, heading, size=10, weight="bold", color=INK)
-    style_axes(axes, "times unreinforced stiffness", "first failure, kN")
+    style_axes(axes, across, up)
     colours = palette(curves)
     for name, points in curves.items():
-        across, up = [p.stiffness for p in points], [p.failure for p in points]
-        axes.plot(across, up, color=colours[name], lw=1.2)
+        where = [p.stiffness for p in points], [p.failure for p in points]
+        axes.plot(*where, color=colours[name], lw=1.2)
         for p in points:
             face = colours[name] if p.printable else "white"
             axes.plot([p.stiffness], [p.failure], "o", ms=5.0, color=colours[name], mfc=face)

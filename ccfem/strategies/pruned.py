@@ -14,7 +14,7 @@ from ccfem.elasticity.part_stress import PartStress
 from ccfem.elasticity.stress_field import solved
 from ccfem.elasticity.weighted_cases import WeightedCases
 from ccfem.errors import InputError
-from ccfem.fibre_aware.cases_bound import single_bounds
+from ccfem.fibre_aware.cases_bound import measures
 from ccfem.fibre_aware.cases_judges import CasesGoal
 from ccfem.fibre_aware.cut_and_move import prune_and_move, prune_and_move_cases
 from ccfem.fibre_aware.plan_cases import plan_by_layers
@@ -69,6 +69,8 @@ class Pruned:
         times the time.
     turns : {"tight", "cut"}
         Whether more than 1 % of the fibre may turn more tightly than the machine's radius.
+    objective : {"worst", "sum", "least"}
+        What counts of several load cases, as in `stream_function`.
     """
 
     of: str = "isocurve"
@@ -80,6 +82,7 @@ class Pruned:
     strength: float = 0.0
     moves: int = 0
     turns: Literal["tight", "cut"] = "tight"
+    objective: Literal["worst", "sum", "least"] = "worst"
 
     amount: ClassVar[Amount] = Amount("coverage", most=0.9, least=0.1)
     flat_layers_only: ClassVar[bool] = True
@@ -168,7 +171,7 @@ class Pruned:
     ) -> list[tuple["Pruned", LayerPlanner]]:
         """Plan each layer for one load case, and prune by tests of all.
 
-        Lengths as in `to_lengths`; the worst case counts (`ccfem.fibre_aware.prune_cases`).
+        Lengths as in `to_lengths`; tests of all say what goes (`ccfem.fibre_aware.prune_cases`).
 
         Raises
         ------
@@ -182,8 +185,9 @@ class Pruned:
         lengths = [min(length, most) for length in lengths]
         planned = self.overfill * max(lengths)
         paths = plan_by_layers(self._planner(), layers, cases, machine, planned)
-        bounds = single_bounds(cases, layers, max(lengths) * len(layers), machine, strand)
-        goal = CasesGoal(specimens(cases), cases.weights, bounds)
+        in_all = max(lengths) * len(layers)
+        bounds = measures(self.objective, cases, layers, in_all, machine, strand)
+        goal = CasesGoal(specimens(cases), cases.weights, bounds, self.objective)
         cut_by = (max(self.rounds, 3), self.strength, self.moves, TIGHT_SHARES[self.turns])
         found: list[tuple[Pruned, LayerPlanner]] = []
         for length in lengths:

@@ -16,7 +16,7 @@ from ccfem.checks import check_choices, check_fields
 from ccfem.elasticity.part_stress import PartStress
 from ccfem.elasticity.stress_field import StressField, solved
 from ccfem.elasticity.weighted_cases import WeightedCases
-from ccfem.fibre_aware.cases_bound import single_bounds
+from ccfem.fibre_aware.cases_bound import measures
 from ccfem.fibre_aware.cases_design import (
     DESIGN_POWERS,
     CasesDesign,
@@ -105,9 +105,10 @@ class StreamFunction:
     inset : float, default 0.5
         Least distance of strands and links from the boundary, in strand widths: 0.5 keeps them in,
         at 0 they may run along it with half of their width outside.
-    objective : {"worst", "sum"}
+    objective : {"worst", "sum", "least"}
         What counts of several load cases: the one that is farthest from the stiffest that it could
-        be made alone, or the weighted mean over the cases.
+        be made alone, the weighted mean over the cases, or the one that gains least over the part
+        without fibre.
     tilt : float, default 0.6
         Weight of a layer's own case in the field that its design starts with, in (0, 1], where
         there are several; the others share the rest.
@@ -132,7 +133,7 @@ class StreamFunction:
     phases: int = 5
     link_limit: float = 10.0
     inset: float = 0.5
-    objective: Literal["worst", "sum"] = "worst"
+    objective: Literal["worst", "sum", "least"] = "worst"
     tilt: float = 0.6
     strength: float = 0.0
     moves: int = 0
@@ -300,7 +301,8 @@ class StreamFunction:
     ) -> tuple[CasesProblem, IntArray, CasesDesign]:
         """Design the fields of several cases: the problem, the group of each layer, the design.
 
-        `bounds` (n,) are the stiffness ratios that no paths exceed in each case alone.
+        `bounds` (n,) are the stiffness ratios that the cases are measured by
+        (`ccfem.fibre_aware.cases_bound.measures`).
         """
         parts = smeared_cases(cases.fields, layers[0].plane.frame)
         alone, group = self._problem(parts, layers, machine)
@@ -357,7 +359,7 @@ class StreamFunction:
         """Design for this coverage, and cut by tests of all cases to some lengths, mm per layer."""
         check_tension(cases.fields, layers)
         in_all, strand = [length * len(layers) for length in lengths], Strand(self.rho)
-        bounds = single_bounds(cases, layers, max(in_all), machine, strand)
+        bounds = measures(self.objective, cases, layers, max(in_all), machine, strand)
         problem, group, found = self.designed_for_cases(cases, layers, machine, bounds)
         specimens = tuple(part.specimen for part in problem.parts)
         goal = CasesGoal(specimens, cases.weights, bounds, self.objective)

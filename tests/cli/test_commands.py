@@ -467,7 +467,12 @@ def test_a_parameter_that_is_a_table_takes_its_entries_one_by_one():
         parameters_by_strategy(["angle=30"])
 
 
-@pytest.mark.parametrize("command", ["support", "calibrate", "front"])
+@pytest.mark.parametrize("command", ["compare", "plan", "front"])
+def test_what_plans_for_all_load_cases_offers_it(ccfem, command):
+    assert '"all" plans for all at once' in " ".join(ccfem(command, "--help")[1].split())
+
+
+@pytest.mark.parametrize("command", ["support", "calibrate"])
 def test_what_takes_one_load_case_does_not_offer_all(ccfem, command):
     said = " ".join(ccfem(command, "--help")[1].split())
     assert "Load case to take; default the first." in said

@@ -3,7 +3,9 @@
 import pytest
 
 from ccfem.cli import fibre_amounts
+from ccfem.comparison.front_cases import PointCases
 from ccfem.comparison.front_points import FibreFront, FrontPoint
+from ccfem.fibre_aware.cases_bound import CasesBound
 from ccfem.toolpaths import Toolpaths
 
 QUICK = ["bar", "--set-case", "element_size=4.0", "--strategy", "zigzag", "--layers", "2"]
@@ -15,7 +17,7 @@ QUICK = ["bar", "--set-case", "element_size=4.0", "--strategy", "zigzag", "--lay
         (["--strength", "much"], "expected numbers separated by commas"),
         (["--strength", ","], "--strength expects numbers from 0 to 1"),
         (["--strength", "0,0.5"], "'zigzag' does not plan for strength"),
-        (["--load-case", "all"], "a front is of one load case"),
+        (["--load-case", "all"], "all load cases of 'bar' were asked for and it has one (pull)"),
         (["--set-fibre", "levels=3"], "fibre has no key 'levels'"),
         (["--set-fibre", "layers=7"], "fibre is asked for on layer 7"),
     ],
@@ -38,3 +40,23 @@ def test_a_plan_that_lays_less_than_asked_is_said_to(capsys, asked, said):
     command = f"ccfem plan ... --strategy stream_function --layers 3 --fibre-per-layer {asked:.0f}"
     after = lines[lines.index(command) + 1 :]
     assert after[0].startswith(said) if said else not after
+
+
+def test_the_table_of_several_load_cases_says_every_ratio_with_its_bound(capsys):
+    bound = CasesBound("worst", [4.0, 2.0], [0.5, 0.5], 1.25, 1.26, [0.5, 0.5])
+    cases = PointCases(("pull", "side"), [2.4, 1.5], [3.0, 2.5], bound)
+    plan = (2.4, 2500.0, "fibre", 4.0, "", Toolpaths.empty(), 0.0, cases)
+    found = FibreFront(
+        "bar", "pruned", (FrontPoint(2, 900.0, 1800.0, *plan),), {}, 1.5, (), ((1800.0, bound),)
+    )
+    fibre_amounts._say(found)
+    lines = capsys.readouterr().out.splitlines()
+    assert lines[0].split("  ")[-1] == "first failure"
+    words = lines[2].replace("(", " ").replace(")", " ").split()
+    # Worst 2.4 / 4, at most 1 / 1.25; ratio and bound of each case; the one that fails first.
+    wanted = "2 0 1.80 60.0%* 80.0% 2.400 4.000 1.500 2.000 2.5 × side*"
+    assert words == wanted.split()
+    assert len(lines[0]) == len(lines[1].split(" 1.5 ×")[0]) + len(" first failure")
+    assert lines[-1] == (
+        "ccfem plan ... --load-case all --strategy pruned --layers 2 --fibre-per-layer 900"
+    )

@@ -5,8 +5,8 @@ import pytest
 from ccfem.cases.case import Case
 from ccfem.cases.reading import read
 from ccfem.cli.run import options_of
-from ccfem.cli.wanted_stiffness import least_fibre_options
-from ccfem.comparison.compare import solve_and_slice
+from ccfem.cli.wanted_stiffness import least_fibre_options, planned_for
+from ccfem.comparison.compare import compare, solve_and_slice
 from ccfem.elasticity.problem import Force, Problem, Support
 from ccfem.layers.slicing.planar import Planar
 from ccfem.machine.machine import Machine
@@ -65,6 +65,47 @@ def test_the_number_of_layers_is_chosen_and_said(capsys):
 )
 def test_a_stiffness_that_makes_no_sense_is_answered_in_one_line(ccfem, words, answer):
     code, _, said = ccfem("plan", "bar", *QUICK, *words)
+    assert code == 2
+    assert answer in said
+    assert said.count("ccfem: error: ") == 1
+
+
+def test_with_all_load_cases_every_one_is_as_stiff_in_the_comparison_too(capsys):
+    mesh = box_mesh((60.0, 24.0, 4.0), (15, 6, 2))
+    loads = {"pull": (Force("x_max", (300.0, 0.0, 0.0)),), "side": (Force("x_max", (0, 40.0, 0)),)}
+    problem = Problem(mesh, isotropic(3500.0, 0.3), (Support("x_min"),), loads, order=1)
+    machine = Machine(minimum_length=15.0)
+    case = Case("beam", "", problem, slicing=Planar(count=4), machine=machine)
+    asked = {**options_of(4, None, True, "all", "auto"), "stiffness": "1.5"}
+    strategy = planned_for(case, create("stream_function", {"evaluations": 6, "phases": 1}), asked)
+    assert strategy.objective == "least"
+    found = least_fibre_options(case, strategy, asked)
+    said = capsys.readouterr().out
+    assert said.startswith("1.5 times the stiffness without fibre in every load case takes")
+    run = compare(case, {"stream": strategy}, **found).runs[0]
+    ratios = run.tested.cases.tension.ratios
+    assert 1.5 - 1e-5 < ratios.min() < 1.51
+    for name, ratio in zip(("pull", "side"), ratios, strict=True):
+        assert f"{ratio:.4g} times in '{name}'" in said
+    assert planned_for(case, strategy, {**asked, "load_case": "side"}) is strategy
+
+
+PLATE = ["--set-case", "element_size=8", "--layers", "2", "--strategy", "zigzag"]
+
+
+@pytest.mark.parametrize(
+    ("stiffness", "answer"),
+    [
+        ("1000N/mm", "is that of one load case, and these differ without fibre (N/mm: "),
+        ("9", "asked for in every load case; no paths on 2 layers exceed 2.953 in 'tension'"),
+        ("1.75", "asked for in every load case; no paths on 2 layers bring all of them above 1.6"),
+        ("1.5", "asked for in every load case; 1."),
+        ("1.0", "must be above 1"),
+    ],
+)
+def test_all_load_cases_and_a_stiffness_that_makes_no_sense(ccfem, stiffness, answer):
+    words = [*PLATE, "--load-case", "all", "--stiffness", stiffness]
+    code, _, said = ccfem("plan", "two_load_plate", *words)
     assert code == 2
     assert answer in said
     assert said.count("ccfem: error: ") == 1

@@ -12,7 +12,8 @@ def legend(figure):
 @pytest.mark.parametrize("printable", [True, False])
 def test_hollow_points_are_explained_where_there_are_any(printable):
     amounts = [AmountPoint(1.0, 2.0, True, True), AmountPoint(2.0, 3.0, True, printable)]
-    front = amount_curves({"stiffness": {"4 layers": amounts}}, [(1.0, 2.5), (2.0, 3.5)], [1.0])
+    bounds = {"stiffness": [(1.0, 2.5), (2.0, 3.5)]}
+    front = amount_curves({"stiffness": {"4 layers": amounts}}, bounds, [1.0])
     assert legend(front)[:2] == ["4 layers", "no paths exceed"]
     trade = trade_curves(
         {"1 m": [TradePoint(2.0, 3.0, 0.0, True), TradePoint(1.9, 3.2, 0.5, printable)]}

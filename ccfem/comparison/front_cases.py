@@ -1,0 +1,117 @@
+"""What one plan of a front does under several load cases."""
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import ArrayLike
+
+from ccfem.arrays import FloatArray, freeze
+from ccfem.comparison.tested_cases import TestedCases
+from ccfem.fibre_aware.cases_bound import CasesBound
+
+__all__ = ["WORST", "PointCases", "stiffness_panels"]
+
+WORST = "worst case, share of its bound"
+"""What counts of several load cases, on an axis."""
+
+Curves = dict[str, list[tuple[float, float]]]
+
+
+@dataclass(frozen=True)
+class PointCases:
+    """Stiffness and first failure of one plan in every load case.
+
+    Attributes
+    ----------
+    names : tuple of str
+    ratios : (n,) array
+        Stiffness over that of the part without fibre, fibres in tension only.
+    factors : (n,) array
+        Load at first failure over the load of the case; NaN where that is not known.
+    bound : CasesBound
+        What no paths of this length exceed.
+    """
+
+    names: tuple[str, ...]
+    ratios: FloatArray
+    factors: FloatArray
+    bound: CasesBound
+
+    def __post_init__(self) -> None:
+        freeze(self, names=tuple, ratios=float, factors=float)
+
+    @classmethod
+    def of(cls, tested: TestedCases, bound: CasesBound) -> "PointCases":
+        """Keep what a front shows of the tests of a plan."""
+        known, failure = tested.tension, tested.failure
+        factors = np.full(len(known.names), np.nan) if failure is None else failure.factors
+        return cls(known.names, known.ratios, np.asarray(factors), bound)
+
+    @property
+    def share(self) -> float:
+        """Least share, over the cases, of what no paths of this length exceed in a case alone."""
+        return self.share_of(self.ratios)
+
+    def share_of(self, ratios: ArrayLike) -> float:
+        """Return the same of other paths, with ratios (n,), by the bounds of this length."""
+        return float(self.bound.shares(ratios).min())
+
+    @property
+    def worst(self) -> int:
+        """Number of the case with the least share."""
+        return int(np.argmin(self.bound.shares(self.ratios)))
+
+    @property
+    def fails_first(self) -> str:
+        """Case that fails at the least multiple of its load; empty where that is not known."""
+        unknown = np.isnan(self.factors).any()
+        return "" if unknown else self.names[int(np.argmin(self.factors))]
+
+    def values(self) -> dict[str, float]:
+        """Values by column, as `TestedCases.values` names them, with the bound of each case."""
+        found: dict[str, float] = {}
+        shares = self.bound.shares(self.ratios)
+        for k, name in enumerate(self.names):
+            found[f"stiffness_ratio_tension[{name}]"] = float(self.ratios[k])
+            found[f"bound[{name}]"] = float(self.bound.singles[k])
+            found[f"share_of_bound[{name}]"] = float(shares[k])
+            found[f"first_failure_factor[{name}]"] = float(self.factors[k])
+        found["worst_share_of_bound"] = self.share
+        found["most_share_of_bound"] = 1.0 / self.bound.least
+        found["above_bound"] = self.bound.gap(self.ratios)
+        return found
+
+
+def stiffness_panels(
+    plans: Sequence[PointCases], bounds: Sequence[tuple[float, CasesBound]]
+) -> tuple[dict[str, list[float]], Curves, Curves]:
+    """Panels of a picture: what counts of the plans, then the stiffness in every case.
+
+    Parameters
+    ----------
+    plans : sequence of PointCases
+        At least one.
+    bounds : sequence of (float, CasesBound)
+        By length, mm.
+
+    Returns
+    -------
+    dict of label to list of float
+        Values of the plans.
+    dict of label to list of (float, float)
+        Lengths, mm, from none on, and what no paths exceed; of the stiffness in that case alone.
+    dict of label to list of (float, float)
+        Lengths, mm, and ratios that no paths exceed in all cases at once.
+    """
+    start = (0.0, 1.0)
+    values = {WORST: [each.share for each in plans]}
+    alone: Curves = {WORST: [start, *((length, 1.0 / one.least) for length, one in bounds)]}
+    together: Curves = {}
+    for k, name in enumerate(plans[0].names):
+        label = f"{name}: times unreinforced stiffness"
+        values[label] = [float(each.ratios[k]) for each in plans]
+        alone[label] = [start, *((length, float(one.singles[k])) for length, one in bounds)]
+        at_once = ((length, float(one.singles[k]) / one.least) for length, one in bounds)
+        together[label] = [start, *at_once]
+    return values, alone, together
