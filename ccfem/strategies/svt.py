@@ -74,8 +74,8 @@ class Svt:
         then ignored up to `minimum_length`. It skips joints and leaves points over, so it fills no
         section.
     spacing : float, default 1
-        Distance between neighbouring strands in fibre widths, at least 1. It is reduced to nine
-        tenths where the width of a main path is no multiple of it.
+        Distance between neighbouring strands in fibre widths, at least 1. Strands may lie
+        as near as nine tenths of it where the width of a main path is no multiple of it.
     links : "outside" or "none", default "outside"
         Join all strands of a piece of the section to one path, or lay single strands.
     longest_inside : float, mm, default 6
