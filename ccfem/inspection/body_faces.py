@@ -1,4 +1,4 @@
-"""The smooth faces of a body, with the numbers that part files choose them by."""
+"""Smooth faces of a body, with the numbers by which part files select them."""
 
 import os
 from dataclasses import dataclass
@@ -22,7 +22,7 @@ if TYPE_CHECKING:
 __all__ = ["BodyFaces", "faces"]
 
 _SMALL = 1.0
-"""Diagonal, mm, below which lengths look like metres: a strand is about as wide."""
+"""Diagonal, mm, below which lengths are probably in metres: a strand is about as wide."""
 
 
 @dataclass(frozen=True)
@@ -33,11 +33,11 @@ class BodyFaces:
     ----------
     points : (n, 3) array, mm
     triangles : (t, 3) int array
-        Outward.
+        Oriented outwards.
     faces : tuple of Face
         Face 1 first.
     names : tuple of str
-        Of the faces of a CAD file, where it has any.
+        Names of the faces of a CAD file, if it has any.
     """
 
     points: FloatArray
@@ -59,14 +59,14 @@ class BodyFaces:
 
     @property
     def doubt(self) -> str:
-        """What to say of a body so small that its lengths look like metres; else nothing."""
+        """Remark on a body so small that its lengths look like metres; else empty."""
         across = float(np.linalg.norm(np.ptp(self.points, axis=0)))
         if across >= _SMALL:
             return ""
         return f"the body measures {across:.3g} mm across: looks like metres: scale = 1000"
 
     def to_frame(self) -> "pd.DataFrame":
-        """One row a face: its number, area, what it is, and its name where it has one."""
+        """One row a face: its number, area, shape, and its name if it has one."""
         import pandas as pd
 
         columns = {
@@ -88,9 +88,9 @@ def faces(
     body : path, str or Case
         Surface, CAD or mesh file, part file, or a case.
     angle : float, degrees
-        Feature angle: that from which an edge separates two faces.
+        Feature angle: edges of at least this angle separate two faces.
     scale : float, default 1
-        Factor on the coordinates of a file, to make them mm.
+        Factor that converts the coordinates of a file to mm.
 
     Raises
     ------
