@@ -30,7 +30,7 @@ class Zigzag:
     spacing : float, default 1
         Distance between the lines in fibre widths, at least 1.
     angle : float, degrees, default 45
-        Angle of the lines on layer 0 to the first axis of the layer.
+        Direction of the lines on layer 0 to the first axis of the layer.
     turn : float, degrees, default 90
         Turn from each layer to the next. 90 alternates between two directions, as the published
         paths of Chen et al. 2021 do; 45 cycles through four.
