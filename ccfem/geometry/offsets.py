@@ -162,7 +162,7 @@ def _ramp(
     gap: float,
     walls: shapely.MultiLineString,
 ) -> tuple[FloatArray, FloatArray, int] | None:
-    """Opened `ring`, the nearest ring of the next level from its start, and its position."""
+    """`ring` opened, the nearest ring of the next level from its start, and its position there."""
     length, longest = line_length(ring), gap + _RAMPS[0] * spacing
     if not inner or length < 2.0 * longest:
         return None
