@@ -23,10 +23,11 @@ from ccfem.fibre_aware.cut_and_move import prune_and_move
 from ccfem.fibre_aware.heights import nearest_layer
 from ccfem.fibre_aware.prune import prune
 from ccfem.fibre_aware.smeared import SmearedPart
-from ccfem.fibre_aware.stream_design import design
+from ccfem.fibre_aware.stream_design import SLACK, design
 from ccfem.fibre_aware.stream_paths import CLEARANCE, SHORTEST
-from ccfem.fibre_aware.stream_start import start_field
-from ccfem.fibre_aware.upper_bound import upper_bound
+from ccfem.fibre_aware.stream_start import field_along, start_field
+from ccfem.fibre_aware.upper_bound import UpperBound, upper_bound
+from ccfem.fields.tensile import Tension
 from ccfem.layers.layer import Layer
 from ccfem.layers.slicing.planar import Planar
 from ccfem.linking.clearance import trim_to_clearance
@@ -35,11 +36,12 @@ from ccfem.machine.machine import Machine
 from ccfem.papers.chen_2021.loop import authors_loop
 from ccfem.planning.whole_part import full_length
 from ccfem.strategies.stream_function import StreamFunction
+from ccfem.tensor import largest_in_plane
 from ccfem.toolpaths import Toolpaths
 from ccfem.virtual_testing.strand import Strand
 from ccfem.virtual_testing.virtual_test import virtual_test
 
-__all__ = ["losses", "posed", "share_inside"]
+__all__ = ["along_one_direction", "losses", "posed", "share_inside", "tension_of"]
 
 COVERAGE = 0.45
 MOVES = 6
@@ -66,6 +68,28 @@ def share_inside(part: SmearedPart, layers: tuple[Layer, ...], inset: float) -> 
     return share
 
 
+def along_one_direction(part: SmearedPart, bound: UpperBound, axial_stiffness: float) -> float:
+    """Stiffness ratio with the density of a bound laid along its largest direction alone."""
+    _, _, angle = largest_in_plane(bound.tensor)
+    cosine, sine = np.cos(angle), np.sin(angle)
+    along = np.stack([cosine**2, sine**2, cosine * sine], axis=1)
+    density = axial_stiffness * bound.density.sum(axis=1)
+    outer = density[:, None, None] * along[:, :, None] * along[:, None, :]
+
+    def fibre(strain: FloatArray) -> FloatArray:
+        stretched = np.einsum("ci,ci->c", along, strain) > 0.0
+        return np.where(stretched, 1.0, SLACK)[:, None, None] * outer
+
+    return part.ratio(part.solve(fibre, tolerance=1e-4).work)
+
+
+def tension_of(bound: UpperBound, capacity: FloatArray, layer: Layer) -> Tension:
+    """Strands a width of a bound's density, and their direction, on the triangles of a layer."""
+    size, _, angle = largest_in_plane(bound.tensor[layer.cell] / capacity[layer.cell, None])
+    direction = np.stack([np.cos(angle), np.sin(angle)], axis=1)
+    return Tension(direction, size, size > _NONE)
+
+
 def losses(
     stress: StressField, layers: tuple[Layer, ...], machine: Machine, length: float
 ) -> dict[str, float]:
@@ -74,7 +98,11 @@ def losses(
     coverage = length / len(layers) / full_length(layers, machine)
     strategy = StreamFunction(coverage=coverage)
     problem, group, found = strategy.designed(stress, layers, machine)
-    rows = {"bound": upper_bound(stress, layers, length, machine).ratio}
+    bound = upper_bound(stress, layers, length, machine)
+    rows = {"bound": bound.ratio}
+    rows["its density, in one direction"] = along_one_direction(
+        problem.part, bound, problem.axial_stiffness
+    )
     inside = np.maximum(share_inside(problem.part, layers, 0.5 * width), _NONE)
     exact = replace(problem, budget=problem.budget / strategy.overfill)
     middle = [layers[len(layers) // 2]] * problem.groups
@@ -82,6 +110,9 @@ def losses(
         posed = replace(exact, capacity=problem.capacity * share)
         start = start_field(posed, stress, middle, strategy.cap)
         rows[what] = design(posed, start, strategy.evaluations).objective.ratio
+    begun = [tension_of(bound, problem.capacity, layer) for layer in middle]
+    start = field_along(exact, middle, begun, 100.0)
+    rows["designed field, begun there"] = design(exact, start, strategy.evaluations).objective.ratio
     strained = ((1.0, found.objective.solution.displacement),)
     extraction = strategy.extraction(problem, (found.field,), strained, machine)
     one = len(layers) // 2

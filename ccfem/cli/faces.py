@@ -55,7 +55,7 @@ def list_faces(body: Path, angle: float, scale: float, picture: Path) -> None:
     about = "" if is_cad(body) else f" at a feature angle of {angle:g} degrees"
     console.print(
         f"{len(faces)} faces{about}; picture: {picture}\n"
-        + (f"warning: {found.doubt} (here --scale 1000)\n" if found.doubt else "")
+        + (f"warning: {found.doubt}\n" if found.doubt else "")
         + 'in a part file: [patches.NAME] with rule = "face", number = [1, 2]; lengths are mm'
     )
 

@@ -7,6 +7,7 @@ from ccfem.errors import InputError
 from ccfem.io.mesh_file import check_mesh_name, write_mesh
 from ccfem.io.surface import is_surface
 from ccfem.io.whole import check_writable
+from ccfem.mesh.in_metres import in_metres
 from ccfem.meshing.cad import is_cad
 from ccfem.meshing.meshed_body import mesh_body
 
@@ -26,4 +27,7 @@ def mesh_file(body: Path, size: float, out: Path, scale: float, mesher: Any) -> 
     write_mesh(mesh, out)
     for line in findings:
         print(line)
+    doubt = in_metres(mesh.points)
+    if doubt:
+        print(f"warning: {doubt}")
     print(f"{out}: {len(mesh.cells):,} cells, patches {', '.join(sorted(mesh.patches)) or 'none'}")

@@ -7,6 +7,7 @@ from typing import TYPE_CHECKING, Annotated, Any
 
 import typer
 
+from ccfem.checks import check_number
 from ccfem.cli.arguments import names_of, numbers_of, path_of
 from ccfem.cli.options import CasePath, SetCase
 from ccfem.errors import InputError
@@ -107,6 +108,9 @@ def optimise(
     from ccfem.cli.run import load
     from ccfem.progress import progress_bar
 
+    check_number("--iterations", iterations, at_least=1)
+    if radius is not None:
+        check_number("--radius", radius, above=0.0, unit="mm")
     options: dict[str, Any] = {
         "element_size": element_size,
         "radius": radius,

@@ -17,7 +17,7 @@ from ccfem.cases.load_cases import asks_for_all, weighted_cases
 from ccfem.cases.reading import read
 from ccfem.checks import check_known, member_name
 from ccfem.comparison.asked import check_all, check_amount
-from ccfem.comparison.judging import Solved, judged
+from ccfem.comparison.judging import Solved, check_propped, judged
 from ccfem.comparison.over_slicings import named_slicers, over_slicings
 from ccfem.comparison.result import Comparison
 from ccfem.comparison.runs import Run
@@ -319,9 +319,10 @@ def compare(
 
     if foreign and layers is None:
         layers = tuple(foreign[0].heights(plane_frame(case.build)[2]).tolist())
+    slicer = None if layers is None else as_slicer(layers)
+    check_propped(case.slicing if slicer is None else slicer, support)
     solved, seconds = _solved(case, strand, load_case, backend, stress, progress)
     with timed(seconds, "slice"):
-        slicer = None if layers is None else as_slicer(layers)
         stack, below = solved.cut(slicer, support)
     part = solved.part(stack, below)
     tell = counted(progress, 0.1, (5 if print_plans else 4) * len(strategies) + 1)

@@ -27,10 +27,22 @@ from ccfem.fibre_aware.cases_bound import CasesBound, cases_bound
 from ccfem.fibre_aware.upper_bound import UpperBound, upper_bound
 from ccfem.layers import Layer
 from ccfem.layers.slicer import Slicer
+from ccfem.layers.slicing.planar import Planar
 from ccfem.planning.given_paths import GivenPaths
 from ccfem.support import SupportLayers, slice_with_support
 
-__all__ = ["Solved", "judged"]
+__all__ = ["Solved", "check_propped", "judged"]
+
+_FLAT = (
+    "support is printed below curved layers alone; these are flat: leave out support, or choose "
+    "curved layers (--slicing load_oriented or spatial)"
+)
+
+
+def check_propped(slicer: Slicer, support: bool) -> None:
+    """Raise where support is wanted below layers that are flat, before anything is solved."""
+    if support and isinstance(slicer, Planar):
+        raise InputError(_FLAT)
 
 
 @dataclass(frozen=True)
@@ -69,10 +81,12 @@ class Solved:
         Raises
         ------
         InputError
-            Where the part cannot be cut, or support is wanted below flat layers.
+            Where the part cannot be cut, or support is wanted below flat layers, or below curved
+            ones of a slicer that does not say the field of its layers (`slice`).
         """
         case, stress, below = self.case, self.planned_on, None
         chosen = case.slicing if slicer is None else slicer
+        check_propped(chosen, support)
         if support and hasattr(chosen, "slice"):
             stack, below = slice_with_support(chosen, stress, case.build, case.machine)
             if case.fibre is not None:
@@ -80,9 +94,11 @@ class Solved:
         else:
             stack = case.fibre_layers(stress, chosen)
         if support and all(layer.flat is not None for layer in stack):
+            raise InputError(_FLAT)
+        if support and below is None:
             raise InputError(
-                "support is printed below curved layers alone; these are flat: leave out support, "
-                "or choose curved layers (--slicing load_oriented or spatial)"
+                "support continues the field whose levels the layers are, and these layers were "
+                "given without one: leave out support, or choose --slicing load_oriented or spatial"
             )
         return stack, below
 

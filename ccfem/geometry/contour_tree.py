@@ -55,10 +55,6 @@ class ContourTree:
     level: IntArray
     parent: IntArray
 
-    def children(self, contour: int) -> IntArray:
-        """Contours attached to a given one."""
-        return np.flatnonzero(self.parent == contour)
-
 
 def contour_trees(
     section: Region, spacing: float, start: FloatArray, closest: float, radius: float = 0.0

@@ -26,8 +26,9 @@ def new_part(
 ) -> Path:
     """Write a part file for a body: its faces listed, a support and a load to be changed.
 
-    The largest plane that faces down is held, and the face farthest from it is pulled away from it
-    with 100 N. Cells are a twenty-fifth of the diagonal long. Where the lengths look like metres
+    The largest plane that faces down is held, with all others at its height, as the feet of a part
+    are; and the face farthest from there is pulled away with 100 N. Cells are a twenty-fifth of the
+    diagonal long. Where the lengths look like metres
     (`BodyFaces.doubt`), the file scales them by 1000.
 
     Parameters
@@ -67,16 +68,32 @@ def new_part(
         range(len(faces)),
         key=lambda k: (_faces_down(faces[k]), faces[k].area),
     )
-    away = [float(np.linalg.norm(face.centre - faces[held].centre)) for face in faces]
-    pulled = int(np.argmax(away))
-    pull = faces[pulled].centre - faces[held].centre
+    feet = _beside(faces, held, 1e-3 * 25.0 * edge)
+    centre = np.average([faces[k].centre for k in feet], axis=0, weights=_areas(faces, feet))
+    away = [float(np.linalg.norm(face.centre - centre)) for face in faces]
+    pulled = max((k for k in range(len(faces)) if k not in feet), key=away.__getitem__, default=0)
+    pull = faces[pulled].centre - centre
     pull = 100.0 * pull / max(float(np.linalg.norm(pull)), 1e-300)
     meshed = is_surface(body) or is_cad(body)
     with whole_file(out) as temporary:
         cells = edge if meshed else None
-        text = _text(body, cells, faces, names, held, pulled, pull.tolist(), doubt)
+        text = _text(body, cells, faces, names, feet, pulled, pull.tolist(), doubt)
         temporary.write_text(text, encoding="utf-8")
     return out
+
+
+def _beside(faces: Sequence[Face], held: int, reach: float) -> list[int]:
+    """Planes that face down no farther above or below a face than `reach`, mm, and itself."""
+    height = faces[held].centre[2]
+    return [
+        k
+        for k, face in enumerate(faces)
+        if k == held or (_faces_down(face) and abs(face.centre[2] - height) <= reach)
+    ]
+
+
+def _areas(faces: Sequence[Face], chosen: Sequence[int]) -> list[float]:
+    return [max(faces[k].area, 1e-300) for k in chosen]
 
 
 def _faces_down(face: Face) -> bool:
@@ -93,7 +110,7 @@ def _text(
     edge: float | None,
     faces: Sequence[Face],
     names: Sequence[str],
-    held: int,
+    held: Sequence[int],
     pulled: int,
     pull: Sequence[float],
     doubt: str,
@@ -133,7 +150,7 @@ def _text(
             "",
             "[patches.held]               # CHANGE: what is fixed",
             'rule = "face"',
-            f"number = [{held + 1}]",
+            f"number = {[k + 1 for k in held]}",
             "",
             "[patches.pulled]             # CHANGE: where the load acts",
             'rule = "face"',

@@ -13,6 +13,7 @@ from ccfem.cases.reading import read
 from ccfem.errors import InputError
 from ccfem.io.mesh_file import read_mesh
 from ccfem.io.surface import is_surface, read_surface
+from ccfem.mesh.in_metres import in_metres
 from ccfem.mesh.smooth_faces import FEATURE_ANGLE, Face, given_faces, smooth_faces
 from ccfem.meshing.cad import is_cad, read_cad
 
@@ -20,9 +21,6 @@ if TYPE_CHECKING:
     import pandas as pd
 
 __all__ = ["BodyFaces", "faces"]
-
-_SMALL = 1.0
-"""Diagonal, mm, below which lengths are probably in metres: a strand is about as wide."""
 
 
 @dataclass(frozen=True)
@@ -60,10 +58,7 @@ class BodyFaces:
     @property
     def doubt(self) -> str:
         """Remark on a body so small that its lengths look like metres; else empty."""
-        across = float(np.linalg.norm(np.ptp(self.points, axis=0)))
-        if across >= _SMALL:
-            return ""
-        return f"the body measures {across:.3g} mm across: looks like metres: scale = 1000"
+        return in_metres(self.points)
 
     def to_frame(self) -> "pd.DataFrame":
         """One row a face: its number, area, shape, and its name if it has one."""

@@ -27,7 +27,9 @@ class Faces:
     Attributes
     ----------
     number : int or tuple of int
-        From 1.
+        From 1, the largest first; those of equal area from low to high x of their centres, then y,
+        then z. In a mirror image equal faces have each other's numbers. Of a CAD file as it has
+        them.
     angle : float, degrees
         Feature angle of the listing.
     """

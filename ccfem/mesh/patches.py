@@ -33,8 +33,6 @@ __all__ = [
 
 Vector = tuple[float, float, float]
 
-FACE_GROUP = "face_{}"
-"""Name of the group that holds a numbered face of the surface that a mesh was made from."""
 _AXES = {"x": (1.0, 0.0, 0.0), "y": (0.0, 1.0, 0.0), "z": (0.0, 0.0, 1.0)}
 _ALONG = np.cos(np.pi / 4)
 """Cosine above which a facet's normal counts as along a direction."""

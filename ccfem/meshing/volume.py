@@ -11,6 +11,7 @@ from ccfem.errors import InputError
 from ccfem.io.surface import Surface
 from ccfem.isolated.process import ChildError, in_own_process
 from ccfem.mesh.check import check_mesh
+from ccfem.mesh.in_metres import in_metres
 from ccfem.mesh.measures import connected
 from ccfem.mesh.smooth_faces import FEATURE_ANGLE, smooth_faces
 from ccfem.mesh.tet_mesh import TetMesh
@@ -108,6 +109,9 @@ def fill(
 def check_edge_length(surface: Surface, edge_length: float) -> float:
     """Cells to expect; raise on an edge length that is too long or too short for a part."""
     size = float(np.linalg.norm(np.ptp(surface.points, axis=0)))
+    doubt = in_metres(surface.points)
+    if doubt and edge_length >= size:
+        raise InputError(f"an edge length of {edge_length:g} mm is longer than the part: {doubt}")
     check_number("edge length", edge_length, above=0.0, below=size, unit="mm (the part's diagonal)")
     expected = surface.volume / (edge_length**3 / (6.0 * np.sqrt(2.0)))
     if expected > _MOST:

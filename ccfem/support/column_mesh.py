@@ -128,7 +128,7 @@ def column_mesh(
     edges = head[facets] - head[np.roll(facets, 1, axis=1)]
     height = float(np.linalg.norm(edges, axis=2).mean()) if size is None else size
     check_number("size", height, above=0.0, unit="mm")
-    foot, rests = _feet(head, facets, turned[mesh.boundary[lean > 0.0]], bed)
+    foot, rests = _feet(head, facets, turned[mesh.boundary[lean > 0.0]], bed, reach)
     points, cells, line, low = _columns(head, foot, facets, height)
     inside = locate(turned, mesh.corners, points[cells].mean(axis=1))[0] >= 0
     cells = cells[~inside]
@@ -146,11 +146,12 @@ def column_mesh(
 
 
 def _feet(
-    head: FloatArray, facets: IntArray, rising: FloatArray, bed: float
+    head: FloatArray, facets: IntArray, rising: FloatArray, bed: float, reach: float
 ) -> tuple[FloatArray, BoolArray]:
     """Height at which the line down from each node ends, and whether it ends on the part.
 
-    `rising` are the corners (f, 3, 3) of the facets that look up.
+    `rising` are the corners (f, 3, 3) of the facets that look up. A node no higher than `reach`
+    stands there itself, as one that rounding holds above the bed: its cells would have no volume.
     """
     count = np.bincount(facets.ravel(), minlength=len(head))
     middle = head[facets].mean(axis=1)
@@ -176,7 +177,7 @@ def _feet(
     foot = np.full(len(head), bed)
     np.maximum.at(foot, line[under], z[under])
     rests = foot > bed
-    return np.minimum(foot, head[:, 2]), rests
+    return np.where(foot < head[:, 2] - reach, foot, head[:, 2]), rests
 
 
 def _columns(

@@ -13,11 +13,10 @@ from ccfem.topopt.material_axes import axes_about_z
 
 __all__ = ["FALLS_APART", "Design"]
 
-FALLS_APART = (
-    "the design falls apart between its loads and supports: raise the volume fraction or the "
-    "filter radius"
-)
-"""What is wrong with a design whose part joins not all of them, and the cure."""
+_APART = "falls apart between its loads and supports"
+_CURE = "raise the volume fraction or the filter radius"
+FALLS_APART = f"the design {_APART}: {_CURE}"
+"""What is wrong with densities whose part joins not all of them, and the cure."""
 
 
 @dataclass(frozen=True)
@@ -64,6 +63,16 @@ class Design:
     def iterations(self) -> int:
         """Iterations taken."""
         return len(self.change)
+
+    @property
+    def apart(self) -> str:
+        """What is wrong where its part joins not all loads and supports, and the cure."""
+        if self.converged or not self.iterations:
+            return FALLS_APART
+        return (
+            f"the design has not converged (iterations: {self.iterations}) and {_APART}: give it "
+            f"more iterations (--iterations), or {_CURE}"
+        )
 
     @property
     def volumes(self) -> FloatArray:

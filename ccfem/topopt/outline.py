@@ -124,6 +124,7 @@ def outline(
     inside: BoolArray | None = None,
     keep: FloatArray | None = None,
     least_hole: float = 4.0,
+    apart: str = FALLS_APART,
 ) -> Any:
     """Outline of a design on a raster.
 
@@ -147,6 +148,8 @@ def outline(
         the part.
     least_hole : float, default 4
         Holes below this many pixels are closed.
+    apart : str, optional
+        What to say where the points to keep lie on different pieces.
 
     Returns
     -------
@@ -193,7 +196,7 @@ def outline(
     for piece in pieces:
         if (shapely.distance(piece, anchors) <= 1.5 * size).all():
             return piece
-    raise InputError(FALLS_APART)
+    raise InputError(apart)
 
 
 def _domain(inside: BoolArray, size: float) -> Any:

@@ -49,6 +49,7 @@ def plate_outline(
         domain,
         raster.inside,
         _anchors(plate, design.density) - raster.origin,
+        apart=design.apart,
     )
     return shapely.transform(found, lambda points: points + raster.origin)
 

@@ -158,6 +158,7 @@ def sheet_outline(design: Design, flat: FlatPart, edge_length: float, solid: Any
         domain=shift,
         inside=inside,
         keep=plane[keep] - origin,
+        apart=design.apart,
     )
     found = shapely.transform(found, lambda points: points + origin)
     if not shapely.is_empty(solid):

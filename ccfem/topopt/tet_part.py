@@ -14,7 +14,7 @@ from ccfem.mesh.measures import connected
 from ccfem.mesh.tet_mesh import TetMesh
 from ccfem.topopt.cut import cut_mesh, volume_above
 from ccfem.topopt.cut_smoothing import relaxed
-from ccfem.topopt.design import FALLS_APART, Design
+from ccfem.topopt.design import Design
 
 __all__ = ["part_mesh"]
 
@@ -69,11 +69,13 @@ def part_mesh(
         share = design.volume_fraction if volume_fraction is None else volume_fraction
         check_number("volume_fraction", share, above=0.0, at_most=1.0)
         threshold = _level(field, share * float(problem.mesh.volumes.sum()))
+        if threshold is None:
+            raise InputError(design.apart)
     else:
         check_number("threshold", threshold, above=0.0, below=1.0)
     cleaned = _cleaned(field, threshold)
     if cleaned is None:
-        raise InputError(FALLS_APART)
+        raise InputError(design.apart)
     return relaxed(cut_mesh(problem.mesh, cleaned, threshold))
 
 
@@ -123,8 +125,8 @@ def _cleaned(field: _Field, level: float) -> FloatArray | None:
     return values
 
 
-def _level(field: _Field, volume: float) -> float:
-    """Level whose part has a wanted volume, by bisection."""
+def _level(field: _Field, volume: float) -> float | None:
+    """Level whose part has a wanted volume, by bisection; None where none has."""
     low, high, found, middle = 0.0, 1.0, 0.0, 0.5
     for _ in range(20):
         middle = 0.5 * (low + high)
@@ -133,6 +135,4 @@ def _level(field: _Field, volume: float) -> float:
         if abs(found - volume) <= 1e-3 * volume:
             return middle
         low, high = (middle, high) if found > volume else (low, middle)
-    if abs(found - volume) > 0.02 * volume:
-        raise InputError(FALLS_APART)
-    return middle
+    return middle if abs(found - volume) <= 0.02 * volume else None

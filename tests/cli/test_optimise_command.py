@@ -140,6 +140,8 @@ def test_one_line_with_the_cure_and_nothing_left_behind(plate, tmp_path):
         (("E1,E2,NU12,G12",), (*whole, "0.4", "--laminate", "1,2"), {}),
         (("--out",), (*whole, "0.4", "--out", "new.npz"), {}),
         (("cannot be met",), (*whole, "0.15"), {}),
+        (("--iterations must be at least 1; got 0",), (*whole, "0.4", "--iterations", "0"), {}),
+        (("--radius must be above 0 mm; got -1",), (*whole, "0.4", "--radius", "-1"), {}),
     ]
     for words, arguments, part in cases:
         code, out, err = plate(*arguments, **part)

@@ -2,11 +2,14 @@
 
 import numpy as np
 import pytest
+import shapely
 
 from ccfem.cases.part_file import read_part
 from ccfem.inspection import check
 from ccfem.io import write_mesh
+from ccfem.mesh import TetMesh
 from ccfem.mesh.box import box_mesh
+from ccfem.meshing import extrude
 
 
 def test_a_body_is_no_part_and_a_new_part_file_is_one(ccfem, tmp_path):
@@ -34,6 +37,21 @@ def test_a_body_is_no_part_and_a_new_part_file_is_one(ccfem, tmp_path):
     assert ccfem("new", "lever.npz", "--force")[0] == 0
     assert "name its file" in ccfem("new", "loop")[2]
     assert "does not exist" in ccfem("new", "none.stl")[2]
+
+
+def test_a_part_on_feet_is_held_by_all_of_them(ccfem, tmp_path):
+    """A table of 60 x 40 mm on bars 10, 18 and 20 mm wide."""
+    outline = shapely.box(0.0, 0.0, 60.0, 20.0)
+    for x in (10.0, 34.0):
+        outline = outline.difference(shapely.box(x, -1.0, x + 6.0, 12.0))
+    upright = extrude(outline, 40.0, 8.0)
+    x, y, z = upright.points.T
+    write_mesh(TetMesh(np.column_stack([x, -z, y]), upright.cells), tmp_path / "table.npz")
+    assert ccfem("new", "table.npz")[0] == 0
+    checked = check(read_part(tmp_path / "table.toml"))
+    assert checked.mistakes == ()
+    areas = {row.name: row.area for row in checked.patches}
+    assert areas["held"] == pytest.approx((10.0 + 18.0 + 20.0) * 40.0)
 
 
 def test_examples_are_listed_written_and_without_mistake(ccfem, tmp_path):
@@ -65,7 +83,7 @@ def test_cite_prints_bibtex(ccfem, tmp_path):
 def test_a_body_in_metres_is_seen_to_be_one(ccfem, tmp_path):
     write_mesh(box_mesh((0.06, 0.024, 0.004), (6, 3, 2)), tmp_path / "lever.npz")
     said = " ".join(ccfem("faces", "lever.npz")[1].split())
-    assert "0.0647 mm across: looks like metres: scale = 1000 (here --scale 1000)" in said
+    assert "0.0647 mm across: looks like metres: scale = 1000 (or --scale 1000)" in said
     assert "looks like" not in ccfem("faces", "lever.npz", "--scale", "1000")[1]
     code, out, _ = ccfem("new", "lever.npz")
     assert (code, "look like metres" in out) == (0, True)
@@ -73,3 +91,24 @@ def test_a_body_in_metres_is_seen_to_be_one(ccfem, tmp_path):
     assert checked.mistakes == ()
     areas = {row.name: row.area for row in checked.patches}
     assert areas["held"] == pytest.approx(60.0 * 24.0)
+
+
+def test_a_surface_in_metres_is_meshed_with_a_hint(ccfem, tmp_path):
+    pyvista = pytest.importorskip("pyvista")
+    box = box_mesh((0.06, 0.024, 0.004), (1, 1, 1))
+    used, facets = np.unique(box.boundary, return_inverse=True)
+    surface = pyvista.PolyData.from_regular_faces(box.points[used], facets.reshape(-1, 3))
+    surface.save(tmp_path / "lever.stl")
+    hint = "0.0647 mm across: looks like metres: scale = 1000 (or --scale 1000)"
+    code, out, err = ccfem("mesh", "lever.stl", "--size", "6", "-o", "lever.npz")
+    assert (code, out, err.count("\n"), hint in err) == (2, "", 1, True)
+    assert not (tmp_path / "lever.npz").exists()
+    code, out, err = ccfem("mesh", "lever.stl", "--size", "0.006", "-o", "lever.npz")
+    assert (code, hint in out, err) == (0, True, "")
+    assert "metres" not in "".join(
+        ccfem("mesh", "lever.stl", "--size", "6", "--scale", "1000", "-o", "lever.npz")[1:]
+    )
+    ccfem("new", "lever.stl")
+    part = (tmp_path / "lever.toml").read_text()
+    (tmp_path / "lever.toml").write_text(part.replace("\nscale = 1000", "\n"))
+    assert hint in ccfem("check", "lever.toml")[2]

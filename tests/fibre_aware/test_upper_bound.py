@@ -3,6 +3,7 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
+from benchmarks.studies.strand_losses import along_one_direction, tension_of
 from ccfem.errors import InputError
 from ccfem.fibre_aware.heights import fibre_capacity
 from ccfem.fibre_aware.smeared import SmearedPart, SmearedSolution
@@ -46,6 +47,23 @@ def test_no_paths_exceed_the_bound(bent_beam, mode):
         reached = virtual_test(paths, stress, mode=mode, span=()).ratio
         assert 1.0 < reached <= found.ratio
         assert 0.0 < found.share(reached) <= 1.0
+
+
+def test_density_along_one_direction_of_a_pulled_bar_is_exact(pulled_bar):
+    stress, layers = pulled_bar
+    part, length = SmearedPart.of(stress, layers[0].plane.frame), 2000.0
+    found = upper_bound(stress, layers, length, MACHINE)
+    exact = 1.0 + 4.0 * length / (60.0 * 20.0 * 4.0)
+    # The bound's own density has a trace in every direction.
+    assert along_one_direction(part, found, 4.0 * part.modulus) == pytest.approx(exact, rel=2e-3)
+    capacity = fibre_capacity(part, layers, MACHINE)
+    tension = tension_of(found, capacity, layers[0])
+    assert np.abs(tension.direction @ layers[0].plane.frame[:2] @ [1.0, 0.0, 0.0]) == pytest.approx(
+        1
+    )
+    even = length / (60.0 * 20.0 * 4.0) / capacity.mean()  # strands a width, the same everywhere
+    assert tension.stress == pytest.approx(even, rel=0.02)
+    assert tension.defined.all()
 
 
 def test_any_displacement_proves_a_bound(bent_beam, rng):

@@ -59,6 +59,18 @@ def test_faces_of_a_box():
     np.testing.assert_array_equal(np.sort(rows), np.arange(len(mesh.boundary)))
 
 
+@pytest.mark.parametrize("seed", range(3))
+def test_equal_faces_are_numbered_by_their_places(seed):
+    """Of a cube with rounding errors, however its triangles are ordered; its mirror image alike."""
+    mesh = box_mesh((20.0, 20.0, 20.0), (4, 3, 5))
+    random = np.random.default_rng(seed)
+    points = mesh.points + random.normal(0.0, 1e-7, mesh.points.shape)
+    triangles = random.permutation(mesh.boundary)
+    for turn, order in ((np.eye(3), [0, 1, 2]), (MIRROR, [0, 2, 1])):
+        faces = smooth_faces(points @ turn, triangles[:, order])
+        assert [face.along for face in faces] == ["-x", "-y", "-z", "z", "y", "x"]
+
+
 @pytest.mark.filterwarnings("error")
 def test_a_triangle_without_an_area_is_no_cylinder():
     points = np.array([[0.0, 0, 0], [2, 0, 0], [1, 0, 0], [1, 1, 0]])

@@ -136,6 +136,18 @@ def test_flat_layers_are_not_propped_in_the_file(part):
         solved.cut(flat, support=True)
     with pytest.raises(InputError, match="support is laid in a print"):
         compare("cantilever", ["zigzag"], support=True)
+    # Nothing is solved before: this part has neither loads nor supports.
+    with pytest.raises(InputError, match="these are flat: leave out support, or choose"):
+        compare(Case("flat", "", problem), ["zigzag"], support=True, print_plans=True)
+
+
+def test_layers_without_a_field_are_not_propped_in_the_file(part):
+    """Those of the slicer `surfaces`, say: their support was left out without a word."""
+    mesh, layers, _ = part
+    problem = Problem(mesh, isotropic(1.0, 0.3), (), {})
+    solved = Solved(Case("curved", "", problem), SimpleNamespace(mesh=mesh))
+    with pytest.raises(InputError, match="were given without one: leave out support"):
+        solved.cut(lambda *_: layers, support=True)
 
 
 def test_layers_that_look_down_are_stood_up(part):

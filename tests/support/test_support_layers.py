@@ -7,7 +7,7 @@ import shapely
 from ccfem.errors import InputError
 from ccfem.layers.slicing import Planar
 from ccfem.machine import Machine
-from ccfem.mesh import box_mesh
+from ccfem.mesh import TetMesh, box_mesh
 from ccfem.meshing import extrude
 from ccfem.support import column_mesh, support_field, support_layers, support_paths
 
@@ -134,3 +134,13 @@ class Tilted:
 
     def __init__(self, layer):
         self.thickness = layer.thickness
+
+
+def test_a_roof_whose_edge_stands_on_the_bed():
+    """Rounding holds that edge 1e-12 mm above the bed: no cells without volume below it."""
+    mesh = extruded([(0.0, 0.0), (4.0, 0.0), (24.0, 12.0), (0.0, 12.0)])
+    points = np.array(mesh.points)
+    points[(points[:, 1] == 0.0) & (points[:, 0] == 4.0), 1] = 1e-12
+    found = column_mesh(TetMesh(points, mesh.cells), UP)
+    assert found.volume == pytest.approx(0.5 * 20.0 * 12.0 * 6.0, rel=1e-9)
+    assert found.mesh.volumes.min() > 1e-3

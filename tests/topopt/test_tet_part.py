@@ -172,6 +172,12 @@ def test_a_design_in_pieces_is_refused_with_the_cure():
     for options in ({}, {"threshold": 0.5}):
         with pytest.raises(InputError, match=r"falls apart .* raise the volume fraction"):
             part_shape(apart, **options)
+    # Cells between the ends may come yet where the iterations ran out.
+    stopped = replace(apart, compliance=np.ones(4), change=np.ones(3))
+    with pytest.raises(InputError, match=r"not converged \(iterations: 3\) .* \(--iter"):
+        part_shape(stopped)
+    with pytest.raises(InputError, match=r"^the design falls apart"):
+        part_shape(replace(stopped, converged="change"))
     # The piece without load is left out where the rest holds together.
     held = made_up(np.where(np.abs(x - 10.0) < 3.0, 0.0, 1.0), point=(0.0, 10.0, 10.0))
     assert part_shape(held, threshold=0.5).points[:, 0].max() < 8.5

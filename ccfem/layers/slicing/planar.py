@@ -45,7 +45,8 @@ class Planar:
     count : int, optional
         Number of layers, at the middle of equal slabs.
     thickness : float, mm, optional
-        Height of a slab; the last one may stand out at the top.
+        Height of a slab. There are as many as fit, from the bottom up; what is left at the top,
+        less than one, belongs to the last layer, gets no fibre of its own and is printed in matrix.
     heights : tuple of float, mm, optional
         Heights ``points @ direction`` of the layers themselves.
     axis : {"build", "x", "y", "z"}
@@ -165,7 +166,7 @@ def slice_heights(
     count : int, optional
         Number of layers.
     thickness : float, mm, optional
-        Height of a slab instead of their number; the last one may stand out at the top.
+        Height of a slab instead of their number: as many as fit, from the lowest up.
     """
     size = highest - lowest
     if (count is None) == (thickness is None):
@@ -178,7 +179,7 @@ def slice_heights(
             f"layer thickness must be above 0 and at most the part's height {size:g} mm; got "
             f"{thickness:g}"
         )
-    slabs = int(np.ceil(size / thickness - 0.5 - 1e-9))
+    slabs = int(np.floor(size / thickness + 1e-9))
     return lowest + (np.arange(slabs, dtype=np.float64) + 0.5) * thickness
 
 

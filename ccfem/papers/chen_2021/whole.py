@@ -22,8 +22,8 @@ def write(study: Study, folder: Path) -> str:
         csv.writer(file).writerows([("quantity", "value"), *found.items()])
     parts = [
         "# Field-based toolpaths of Chen et al. (2021): ours beside theirs\n",
-        "Written by `ccfem reproduce chen_2021`. The algorithm is the one that the "
-        f"paper prints. Part: {study.loop.case.title}. The paper's Shell, Wrench and Piston are "
+        "Written by `ccfem reproduce chen_2021`. The algorithm is the published one. "
+        f"Part: {study.loop.case.title}. The paper's Shell, Wrench and Piston are "
         "not published; `open_hole` and `lifting_eye` stand in.\n",
         f"## Claims\n\n{claims}",
         f"## Table 1: times\n\n{time_table(study)}",

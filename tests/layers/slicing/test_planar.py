@@ -100,6 +100,25 @@ def test_heights_lie_at_the_middle_of_slabs() -> None:
     )
 
 
+@given(size=st.floats(1.0, 100.0), share=st.floats(0.01, 1.0))
+def test_slabs_of_a_thickness_lie_in_the_part_and_leave_no_room_for_one_more(
+    size: float, share: float
+) -> None:
+    """The last layer lay up to half a slab nearer to the top, where its strand stood out."""
+    thickness = share * size
+    heights = slice_heights(2.0, 2.0 + size, thickness=thickness)
+    assert heights[0] == pytest.approx(2.0 + 0.5 * thickness)
+    np.testing.assert_allclose(np.diff(heights), thickness)
+    above = 2.0 + size - heights[-1]
+    assert 0.5 * thickness * (1.0 - 1e-6) <= above < 1.5 * thickness * (1.0 + 1e-6)
+
+
+def test_the_rest_above_slabs_of_a_thickness_belongs_to_the_last_layer() -> None:
+    layers = Planar(thickness=0.4).cut(box_mesh((3.0, 2.0, 1.0), (3, 2, 1)))
+    assert [layer.plane.height for layer in layers] == pytest.approx([0.2, 0.6])
+    assert [layer.thickness for layer in layers] == pytest.approx([0.4, 0.6])
+
+
 @pytest.mark.parametrize(
     ("arguments", "message"),
     [
