@@ -24,6 +24,7 @@ class Aggregates(NamedTuple):
     ----------
     of_node : (n,) int array
         Group of each node; -1 for a node with no strong connection.
+    motions : (n, d, 6) array
         Motions of each node as part of its group, orthonormal over the group; zero where a group is
         too small, or too straight, for all six.
     near_kernel : (c, 6, 6) array

@@ -50,7 +50,6 @@ class SolveRecord:
         The order of the displacement that was chosen, and why, if it was left open.
     backend_because : str
         The rule that chose the backend, or why another backend replaced it.
-        The rule that chose the backend, or why another one went on.
     """
 
     backend: str

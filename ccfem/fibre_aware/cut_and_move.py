@@ -105,10 +105,10 @@ def best_cut(
     ----------
     candidates : sequence of Toolpaths
         Those beyond the second are cut for the stiffness alone.
+    cut : callable
         Cuts toolpaths, given the weight of the load at first failure and the number of tests.
-        Cuts toolpaths, with how much the load at first failure counts, by a number of tests.
+    judge : callable
         Tests the cut paths.
-        Tests what is left.
     strength : float in [0, 1]
         Weight of the load at first failure; at 0 each candidate is cut once.
     rounds : int

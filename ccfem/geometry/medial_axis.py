@@ -40,6 +40,7 @@ class MedialSegment:
         A closed one repeats its first point; one that meets no other starts where it is widest.
     radius : (m,) array, mm
         Distance of each point to the border.
+    left, right : (m - 1, 2) arrays, mm
         Points of the border nearest to the middle of each step, on both sides of the walking
         direction.
     ends : tuple of 2 ints

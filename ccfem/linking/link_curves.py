@@ -34,8 +34,8 @@ class LinkCurves(NamedTuple):
         Symmetric; inf between the two ends of one strand, and where no curve is below the bound.
     reach : (t, t) array, mm
         Straight extension at the first end; that at the second is ``reach[b, a]``.
+    word : (t, t) int array
         Word from the end with the smaller number to the other.
-        From the first end to the second, where the first has the smaller number.
     """
 
     cost: FloatArray

@@ -46,6 +46,7 @@ class Islands:
         That each stands for.
     offsets : (k + 1,) int array
         Where the points of each island begin.
+    reach : (k,) array, mm
         Distance within which an island below has points if this one rests on it.
     """
 

@@ -16,7 +16,6 @@ def preheated(moves: Moves, machine: Machine) -> Moves:
 
     It is inserted before the last row that starts at least the heating time, (work - standby) over
     the rate, ahead of the change; or right after the change away if that is later.
-    over the rate, or right behind the change away where that is later.
 
     Parameters
     ----------

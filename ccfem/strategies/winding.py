@@ -92,7 +92,6 @@ class Winding:
         that strands do not spread there.
     sharpest : float, 1/mm, default 0.115
         Largest curvature: strands that bend more sharply are smoothed there.
-        Strands that bend more sharply are smoothed there.
     joined : int, optional
         Number of joints that a piece must hold to get fibre. By default it is the largest number in
         any piece of the part, which selects the layers that the paper lays fibre on.

@@ -88,6 +88,7 @@ def band(
     ----------
     path : MainPath
     frame : Frame
+    crossing : bool, default True
         Whether an end in a joint continues beyond it; otherwise it stops in the joint's middle.
     turns : 2 floats, radians, default 0
         Turns to the left, at the start and at the end, with which the path leaves such joints.

@@ -82,7 +82,6 @@ class LoadOriented:
     gap : float, default 0.1
         Layers follow the stress only where the other two principal stresses also differ by this
         share of the largest; the paper requires no difference, 0.
-        paper asks for none, 0.
     alignment : float, default 0.75
         Least cosine of the angle between neighbours of one region.
     regions : int, default 10
