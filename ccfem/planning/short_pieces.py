@@ -14,7 +14,7 @@ _WORTH_A_WORD = 0.1
 
 
 def short_share(layers: Sequence[Layer], machine: Machine) -> float:
-    """Share of the sections in pieces that are shorter everywhere than the minimum path length.
+    """Share of the sections in pieces that are shorter than the minimum path length.
 
     The pieces are the region that the middle of a strand can reach inside the section. Their length
     is the longer side of their smallest bounding rectangle. Curved layers do not count.
