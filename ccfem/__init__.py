@@ -2,12 +2,12 @@
 
 Units are mm, N and MPa everywhere, angles in degrees at the interface.
 
-The line of flow, each arrow one function or one small callable value::
+The data flow, in which each arrow is one function or one small callable object::
 
     TetMesh -> Problem -> StressField -> Layers -> Strategy -> Toolpaths -> Evaluation
 
-Its functions are here, from ``ccfem.read`` to ``ccfem.compare``. What they take and give lives in
-packages by name: ``ccfem.strategies.Isocurve``, ``ccfem.elasticity.Force``.
+These functions are here, from ``ccfem.read`` to ``ccfem.compare``. The types of their arguments and
+results are in the subpackages: ``ccfem.strategies.Isocurve``, ``ccfem.elasticity.Force``.
 
 Examples
 --------
@@ -88,7 +88,7 @@ _HOMES = {
     "study": "studies",
     "virtual_test": "virtual_testing",
 }
-"""Package that each name comes from, imported when the name is first used."""
+"""Package of each name; it is imported when the name is first used."""
 
 _PACKAGES = frozenset(
     {
@@ -98,7 +98,7 @@ _PACKAGES = frozenset(
         *("studies", "tensor", "toolpaths", "topopt", "virtual_testing"),
     }
 )
-"""Packages and modules that need no import of their own."""
+"""Packages and modules that are available without a separate import."""
 
 
 def __getattr__(name: str) -> Any:

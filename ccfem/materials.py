@@ -35,13 +35,13 @@ class Material:
         Where the numbers come from, and which of them are assumed.
     mass_density : float or None, g/cm^3
     expansion : tuple of 3 floats or None, 1/K
-        Strain by heat along axes 1, 2 and 3.
+        Thermal strain along axes 1, 2 and 3.
     interlayer_tensile : float or None, MPa
-        Strength of the bond between printed layers across them: that of a bar printed upright,
+        Strength of the bond between printed layers, normal to them: that of a bar printed upright,
         over its gross area.
     interlayer_shear : float or None, MPa
-        The same along the layers; where None, `interlayer_tensile`. A bar with layers at 45 degrees
-        that fails at s gives it: ``1 / shear^2 = 4 / s^2 - 1 / tensile^2``.
+        The same for shear along the layers; if None, `interlayer_tensile` is used. A bar with
+        layers at 45 degrees that fails at s gives it: ``1 / shear^2 = 4 / s^2 - 1 / tensile^2``.
     """
 
     name: str

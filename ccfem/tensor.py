@@ -30,8 +30,8 @@ _SQUARE = np.array([[0, 5, 4], [5, 1, 3], [4, 3, 2]])
 _ENGINEERING = np.array([1.0, 1.0, 1.0, 2.0, 2.0, 2.0])
 
 _EQUAL = 0.02
-"""Principal values whose sizes differ by no more than this share of the larger size have no
-strongest direction: in pure shear two directions at right angles are equally strong."""
+"""Share of the larger absolute value by which principal values may differ and still have no
+strongest direction: in pure shear two perpendicular directions are equally strong."""
 
 
 def to_voigt(stress: FloatArray) -> FloatArray:
@@ -63,7 +63,7 @@ def strain_from_voigt(strain: FloatArray) -> FloatArray:
 
 
 def bond_matrix(axes: FloatArray) -> FloatArray:
-    """Bond matrices that turn Voigt stress from material axes to the global frame.
+    """Bond matrices that rotate Voigt stress from material axes to the global frame.
 
     Parameters
     ----------
@@ -73,7 +73,7 @@ def bond_matrix(axes: FloatArray) -> FloatArray:
     Returns
     -------
     (..., 6, 6) array
-        M with ``stress_global = M @ stress_local``; a stiffness turns as ``M C M.T`` (Auld,
+        M with ``stress_global = M @ stress_local``; a stiffness rotates as ``M C M.T`` (Auld,
         Acoustic Fields and Waves in Solids, 1973, eq. 3.34).
     """
     a, b = axes[..., _ROWS, :], axes[..., _COLUMNS, :]
@@ -84,7 +84,7 @@ def bond_matrix(axes: FloatArray) -> FloatArray:
 
 
 def rotate_stiffness(stiffness: FloatArray, axes: FloatArray) -> FloatArray:
-    """Turn stiffness matrices (..., 6, 6) given in material axes to the global frame, MPa."""
+    """Rotate stiffness matrices (..., 6, 6) from material axes to the global frame, MPa."""
     matrix = bond_matrix(axes)
     return matrix @ stiffness @ np.swapaxes(matrix, -1, -2)
 
@@ -102,7 +102,7 @@ def principal(stress: FloatArray) -> tuple[FloatArray, FloatArray]:
         Sorted from the largest (most tensile) to the smallest.
     directions : (..., 3, 3) array
         ``directions[..., :, k]`` is the unit vector of ``values[..., k]``. It is a line: its sign
-        means nothing, and where values coincide any vector of their plane may come.
+        is arbitrary, and where values coincide so is the vector in their plane.
     """
     values, directions = np.linalg.eigh(stress)
     return values[..., ::-1], directions[..., ::-1]
@@ -151,8 +151,8 @@ def largest_in_plane(plane_stress: FloatArray) -> tuple[FloatArray, FloatArray, 
     -------
     largest, smallest : (...,) arrays, MPa
     angle : (...,) array, radians
-        Of the direction of `largest` to axis 1, in (-pi/2, pi/2]. Where both values coincide the
-        angle is 0 and means nothing.
+        Angle of the direction of `largest` to axis 1, in (-pi/2, pi/2]. If both values coincide it
+        is 0 and meaningless.
     """
     s11, s22, s12 = np.moveaxis(plane_stress, -1, 0)
     mean, half = 0.5 * (s11 + s22), 0.5 * (s11 - s22)
@@ -161,7 +161,7 @@ def largest_in_plane(plane_stress: FloatArray) -> tuple[FloatArray, FloatArray, 
 
 
 def strongest(largest: FloatArray, smallest: FloatArray) -> tuple[BoolArray, BoolArray]:
-    """Find which of two principal values in a plane is the larger in size.
+    """Find which of two in-plane principal values has the larger absolute value.
 
     Parameters
     ----------
@@ -181,7 +181,7 @@ def strongest(largest: FloatArray, smallest: FloatArray) -> tuple[BoolArray, Boo
 
 
 def strongest_in_plane(plane_stress: FloatArray) -> tuple[FloatArray, FloatArray, BoolArray]:
-    """Principal value of the largest size of plane stress, tension or compression.
+    """Principal value of plane stress of largest absolute value, in tension or compression.
 
     Parameters
     ----------

@@ -35,11 +35,11 @@ class Toolpaths(Shown):
         Whether the path is a closed curve.
     link : (P,) bool array, optional
         Whether the step from each point to the next one of its path is a link: fibre that only
-        joins two strands and is not there to carry load. False at the last point of a path.
-        Default: none is.
-        A strategy marks what may leave the section or cross a void, as `svt` does, for that is
-        measured apart; short links within the section that follow the border or the field, as those
-        of `isocurve` and `zigzag`, are fibre like any other and not marked.
+        joins two strands and is not meant to carry load. False at the last point of a path.
+        Default: no step is a link.
+        A strategy marks links that may leave the section or cross a void, as `svt` does, since
+        these are evaluated separately. Short links inside the section that follow the border or the
+        field, as those of `isocurve` and `zigzag`, count as fibre and are not marked.
     """
 
     points: FloatArray

@@ -24,14 +24,14 @@ __all__ = ["Case", "check_name", "pulled"]
 
 
 def pulled(mesh: TetMesh, force: tuple[float, float, float], order: Order) -> Problem:
-    """Make a part of printed PLA, held at patch ``support`` and pulled at patch ``load``, N."""
+    """Make a part of printed PLA, held at patch ``support``; a force, N, pulls at ``load``."""
     loads = {"pull": (Force("load", force),)}
     return Problem(mesh, printed_pla(), (Support("support"),), loads, order=order)
 
 
 @dataclass(frozen=True)
 class Case(Shown):
-    """A part with its loads, how it is layered, and the machine that prints it.
+    """A part with its loads, its slicing, and the machine that prints it.
 
     Attributes
     ----------
@@ -47,20 +47,20 @@ class Case(Shown):
         Cuts the part into layers of fibre.
     machine : Machine
     parameters : mapping of strategy name to parameters
-        Where a strategy should not use its defaults on this part.
+        Parameters of strategies that should not use their defaults on this part.
     source : str
         Paper or person that the case comes from.
     alternative_supports : tuple of supports
-        Another model of how the part is held, such as bolts that only press in place of walls that
-        are held. Where there are some, strategies are tested under both, and no order is told that
-        the two do not agree on.
+        Another model of how the part is held, such as bolts that only press instead of walls that
+        are held. If given, strategies are tested under both models, and no ranking is stated on
+        which the two disagree.
     fibre : FibrePlaces, optional
-        Which of the layers, and which regions of them, get fibre; by default all.
+        Which layers, and which regions of them, get fibre; by default all.
     weights : mapping of load case to float
-        Of the load cases, combinations among them, that are planned for when all are asked for;
-        those that are not named do not count. Default: all but combinations, alike.
+        Weights of the load cases and combinations when all are planned for; those not named do not
+        count. Default: all load cases equally, without combinations.
     findings : tuple of str
-        What was found and repaired in a mesh from a file, one line each.
+        Problems found and repaired in a mesh from a file, one line each.
     """
 
     name: str
@@ -96,7 +96,7 @@ class Case(Shown):
 
 
 def check_name(name: str, title: str) -> None:
-    """Refuse a name that is none for a folder, and a title that does not print.
+    """Refuse a name that cannot be that of a folder, and a title that cannot be printed.
 
     Raises
     ------

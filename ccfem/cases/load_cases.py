@@ -1,4 +1,4 @@
-"""The load cases that a part is planned for at once, solved and weighted."""
+"""Load cases that a part is planned for together, solved and weighted."""
 
 from collections.abc import Mapping
 
@@ -10,16 +10,16 @@ from ccfem.errors import InputError
 __all__ = ["ALL_CASES", "asks_for_all", "weighted_cases"]
 
 ALL_CASES = "all"
-"""What asks for all load cases in place of the name of one."""
+"""Text that asks for all load cases instead of one."""
 
 
 def asks_for_all(case: Case, load_case: str | None) -> bool:
-    """Whether all load cases are asked for; a case of that name goes before."""
+    """Whether all load cases are asked for; a case with this name takes precedence."""
     return load_case == ALL_CASES and ALL_CASES not in case.problem.cases
 
 
 def weighted_cases(case: Case, fields: Mapping[str, StressField]) -> WeightedCases:
-    """Cases that `Case.weights` names, with these weights; without, all but combinations alike.
+    """Cases named in `Case.weights`, with these weights; by default all but combinations equally.
 
     Parameters
     ----------

@@ -1,4 +1,4 @@
-"""Topology optimisation of a case: the part that is left, as a case of its own."""
+"""Topology optimisation of a case: the remaining part, as a case of its own."""
 
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
@@ -25,13 +25,13 @@ from ccfem.topopt.sheet_part import plane_stiffness, sheet_outline, sheet_part, 
 __all__ = ["Optimised", "optimise"]
 
 _CELLS = 4000.0
-"""Squares of the element size that a sheet is divided into."""
+"""Number of squares of the element size into which a sheet is divided."""
 _RIM = 2.0
-"""Width of what stays solid beside a patch, in element sizes."""
+"""Width of the solid rim beside a patch, in element sizes."""
 _REACH = 2.0
 """Radius of the filter, in element sizes."""
 _AS_WANTED = 0.1
-"""Share by which the part may miss the volume fraction before it is said."""
+"""Share by which the part may miss the volume fraction before there is a remark."""
 
 
 @dataclass(frozen=True)
@@ -41,15 +41,15 @@ class Optimised:
     Attributes
     ----------
     case : Case
-        The part that is left, held, loaded and printed as the whole one.
+        The remaining part, held, loaded and printed like the whole one.
     design : Design
         Densities, and the compliance of every iteration.
     element_size : float, mm
         Of the cells of the design.
     planform : shapely Polygon, mm, or None
-        Outline of the part, where it was optimised as a sheet.
+        Outline of the part, if it was optimised as a sheet.
     remarks : tuple of str
-        What there is to say about it, one line each.
+        Remarks on the result, one line each.
     """
 
     case: Case
@@ -81,35 +81,35 @@ def optimise(
 ) -> Optimised:
     """Find the stiffest part with a share of the volume of a case.
 
-    A prism along z whose loads lie in its plane is optimised as a sheet in plane stress, by one
-    layer of cells of its own, and the outline of the design is extruded again; all else in space,
-    on the cells that the part has. Sums of load cases (combinations) are no load cases here.
+    A prism along z whose loads lie in its plane is optimised as a sheet in plane stress, with one
+    layer of cells of its own, and the outline of the design is extruded again. Other parts are
+    optimised in space, on their own cells. Combinations of load cases do not count here.
 
     Parameters
     ----------
     case : Case
-        The part to begin with: its whole volume may be used.
+        The initial part: its whole volume may be used.
     volume_fraction : float in (0, 1)
     method : str
-        "somp": densities, and the axis of a laminate, of a sheet. "simp": densities alone.
+        "somp": densities and the axis of a laminate, for a sheet. "simp": densities only.
     element_size : float, mm, optional
-        Edge length of the cells of a sheet; default the side of a square that 4000 of make it.
+        Edge length of the cells of a sheet; by default such that about 4000 squares fill it.
     radius : float, mm, optional
-        Of the filter; default two element sizes.
+        Radius of the filter; default two element sizes.
     filter, max_iterations
         As in `Simp`.
     orientation : str, default "gradient"
-        As in `Somp`; stiffer than its default on nearly all plates, and slower.
+        As in `Somp`; stiffer than the default there on nearly all plates, and slower.
     laminate : 4 floats, optional
         Modulus along the axis, modulus across, MPa, Poisson's ratio and shear modulus, MPa, for
-        "somp"; default the part's own material where it has an axis, else that of Wang et al. 2021.
+        "somp"; default the part's own material if it has an axis, else that of Wang et al. 2021.
     weights : mapping of load case name to float, optional
-        Compliances are summed with these; default 1 each.
+        Weights of the compliances in the sum; default 1 each.
     keep : sequence of str, optional
-        Patches beside which two element sizes stay solid; default those that are loaded, and
-        curved ones that hold the part.
+        Patches beside which a rim of two element sizes stays solid; default those that are loaded,
+        and curved ones that hold the part.
     solid, void : sequences of places
-        That stay full, and empty: (x, y, radius), or the corners of a rectangle or a box, mm.
+        Places that stay full, and empty: (x, y, radius), or the corners of a rectangle or box, mm.
     in_space : bool
         Do not take a flat part for a sheet.
     progress : callable, optional
@@ -117,7 +117,7 @@ def optimise(
     Raises
     ------
     InputError
-        For what cannot be optimised so; when the design falls apart.
+        For a case that cannot be optimised this way; when the design falls apart.
     SolveError
         When a solve misses its tolerance.
     """
@@ -144,7 +144,7 @@ def optimise(
 
 @dataclass(frozen=True)
 class _Wanted:
-    """What is asked for of a part, whether it is a sheet or not."""
+    """The wanted part, whether it is a sheet or not."""
 
     case: Case
     volume_fraction: float
@@ -248,7 +248,7 @@ def _of_solid(wanted: _Wanted) -> Optimised:
 def _found(
     case: Case, part: Problem, design: Design, size: float, planform: Any, share: float
 ) -> Optimised:
-    """Gather what was found, with what there is to say about it."""
+    """Gather the results, with remarks on them."""
     wanted, remarks = design.volume_fraction, []
     if not design.converged:
         remarks.append(
@@ -271,7 +271,7 @@ def _found(
 
 
 def _laminate(given: Sequence[float] | None, own: FloatArray) -> FloatArray:
-    """Plane stress stiffness of what is laid: as given, of the part, or of the paper."""
+    """Plane stress stiffness of the laminate: as given, of the part, or of the paper."""
     if given is not None:
         if (
             len(given) != 4

@@ -166,8 +166,8 @@ them with a minus ("-z"), or three numbers.
     tangential = 0.0                  # optional
 
     [[alternative_supports]]          # another model of how the part is held, keys as of supports:
-    patch = "foot"                    # strategies are tested under both, and no order is told that
-    kind = "pressing"                 # the two do not agree on
+    patch = "foot"                    # strategies are tested under both, and no ranking is stated
+    kind = "pressing"                 # on which the two disagree
 
     [[loads.pull]]                    # at least one load of one load case, here "pull"
     kind = "bearing"                  # total force, N, that a pin presses on a cylinder
@@ -199,9 +199,9 @@ them with a minus ("-z"), or three numbers.
     pull = 1.5
     heat = 1.0
 
-    [weights]                         # what each case counts where all are planned for at once
-    pull = 1.0                        # (--load-case all); cases that are left out do not count,
-    weight = 0.5                      # without this table all but combinations count alike
+    [weights]                         # weight of each case when all are planned for together
+    pull = 1.0                        # (--load-case all); cases that are left out do not count.
+    weight = 0.5                      # Without this table all but combinations count equally
 
     [machine]                         # what differs from ccfem.machine.machine.Machine, or from a
     profile = "klipper"               # machine of ccfem machines

@@ -22,19 +22,19 @@ class Part(Body):
     loads : dict
         The load cases by name, each a list of loads; at least one.
     alternative_supports : tuple of tables
-        Another model of how the part is held: strategies are tested under both, and no order is
-        told that the two do not agree on.
+        Another model of how the part is held. Strategies are tested under both, and no ranking is
+        stated on which the two disagree.
     combinations : dict
         Load cases that are sums of others times factors.
     weights : dict
-        What each load case counts when all are planned for at once (``--load-case all``); those
-        that are not named do not count. Without any all but combinations count alike.
+        Weight of each load case when all are planned for together (``--load-case all``). Cases
+        that are not named do not count. Without weights all cases but combinations count equally.
     regions : dict
         Cells of another material.
     name : str
-        Name of the part; that of the file where there is none.
+        Name of the part; by default that of the file.
     title : str
-        One line for tables and reports; the name where there is none.
+        One line for tables and reports; by default the name.
     source : str
         Where the part comes from.
     build : str or tuple of 3 floats
@@ -51,7 +51,7 @@ class Part(Body):
     patches : dict
         Patches of the boundary, each by a rule. Groups of a mesh file are patches already.
     machine : table
-        What differs from the default printer.
+        Values that differ from the default printer.
     strategies : dict
         Parameters of strategies on this part.
     """

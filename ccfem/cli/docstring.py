@@ -32,7 +32,7 @@ def attributes(what: Callable[..., Any]) -> dict[str, Attribute]:
     --------
     >>> from ccfem.strategies.zigzag import Zigzag
     >>> attributes(Zigzag)["spacing"]
-    Attribute(kind='float', meaning='Distance of the lines in fibre widths, at least 1.')
+    Attribute(kind='float', meaning='Distance between the lines in fibre widths, at least 1.')
     """
     parts = _SECTION.split(inspect.getdoc(what) or "")
     sections = dict(zip(parts[1::2], parts[2::2], strict=True))

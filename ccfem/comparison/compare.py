@@ -1,6 +1,6 @@
-"""Comparison of strategies on one part: the same stress, layers, machine and length of fibre.
+"""Comparison of strategies on one part: with the same stress, layers, machine and fibre length.
 
-`compare` reads from top to bottom: solve and slice, plan, level the lengths, evaluate, plan the
+`compare` reads from top to bottom: solve and slice, plan, equalise the lengths, evaluate, plan the
 print, test, bound.
 """
 
@@ -53,7 +53,7 @@ STRATEGIES = ("isocurve", "concentric", "zigzag", "contour_zigzag")
 """The strategies that are compared when none are named."""
 
 DEFAULT_STRAND = Strand()
-"""What a strand is worth where nothing else is known."""
+"""Stiffness and strength of a strand where nothing else is known."""
 
 
 @dataclass(frozen=True)
@@ -64,7 +64,7 @@ class ForeignStress:
     ----------
     path : path
     unit : str, optional
-        Where the file does not say it.
+        Unit of the stress, if the file does not state it.
     array : str, default "stress"
         Name of the array in a ``.vtu`` file.
     """
@@ -79,14 +79,14 @@ def create_all(
     strategies: Sequence[str | Strategy] = STRATEGIES,
     parameters: Mapping[str, Mapping[str, Any]] | None = None,
 ) -> dict[str, Strategy]:
-    """Strategies by name, with the parameters of the case and, above these, those given.
+    """Make strategies by name, with the parameters of the case, which those given override.
 
     Parameters
     ----------
     case : Case
     strategies : sequence of str or Strategy
-        One that is given itself keeps its parameters, and has the name of its module; a second one
-        of a name gets a number.
+        A strategy object keeps its parameters and gets the name of its module; a second one of the
+        same name gets a number.
     parameters : mapping of strategy name to parameters, optional
 
     Raises
@@ -229,54 +229,54 @@ def compare(
 ) -> Comparison | SlicingComparison:
     """Solve a case once, and plan and evaluate each strategy on it.
 
-    Strategies are compared at equal length of fibre: more fibre wins almost any comparison. When no
-    length is given, it is the shortest natural length of any of them, and all others are thinned to
-    it, each by its own parameter (`LayerStrategy.amount`). Paths of another program (`GivenPaths`)
-    stay as they are: the least of their lengths is then the one for all, and their heights are
-    those of the layers where no others are given. A strategy that fails stays in the result, with
-    the reason. Where one cannot lay the length, the comparison is made along a curve too: stiffness
-    over length of fibre.
+    Strategies are compared at equal length of fibre, since more fibre wins almost any comparison.
+    If no length is given, it is the shortest natural length of any strategy. All others are thinned
+    to it, each by its own parameter (`LayerStrategy.amount`). Paths of another program
+    (`GivenPaths`) are never changed: the shortest of their lengths then applies to all, and their
+    heights are those of the layers if no others are given. A strategy that fails stays in the
+    result, with the reason. If a strategy cannot lay the length, stiffness is also compared along a
+    curve over the length of fibre.
 
-    With `slicings` the part is cut in several ways, and each strategy is planned on each: all lay
-    the same length of fibre in all, whatever the number of layers.
+    With `slicings` the part is cut in several ways, and each strategy is planned on each of them.
+    All lay the same total length of fibre, whatever the number of layers.
 
     Parameters
     ----------
     case : Case, str or path
         A case, the name of one, or a part file.
     strategies : sequence of str or Strategy, or mapping of name to Strategy
-        Those by name take the parameters of the case.
+        Strategies given by name take the parameters of the case.
     layers : int, sequence of float, str or Slicer, optional
         Instead of the case's own slicing: a number of flat layers, their heights along the build
         direction in mm, the name of a slicer, or a slicer.
     fibre_per_layer : float, mm, optional
-        Length that every strategy is held to, mean over the layers.
+        Length that every strategy is held to, as a mean over the layers.
     natural : bool, default False
         Let every strategy lay its own amount instead.
     strand : Strand or None
-        What a strand is worth in the virtual test; None leaves the test out.
+        Stiffness and strength of a strand in the virtual test; None leaves the test out.
     load_case : str, optional
         Load case to plan, evaluate and test for; by default the first one. "all" plans for all of
-        them at once, by `Case.weights`, tests under all and ranks by the worst.
+        them at once, weighted by `Case.weights`, tests under all and ranks by the worst.
     backend : str, default "auto"
         As in `solve`.
     print_plans : bool, default False
-        Also plan the print of the whole part by every strategy, matrix and fibre.
+        Also plan the print of the whole part, matrix and fibre, for every strategy.
     support : bool, default False
         Also print support below a part of curved layers (`ccfem.support`).
     stress : ForeignStress, optional
-        File of another program with the stress, on the same mesh, to plan and evaluate on. Virtual
-        tests and the bound solve the part themselves all the same.
+        Stress file of another program, on the same mesh, to plan and evaluate on. Virtual tests and
+        the bound still solve the part themselves.
     curve : bool, optional
         Test every strategy at three to five lengths of fibre (`Comparison.curve`). By default only
-        where a strategy lays neither more nor less than its own, which is not the wanted length.
-        Never over several slicings.
+        if a strategy cannot change its amount of fibre to the wanted length. Never over several
+        slicings.
     progress : callable, optional
-        Told what is being done, and the share that is done.
+        Receives what is being done, and the share of the work that is done.
     slicings : sequence of str or Slicer, or mapping of name to Slicer, optional
-        Ways to cut the part, instead of `layers`: as ``["planar:z", "planar:x", "spatial"]``.
+        Ways to cut the part, instead of `layers`, such as ``["planar:z", "planar:x", "spatial"]``.
     fibre : float, mm, optional
-        Length that every strategy is held to in all layers together, instead of `fibre_per_layer`.
+        Total length that every strategy is held to in all layers, instead of `fibre_per_layer`.
 
     Returns
     -------
@@ -285,8 +285,8 @@ def compare(
     Raises
     ------
     InputError
-        When the case, a strategy's name or its parameters make no sense, or the machine cannot
-        print though that was asked for.
+        When the case, the name of a strategy or its parameters are invalid, or when a print is
+        asked for that the machine cannot do.
     SolveError
         When the solve misses its tolerance.
     """
@@ -347,7 +347,7 @@ def _solved(
     stress: ForeignStress | None,
     progress: Progress,
 ) -> tuple[Solved, dict[str, float]]:
-    """Solve a case, and make what virtual tests stand on; the seconds of each."""
+    """Solve a case, and prepare what virtual tests need; also return the seconds of each."""
     progress(f"solving {case.name}", 0.0)
     if asks_for_all(case, load_case) and strand is not None:
         seconds: dict[str, float] = {}

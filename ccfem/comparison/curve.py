@@ -1,4 +1,4 @@
-"""Stiffness over the length of fibre: what is compared where one length is not right for all."""
+"""Stiffness over the length of fibre, for comparisons in which no single length suits all."""
 
 from collections.abc import Mapping
 from dataclasses import dataclass
@@ -34,9 +34,9 @@ class Curve:
     Attributes
     ----------
     lengths : tuple of float, mm per layer
-        Lengths that all strategies are held to; none where there is no length that all reach.
+        Lengths that all strategies are held to; empty if there is no length that all reach.
     points : mapping of strategy name to tuple of (float, Run)
-        Wanted length, mm per layer, and the run: from the least fibre to the most.
+        Wanted length, mm per layer, and the run, from the least fibre to the most.
     """
 
     lengths: tuple[float, ...]
@@ -85,7 +85,7 @@ class Curve:
 
     @property
     def frame(self) -> "pd.DataFrame":
-        """One row a point: strategy, wanted length, whether all reach it, and what came of it."""
+        """One row a point: strategy, wanted length, whether all reach it, and the results."""
         import pandas as pd
 
         rows = []

@@ -1,4 +1,4 @@
-"""How the curve of a comparison comes about: lengths, plans, tests."""
+"""Stages of the curve of a comparison: lengths, plans, tests."""
 
 import itertools
 from collections.abc import Callable, Sequence
@@ -17,14 +17,14 @@ from ccfem.planning.strategy import LengthStrategy
 __all__ = ["along_curve"]
 
 _COMMON = 3
-"""Lengths that all strategies are held to."""
+"""Number of lengths that all strategies are held to."""
 _APART = 0.1
-"""Share of a length by which the next one on a curve is larger, at least."""
+"""Least relative step between the lengths of a curve."""
 
 
 @dataclass(frozen=True)
 class _Reach:
-    """What one strategy lays at the least and at the most, mm per layer, and plans that show it."""
+    """Least and most that one strategy lays, mm per layer, with plans that show it."""
 
     run: Run
     least: float
@@ -41,17 +41,17 @@ def along_curve(
 ) -> Curve:
     """Plan and test every strategy at three to five lengths of fibre.
 
-    Three are lengths that all reach, from the largest of the leasts to the smallest of the mosts;
-    the other two are a strategy's own least and most. Where nobody's reach overlaps, each has three
-    lengths of its own. Given paths are one point each.
+    Three lengths are ones that all reach, from the largest of the least to the smallest of the most
+    lengths. The other two are a strategy's own least and most. If the ranges do not overlap, each
+    strategy has three lengths of its own. Given paths are one point each.
 
     Parameters
     ----------
     runs : sequence of Run
-        With the strategies as they were asked for, and what they laid.
+        With the strategies as they were asked for, and their lengths.
     part : Part
     wanted : float, mm, or None
-        Length per layer that the comparison is made at: one of the three where it can be.
+        Length per layer of the comparison; one of the three if possible.
     tested : callable
         Tests runs virtually.
     tell : callable

@@ -1,4 +1,4 @@
-"""Fronts: runs of which none is better in one thing without being worse in another."""
+"""Fronts: runs that no other run beats in one quantity without being worse in another."""
 
 import numpy as np
 
@@ -8,14 +8,14 @@ __all__ = ["on_front"]
 
 
 def on_front(across: FloatArray, up: FloatArray, better: str = "low") -> BoolArray:
-    """Points that no other one dominates: none is as good in both and better in one.
+    """Mask of points that no other point dominates, as good in both values and better in one.
 
     Parameters
     ----------
     across, up : (n,) arrays
-        The second is better where it is high. Points with NaN are on no front.
+        The second values are better when high. Points with NaN are on no front.
     better : {"low", "high"}
-        Which end of the first is better.
+        Which first values are better.
 
     Examples
     --------

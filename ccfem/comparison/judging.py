@@ -1,4 +1,4 @@
-"""What becomes of planned runs on one stack of layers: evaluated, printed, tested, bounded."""
+"""Evaluation, printing, testing and bounding of planned runs on one stack of layers."""
 
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
@@ -47,7 +47,7 @@ def check_propped(slicer: Slicer, support: bool) -> None:
 
 @dataclass(frozen=True)
 class Solved:
-    """A case with its stress: what all stacks of layers share.
+    """A case with its stress: the data shared by all stacks of layers.
 
     Attributes
     ----------
@@ -57,9 +57,9 @@ class Solved:
     given : GivenStress, optional
         Stress of another program to plan and evaluate on.
     tests : Tests, optional
-        None where nothing is tested.
+        None if nothing is tested.
     cases : WeightedCases, optional
-        Where paths are planned for several load cases.
+        If paths are planned for several load cases.
     """
 
     case: Case
@@ -76,7 +76,7 @@ class Solved:
     def cut(
         self, slicer: Slicer | None = None, support: bool = False
     ) -> tuple[tuple[Layer, ...], SupportLayers | None]:
-        """Layers that get fibre by the part's own slicer or another, and if wanted their support.
+        """Layers that get fibre, by the part's own slicer or another, and their support if wanted.
 
         Raises
         ------
@@ -131,14 +131,14 @@ def judged(
     runs : sequence of Run
         Planned.
     asked_for : sequence of Run
-        The same with the strategies as they were asked for.
+        The same runs, with the strategies as they were asked for.
     wanted : float, mm, or None
-        Length per layer that they were held to.
+        Length per layer that the runs were held to.
     tell : callable
     curve : bool, optional
         As in `ccfem.compare`.
     bounded : bool
-        Whether to bound what any paths could reach.
+        Whether to compute the bound on what any paths can reach.
     print_plans : bool
     seconds : dict of stage to float, optional
         Of the stages before.
@@ -185,7 +185,7 @@ def _bounded(run: Run, bound: UpperBound, wanted: float | None) -> Run:
 
 
 def _misses(runs: Sequence[Run], wanted: float | None) -> bool:
-    """Whether a strategy lays another length than the wanted one, since it cannot lay that."""
+    """Whether a strategy lays a length other than the wanted one, since it cannot lay that."""
     return any(
         off_length(run, wanted) and not isinstance(run.strategy, GivenPaths)
         for run in runs
@@ -218,10 +218,10 @@ def _bound(
     tell: Tell,
     seconds: dict[str, float],
 ) -> UpperBound | None:
-    """Bound the stiffness that any paths could reach with as much fibre as the runs lay.
+    """Bound the stiffness that any paths can reach with as much fibre as the runs lay.
 
-    None where no run of the wanted length was tested, for curved layers, and for supports that do
-    not hold both ways.
+    None if no run of the wanted length was tested, for curved layers, and for supports that hold in
+    one sense only.
     """
     longest = _longest_bounded(solved, part, runs, wanted)
     if longest is None or solved.tests is None:
@@ -240,7 +240,7 @@ def _bound_of_cases(
     tell: Tell,
     seconds: dict[str, float],
 ) -> CasesBound | None:
-    """Bound what any paths could reach in all load cases together; None as `_bound`."""
+    """Bound what any paths can reach in all load cases together; None as in `_bound`."""
     longest = _longest_bounded(solved, part, runs, wanted)
     if longest is None or solved.tests is None:
         return None

@@ -1,4 +1,4 @@
-"""The order of the runs of a comparison, and where an order cannot be told."""
+"""Ranking of the runs of a comparison, and cases in which no order can be stated."""
 
 from collections.abc import Sequence
 
@@ -20,7 +20,7 @@ __all__ = [
 ]
 
 _SAME = TOLERANCE * (1.0 + 1e-9)
-"""Share of the wanted length by which a run may differ and count as equal."""
+"""Share of the wanted length by which a run may differ and still count as equal."""
 
 _STIFFNESSES = (
     "stiffness",
@@ -28,16 +28,16 @@ _STIFFNESSES = (
     "stiffness_ratio_bonded",
     "displacement",
 )
-"""Columns of which the best is that of the stiffest run, where one is."""
+"""Columns whose best value is that of the stiffest run, if there is one."""
 
 
 def ranking(runs: Sequence[Run], wanted: Wanted) -> tuple[Run, ...]:
     """Return the runs from the best to the worst, failed ones last.
 
-    By the predicted stiffness with fibres that carry tension only, with several load cases that of
-    the case which is farthest below its bound; those without a virtual test
-    come after, by efficiency. Runs that cannot be printed as they are stand below all that can,
-    and among these a run that lays more or less than the wanted fibre below all that lay it.
+    Runs are ranked by the predicted stiffness with fibres that carry tension only; with several
+    load cases, by the case that is farthest below its bound. Runs without a virtual test come
+    after these, by efficiency. Runs that cannot be printed as they are rank below all that can.
+    Among printable runs, those that lay more or less than the wanted fibre rank below the others.
 
     Parameters
     ----------
@@ -61,12 +61,12 @@ def ranking(runs: Sequence[Run], wanted: Wanted) -> tuple[Run, ...]:
 
 
 def best_values(runs: Sequence[Run], wanted: Wanted) -> dict[str, float]:
-    """Best value of each headline column where a run is really better than another.
+    """Best value of each headline column, if a run is really better than another.
 
-    Runs that cannot be printed, lay another length than the wanted one or leave layers empty have
-    no best value. A stiffness is best only where its run is stiffer than every other, by more than
-    the test resolves and whatever fibres in compression do; a load at first failure where it is
-    the largest by more than that.
+    Runs that cannot be printed, lay another length than the wanted one, or leave layers empty have
+    no best value. A stiffness is best only if its run is stiffer than every other by more than the
+    resolution of the test, whatever fibres in compression do. A load at first failure is best if it
+    is the largest by more than that.
     """
     equal = [
         run
@@ -91,7 +91,7 @@ def best_values(runs: Sequence[Run], wanted: Wanted) -> dict[str, float]:
 
 
 def _strongest(runs: Sequence[Run], load: float) -> bool:
-    """Whether the run that fails last, at a load, does so by far and under all supports."""
+    """Whether the run that fails last, at a load, does so by a margin and under all supports."""
     columns = ("first_failure_load", "first_failure_load_alternative")
     first, again = ([headline_values(run).get(name, np.nan) for run in runs] for name in columns)
     best = first.index(load)
@@ -120,7 +120,7 @@ def stiffness_ratio(run: Run, mode: str = "tension") -> float:
 
 
 def merit(run: Run, mode: str = "tension") -> float:
-    """Return what runs are ranked by: the ratio, or `TestedCases.merit` of several load cases."""
+    """Return the value that ranks runs: the ratio, or `TestedCases.merit` of several load cases."""
     if run.tested is not None and run.tested.cases is not None:
         return run.tested.cases.merit(mode)
     return stiffness_ratio(run, mode)
@@ -135,14 +135,14 @@ def stiffness_ratios(one: Run, other: Run) -> tuple[float, float]:
 
 
 def order_of(better: Run, other: Run) -> str:
-    """Say whether a run is stiffer than one that is placed below it.
+    """Say whether a run is stiffer than one ranked below it.
 
     Returns
     -------
     str
-        FIRST, SAME or UNDECIDED of `ccfem.virtual_testing.stiffer`: undecided also where only
-        bonded fibres, or only the alternative supports, tell them apart, and where these tell the
-        opposite. SAME where one is untested.
+        FIRST, SAME or UNDECIDED of `ccfem.virtual_testing.stiffer`. It is also undecided if only
+        bonded fibres, or only the alternative supports, tell the runs apart, or tell the opposite.
+        SAME if one run is untested.
     """
     if better.tested is None or other.tested is None:
         return SAME

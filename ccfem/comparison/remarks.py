@@ -1,4 +1,4 @@
-"""What is said of a comparison: remarks that stand beside the table."""
+"""Remarks on a comparison, to be shown beside the table."""
 
 from collections.abc import Mapping, Sequence
 
@@ -16,21 +16,21 @@ from ccfem.virtual_testing.stiffer import RESOLUTION, SAME, UNDECIDED
 __all__ = ["bound_remark", "open_remarks", "remarks"]
 
 _FULL = 0.93
-"""Coverage of a layer from which it counts as filled."""
+"""Coverage of a layer above which it counts as filled."""
 _NAMED = 6
-"""Layers that are named."""
+"""Number of layers that are named."""
 _PLACES = 3
-"""Open places that are named."""
+"""Number of open places that are named."""
 
 
 def remarks(runs: Sequence[Run], wanted: Wanted, bound: UpperBound | None = None) -> list[str]:
-    """Say what has to stand next to the numbers, a line each.
+    """Remarks that must be shown with the numbers, one line each.
 
     Parameters
     ----------
     runs : sequence of Run
     wanted : float, mm, InAll or None
-        Length of fibre per layer, or in all, that all were held to; None where each laid its own.
+        Length of fibre per layer, or in total, that all were held to; None if each laid its own.
     bound : UpperBound, optional
     """
     order = ranking(runs, wanted)
@@ -45,7 +45,7 @@ def remarks(runs: Sequence[Run], wanted: Wanted, bound: UpperBound | None = None
 
 
 def _about(run: Run, wanted: Wanted, bounded: bool) -> list[str]:
-    """Say what has to stand next to the numbers of one run."""
+    """Remarks on one run that must be shown with the numbers."""
     reasons = {
         "failed": run.failure,
         "no virtual test": run.untested,
@@ -74,7 +74,7 @@ def _about(run: Run, wanted: Wanted, bounded: bool) -> list[str]:
 
 
 def _about_orders(tested: Sequence[Run]) -> list[str]:
-    """Say which runs, best first, cannot be put in an order; each reason once."""
+    """Say which runs, best first, cannot be ranked against each other; each reason once."""
     both = any(run.tested is not None and run.tested.alternative is not None for run in tested)
     of = "tension-only and bonded fibres" + (", or both models of the supports," if both else "")
     reasons = {
@@ -94,7 +94,7 @@ def _about_orders(tested: Sequence[Run]) -> list[str]:
 
 
 def _about_links(total: Mapping[str, float]) -> list[str]:
-    """Say how much fibre joins strands where no part holds it, from a millimetre on."""
+    """Say how much link fibre has no part to hold it, from a millimetre on."""
     places = {
         "link_outside": "lie outside the part, to be cut off",
         "link_over_void": "hang over voids, where nothing holds the fibre",
@@ -107,7 +107,7 @@ def _about_links(total: Mapping[str, float]) -> list[str]:
 
 
 def _about_crossings(evaluation: Evaluation, bounded: bool) -> list[str]:
-    """Say how often strands that cross by intention lie over each other, and what that means."""
+    """Say how often strands that cross on purpose lie over each other, and the consequences."""
     crossings = evaluation.values["crossings"] + evaluation.values["self_crossings"]
     if not crossings[-1]:
         return []
@@ -120,7 +120,7 @@ def _about_crossings(evaluation: Evaluation, bounded: bool) -> list[str]:
 
 
 def _about_open(evaluation: Evaluation) -> list[str]:
-    """Name the layers that strands meant to fill a section leave open, and how much of them."""
+    """Name the layers that are left open by strands meant to fill a section, and how much."""
     cover = evaluation.values["coverage"][:-1]
     open_ = np.flatnonzero(cover < _FULL)
     if not len(open_):
@@ -132,9 +132,9 @@ def _about_open(evaluation: Evaluation) -> list[str]:
 
 
 def open_remarks(runs: Sequence[Run], layers: Sequence[Layer], width: float) -> list[str]:
-    """Say where strands meant to fill a section leave the most of it open, a line each run.
+    """Say where strands meant to fill a section leave most of it open, one line a run.
 
-    Of runs that lay as much fibre as their strategy can: others leave it open by intention.
+    Only for runs that lay as much fibre as their strategy can: others leave room on purpose.
 
     Parameters
     ----------
@@ -167,7 +167,7 @@ def open_remarks(runs: Sequence[Run], layers: Sequence[Layer], width: float) -> 
 
 
 def _filling(run: Run) -> bool:
-    """Whether a run is meant to fill the section: with strands that cross, as many as it can."""
+    """Whether a run is meant to fill the section: with crossing strands, as many as possible."""
     amount = getattr(run.strategy, "amount", None)
     if amount is None or not amount.parameter or not getattr(run.strategy, "crosses", False):
         return False
@@ -177,8 +177,8 @@ def _filling(run: Run) -> bool:
 def bound_remark(tested: Sequence[Run], bound: UpperBound) -> str:
     """Say how far the best run is from what any paths could reach.
 
-    The bound is for strands beside each other that carry tension only: strands that overlap may
-    exceed it, and so may bonded ones.
+    The bound holds for strands that lie beside each other and carry tension only. Strands that
+    overlap may exceed it, and so may bonded ones.
 
     Parameters
     ----------

@@ -46,21 +46,22 @@ class Comparison:
     runs : tuple of Run
         In the order they were asked for, failed ones included.
     fibre_per_layer : float, mm, or None
-        Length that every strategy was held to; None where each laid its own.
+        Length that every strategy was held to; None if each laid its own.
     seconds : mapping of stage to float
         Solve and slice; the stages of each strategy are in its run.
     given : GivenStress, optional
-        Stress of another program, where paths are planned and evaluated on that.
+        Stress of another program, if paths are planned and evaluated on that.
     bound : UpperBound or None
-        Stiffness that no paths exceed at the largest length of any run; None without virtual tests.
+        Stiffness that no paths can exceed at the largest length of any run; None without virtual
+        tests.
     cases : WeightedCases, optional
-        Where paths are planned for several load cases: `stress` is that of the first of the largest
-        weight.
+        If paths are planned for several load cases. `stress` is then that of the case of largest
+        weight, the first of several.
     cases_bound : CasesBound, optional
-        What no paths exceed in all load cases together.
+        What no paths can exceed in all load cases together.
     curve : Curve, optional
-        The strategies at several lengths of fibre, where that was asked for or one cannot lay the
-        length of the others.
+        The strategies at several lengths of fibre, if that was asked for, or if a strategy cannot
+        lay the length of the others.
     """
 
     case: Case
@@ -114,7 +115,7 @@ class Comparison:
         return layer_view(self.succeeded, self.layers, self.planned_on, machine, index)
 
     def pareto(self, over: str = "fibre_length") -> "Figure":
-        """Draw stiffness over another index, and the runs that no other printable one dominates.
+        """Draw stiffness over another index, and the front of the printable runs.
 
         Parameters
         ----------
@@ -162,7 +163,7 @@ class Comparison:
 
     @property
     def remarks(self) -> list[str]:
-        """What has to stand next to the numbers, a line each."""
+        """Remarks to be shown with the numbers, one line each."""
         found = remarks(self.runs, self.fibre_per_layer, self.bound)
         found += open_remarks(self.succeeded, self.layers, self.case.machine.fibre_width)
         if self.case.fibre is not None:

@@ -1,4 +1,4 @@
-"""One strategy of a comparison: its paths, and what became of them."""
+"""One strategy of a comparison: its paths, and their results."""
 
 import dataclasses
 from collections.abc import Mapping
@@ -20,7 +20,7 @@ __all__ = ["InAll", "Run", "Tested", "Wanted"]
 
 @dataclass(frozen=True)
 class InAll:
-    """Length of fibre in the whole part, which runs on layers of their own are held to.
+    """Total length of fibre in the part, for runs with different layers.
 
     Attributes
     ----------
@@ -31,7 +31,7 @@ class InAll:
 
 
 Wanted = float | InAll | None
-"""Length of fibre that runs are held to: mm per layer, in all, or none where each lays its own."""
+"""Length of fibre that runs are held to: mm per layer, in total, or None if each lays its own."""
 
 
 @dataclass(frozen=True)
@@ -49,11 +49,11 @@ class Tested:
     matrix_before : float, MPa
         Peak of the averaged von Mises stress without fibre; NaN where it cannot be judged.
     alternative : Tested, optional
-        The same under the alternative supports of the case, where it has some.
+        The same under the alternative supports of the case, if it has any.
     most : float
-        Stiffness ratio that no paths of the compared length exceed; NaN where there is no bound.
+        Stiffness ratio that no paths of the compared length can exceed; NaN without a bound.
     cases : TestedCases, optional
-        The tests under all load cases, where the paths are planned for several.
+        The tests under all load cases, if paths are planned for several.
     """
 
     bracket: Bracket
@@ -69,7 +69,7 @@ class Tested:
 
 @dataclass(frozen=True)
 class Run:
-    """What one strategy did on the part.
+    """Result of one strategy on the part.
 
     Attributes
     ----------
@@ -88,18 +88,18 @@ class Run:
         Volume of matrix and fibre of the print plan over that of the part; NaN without a plan.
     length_per_layer : float, mm
     sampled : float, mm, optional
-        The same by a few layers, where no others were planned.
+        The same on a few layers, if no others were planned.
     note : str
-        Why the length is not the wanted one, or that it sets it; else empty.
+        Why the length is not the wanted one, or that this run sets it; else empty.
     failure : str
-        One line that says why there are no paths, or why they could not be evaluated; else empty.
+        One line on why there are no paths, or why they could not be evaluated; else empty.
     untested : str
-        Why there is no virtual test though one was asked for; else empty.
+        Why there is no virtual test although one was asked for; else empty.
     why_not : str
-        What keeps the paths from being printed as they are: lengths, turns, room, what lies outside
-        or on nothing; empty where they can be.
+        What keeps the paths from being printed as they are: lengths, turns, room, fibre outside the
+        part or on nothing; empty if they can be.
     unprinted : str
-        Why the part cannot be printed as planned though a print was asked for; else empty.
+        Why the part cannot be printed as planned although a print was asked for; else empty.
     seconds : mapping of stage to float
     """
 
@@ -141,7 +141,7 @@ class Run:
 
     @property
     def length(self) -> float:
-        """Length of fibre in all layers, mm; 0 where nothing was evaluated."""
+        """Length of fibre in all layers, mm; 0 if nothing was evaluated."""
         layers = 0 if self.evaluation is None else len(self.evaluation.layers)
         return self.length_per_layer * layers
 
@@ -152,7 +152,7 @@ class Run:
 
     @property
     def fails_in(self) -> str:
-        """What fails first, "matrix", "fibre" or "interlayer"; empty where that is not known."""
+        """What fails first, "matrix", "fibre" or "interlayer"; empty if that is not known."""
         failure = None if self.tested is None else self.tested.failure
         return "" if failure is None else failure.what
 

@@ -1,4 +1,4 @@
-"""What is said of a comparison over several load cases: its verdict, its remarks, its table."""
+"""Verdict, remarks and table of a comparison over several load cases."""
 
 from collections.abc import Sequence
 
@@ -60,7 +60,7 @@ def cases_remarks(
     bound: CasesBound | None,
     others: bool = False,
 ) -> list[str]:
-    """Say which cases count how much, which one the other tables speak of, and what is possible.
+    """Say how much each case counts, which case the other tables show, and what is possible.
 
     Parameters
     ----------
@@ -68,7 +68,7 @@ def cases_remarks(
     wanted : float, mm, InAll or None
     cases : WeightedCases
     reference : str
-        Name of the case that the other tables speak of.
+        Name of the case that the other tables show.
     bound : CasesBound, optional
     others : bool
         Whether the part has alternative supports.

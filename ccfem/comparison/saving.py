@@ -1,4 +1,4 @@
-"""A comparison written to a folder, as the command line does it."""
+"""Writing a comparison to a folder, as the command line does."""
 
 import os
 from pathlib import Path
@@ -19,15 +19,15 @@ def save(
     force: bool = False,
     progress: Progress = silent,
 ) -> Path:
-    """Write the report, tables and paths of a comparison, all of them or none.
+    """Write the report, tables and paths of a comparison: all files or none.
 
     Parameters
     ----------
     comparison : Comparison or SlicingComparison
     folder : path
-        Of earlier results, only files that ccfem wrote and nobody changed since are replaced.
+        In an existing folder only files that ccfem wrote, and nobody has changed, are replaced.
     force : bool, default False
-        Replace files of the same names whoever wrote them.
+        Also replace files of the same names that others wrote or changed.
     progress : callable, optional
 
     Returns
@@ -38,7 +38,7 @@ def save(
     Raises
     ------
     InputError
-        When the folder cannot be written to, or holds files of others.
+        When the folder cannot be written to, or holds files that would be overwritten.
     """
     folder, command = Path(folder), "ccfem.save(comparison) in Python"
     with whole_folder(folder, force) as temporary:

@@ -1,4 +1,4 @@
-"""Which layers of a comparison are shown, and what is said of a run on one of them."""
+"""Selection of the layers of a comparison that are shown, and captions of runs on them."""
 
 import re
 
@@ -19,7 +19,7 @@ def drawn_layers(comparison: Comparison) -> list[Layer]:
 
 
 def middle_layer(comparison: Comparison) -> Layer:
-    """Middle one of the layers on which the most runs lay fibre: it stands for all."""
+    """Middle one of the layers on which most runs lay fibre, to represent all."""
     laid = [set(np.unique(run.toolpaths.layer).tolist()) for run in comparison.succeeded]
     drawn = drawn_layers(comparison)
     runs = [sum(layer.index in those for those in laid) for layer in drawn]

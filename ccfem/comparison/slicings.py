@@ -38,11 +38,11 @@ class SlicingComparison:
     slicings : mapping of name to Comparison
         In the order they were asked for.
     fibre : float, mm, or None
-        Length in all layers together that every run was held to; None where each laid its own.
+        Length in all layers together that every run was held to; None if each laid its own.
     refused : mapping of name to str
         Slicings that could not cut the part, and why.
     seconds : mapping of stage to float
-        Of what is done once.
+        Of the stages that are done once.
     """
 
     case: Case
@@ -69,7 +69,7 @@ class SlicingComparison:
         return summary_html(self.ranking, self.verdict, SUMMARY_OF_SLICINGS)
 
     def pareto(self, over: str = "first_failure_load") -> "Figure":
-        """Draw stiffness over another index, and the runs that no other printable one dominates.
+        """Draw stiffness over another index, and the front of the printable runs.
 
         The paths of one slicing are drawn by its own comparison: ``.slicings[name].plot()``.
 
@@ -85,7 +85,7 @@ class SlicingComparison:
         Parameters
         ----------
         run : str, optional
-            As ``"zigzag on planar:z"``; by default the best one.
+            Such as ``"zigzag on planar:z"``; by default the best one.
         picture : path, optional
             Write the view to a file (.png) instead.
         """
@@ -103,7 +103,7 @@ class SlicingComparison:
 
     @property
     def wanted(self) -> Wanted:
-        """Length that runs were held to, as ranking and verdict take it."""
+        """Length that runs were held to, as used by ranking and verdict."""
         return None if self.fibre is None else InAll(self.fibre)
 
     @property
@@ -132,7 +132,7 @@ class SlicingComparison:
 
     @property
     def remarks(self) -> list[str]:
-        """What has to stand next to the numbers, a line each."""
+        """Remarks that must be shown with the numbers, one line each."""
         found = [f"{name}: cannot cut the part: {why}" for name, why in self.refused.items()]
         thick = ", ".join(f"{name} {_stack(each)}" for name, each in self.slicings.items())
         chosen = next(iter(self.slicings.values())).case.fibre

@@ -1,4 +1,4 @@
-"""Stages of a comparison: each makes of a `Run` one that holds more, or the reason why not."""
+"""Stages of a comparison: each returns a more complete `Run`, or one with the reason of failure."""
 
 import time
 from collections.abc import Callable, Iterator, Mapping, Sequence
@@ -58,11 +58,11 @@ __all__ = [
 ]
 
 Tell = Callable[[str], None]
-"""Told what is done next."""
+"""Receives what is done next."""
 
 _UNLIKE = 1.3
-"""How much more a few layers may lay than the whole stack: a strategy that lays more than so many
-times the least of all is not planned to its own amount."""
+"""Factor on the least length of all, on a few layers, above which a strategy is not planned to its
+own amount."""
 
 _TOLERANCE = 1e-6
 """Relative residual of the virtual tests: the error of the stiffness is of its square."""
@@ -80,9 +80,9 @@ def counted(progress: Progress, first: float, steps: int) -> Tell:
 
 @dataclass(frozen=True)
 class Part:
-    """What all runs share: stress that counts, layers and what supports them, machine, strand.
+    """Data shared by all runs: stress, layers, their support, machine and strand.
 
-    With `cases` paths are planned for and tested under all of them; the stress is that of one.
+    With `cases`, paths are planned for and tested under all of them; the stress is that of one.
     """
 
     stress: PartStress
@@ -135,12 +135,12 @@ def with_plan(run: Run, found: Planned) -> Run:
 
 
 def attempted(run: Run, work: Callable[[], Run]) -> Run:
-    """Run that planning makes of `run`; where it fails, `run` with the reason."""
+    """Run returned by `work`; if it fails, `run` with the reason."""
     return _stage(run, "plan", work)
 
 
 def _as_given(laid: float, wanted: float | None) -> str:
-    """Note on paths that stay as they are, where they miss the wanted length, mm per layer."""
+    """Note on given paths, which are not changed, if they miss the wanted length, mm per layer."""
     if wanted is None or abs(laid / wanted - 1.0) <= TOLERANCE:
         return ""
     return f"given paths stay as they are: lays {laid:.0f} of {wanted:.0f} mm per layer"
@@ -149,13 +149,13 @@ def _as_given(laid: float, wanted: float | None) -> str:
 def levelled(runs: Sequence[Run], part: Part, tell: Tell) -> tuple[list[Run], float | None]:
     """Plan all runs to the smallest of their natural amounts.
 
-    Strategies that take the length itself are planned once that is known.
+    Strategies that take the length itself are planned once it is known.
 
     Returns
     -------
     list of Run
     float, mm, or None
-        The length per layer; None where nobody lays fibre.
+        The length per layer; None if no run lays fibre.
     """
     own, setter = natural(runs, part, tell)
     length = None if setter is None else own[setter].length_per_layer
@@ -163,10 +163,10 @@ def levelled(runs: Sequence[Run], part: Part, tell: Tell) -> tuple[list[Run], fl
 
 
 def natural(runs: Sequence[Run], part: Part, tell: Tell) -> tuple[dict[str, Run], str | None]:
-    """Plan runs to their natural amounts: by name, and the name of the one that lays least.
+    """Plan runs to their natural amounts; return them by name, and the name of the least one.
 
     Strategies that take the length itself, and those that lay much more than others on a few
-    layers, are planned only where they lay least; the name is None where nobody lays fibre.
+    layers, are planned only if they lay least. The name is None if no run lays fibre.
     """
     own: dict[str, Run] = {}
     for run in runs:
@@ -176,13 +176,13 @@ def natural(runs: Sequence[Run], part: Part, tell: Tell) -> tuple[dict[str, Run]
 
 
 def _by_itself(run: Run, part: Part, tell: Tell) -> Run:
-    """Run planned to its natural amount, but for a strategy that takes the length itself."""
+    """Run planned to its natural amount, unless its strategy takes the length itself."""
     told = isinstance(run.strategy, LengthStrategy)
     return run if told else planned(run, part, None, tell)
 
 
 def _sampled(run: Run, part: Part, tell: Tell) -> Run:
-    """Run with what it lays on a few layers; planned where these are all."""
+    """Run with the length it lays on a few layers; fully planned if these are all layers."""
     if isinstance(run.strategy, LengthStrategy | GivenPaths) or run.failure:
         return _by_itself(run, part, tell)
     tell(f"planning {run.name} on a few layers")
@@ -192,7 +192,7 @@ def _sampled(run: Run, part: Part, tell: Tell) -> Run:
         return replace(run, sampled=length)
 
     found = _stage(run, "plan", work)
-    # Layers that stay empty say nothing of others.
+    # Layers that stay empty tell nothing about others.
     return found if found.failure or found.sampled else _by_itself(found, part, tell)
 
 
@@ -206,9 +206,9 @@ def to_length(
     own : mapping of name to Run
         From `natural`.
     setter : str, optional
-        Name of the run whose natural length that is: it stays as it is.
+        Name of the run whose natural length this is; it is not planned again.
     length : float, mm, optional
-        None where nobody lays fibre.
+        None if no run lays fibre.
     part : Part
     tell : callable
     """
@@ -225,9 +225,9 @@ def to_length(
 
 
 def _setter(own: dict[str, Run], part: Part, tell: Tell) -> str | None:
-    """Name of the run whose natural length is that of all: it is planned after this."""
+    """Name of the run whose natural length applies to all; it is planned afterwards."""
     while True:
-        natural, least = {}, {}  # least: what the run may turn out to lay
+        natural, least = {}, {}  # least: the length that the run may turn out to lay
         for name, run in own.items():
             if len(run.toolpaths):
                 natural[name] = least[name] = run.length_per_layer
@@ -290,14 +290,14 @@ def with_print(run: Run, part: Part, tell: Tell) -> Run:
 
 @dataclass(frozen=True)
 class Tests:
-    """What virtual tests of a part stand on: made once, with one factorisation a model.
+    """Data for the virtual tests of a part, made once, with one factorisation for each model.
 
     Attributes
     ----------
     strand : Strand
     models : sequence of (Specimen, float)
-        The part under its supports, and under alternative ones where it has some, each with the
-        peak of the averaged von Mises stress without fibre, MPa.
+        The part under its supports, and under alternative ones if there are any, each with the peak
+        of the averaged von Mises stress without fibre, MPa.
     refused : str
         Why the part cannot be tested; else empty.
     """
@@ -323,7 +323,7 @@ def all_tested(
 ) -> list[Run]:
     """Test every run that did not fail virtually.
 
-    Where there is a model of alternative supports, every run is tested under these too.
+    If there is a model of alternative supports, every run is tested under these too.
     """
     if tests.refused:
         return [replace(run, untested=tests.refused) for run in runs]
@@ -378,7 +378,7 @@ def _test(
 
 
 def _stage(run: Run, stage: str, work: Callable[[], Run], reason: str = "failure") -> Run:
-    """Run that `work` makes of `run`; where it fails, `run` with the reason in that field."""
+    """Run returned by `work`; if it fails, `run` with the reason in that field."""
     seconds = dict(run.seconds)
     try:
         with timed(seconds, stage):
@@ -391,7 +391,7 @@ def _stage(run: Run, stage: str, work: Callable[[], Run], reason: str = "failure
 
 @contextmanager
 def timed(seconds: dict[str, float], stage: str) -> Iterator[None]:
-    """Add what the block takes to the seconds of a stage."""
+    """Add the time of the block to the seconds of a stage."""
     start = time.perf_counter()
     try:
         yield

@@ -16,7 +16,7 @@ SUMMARY = (
     Headline("fibre_per_layer", "fibre, mm a layer", "", "{:.0f}"),
     Headline("efficiency", "efficiency", "high", "{:.3f}"),
 )
-"""The columns of the summary; those that no run has are left out."""
+"""Columns of the summary; those that no run has are left out."""
 
 SUMMARY_OF_SLICINGS = (
     *SUMMARY[:4],
@@ -76,7 +76,7 @@ def _rows(ranking: Sequence[Run], columns: Sequence[Headline]) -> list[list[str]
     rows = [["strategy", *(head.title for head in heads)]]
     for run in ranking:
         cells = [cell_text(run, head) for head in heads]
-        # What is added in smaller letters: where the part fails. The rest is in the report.
+        # Additions in smaller letters: where the part fails. The rest is in the report.
         rows.append(
             [run.name, *(f"{text} {more}" if more.isalpha() else text for text, more in cells)]
         )

@@ -17,7 +17,7 @@ __all__ = ["frame"]
 def frame(ranking: Sequence[Run]) -> "pd.DataFrame":
     """Table of all numbers of runs.
 
-    It is a data frame, as that of an evaluation: both are there to be sorted, joined and written.
+    It is a data frame, like that of an evaluation, to be sorted, joined and written.
 
     Parameters
     ----------

@@ -1,4 +1,4 @@
-"""One strategy's paths under all load cases: what the tests found, and how good that is."""
+"""Virtual tests of one strategy's paths under all load cases, and their merit."""
 
 from collections.abc import Sequence
 from dataclasses import dataclass
@@ -36,7 +36,7 @@ class TestedCases:
     failure : CasesFailure or None
         Of the tests in tension; None where a strength is unknown.
     bound : CasesBound, optional
-        What no paths of the compared length exceed; None where there is no bound.
+        What no paths of the compared length can exceed; None without a bound.
     """
 
     tension: CasesTest
@@ -52,12 +52,12 @@ class TestedCases:
         return self.tension.names
 
     def shares(self, mode: str = "tension") -> FloatArray:
-        """Stiffness ratio of each case over its own bound, (n,); over 1 where there is none."""
+        """Stiffness ratio of each case over its own bound, (n,); over 1 without a bound."""
         ratios = (self.tension if mode == "tension" else self.bonded).ratios
         return ratios if self.bound is None else self.bound.shares(ratios)
 
     def merit(self, mode: str = "tension") -> float:
-        """Least share of all cases: what runs are ranked by."""
+        """Least share of all cases, by which runs are ranked."""
         return float(self.shares(mode).min())
 
     def values(self) -> dict[str, float]:

@@ -1,4 +1,4 @@
-"""The verdict of a comparison: one sentence on which strategy is best, and by what."""
+"""The verdict of a comparison: one sentence on which strategy is best, and in what respect."""
 
 from collections.abc import Sequence
 
@@ -13,23 +13,23 @@ __all__ = ["verdict"]
 
 
 def verdict(runs: Sequence[Run], wanted: Wanted) -> str:
-    """Say in one sentence which strategy is best, by what, and at how much fibre.
+    """Say in one sentence which strategy is best, in what respect, and at how much fibre.
 
-    It speaks of the runs that can be printed and keep to the wanted length. "No difference" where
-    the best are nearer to each other than the resolution of the test, "undecided" where
-    tension-only and bonded fibres, or the supports of the part and its alternative ones, disagree
-    on the order of the best and any other.
+    Only runs count that can be printed and have the wanted length. "No difference" is stated if the
+    best differ by less than the resolution of the test. "Undecided" is stated if tension-only and
+    bonded fibres, or the supports of the part and its alternative ones, disagree on the order of
+    the best and any other.
 
     Parameters
     ----------
     runs : sequence of Run
     wanted : float, mm, InAll or None
-        Length of fibre per layer, or in all, that all were held to; None where each laid its own.
+        Length of fibre per layer, or in total, that all were held to; None if each laid its own.
 
     Returns
     -------
     str
-        Empty where fewer than two runs are left.
+        Empty if fewer than two runs are left.
     """
     order = [run for run in ranking(runs, wanted) if run.evaluation is not None]
     kept = [run for run in order if run.printable and not off_length(run, wanted)]

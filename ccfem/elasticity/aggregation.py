@@ -14,7 +14,7 @@ from ccfem.arrays import FloatArray, IntArray
 __all__ = ["Aggregates", "aggregates"]
 
 _DEPENDENT = 1e-10
-"""Length, over what it was, below which a motion adds nothing to those before it."""
+"""Relative length below which an orthogonalised motion counts as dependent on those before it."""
 
 
 class Aggregates(NamedTuple):
@@ -25,10 +25,10 @@ class Aggregates(NamedTuple):
     of_node : (n,) int array
         Group of each node; -1 for a node with no strong connection.
     motions : (n, d, 6) array
-        Motions of each node as a part of its group, orthonormal over the group; zero where a group
-        is too small, or too straight, for all six.
+        Motions of each node as part of its group, orthonormal over the group; zero where a group is
+        too small, or too straight, for all six.
     near_kernel : (c, 6, 6) array
-        The given motions, in those of each group.
+        The given motions, expressed by those of each group.
     """
 
     of_node: IntArray
@@ -43,9 +43,9 @@ def aggregates(matrix: sp.bsr_array, near_kernel: FloatArray, strength: float) -
     ----------
     matrix : bsr_array (d n, d n) with d x d blocks
     near_kernel : (n, d, 6) array
-        Motions that cost little energy.
+        Motions of little energy.
     strength : float
-        Size of a block, over the geometric mean of the sizes of the diagonal ones, from which it
+        Size of a block, over the geometric mean of the sizes of its diagonal blocks, above which it
         is a strong connection.
     """
     start, column = _strong(matrix.indptr, matrix.indices, matrix.data, strength)
@@ -87,7 +87,7 @@ def _grouped(start, column):  # type: ignore[no-untyped-def]
     """Group of each node, and their number."""
     n, count = start.size - 1, 0
     result = np.full(n, -1, np.int32)
-    # Nodes with all their neighbours, where none of them belongs to a group yet.
+    # First, nodes with all their neighbours, if none of them belongs to a group yet.
     for i in range(n):
         alone = result[i] < 0 and start[i + 1] > start[i]
         for s in range(start[i], start[i + 1]):
@@ -105,7 +105,7 @@ def _grouped(start, column):  # type: ignore[no-untyped-def]
                 if result[column[s]] >= 0:
                     joined[i] = result[column[s]]
                     break
-    # and what is left makes groups of its own.
+    # and the remaining nodes form groups of their own.
     for i in range(n):
         if joined[i] < 0 and start[i + 1] > start[i]:
             joined[i] = count

@@ -2,8 +2,7 @@
 
 Each row of blocks is the sum over the cells round its node, so no element matrix is ever stored.
 Quadratic cells with straight sides are integrated exactly: their gradients are linear in the
-barycentric coordinates, so every block is a combination of the sixteen products of the four
-corner gradients.
+barycentric coordinates, so every block combines the sixteen products of the four corner gradients.
 """
 
 from dataclasses import dataclass
@@ -22,7 +21,7 @@ __all__ = ["Pattern", "add_blocks", "assemble", "cell_gradients", "pattern"]
 
 @dataclass(frozen=True)
 class Pattern:
-    """Where the blocks of the stiffness matrix are; the same for every stiffness on a mesh.
+    """Positions of the blocks of the stiffness matrix; the same for every stiffness on a mesh.
 
     Attributes
     ----------
@@ -192,8 +191,8 @@ def _mark(indptr, indices, i, slot):  # type: ignore[no-untyped-def]
 def _mirror(indptr, indices, i, diagonal, data):  # type: ignore[no-untyped-def]
     """Copy the blocks left of the diagonal of row i from the rows above; note its diagonal.
 
-    Rows come in order, so the blocks of row j that are wanted come in order too: `diagonal` holds
-    the place of the last one.
+    Rows are processed in order, so the wanted blocks of row j come in order too: `diagonal` holds
+    the position of the last one.
     """
     for s in range(indptr[i], indptr[i + 1]):
         j = indices[s]
@@ -298,7 +297,7 @@ def assemble(
     density : (m,) array, optional
         Factor on the stiffness of each cell.
     where : Pattern, optional
-        From `pattern`, when it is at hand already.
+        From `pattern`, if already known.
 
     Returns
     -------

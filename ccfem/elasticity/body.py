@@ -1,4 +1,4 @@
-"""What loads and supports ask of a body and of a problem, in space or in the plane."""
+"""Protocols of the bodies and problems that loads and supports act on, in space or in the plane."""
 
 from collections.abc import Mapping
 from typing import Protocol
@@ -43,21 +43,21 @@ class LoadedBody(Protocol):
 
 
 class SupportedProblem(Protocol):
-    """A problem as supports and loads see it."""
+    """A problem as seen by supports and loads."""
 
     @property
     def mesh(self) -> CellMesh:
-        """The mesh that is held."""
+        """The mesh that supports act on."""
         ...
 
     @property
     def body(self) -> LoadedBody:
-        """The mesh with what loads act on."""
+        """The body that loads act on."""
         ...
 
     @property
     def supports(self) -> tuple[AnySupport, ...]:
-        """What is held."""
+        """The supports."""
         ...
 
     @property

@@ -1,4 +1,4 @@
-"""What makes the equations of a part ill-conditioned, and what helps."""
+"""Causes of ill-conditioned equations of a part, and their cures."""
 
 import numpy as np
 
@@ -9,13 +9,13 @@ from ccfem.mesh.check import about_slivers
 __all__ = ["about_conditioning", "incompressibility", "stiffness_contrast"]
 
 _NEARLY_INCOMPRESSIBLE = 500.0
-"""Bulk over shear modulus from which it is worth a word: Poisson's ratio 0.499."""
+"""Bulk over shear modulus above which there is a remark: Poisson's ratio 0.499."""
 _CONTRAST = 1e5
-"""Largest over least stiffness of the cells from which it is worth a word."""
+"""Largest over least stiffness of the cells above which there is a remark."""
 
 
 def incompressibility(stiffness: FloatArray) -> float:
-    """Bulk modulus over the least shear modulus, the largest of all cells.
+    """Bulk modulus over the least shear modulus, as the maximum over all cells.
 
     Parameters
     ----------
@@ -28,7 +28,7 @@ def incompressibility(stiffness: FloatArray) -> float:
     """
     compliance = np.linalg.inv(stiffness.reshape(-1, 6, 6))
     bulk = 1.0 / compliance[:, :3, :3].sum(axis=(1, 2))
-    shear = 1.0 / np.linalg.eigvalsh(compliance)[:, -1]  # of the softest way to change shape
+    shear = 1.0 / np.linalg.eigvalsh(compliance)[:, -1]  # of the softest change of shape
     return float((bulk / shear).max())
 
 

@@ -1,4 +1,4 @@
-"""Conjugate gradients with a preconditioner that somebody else made."""
+"""Conjugate gradients with a given preconditioner."""
 
 from collections.abc import Callable
 from typing import Any
@@ -12,7 +12,7 @@ from ccfem.elasticity.solution import product
 __all__ = ["conjugate_gradient", "highest_eigenvalue"]
 
 _LANCZOS = 6
-"""Steps after which the highest eigenvalue is known to some six per cent."""
+"""Steps after which the highest eigenvalue is accurate to about six per cent."""
 
 
 def conjugate_gradient(
@@ -25,8 +25,8 @@ def conjugate_gradient(
 ) -> tuple[FloatArray, int, float]:
     """Solve a symmetric positive definite system (Saad, Iterative Methods, 2003, algorithm 9.1).
 
-    The step length ``beta`` is Polak and Ribiere's, which forgives a preconditioner that is not
-    quite symmetric.
+    The step length ``beta`` is that of Polak and Ribiere, which tolerates a slightly unsymmetric
+    preconditioner.
 
     Parameters
     ----------
@@ -35,11 +35,11 @@ def conjugate_gradient(
     precondition : callable
         Approximate solution (n,) for a residual (n,).
     x0 : (n,) array, optional
-        Where to start; default zero.
+        Start of the iteration; default zero.
     tolerance : float
         On ``|rhs - matrix x| / |rhs|``.
     most : int
-        Iterations after which to give up; the caller checks the residual.
+        Largest number of iterations; the caller checks the residual.
 
     Returns
     -------
@@ -54,7 +54,7 @@ def conjugate_gradient(
 
 
 def highest_eigenvalue(matrix: Any, precondition: Callable[[FloatArray], FloatArray]) -> float:
-    """Highest eigenvalue of a preconditioned matrix, or a little less, by the method of Lanczos.
+    """Highest eigenvalue of a preconditioned matrix, or slightly less, by the Lanczos method.
 
     Parameters
     ----------

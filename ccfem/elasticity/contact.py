@@ -1,4 +1,4 @@
-"""Equilibrium of a part on supports that only press: which of them it touches."""
+"""Equilibrium of a part on supports that only press, with the contact that results."""
 
 from dataclasses import dataclass, replace
 
@@ -14,19 +14,19 @@ from ccfem.errors import InputError, SolveError
 __all__ = ["EXPECTED", "Contact", "check_pressed", "find_contact"]
 
 EXPECTED = 8
-"""Solves until a contact has settled, about."""
+"""Number of solves expected until a contact has converged."""
 
 _ROUGH = 1e-4
-"""Relative residual of the solves until then."""
+"""Relative residual of the solves until the contact has converged."""
 
 _ROUNDS = 200
-"""Changes of the contact after which to give up: a slender part lifts off cell by cell."""
+"""Largest number of changes of the contact: a slender part lifts off cell by cell."""
 
 _SLOW = 40
-"""Iterations from which a factorisation with the contact at hand pays."""
+"""Iterations above which a factorisation with the present contact pays off."""
 
 _CARRIED = 1e-4
-"""Share of the load that may be left to what keeps a loose part in place."""
+"""Share of the load that may be carried by what keeps a loose part in place."""
 
 
 @dataclass(frozen=True)
@@ -36,9 +36,9 @@ class Contact:
     Attributes
     ----------
     held : Held
-        The supports, with what is touched.
+        The supports with the converged contact.
     solver : Solver
-        Of the matrix with these, for further load cases.
+        For the matrix with this contact, for further load cases.
     right : (n,) array
         Right-hand side.
     solution : Solution
@@ -60,20 +60,20 @@ def find_contact(
     solver: Solver,
     tolerance: float,
 ) -> Contact:
-    """Solve, let go what pulls, hold what sinks in, and so on until nothing changes.
+    """Solve, release components that pull and hold those that sink in, until nothing changes.
 
-    The first round is solved with all in contact. A direct backend then renews its factorisation,
-    the ordering of which stays; with a multigrid the following rounds are solved by conjugate
-    gradients with that of the first as preconditioner, which is renewed where they are slow.
+    The first round is solved with all components in contact. A direct backend then renews its
+    factorisation with the same ordering. With multigrid, the following rounds use conjugate
+    gradients with the preconditioner of the first round, which is renewed where they are slow.
 
     Parameters
     ----------
     matrix : bsr_array (3n, 3n), N/mm
     held : Held
-        With all in contact.
+        With all components in contact.
     forces : (n, 3) array, N
     solver : Solver
-        Of the matrix with these supports, in whatever contact; it may be used up.
+        For the matrix with these supports, in any contact; it may be invalidated.
     tolerance : float
         Relative residual of the solution.
 
@@ -82,7 +82,7 @@ def find_contact(
     InputError
         Where the load lifts the part off its supports.
     SolveError
-        Where a solve fails, or the contact does not settle.
+        Where a solve fails, or the contact does not converge.
     """
     start, slow, total, goal = None, False, 0, max(tolerance, _ROUGH)
     for _ in range(_ROUNDS):
@@ -117,7 +117,7 @@ def check_pressed(held: Held, reactions: FloatArray, forces: FloatArray) -> None
     ----------
     held : Held
     reactions : (n, 3) array, N
-        Of all supports, and of what keeps a loose part in place.
+        Reactions of all supports, and of what keeps a loose part in place.
     forces : (n, 3) array, N
         Of the load.
     """

@@ -18,8 +18,8 @@ __all__ = ["Pardiso", "cholmod", "superlu"]
 Apply = Callable[[FloatArray], FloatArray]
 
 _SMALL = 300_000
-"""Entries of an upper triangle up to which PARDISO keeps to one thread: with more it is hardly
-quicker, and several times slower beside other work on the machine (measured)."""
+"""Entries of an upper triangle up to which PARDISO uses one thread: with more threads it is hardly
+faster, and several times slower beside other work on the machine (measured)."""
 
 _PIVOT = -4
 """Error of PARDISO at a pivot that is not positive."""
@@ -33,8 +33,8 @@ def superlu(matrix: sp.bsr_array, often: bool = False) -> Apply:
     matrix : bsr_array (n, n)
         Symmetric.
     often : bool, default False
-        Whether many solves follow: its lower factor is then kept by supernodes, which takes as long
-        as some thirty solves save.
+        Whether many solves follow. The lower factor is then stored by supernodes, which takes as
+        long as is saved in about thirty solves.
     """
     rows = matrix.tocsr()
     columns = sp.csc_array((rows.data, rows.indices, rows.indptr), shape=rows.shape)
@@ -54,8 +54,8 @@ def superlu(matrix: sp.bsr_array, often: bool = False) -> Apply:
 class Pardiso:
     """Cholesky factorisation by PARDISO of the MKL, of the upper triangle (matrix type 2).
 
-    Its analysis of the pattern (ordering and symbolic factorisation) serves any number of
-    matrices; its memory is released with the object. Threads may share it.
+    One analysis of the pattern (ordering and symbolic factorisation) serves any number of matrices.
+    The memory is released with the object. Threads may share it.
 
     Parameters
     ----------
@@ -86,7 +86,7 @@ class Pardiso:
     def _call(self, phase: int, rhs: FloatArray) -> FloatArray:
         from pypardiso.pardiso_wrapper import PyPardisoError
 
-        # It crashes where the phases differ in their number of threads.
+        # It crashes if phases differ in their number of threads.
         limit = self._solver.libmkl.MKL_Set_Num_Threads_Local
         before = limit(self._threads)
         try:

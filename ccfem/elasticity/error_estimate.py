@@ -1,9 +1,9 @@
-"""How far a solution is from the exact one, estimated in energy, cell by cell.
+"""Estimated error of a solution in energy, cell by cell.
 
-The stress of the cells is held against the smoother one that patches of cells recover; the energy
-of the difference estimates that of the error (Zienkiewicz and Zhu, Int. J. Numer. Meth. Engng 24,
-1987, 337-357; 33, 1992, 1365-1382). The error of displacements at the load goes with its square:
-10 % here is 1 % of the work of the load.
+The stress of the cells is compared with the smoother stress recovered from patches of cells. The
+energy of the difference estimates that of the error (Zienkiewicz and Zhu, Int. J. Numer. Meth.
+Engng 24, 1987, 337-357; 33, 1992, 1365-1382). The error of the displacement at the load is of its
+square: 10 % here is 1 % of the work of the load.
 """
 
 from dataclasses import dataclass
@@ -21,7 +21,7 @@ __all__ = ["ErrorEstimate", "estimate_error"]
 
 @dataclass(frozen=True)
 class ErrorEstimate:
-    """Estimated energy of the error that the cells leave.
+    """Estimated energy of the discretisation error of the cells.
 
     Attributes
     ----------
@@ -41,7 +41,7 @@ class ErrorEstimate:
     def relative(self) -> float:
         """Energy norm of the error over that of the exact stress, in [0, 1].
 
-        The energies of solution and error add up to that of the exact stress under forces.
+        Under forces, the energies of solution and error add up to that of the exact stress.
         """
         error = float(self.cells.sum())
         total = error + self.energy
@@ -69,7 +69,7 @@ def estimate_error(
     stiffness : (6, 6) or (m, 6, 6) array, MPa
         In the global frame.
     free : (m, 6) array, optional
-        Strain, Voigt, of each cell that is without stress.
+        Stress-free strain of each cell, Voigt.
     """
     stiffness = seen_only(stiffness).reshape(-1, 6, 6)
     m = len(mesh.cells)
@@ -82,7 +82,7 @@ def estimate_error(
     patches = stress_patches(mesh, stress, np.trace(stiffness, axis1=1, axis2=2))
     corner = stress
     if mesh.order == 2:
-        # Linear in a cell, so its corners tell all of it.
+        # Linear in a cell, so the values at its corners determine it.
         corner = np.empty((m, 4, 6))
         _stress(*arguments, np.eye(4), corner)
     compliance = np.linalg.inv(stiffness)
@@ -135,7 +135,7 @@ def _stress(cells, gradients, u, stiffness, free, edges, at, result):  # type: i
 
 @njit(cache=True)
 def _linear_energy(values, s):  # type: ignore[no-untyped-def]
-    """Mean of ``v . S v`` of a field that is linear in a cell, of its values at the corners."""
+    """Mean of ``v . S v`` over a cell for a field that is linear in it, from its corner values."""
     total, sums = 0.0, np.zeros(6)
     for a in range(4):
         for i in range(6):
@@ -153,7 +153,7 @@ def _compare_linear(  # type: ignore[no-untyped-def]
     points, corners, volumes, edges, of_corner, centre, size, coefficients, stress, compliance,
     error, energy,
 ):  # fmt: skip
-    """Energies of the difference of the recovered stress, and of the stress of the cells."""
+    """Energies of the difference from the recovered stress, and of the stress of the cells."""
     difference = np.empty((4, 6))
     for cell in range(len(corners)):
         s = compliance[cell if len(compliance) > 1 else 0]
@@ -174,7 +174,7 @@ def _compare_quadratic(  # type: ignore[no-untyped-def]
     points, corners, volumes, edges, of_corner, centre, size, coefficients, stress, compliance,
     error, energy,
 ):  # fmt: skip
-    """Do the same for quadratic cells: the difference is quadratic, so its ten nodes tell it.
+    """Do the same for quadratic cells: ten nodes determine the difference, which is quadratic.
 
     The integrals of the products of the shape functions are those of the quadratic tetrahedron,
     over the volume: 6, 1, -4, -6, 32, 16 and 8 over 420.

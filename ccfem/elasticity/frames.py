@@ -1,4 +1,4 @@
-"""Axes of nodes that are held, or may only lift off, along directions of their own."""
+"""Nodal axes for supports that hold, or press, along oblique directions."""
 
 from collections.abc import Sequence
 
@@ -10,11 +10,11 @@ from ccfem.errors import InputError
 __all__ = ["node_frames"]
 
 _PARALLEL = 1e-6
-"""Sine of the angle below which directions that are held count as one."""
+"""Sine of the angle below which held directions count as the same."""
 
 _ALIKE, _ACROSS = 0.98, 0.2
-"""Cosine of the angle from which two directions of pressing count as one, and up to which they
-count as perpendicular: normals at nodes of a mesh are good to some degrees."""
+"""Cosine of the angle above which two directions of pressing count as the same, and below which
+they count as perpendicular: normals at nodes of a mesh are accurate to some degrees."""
 
 
 def node_frames(
@@ -24,32 +24,32 @@ def node_frames(
     value: FloatArray,
     presses: BoolArray,
 ) -> tuple[IntArray, FloatArray]:
-    """Find axes such that what is held, or presses, is along them; it becomes theirs, in place.
+    """Find axes along which components are held or press; the arrays are changed to these axes.
 
     Parameters
     ----------
     oblique : sequence of nodes (k,), directions (k, 3), values (k,) mm
-        Held across the axes of the space.
+        Directions held that are oblique to the global axes.
     pressing : sequence of nodes (k,), directions (k, 3)
-        Along which nodes may move back alone.
+        Directions along which nodes may only move back.
     free : (n, 3) bool array
-        Changed: a direction that presses counts as held.
+        Changed in place: a direction that presses counts as held.
     value : (n, 3) array, mm
-        Changed.
+        Changed in place.
     presses : (n, 3) bool array
-        Changed: which components only press.
+        Changed in place: components that only press.
 
     Returns
     -------
     turned : (k,) int array
         Nodes with axes of their own.
     frames : (k, 3, 3) array
-        These axes as columns: first what is held, then what presses.
+        These axes as columns: first those held, then those that press.
 
     Raises
     ------
     InputError
-        For values that contradict each other, and for patches that press and meet at a slant.
+        For values that contradict each other, and for pressing patches that meet obliquely.
     """
     wanted: dict[int, list[tuple[FloatArray, float]]] = {}
     for nodes, directions, values in oblique:

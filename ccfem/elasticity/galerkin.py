@@ -15,7 +15,7 @@ _CONTRACT = {"contract"}
 
 
 class Prolongation(NamedTuple):
-    """Motions of the nodes that those of groups of them stand for.
+    """Interpolation from the motions of groups to those of their nodes.
 
     Attributes
     ----------
@@ -23,7 +23,7 @@ class Prolongation(NamedTuple):
     indices : (b,) int array
         Groups that move a node.
     blocks : (b, d, 6) array, single precision
-        Both the prolongation and its transpose are made of these, so that nothing is lost.
+        Used for both the prolongation and its transpose, so that they match exactly.
     groups : int
     """
 
@@ -33,13 +33,13 @@ class Prolongation(NamedTuple):
     groups: int
 
     def restrict(self, forces: FloatArray) -> FloatArray:
-        """Sum the forces (d n,) on the motions (6 c,) of the groups."""
+        """Restrict forces (d n,) to the motions (6 c,) of the groups."""
         result = np.zeros((self.groups, 6))
         _restrict(self.indptr, self.indices, self.blocks, self._nodes(forces), result)
         return result.reshape(-1)
 
     def add(self, motions: FloatArray, x: FloatArray) -> None:
-        """Add to x (d n,), in place, what the groups' motions (6 c,) make of it."""
+        """Add the nodal motions due to the groups' motions (6 c,) to x (d n,), in place."""
         nodes = self._nodes(x)
         _prolong(self.indptr, self.indices, self.blocks, motions.reshape(-1, 6), nodes)
 
@@ -236,7 +236,7 @@ def _project(  # type: ignore[no-untyped-def]
     most = 0
     for k in range(count):
         most = max(most, own[k + 1] - own[k])
-    # The groups that the neighbours of a node meet are among those that its own meet.
+    # All groups met by the neighbours of a node are among those met by its own groups.
     images, groups = np.empty((most, data.shape[1], 6)), np.empty(most, np.int32)
     place = np.full(count, -1, np.int32)
     for i in range(start.size - 1):
@@ -280,7 +280,7 @@ def _reflect(own, other, result):  # type: ignore[no-untyped-def]
             if j == i:
                 place[i] = s + 1
                 break
-            # Rows come in order, and so do the columns of row j behind its diagonal.
+            # Rows come in order, and so do the columns of row j beyond its diagonal.
             target = result[place[j]]
             for p in range(6):
                 for c in range(6):

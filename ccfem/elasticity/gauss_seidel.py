@@ -1,8 +1,8 @@
-"""Block Gauss-Seidel sweeps over symmetric matrices of which half is kept, compiled.
+"""Block Gauss-Seidel sweeps over symmetric matrices stored as one triangle, compiled.
 
-What lies below the diagonal tells what lies above. A sweep that takes the blocks of row i for both,
-to gather what the rows before it give to row i and to scatter what row i gives back, reads half as
-much memory as one over whole rows.
+The blocks below the diagonal determine those above it. A sweep uses each block of row i twice: to
+gather the contributions of earlier rows to row i, and to scatter those of row i back. It reads half
+as much memory as a sweep over whole rows.
 """
 
 from typing import Any
@@ -112,9 +112,9 @@ class GaussSeidel:
         Symmetric, a positive definite block on each diagonal; components without any stiffness
         stay zero.
     single : bool, default False
-        Whether to keep what is beside the diagonal in single precision.
+        Whether to store the off-diagonal blocks in single precision.
     singular : bool, default False
-        Whether blocks on the diagonal may be singular: their pseudoinverses are taken.
+        Whether diagonal blocks may be singular: their pseudoinverses are then used.
     """
 
     def __init__(self, matrix: sp.bsr_array, single: bool = False, singular: bool = False) -> None:

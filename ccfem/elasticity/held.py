@@ -1,4 +1,4 @@
-"""What is held of a displacement, and the equations that are left."""
+"""Held components of a displacement, and the reduced equations."""
 
 from dataclasses import dataclass, replace
 from functools import cached_property
@@ -12,14 +12,14 @@ from ccfem.elasticity.ties import Ties
 __all__ = ["Held", "rigid_modes"]
 
 _BED = 1e-11
-"""Stiffness, over the mean of the diagonal, that a component which has lifted off keeps, so that a
-part which nothing presses any more has a solution; what it carries is checked."""
+"""Stiffness, over the mean of the diagonal, that a lifted-off component keeps, so that a part that
+nothing presses any more has a solution; the force it carries is checked."""
 
 _PULLS = 1e-6
-"""Force of a support that pulls, over the largest, that is taken for rounding."""
+"""Force of a support that pulls, over the largest force, that counts as rounding error."""
 
 _SINKS = 1e-7
-"""Displacement into a support, over the largest of all, that is taken for rounding."""
+"""Displacement into a support, over the largest displacement, that counts as rounding error."""
 
 
 def rigid_modes(points: FloatArray) -> FloatArray:
@@ -35,21 +35,21 @@ def rigid_modes(points: FloatArray) -> FloatArray:
 
 @dataclass(frozen=True)
 class Held:
-    """Which components are held, and where; in the plane two a node instead of three.
+    """Which components are held, and at which values; in the plane each node has two components.
 
     Attributes
     ----------
     free : (n, 3) bool array
         Components that the solve finds.
     value : (n, 3) array, mm
-        What held components are held at; zero elsewhere.
+        Values of held components; zero elsewhere.
     nodes : (k,) int array
         Nodes with at least one free component: the rows of the reduced matrix.
     ties : Ties, optional
         Where nodes have axes of their own, or move together as a rigid body. Then `free`, `value`
-        and `nodes` are of the nodes that the ties leave, along their axes.
+        and `nodes` refer to the nodes that the ties leave, along their axes.
     presses : (n, 3) bool array, optional
-        Components that may move back, below zero, and not forth. Those in contact are not free.
+        Components that may move back, below zero, but not forth. Those in contact are not free.
     """
 
     free: BoolArray
@@ -60,20 +60,20 @@ class Held:
 
     @cached_property
     def _pressing(self) -> tuple[IntArray, IntArray, FloatArray]:
-        """Node, component and axis (3,) of all that presses."""
+        """Node, component and axis (3,) of all pressing components."""
         assert self.presses is not None
         assert self.ties is not None
         node, component = np.nonzero(self.presses)
         return node, component, self.ties.axes[node, :, component]
 
     def along_pressing(self, vectors: FloatArray) -> FloatArray:
-        """Part (k,) of nodal vectors (n, 3) along the axes that press, out of the part."""
+        """Components (k,) of nodal vectors (n, 3) along the pressing axes, out of the part."""
         node, _, axis = self._pressing
         return np.einsum("ki,ki->k", axis, vectors[node])
 
     @property
     def contact(self) -> BoolArray:
-        """Which of the components that press are in contact, (k,)."""
+        """Mask (k,) of the pressing components that are in contact."""
         node, component, _ = self._pressing
         return ~self.free[node, component]
 
@@ -85,17 +85,17 @@ class Held:
         return replace(self, free=free)
 
     def touching(self, displacement: FloatArray) -> "Held":
-        """Return the same supports in the contact that a solution (n, 3), mm, has."""
+        """Return the same supports with the contact of a solution (n, 3), mm."""
         if self.presses is None:
             return self
         back = -1e-12 * float(np.abs(displacement).max())
         return self.with_contact(self.along_pressing(displacement) >= back)
 
     def following(self, displacement: FloatArray, reactions: FloatArray) -> "Held":
-        """Contact that follows from a solution with this one; this one where it holds.
+        """Contact that follows from a solution; self if it is unchanged.
 
-        What pulls is let go, what sinks in is held: the primal-dual active set (Hintermueller, Ito
-        and Kunisch, SIAM J. Optimization 13, 2002, 865-888).
+        Components that pull are released, those that sink in are held: the primal-dual active set
+        method (Hintermueller, Ito and Kunisch, SIAM J. Optimization 13, 2002, 865-888).
 
         Parameters
         ----------

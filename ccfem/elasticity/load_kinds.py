@@ -1,4 +1,4 @@
-"""What can load a part: on its patches, at points, in its volume, and by moving what is held."""
+"""Kinds of loads: on patches, at points, in the volume, and by moving supports."""
 
 from collections.abc import Mapping
 from dataclasses import dataclass
@@ -77,12 +77,12 @@ class BodyForce:
 
 @dataclass(frozen=True)
 class Gravity:
-    """The part's own weight, or what an acceleration does to its mass.
+    """The weight of the part, or the inertia force of an acceleration.
 
     Attributes
     ----------
     acceleration : tuple of 3 floats, m/s^2, default (0, 0, -9.81)
-        The way in which the weight pulls.
+        Direction in which the weight pulls.
     mass_density : float, g/cm^3, optional
         Of the whole part; by default each material's own.
     """
@@ -100,7 +100,7 @@ class Temperature:
 
 @dataclass(frozen=True)
 class Displacement:
-    """A displacement, mm, that the supports on a patch take in this load case.
+    """A displacement, mm, of the supports on a patch in this load case.
 
     It replaces their own value in the components, or along the directions, that they hold.
     """

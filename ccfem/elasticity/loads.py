@@ -29,7 +29,7 @@ from ccfem.mesh.facets import positions
 __all__ = ["check_load", "load_case", "load_cases", "nodal_forces"]
 
 _SMALLEST, _LARGEST = 1e-12, 1e12
-"""Numbers of a load below which it is zero, and above which it is a mistake."""
+"""Magnitude of a load below which it is zero, and above which it is a mistake."""
 
 
 def _outward(mesh: LoadedBody, name: str) -> tuple[IntArray, FloatArray, FloatArray]:
@@ -82,9 +82,9 @@ def _pressure(mesh: LoadedBody, load: Pressure) -> FloatArray:
 
 
 def _bearing(mesh: LoadedBody, load: Bearing) -> FloatArray:
-    """Pressure ``-normal . a`` where that is positive, the vector a fitted to the total force.
+    """Pressure ``-normal . a`` where that is positive, with a fitted to the total force.
 
-    On an evenly meshed half cylinder a is parallel to the force, and the pressure its cosine.
+    On an evenly meshed half cylinder a is parallel to the force, and the pressure is a cosine.
     """
     facets, area, normal = _outward(mesh, load.patch)
     force = _vector(mesh, load)
@@ -121,7 +121,7 @@ _KINDS: dict[type, Callable[..., FloatArray]] = {
 
 
 def check_load(load: Load) -> None:
-    """Raise for a load that is not finite, beyond any size, or zero; displacements may be zero."""
+    """Refuse a load that is not finite, absurdly large, or zero; displacements may be zero."""
     for value in vars(load).values():
         if value is None or isinstance(value, str):
             continue

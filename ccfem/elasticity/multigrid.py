@@ -15,23 +15,23 @@ from ccfem.elasticity.quick_aggregation import quick_aggregation
 __all__ = ["Coarse", "smoothed_aggregation", "two_level"]
 
 _COARSEST = 50
-"""Aggregates below which a level is inverted."""
+"""Number of aggregates below which a level is inverted."""
 
 
 _ENERGY = ("energy", {"krylov": "cg", "maxiter": 4, "degree": 1})
-"""What smooths the prolongation."""
+"""Smoothing of the prolongation."""
 
 
 @dataclass(frozen=True)
 class Coarse:
-    """Linear displacements within those of a quadratic mesh.
+    """Linear displacements as a subspace of those of a quadratic mesh.
 
     Attributes
     ----------
     prolong : bsr_array (3n, 3c)
-        From linear displacements to all.
+        From linear displacements to all displacements.
     nodes : (c,) int array
-        Rows that they have for their own.
+        Rows of the nodes of the linear displacements.
     """
 
     prolong: sp.bsr_array
@@ -50,7 +50,7 @@ def _cycle(smoother: GaussSeidel, prolong: Any, restrict: Any, coarse: Apply) ->
 
 
 def _twice(levels: Any, cycle: Apply) -> Apply:
-    """Two cycles in place of one, where the first of the levels is not inverted anyway."""
+    """Two cycles instead of one, unless the first level is inverted anyway."""
     if len(levels) == 1:
         return cycle
 
@@ -62,7 +62,7 @@ def _twice(levels: Any, cycle: Apply) -> Apply:
 
 
 def _coarser(levels: Any, thorough: bool) -> Apply:
-    """Cycle over the levels of a pyamg hierarchy, the last one inverted: V, or thorough: W."""
+    """Cycle over the levels of a pyamg hierarchy, the last one inverted: V-cycle, or W-cycle."""
     level = levels[0]
     if len(levels) == 1:
         # Singular for the same reason as blocks of other levels, below.
@@ -87,12 +87,12 @@ def smoothed_aggregation(
     matrix : bsr_array (3n, 3n) with 3x3 blocks
     points : (n, 3) array, mm; or (3n, 6) rigid motions
     frugal : bool, default False
-        Whether one damped Jacobi step smooths the prolongation (`quick_aggregation`), where by
-        default four steps lower its energy: made several times as fast, from less memory, for up
-        to twice the iterations on thin parts.
+        Whether a single damped Jacobi step smooths the prolongation (`quick_aggregation`); by
+        default four steps reduce its energy. The set-up is several times as fast and needs less
+        memory, but thin parts need up to twice the iterations.
     thorough : bool, default False
-        Whether it is a W-cycle, which keeps its rate where a V-cycle loses it: on parts that are
-        thin, curved and fine.
+        Whether to use a W-cycle. It keeps its convergence rate where a V-cycle loses it: on parts
+        that are thin, curved and finely meshed.
     """
     near_kernel = points
     if points.shape[1] == 3:
@@ -123,16 +123,17 @@ def smoothed_aggregation(
 def two_level(matrix: sp.bsr_array, points: FloatArray, parents: IntArray | Coarse) -> Apply:
     """One cycle over a quadratic mesh and the linear displacements on the same cells.
 
-    Block Gauss-Seidel on the quadratic displacement, and a W-cycle of smoothed aggregation on the
-    linear one, whose matrix is the Galerkin product. It is an eighth of the work.
+    It combines block Gauss-Seidel on the quadratic displacement with a W-cycle of smoothed
+    aggregation on the linear one, whose matrix is the Galerkin product. The W-cycle takes an eighth
+    of the work.
 
     Parameters
     ----------
     matrix : bsr_array (3n, 3n) with 3x3 blocks
     points : (n, 3) array, mm; or (3n, 6) rigid motions
     parents : (n, 2) int array, or Coarse
-        Rows of the two corners whose middle each node is (twice its own row for a corner), -1
-        for a corner without a row; or the linear displacements, where that does not tell them.
+        Rows of the two corners whose midpoint each node is (twice its own row for a corner), -1
+        for a corner without a row; or the linear displacements, if the rows do not define them.
     """
     rough = parents if isinstance(parents, Coarse) else _corners(parents)
     prolong = rough.prolong
@@ -148,7 +149,7 @@ def two_level(matrix: sp.bsr_array, points: FloatArray, parents: IntArray | Coar
 
 
 def _corners(parents: IntArray) -> Coarse:
-    """Linear displacements of the corners: a middle takes the mean of its two."""
+    """Linear displacements of the corners: a midpoint takes the mean of its two."""
     n = len(parents)
     nodes = np.flatnonzero(parents[:, 0] == np.arange(n))
     place = np.zeros(n, dtype=np.int64)

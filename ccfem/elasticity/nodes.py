@@ -13,7 +13,7 @@ __all__ = ["edge_nodes", "nearest_node", "patch_facets", "patch_nodes", "patch_n
 
 
 def patch_facets(mesh: CellMesh | LoadedBody, name: str) -> IntArray:
-    """Facets of a patch that must not be empty."""
+    """Facets of a patch, which must not be empty."""
     facets = mesh.patch(name)
     if not len(facets):
         raise InputError(f"patch '{name}' is empty: no boundary facet meets its rule")
@@ -42,7 +42,7 @@ def nearest_node(mesh: CellMesh | LoadedBody, point: Sequence[float], what: str)
     Raises
     ------
     InputError
-        When the point lies farther from it than the cells there are long: outside the part.
+        When the point is farther from it than the cells there are long, that is outside the part.
     """
     used = np.unique(mesh.cells)
     wanted = np.asarray(point, dtype=np.float64)[: mesh.points.shape[1]]
@@ -60,7 +60,7 @@ def nearest_node(mesh: CellMesh | LoadedBody, point: Sequence[float], what: str)
 
 
 def patch_normals(mesh: LoadedBody, facets: IntArray, nodes: IntArray) -> FloatArray:
-    """Average unit normals (k, 3) at nodes of facets, over those round each by their area."""
+    """Average unit normals (k, 3) at nodes of facets, weighted by the areas of the facets."""
     area, normal = mesh.facet_areas(facets)
     all_nodes = mesh.facet_nodes(facets)
     total = np.zeros(mesh.points.shape)

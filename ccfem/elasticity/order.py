@@ -1,8 +1,8 @@
-"""Linear or quadratic cells: which a solve takes on a mesh of linear ones, and why.
+"""Choice of linear or quadratic cells for a solve on a mesh of linear ones.
 
-Linear tetrahedra lock in bending and where the material hardly changes its volume: one layer of
-them through a plate shows a tenth of its deflection. What they leave of the error is estimated
-with every solve; where it is too much, the part is solved again on quadratic cells.
+Linear tetrahedra lock in bending, and where the material is nearly incompressible: one layer of
+them through a plate shows a tenth of its deflection. The error they leave is estimated with every
+solve. If it is too large, the part is solved again on quadratic cells.
 """
 
 from dataclasses import replace
@@ -16,14 +16,15 @@ LARGEST_ERROR = 0.1
 """Estimated error, in energy norm, up to which cells are fine enough: 1 % of the displacement."""
 
 _LOCKS = 2.0 * 1.45 / (3.0 * (1.0 - 2.0 * 0.45))
-"""Bulk over shear modulus from which linear cells lock: Poisson's ratio 0.45."""
+"""Bulk over shear modulus above which linear cells lock: Poisson's ratio 0.45."""
 
 MOST_CELLS = 300_000
-"""Cells up to which quadratic ones are taken by themselves: about 4 GB, minutes (measured)."""
+"""Number of cells up to which quadratic ones are chosen automatically: about 4 GB, minutes
+(measured)."""
 
 
 def linear_locks(problem: Problem) -> bool:
-    """Whether linear cells are known to be poor whatever the load: nu above 0.45."""
+    """Whether linear cells are known to be poor under any load: nu above 0.45."""
     if problem.stiffness is not None:
         count = len(problem.stiffness)
         sample = problem.stiffness[:: max(1, count // 1000)]
@@ -32,14 +33,14 @@ def linear_locks(problem: Problem) -> bool:
 
 
 def about_error(error: float, problem: Problem) -> str:
-    """Say what to do about an estimated error; empty where it is small enough.
+    """Say what to do about an estimated error; empty if it is small enough.
 
     Parameters
     ----------
     error : float
         Energy norm of the error over that of the solution.
     problem : Problem
-        As it was solved.
+        The problem as it was solved.
     """
     if not error > LARGEST_ERROR:
         return ""

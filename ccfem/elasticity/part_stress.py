@@ -1,4 +1,4 @@
-"""Stress of a whole part as planning and evaluation see it, whoever found it."""
+"""Stress of a whole part for planning and evaluation, whatever its source."""
 
 from dataclasses import dataclass
 from typing import Protocol
@@ -47,7 +47,7 @@ class PartStress(Protocol):
 
 @dataclass(frozen=True)
 class GivenStress:
-    """Stress that another program, or a formula, found on a mesh.
+    """Stress on a mesh from another program or a formula.
 
     Attributes
     ----------

@@ -1,9 +1,9 @@
-"""Stress fitted by polynomials to patches of cells: more exact than the cells' own.
+"""Stress fitted by polynomials on patches of cells: more accurate than the stress of the cells.
 
 Superconvergent patch recovery (Zienkiewicz and Zhu, Int. J. Numer. Meth. Engng 33, 1992,
 1331-1364): round each corner node a polynomial of the order of the displacement, linear or
-quadratic, is fitted to the stress at the points of the cells where that is most exact. Cells of
-much different stiffness are fitted apart, for stress jumps between them.
+quadratic, is fitted to the stress at the points where that of the cells is most accurate. Cells of
+very different stiffness are fitted separately, since the stress jumps between them.
 """
 
 from dataclasses import dataclass
@@ -18,15 +18,15 @@ __all__ = ["SAMPLES", "Patches", "fitted", "stress_patches"]
 
 _A, _B = 0.5854101966249685, 0.1381966011250105
 SAMPLES = {1: np.full((1, 4), 0.25), 2: np.full((4, 4), _B) + (_A - _B) * np.eye(4)}
-"""Barycentric coordinates of the points where the stress of a cell is most exact, by its order:
-those of the integration that is exact for the products of its stress."""
+"""Barycentric coordinates of the points where the stress of a cell is most accurate, by its order:
+those of the quadrature that is exact for the products of its stress."""
 
 _LEAST = {1: 10, 2: 6}
-"""Cells of a patch, at least, where there are so many: more than their number, a polynomial needs
-them on all sides (measured on problems with known solutions)."""
+"""Least number of cells of a patch, where there are so many. A polynomial needs cells on all sides
+rather than a large number (measured on problems with known solutions)."""
 _RIDGE = np.array([1e-10, 1e-6])
 """Weights, over that of the samples, that keep linear and quadratic terms near zero where a patch
-does not determine them: the quadratic ones rather."""
+does not determine them; larger for the quadratic ones."""
 _ALIKE = 4.0
 """Ratio of stiffnesses up to which cells are fitted together."""
 
@@ -65,7 +65,7 @@ def stress_patches(mesh: TetMesh, stress: FloatArray, stiffness: FloatArray) -> 
     """
     kind = np.floor(np.log(stiffness) / np.log(_ALIKE)).astype(np.int64)
     if len(kind) == 1 or (kind == kind[0]).all():
-        # A polynomial for each node, those without cells left empty.
+        # A polynomial for each node; nodes without cells stay empty.
         nodes, of_corner = np.arange(len(mesh.points)), mesh.corners
     else:
         kind -= kind.min()
@@ -112,7 +112,7 @@ def _terms(x, y, z, p):  # type: ignore[no-untyped-def]
 
 @njit(cache=True)
 def _gather(group, corners, of_corner, start, cells, least, stamp, found):  # type: ignore[no-untyped-def]
-    """Store the cells of a patch, return their number: those at the node, more if they are few."""
+    """Store the cells of a patch and return their number: those at the node, more if too few."""
     count = 0
     for k in range(start[group], start[group + 1]):
         found[count] = cells[k]

@@ -23,7 +23,7 @@ __all__ = ["Probe", "displacement_at", "located", "support_forces"]
 
 @dataclass(frozen=True)
 class Probe:
-    """What a solution says at points.
+    """Results of a solution at points.
 
     Attributes
     ----------
@@ -46,7 +46,7 @@ class Probe:
 
     @property
     def distance(self) -> FloatArray:
-        """Length (k,) of the line through the points from the first on, mm."""
+        """Length (k,) of the line through the points, from the first one, mm."""
         steps = np.linalg.norm(np.diff(self.points, axis=0), axis=1)
         return np.concatenate([np.zeros(min(1, len(self.points))), np.cumsum(steps)])
 
@@ -87,8 +87,8 @@ def displacement_at(
 def support_forces(problem: Problem, reactions: FloatArray) -> dict[str, FloatArray]:
     """Force (3,), N, of each support on the part, by the patch, edge or point that it holds.
 
-    Where supports share a node, each component is shared evenly among those that hold it, so that
-    all forces together are all reactions.
+    Where supports share a node, each component is divided equally among those that hold it, so that
+    all forces together are the total reaction.
 
     Parameters
     ----------

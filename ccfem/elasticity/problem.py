@@ -66,7 +66,7 @@ class Region:
 
 @dataclass(frozen=True)
 class Problem(Shown):
-    """A linear elastic part with its supports and loads; one that exists can be solved on.
+    """A linear elastic part with its supports and loads, checked so that it can be solved.
 
     Attributes
     ----------
@@ -86,20 +86,20 @@ class Problem(Shown):
     regions : tuple of Region
         Cells of other materials; no cell in two of them.
     combinations : mapping of name to mapping of load case name to factor
-        Further load cases: sums of others, each times its factor. Factors are of the loads: on
-        supports that only press the displacements do not add up.
+        Further load cases: sums of others, each times its factor. Factors apply to the loads: with
+        supports that only press, displacements do not add up.
     order : "auto", 1 or 2, default "auto"
         Order of the displacement that `solve` takes on a mesh of linear cells: see
         `ccfem.elasticity.order`. Quadratic cells stay.
     case_supports : mapping of load case name to tuple of supports
-        Supports that hold in that load case alone, besides `supports`. Each set of supports is
-        solved on its own: see `ccfem.elasticity.support_sets`.
+        Supports that hold in that load case only, besides `supports`. Each set of supports is
+        solved separately: see `ccfem.elasticity.support_sets`.
 
     Raises
     ------
     InputError
-        For a mesh that cannot be solved on, arrays that do not fit it or that no material can
-        have, patches that do not exist or are empty, and combinations of unknown cases.
+        For a mesh that cannot be solved on, arrays that do not fit it or are physically impossible,
+        patches that do not exist or are empty, and combinations of unknown cases.
     """
 
     mesh: TetMesh
@@ -264,7 +264,7 @@ class Problem(Shown):
 
 
 def _check_stiffness(stiffness: FloatArray) -> None:
-    """Raise where a cell has a stiffness that no material can have."""
+    """Raise an error where a cell has a stiffness that no material can have."""
     size = np.abs(stiffness).max(axis=(1, 2))
     skew = np.abs(stiffness - np.swapaxes(stiffness, 1, 2)).max(axis=(1, 2))
     wrong = np.flatnonzero(skew > _SYMMETRIC * size)

@@ -1,4 +1,4 @@
-"""Smoothed aggregation that is made quickly and takes little memory."""
+"""Smoothed aggregation with a fast set-up and little memory."""
 
 import numpy as np
 import scipy.sparse as sp
@@ -13,27 +13,26 @@ from ccfem.elasticity.gauss_seidel import GaussSeidel
 __all__ = ["quick_aggregation"]
 
 _STRENGTH = 0.02
-"""Size of a block from which it is a strong connection."""
+"""Size of a block above which it is a strong connection."""
 
 _DAMPING = 4.0 / 3.0
 """Jacobi step, times the highest eigenvalue of ``D^-1 A`` (Vanek, Mandel and Brezina, 1996)."""
 
 _COARSEST = 50
-"""Groups below which a level is inverted."""
+"""Number of groups below which a level is inverted."""
 
 _LARGEST_INVERSE = 500
-"""Groups above which a level that does not become coarser is swept alone."""
+"""Number of groups above which a level that does not coarsen is only swept."""
 
 _SLOW = 0.8
-"""Share of the nodes that are left from which a level does not become coarser."""
+"""Share of the nodes remaining above which a level does not coarsen."""
 
 
 def quick_aggregation(matrix: sp.bsr_array, near_kernel: FloatArray) -> Apply:
-    """One V-cycle of smoothed aggregation, a damped Jacobi step smoothing the prolongation.
+    """One V-cycle of smoothed aggregation with a damped Jacobi step to smooth the prolongation.
 
-    Beside the matrix it keeps half of it in single precision, which the sweeps read; the stiffness
-    of the groups is exact to double precision, so that the cycle stays positive definite on
-    slender parts.
+    Besides the matrix it stores half of it in single precision for the sweeps. The stiffness of the
+    groups has full double precision, so that the cycle stays positive definite on slender parts.
 
     Parameters
     ----------

@@ -83,7 +83,7 @@ def cell_stress(
     displacement : (n, 3) array, mm
     stiffness : (6, 6) or (m, 6, 6) array, MPa
     free : (m, 6) array, optional
-        Strain, Voigt, of each cell that is without stress, as heat makes it.
+        Stress-free strain of each cell, Voigt, such as thermal strain.
 
     Returns
     -------
@@ -99,14 +99,14 @@ def nodal_stress(
     stiffness: FloatArray,
     free: FloatArray | None = None,
 ) -> FloatArray:
-    """Stress at the nodes: the average over the cells round each, weighted by their volumes.
+    """Stress at the nodes: volume-weighted average over the cells round each node.
 
     In quadratic cells the stress of a cell is taken at the node itself.
 
     Returns
     -------
     (n, 3, 3) array, MPa
-        Zero at nodes that belong to no cell.
+        Zero at nodes without a cell.
     """
     m, q = mesh.cells.shape
     if mesh.order == 1:

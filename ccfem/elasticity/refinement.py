@@ -1,4 +1,4 @@
-"""Finer cells where the estimated error of a solution sits."""
+"""Refinement of the cells where the estimated error of a solution is large."""
 
 from dataclasses import replace
 
@@ -16,13 +16,13 @@ from ccfem.mesh.tet_mesh import TetMesh
 __all__ = ["refine"]
 
 _SHARE = 0.7
-"""Share of the squared error that lies in the cells that a round refines (Doerfler 1996)."""
+"""Share of the squared error in the cells that a round refines (Doerfler 1996)."""
 
 _HALVINGS = 3
-"""Times that a cell is halved in a round at most: its edges are then half as long."""
+"""Largest number of times that a cell is halved in a round: its edges are then half as long."""
 
 _ROUNDS = 8
-"""Rounds after which a part is as fine as it will be."""
+"""Largest number of rounds."""
 
 
 def refine(
@@ -30,9 +30,9 @@ def refine(
 ) -> Problem:
     """Refine the cells of a problem until their estimated error is small enough.
 
-    In every round the cells that hold most of the error (Doerfler, SIAM J. Numer. Anal. 33, 1996,
-    1106-1124) are halved up to three times. The surface stays as it is: a curved wall gets more
-    facets and no rounder.
+    In every round the cells with most of the error (Doerfler, SIAM J. Numer. Anal. 33, 1996,
+    1106-1124) are halved up to three times. The surface does not change: a curved wall gets more
+    facets but is no rounder.
 
     Parameters
     ----------
@@ -41,8 +41,8 @@ def refine(
     error : float, default 0.1
         Estimated error, in energy norm, of the worst load case.
     most_cells : int, default 100,000
-        What no round goes beyond; then the error stays above what was asked for, and every solve
-        says so.
+        Limit that no round exceeds. The error may then stay above what was asked for, and every
+        solve says so.
 
     Returns
     -------
@@ -58,7 +58,7 @@ def refine(
         worst = max(fields.values(), key=lambda field: field.record.error)
         if worst.record.error <= error:
             break
-        # The error goes with the edges to the power of the order, each a half after three halvings.
+        # The error scales with edge length to the power of the order; three halvings halve an edge.
         wanted = 3.0 * np.log2(worst.record.error / error) / worst.mesh.order
         finer, chosen = problem, _worst(fields, error)
         for _ in range(int(np.clip(np.ceil(wanted), 1, _HALVINGS))):
@@ -71,7 +71,7 @@ def refine(
 
 
 def _worst(fields: dict[str, StressField], error: float) -> BoolArray:
-    """Cells (m,) that hold most of the error of any load case that is above the wanted one."""
+    """Cells (m,) with most of the error of any load case whose error is above the wanted one."""
     chosen = np.zeros(len(next(iter(fields.values())).mesh.cells), dtype=bool)
     for field in fields.values():
         if field.record.error <= error:
@@ -84,7 +84,7 @@ def _worst(fields: dict[str, StressField], error: float) -> BoolArray:
 
 
 def _on(problem: Problem, mesh: TetMesh, parent: IntArray) -> Problem:
-    """Return a problem on finer cells, each the piece of one of before."""
+    """Return a problem on finer cells, each of which is a piece of a previous one."""
     arrays = {
         name: value[parent]
         for name in ("axes", "density", "stiffness")

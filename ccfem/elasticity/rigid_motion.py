@@ -1,8 +1,8 @@
-"""Whether the supports hold a part at all: the rigid motions that they leave it.
+"""Check whether the supports hold a part: the rigid motions that remain.
 
-Bodies are cells joined through faces (edges in the plane), and rigid patches; bodies that share a
-node are hinged there. A part is held when no rigid motion of its bodies respects hinges and
-supports. Bodies that share three nodes off a line are one.
+Bodies are cells joined through faces (edges in the plane), and rigid patches. Bodies that share a
+node are hinged there. A part is held if no rigid motion of its bodies satisfies hinges and
+supports. Bodies that share three nodes off a line are merged.
 """
 
 from dataclasses import dataclass, field, replace
@@ -21,11 +21,11 @@ from ccfem.mesh.measures import connected
 __all__ = ["Holds", "check_motion"]
 
 _DENSE = 100
-"""Bodies up to which the motions are found by a dense eigenvalue problem."""
+"""Number of bodies up to which motions are found by a dense eigenvalue problem."""
 _FREE = 1e-10
-"""Eigenvalue, over the largest, that counts as zero; of a motion's gaps the square."""
+"""Eigenvalue, over the largest, that counts as zero; it is the square of the gap of a motion."""
 _APART = 1e-8
-"""Gap at a hinge or a support, over the motion, that counts as none."""
+"""Gap at a hinge or a support, over the motion, that counts as zero."""
 
 
 @dataclass(frozen=True)
@@ -108,7 +108,7 @@ def check_motion(mesh: CellMesh, points: FloatArray, holds: Holds) -> None:
 
 @dataclass(frozen=True)
 class _Members:
-    """Which bodies have which nodes: entry k says that body ``owner[k]`` has ``node[k]``."""
+    """Nodes of the bodies: entry k says that body ``owner[k]`` has ``node[k]``."""
 
     node: IntArray
     owner: IntArray
@@ -124,7 +124,7 @@ class _Members:
         return _Members(self.node[kept][order], self.owner[kept][order])
 
     def pairs(self) -> tuple[IntArray, IntArray]:
-        """Entries one after the other that have the same node; they must be sorted."""
+        """Consecutive entries with the same node; the entries must be sorted."""
         first = np.flatnonzero(self.node[1:] == self.node[:-1])
         return first, first + 1
 
@@ -132,14 +132,14 @@ class _Members:
 def _joined(
     points: FloatArray, members: _Members, holds: Holds, count: int
 ) -> tuple[_Members, Holds]:
-    """Bodies with three common nodes off a line made one; `count` are bodies of cells."""
+    """Merge bodies with three common nodes off a line; `count` are bodies of cells."""
     points = (points - points.mean(axis=0)) / max(float(np.ptp(points, axis=0).max()), 1e-300)
     number = np.arange(members.bodies)
     while True:
         order = np.lexsort((members.owner, members.node))
         members = _Members(members.node[order], members.owner[order])
         step, left, right = 1, [np.zeros(0, dtype=np.int64)], [np.zeros(0, dtype=np.int64)]
-        while True:  # every two bodies at a node, not the neighbours alone
+        while True:  # every two bodies at a node, not only neighbours
             first = np.flatnonzero(members.node[step:] == members.node[:-step])
             if not len(first):
                 break
@@ -176,7 +176,7 @@ def _joined(
 def _constraints(
     points: FloatArray, members: _Members, holds: Holds, chosen: BoolArray, centres: FloatArray
 ) -> sp.csr_array:
-    """Matrix (c, 6 b) that takes the motions of the chosen bodies to what supports hinder."""
+    """Matrix (c, 6 b) from the motions of the chosen bodies to those that supports hinder."""
     place = np.cumsum(chosen) - 1
     size = 6 * int(chosen.sum())
 
@@ -217,7 +217,7 @@ def _free_motions(
     centre: FloatArray,
     radius: float,
 ) -> str:
-    """Words for the rigid motions left to the bodies of one piece; empty when it is held."""
+    """Names of the rigid motions left to the bodies of one piece; empty if it is held."""
     centres = (holds.centres - centre) / radius
     matrix = _constraints(points, members, holds, chosen, centres)
     null = _null_space(matrix, int(chosen.sum()))
@@ -229,12 +229,12 @@ def _free_motions(
 
 
 def _null_space(matrix: sp.csr_array, bodies: int) -> FloatArray:
-    """Motions (6 b, k), of length one, that a sparse matrix of constraints leaves free."""
+    """Motions (6 b, k), of unit length, that a sparse matrix of constraints leaves free."""
     gram = (matrix.T @ matrix).tocsc()
     if bodies <= _DENSE:
         values, vectors = np.linalg.eigh(gram.toarray())
         return np.asarray(vectors[:, values <= _FREE * max(1.0, values[-1])])
-    # Chains of bodies have motions that are almost free: what tells them is the gap they leave.
+    # Chains of bodies have motions that are almost free: the gap they leave tells them apart.
     shift = -1e-15 * max(1.0, float(gram.diagonal().max()))
     start = np.random.default_rng(0).normal(size=gram.shape[0])
     _, vectors = eigsh(gram, k=6, sigma=shift, which="LM", v0=start)
@@ -243,7 +243,7 @@ def _null_space(matrix: sp.csr_array, bodies: int) -> FloatArray:
 
 
 def _words(motions: FloatArray, centre: FloatArray, radius: float) -> list[str]:
-    """Words for the span of rigid motions (6, k): translation, then rotation over `radius`."""
+    """Names of the span of rigid motions (6, k): translation, then rotation over `radius`."""
     values, combination = np.linalg.eigh(motions[3:].T @ motions[3:])
     moving = values <= 1e-8
     words = []
@@ -251,7 +251,7 @@ def _words(motions: FloatArray, centre: FloatArray, radius: float) -> list[str]:
     if translations.shape[1]:
         words.append("move along " + " and ".join(_directions(translations)))
     rotating = motions @ combination[:, ~moving]
-    # Translations that are free anyway say nothing about where an axis of rotation lies.
+    # Free translations say nothing about where an axis of rotation lies.
     rotating[:3] -= translations @ (translations.T @ rotating[:3])
     rotations = rotating[3:]
     for direction in _axes(rotations):
@@ -267,11 +267,11 @@ def _words(motions: FloatArray, centre: FloatArray, radius: float) -> list[str]:
 
 
 def _axes(span: FloatArray) -> list[FloatArray]:
-    """Basis of the column span (3, k), of coordinate axes where it can be."""
+    """Basis of the column span (3, k), made of coordinate axes where possible."""
     if not span.shape[1]:
         return []
     basis = np.linalg.svd(span, full_matrices=False)[0]
-    # Each as it lies in the span: a direction may be a coordinate axis but for a thousandth.
+    # Use each axis as projected onto the span: a direction may differ from it by a thousandth.
     near = [np.asarray(basis @ (basis.T @ axis)) for axis in np.eye(3)]
     inside = [axis / np.linalg.norm(axis) for axis in near if np.linalg.norm(axis) > 1.0 - 1e-6]
     rest = basis - sum((np.outer(axis, axis @ basis) for axis in inside), np.zeros_like(basis))

@@ -1,7 +1,7 @@
-"""Cholesky factorisation within the skyline of a matrix: quick where its band is narrow.
+"""Cholesky factorisation within the skyline of a matrix: fast where its band is narrow.
 
-One compiled loop and no library behind it, so that its time does not depend on threads. On a raster
-of h rows of cells it does about ``(2 h)^2`` operations an unknown.
+It is one compiled loop without a library, so its time does not depend on threads. On a raster of h
+rows of cells it does about ``(2 h)^2`` operations an unknown.
 """
 
 from collections.abc import Callable
@@ -127,11 +127,11 @@ def _lowest(matrix: sp.bsr_array, place: IntArray) -> IntArray:
 
 
 def _ordering(matrix: sp.bsr_array) -> tuple[IntArray, IntArray]:
-    """Find the new place of each block row, and the skyline: as it comes, or Cuthill-McKee.
+    """Find the new place of each block row, and the skyline: unchanged, or by Cuthill-McKee.
 
     Reverse Cuthill-McKee (George and Liu, Computer Solution of Large Sparse Positive Definite
-    Systems, 1981, chapter 4) is taken where its factorisation is cheaper; where that costs no
-    more than on a square grid already, it is not tried.
+    Systems, 1981, chapter 4) is used where its factorisation is cheaper. It is not tried if the
+    given order costs no more than on a square grid.
     """
     n = len(matrix.indptr) - 1
     natural = np.arange(n)
@@ -175,9 +175,9 @@ def skyline(matrix: sp.bsr_array) -> Callable[[FloatArray], FloatArray]:
 
 
 def skyline_within(matrix: sp.bsr_array, most: float) -> Callable[[FloatArray], FloatArray] | None:
-    """Cholesky factorisation within the skyline, where it takes no more multiplications.
+    """Cholesky factorisation within the skyline if it takes at most `most` multiplications.
 
-    Parameters and errors as of `skyline`; None where it takes more than `most`.
+    Parameters and errors as in `skyline`; None if it takes more.
     """
     place, lowest = _ordering(matrix)
     return _factor(matrix, place, lowest) if _operations(matrix, lowest) <= most else None

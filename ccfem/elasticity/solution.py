@@ -1,12 +1,12 @@
-"""What a solve found, how good it is, and whether that is good enough.
+"""Result of a solve, its accuracy, and whether that is sufficient.
 
-A residual says little by itself: on a slender part the load is tiny beside the forces that cancel
-in the equations, and rounding leaves a residual of 1e-6 of it where the displacement is right to
-nine digits. So a solution counts as reached when its residual is below the tolerance, or when it
-solves exactly equations that differ from these by no more than rounding: its backward error
-(Rigal and Gaches, J. ACM 14, 1967, 543-548; Higham, Accuracy and Stability of Numerical
-Algorithms, 2002, section 7.1). How far it lies from the exact solution is told by the energy of
-the error, ``|x - x*|_A / |x|_A`` with ``|e|_A^2 = e^T A e = r^T A^-1 r``.
+A residual says little by itself. On a slender part the load is tiny beside the forces that cancel
+in the equations; rounding then leaves a residual of 1e-6 of it where the displacement is accurate
+to nine digits. So a solution is accepted if its residual is below the tolerance, or if it exactly
+solves equations that differ from these by no more than rounding: its backward error (Rigal and
+Gaches, J. ACM 14, 1967, 543-548; Higham, Accuracy and Stability of Numerical Algorithms, 2002,
+section 7.1). Its distance from the exact solution follows from the energy of the error,
+``|x - x*|_A / |x|_A`` with ``|e|_A^2 = e^T A e = r^T A^-1 r``.
 """
 
 from typing import Any, NamedTuple
@@ -19,11 +19,11 @@ from ccfem.errors import SolveError
 __all__ = ["ROUNDING", "Solution", "checked", "judged", "norm", "product", "reached"]
 
 ROUNDING = 1e-14
-"""Backward error that counts as rounding: what Cholesky leaves is 1e-17 to 1e-16 (measured)."""
+"""Backward error that counts as rounding: Cholesky leaves 1e-17 to 1e-16 (measured)."""
 
 
 class Solution(NamedTuple):
-    """What a solve found.
+    """Result of a solve.
 
     Attributes
     ----------
@@ -33,10 +33,10 @@ class Solution(NamedTuple):
     residual : float
         ``|r| / |rhs|`` with ``r = rhs - matrix values``, computed from the matrix.
     backward_error : float
-        ``|r| / (|matrix| |values| + |rhs|)``, with the largest diagonal entry for the norm of the
-        matrix, which it does not exceed.
+        ``|r| / (|matrix| |values| + |rhs|)``, using the largest diagonal entry, a lower bound, for
+        the norm of the matrix.
     lowest : float
-        Lowest eigenvalue of the preconditioned matrix that conjugate gradients saw; 1 for a direct
+        Lowest eigenvalue of the preconditioned matrix found by conjugate gradients; 1 for a direct
         solve.
     """
 
@@ -48,7 +48,7 @@ class Solution(NamedTuple):
 
 
 def product(a: FloatArray, b: FloatArray) -> float:
-    """Inner product without the threads of a BLAS, which cost more than they save here."""
+    """Inner product without BLAS threads, which cost more than they save here."""
     return float(np.einsum("i,i->", a, b))
 
 
@@ -72,12 +72,12 @@ def judged(
 
 
 def reached(solution: Solution, tolerance: float) -> bool:
-    """Whether a solution is as good as wanted, or as rounding lets it be."""
+    """Whether a solution is as accurate as wanted, or as rounding allows."""
     return solution.residual <= tolerance or solution.backward_error <= ROUNDING
 
 
 def checked(solution: Solution, tolerance: float, backend: str) -> Solution:
-    """Return a solution that is good enough.
+    """Return a solution that is accurate enough.
 
     Raises
     ------

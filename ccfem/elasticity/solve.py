@@ -26,8 +26,8 @@ __all__ = ["solve", "solve_system"]
 FieldT = TypeVar("FieldT", covariant=True)
 
 _ENERGY = 1e-4
-"""Energy of the error, over that of the displacement, above which a solution is no good: a
-hundredth of what the cells themselves leave of it."""
+"""Energy of the error, over that of the displacement, above which a solution is refused: a
+hundredth of the discretisation error of the cells themselves."""
 
 
 def solve(
@@ -38,33 +38,33 @@ def solve(
     Parameters
     ----------
     problem : Problem
-        With ``order = "auto"`` a mesh of linear cells is solved on quadratic ones where linear
-        ones lock or leave too large an error: see `ccfem.elasticity.order`. The nodes of the mesh
-        stay the first ones, the cells stay in their order, and the problem of each field is the
-        one that was solved.
+        With ``order = "auto"`` a mesh of linear cells is solved on quadratic ones if linear ones
+        lock or leave too large an error: see `ccfem.elasticity.order`. The nodes of the mesh then
+        stay the first ones, and the cells keep their order. The problem of each field is the one
+        that was solved.
     backend : str, default "auto"
-        One of `ccfem.elasticity.BACKENDS`; "auto" chooses by size and by what is installed, and
-        where an iterative backend fails goes on with a direct one. The record names the one that
+        One of `ccfem.elasticity.BACKENDS`. "auto" chooses by size and by what is installed, and
+        falls back to a direct backend if an iterative one fails. The record names the backend that
         solved.
     tolerance : float, default 1e-8
-        Relative residual at which iterations end. A solution is accepted when its residual is
-        below it or its backward error is rounding (`ccfem.elasticity.solution`), and the energy
-        of its error is below 1e-4 of that of the displacement.
+        Relative residual at which iterations stop. A solution is accepted if its residual is below
+        this, or its backward error is rounding (`ccfem.elasticity.solution`), and if the energy of
+        its error is below 1e-4 of that of the displacement.
 
     Returns
     -------
     dict of load case name to StressField
-        Combinations of load cases come last. Where supports only press they are solved as load
-        cases of their own, since the contact is another one. The time of the factorisation counts
-        in the record of the first load case. Where cases have supports of their own, the problem
-        of each field is that of its set of supports, and all are on one mesh.
+        Combinations of load cases come last. With supports that only press they are solved as load
+        cases of their own, since their contact differs. The time of the factorisation counts in the
+        record of the first load case. If cases have supports of their own, the problem of each
+        field is that of its set of supports, and all are on one mesh.
 
     Raises
     ------
     InputError
         For an invalid mesh, support, load or backend.
     SolveError
-        When a solution is not accepted; what makes the equations ill-conditioned is named.
+        When a solution is not accepted; the message names what makes the equations ill-conditioned.
     """
     fields: dict[str, StressField] = {}
     sets = support_sets(problem)
@@ -156,7 +156,7 @@ def solve_system(
     system = prepare()
     matrix = system.assemble()
     assembled = perf_counter()
-    # Where supports only press, the solutions of load cases do not add up: their loads do.
+    # Where supports only press, loads can be added but solutions cannot.
     linear = system.held.presses is None
     sums = system.combinations if linear else {}
     alone = (*system.forces, *(name for name in system.combinations if name not in sums))

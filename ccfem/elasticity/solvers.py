@@ -29,33 +29,33 @@ _CURES = {
 _MODULES = {"pypardiso": "pypardiso", "cholmod": "sksparse"}
 
 _SMALL = 6_000
-"""Unknowns up to which SuperLU is quicker than setting up a multigrid (measured)."""
+"""Unknowns up to which SuperLU is faster than setting up a multigrid (measured)."""
 
 _MANY = 4
-"""Right-hand sides from which a sparse Cholesky is quicker than a multigrid (measured)."""
+"""Right-hand sides from which a sparse Cholesky is faster than a multigrid (measured)."""
 
 _SEVERAL = 3
-"""Right-hand sides from which a multigrid that takes several times as long to make is worth it on
-thin parts (measured: from 3 on one cell high, from 9 on two; never on higher ones)."""
+"""Right-hand sides from which a multigrid with a several times longer set-up pays off on thin parts
+(measured: from 3 on parts one cell high, from 9 on two; never on higher ones)."""
 
 _OFTEN = 30
-"""Right-hand sides from which it is worth it to keep the factor of SuperLU by supernodes."""
+"""Right-hand sides from which it pays to store the factor of SuperLU by supernodes."""
 
 _THIN = 12.4
-"""Neighbours of a node of linear cells, itself among them, below which a part is so thin that
-PARDISO is quicker than a multigrid for one right-hand side already (measured): two cells high."""
+"""Neighbours of a node of linear cells, including itself, below which a part is so thin that
+PARDISO is faster than a multigrid even for one right-hand side (measured): two cells high."""
 
 _THIN_LARGEST = 40_000
-"""Unknowns up to which it is (measured on flat and curved sheets: 16,000 and 71,000)."""
+"""Unknowns up to which this holds (measured on flat and curved sheets: 16,000 and 71,000)."""
 
 _REFINEMENTS = 2
-"""Times that a solution is improved by solving for what its residual leaves."""
+"""Times that a solution is improved by solving for its residual."""
 
 _SKYLINE = 1e9
-"""Operations up to which the skyline is quicker than the sparse factorisations (measured)."""
+"""Operations up to which the skyline is faster than the sparse factorisations (measured)."""
 
 _SKYLINE_RENEWED = 1e7
-"""The same for matrices of one pattern, of which PARDISO analyses the first alone (measured)."""
+"""The same for matrices of one pattern, of which PARDISO analyses only the first (measured)."""
 
 LARGEST_DIRECT = 100_000
 """Unknowns up to which a direct backend is worth its memory."""
@@ -70,11 +70,11 @@ class Solver:
     backend : str
     matrix : bsr_array (n, n)
     apply : callable
-        Solution of a right-hand side (n,): exact to rounding of a direct backend, else one
-        application of the preconditioner.
+        Returns the solution for a right-hand side (n,): exact to rounding for a direct backend,
+        otherwise one application of the preconditioner.
     exact : bool
     make : callable
-        Makes `apply` of any matrix with the pattern of this one.
+        Makes `apply` for any matrix with the pattern of this one.
     because : str
         The rule that chose the backend.
     """
@@ -126,7 +126,7 @@ class Solver:
         ----------
         rhs : (n,) array
         x0 : (n,) array, optional
-            Where an iterative backend starts.
+            Start of an iterative backend.
         tolerance : float
             Largest relative residual that is accepted.
 
@@ -151,16 +151,16 @@ class Solver:
 
     @cached_property
     def size(self) -> float:
-        """Largest diagonal entry of the matrix, which its norm does not fall below."""
+        """Largest diagonal entry of the matrix, a lower bound of its norm."""
         return float(self.matrix.diagonal().max(initial=0.0))
 
     def energy_error(self, rhs: FloatArray, solution: Solution) -> float:
         """Bound of the energy of a solution's error, ``|x - x*|_A / |x|_A``.
 
-        The preconditioner M gives ``|e|_A^2 = r^T A^-1 r <= r^T M^-1 r / lowest``, lowest being
-        that eigenvalue of ``M^-1 A`` (Axelsson, Iterative Solution Methods, 1994, section 13.4); a
-        factorisation is its own preconditioner. Half of what conjugate gradients saw of it stands
-        for the lowest, since they approach it from above.
+        The preconditioner M gives ``|e|_A^2 = r^T A^-1 r <= r^T M^-1 r / lowest``, with the lowest
+        eigenvalue of ``M^-1 A`` (Axelsson, Iterative Solution Methods, 1994, section 13.4); a
+        factorisation is its own preconditioner. Conjugate gradients approach the lowest eigenvalue
+        from above, so half of their value is used.
         """
         x = solution.values
         image = self.matrix @ x
@@ -184,7 +184,7 @@ def preconditioned_cg(
     matrix : bsr_array (n, n), or anything that ``@`` applies to an (n,) array
     rhs : (n,) array
     solver : Solver
-        Of this matrix or of one like it (another stiffness on the same mesh and supports).
+        For this matrix or a similar one (another stiffness on the same mesh and supports).
     x0 : (n,) array, optional
     tolerance : float
 
@@ -193,8 +193,8 @@ def preconditioned_cg(
     SolveError
         When the relative residual stays above the tolerance.
     """
-    # The residual of the recursion drifts from the true one: aim lower, and start again from what
-    # was found where the true one is still too large.
+    # The recursive residual drifts from the true one: aim lower, and restart from the result if the
+    # true one is still too large.
     found, total = None, 0
     for _ in range(1 + _REFINEMENTS):
         x, more, lowest = conjugate_gradient(matrix, rhs, solver.apply, x0, 0.5 * tolerance)
@@ -250,7 +250,7 @@ def choose(unknowns: int, order: int, solves: int = 1, neighbours: float = np.in
     solves : int
         Right-hand sides to expect.
     neighbours : float
-        Of a node, itself among them, in the mean.
+        Mean number of neighbours of a node, including itself.
     """
     if unknowns <= _SMALL:
         return Choice("superlu", f"at most {_SMALL:,} unknowns")
@@ -285,14 +285,14 @@ def factorise(
         Symmetric positive definite, columns sorted; (2n, 2n) with 2x2 blocks in the plane, for
         a direct backend.
     points : (n, 3) array, mm
-        Of the nodes that the rows stand for; or (3n, 6) their motions as a rigid body, where
-        rows stand for something else.
+        Points of the nodes that the rows belong to; or (3n, 6) their rigid-body motions, if rows
+        belong to something else.
     backend : str, default "auto"
         One of `BACKENDS`; "auto" chooses by size and by what is installed.
     parents : (n, 2) int array, optional
-        On quadratic meshes: the two rows of the corners whose middle each node is (twice its own
-        row for a corner, -1 for a corner without a row), or the linear displacements, where that
-        does not tell them. "two-level" needs it.
+        On quadratic meshes: the two rows of the corners whose midpoint each node is (twice its own
+        row for a corner, -1 for a corner without a row); or the linear displacements, if the rows
+        do not define them. "two-level" needs it.
     solves : int, default 1
         Right-hand sides to expect: with many, "auto" prefers a direct backend.
 
@@ -315,7 +315,7 @@ def factorise(
 
 
 def _neighbours(matrix: sp.bsr_array) -> float:
-    """Neighbours of a node, itself among them, in the mean."""
+    """Mean number of neighbours of a node, including itself."""
     return len(matrix.indices) / max(1, len(matrix.indptr) - 1)
 
 
@@ -326,7 +326,7 @@ def _maker(
     parents: IntArray | multigrid.Coarse | None,
     solves: int,
 ) -> Callable[[sp.bsr_array], Callable[[FloatArray], FloatArray]]:
-    """Choose what makes `Solver.apply` of this matrix, and of others of its pattern."""
+    """Choose the function that makes `Solver.apply` for this matrix and others of its pattern."""
     if backend == "pypardiso":
         return direct.Pardiso(matrix).factorise
     if backend == "two-level":

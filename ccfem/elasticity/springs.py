@@ -1,4 +1,4 @@
-"""Springs and elastic beds: the stiffness that they add, and the directions that they hold."""
+"""Springs and elastic beds: their stiffness, and the directions they hold."""
 
 import numpy as np
 import scipy.sparse as sp
@@ -32,7 +32,7 @@ _QUADRATIC = (
 
 
 def soft_supports(problem: SupportedProblem) -> tuple[Soft, ...]:
-    """Supports of a problem that give."""
+    """Supports of a problem that are elastic."""
     return tuple(s for s in problem.supports if isinstance(s, Spring | PointSpring | Foundation))
 
 
@@ -41,7 +41,7 @@ def soft_holds(
 ) -> list[tuple[IntArray, FloatArray]]:
     """Nodes (k,) and directions (k, 3) that a soft support holds against rigid motions."""
     if isinstance(support, Foundation):
-        # At the corners of each facet, for on a curved patch they differ.
+        # At the corners of each facet, since directions differ between them on a curved patch.
         facets = patch_facets(surface, support.patch)
         across = _across(surface.facet_areas(facets)[1])
         chosen = [across[:, 0]] if support.normal > 0.0 else []

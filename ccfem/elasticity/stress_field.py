@@ -40,17 +40,16 @@ class SolveRecord:
     unknowns : int
         Free components of the displacement.
     backward_error : float
-        ``|f - K u| / (|K| |u| + |f|)``: how far equations that u solves exactly are from these.
+        ``|f - K u| / (|K| |u| + |f|)``: distance to the equations that u solves exactly.
     energy_error : float
-        Bound of the energy norm of the error that the solve leaves, over that of u; NaN where it
-        was not looked for.
+        Bound of the energy norm of the solver's error, over that of u; NaN if not computed.
     error : float
-        Estimated energy norm of the error that the cells leave, over that of the exact solution;
-        NaN where it was not looked for.
+        Estimated energy norm of the discretisation error, over that of the exact solution; NaN if
+        not computed.
     order_because : str
-        Which order of the displacement was chosen and why, where it was left open.
+        The order of the displacement that was chosen, and why, if it was left open.
     backend_because : str
-        The rule that chose the backend, or why another one went on.
+        The rule that chose the backend, or why another backend replaced it.
     """
 
     backend: str
@@ -122,7 +121,7 @@ class StressField(Shown):
 
     @property
     def findings(self) -> tuple[str, ...]:
-        """One line for each thing worth knowing about the solution."""
+        """Remarks on the solution, one line each."""
         found = about_error(self.record.error, self.problem)
         return (found,) if found else ()
 
@@ -165,12 +164,12 @@ class StressField(Shown):
 
     @cached_property
     def strain(self) -> FloatArray:
-        """Strain of each cell (P2: at the centroid), (m, 3, 3); shear halved, as a tensor's is."""
+        """Strain tensor of each cell (P2: at the centroid), (m, 3, 3), with tensor shear."""
         return read_only(strain_from_voigt(cell_strain(self.mesh, self.displacement)))
 
     @cached_property
     def nodal_strain(self) -> FloatArray:
-        """Strain at the nodes, (n, 3, 3), averaged as the stress is."""
+        """Strain at the nodes, (n, 3, 3), averaged like the stress."""
         engineering = nodal_stress(self.mesh, self.displacement, np.eye(6))
         return read_only(strain_from_voigt(to_voigt(engineering)))
 
@@ -202,14 +201,14 @@ class StressField(Shown):
     def along(self, start: Sequence[float], end: Sequence[float], count: int = 101) -> Probe:
         """`probe` at `count` >= 2 points of the straight line between two points, mm, of the part.
 
-        Its `distance` is that from the start.
+        Its `distance` is measured from the start.
         """
         check_number("number of points of a line", count, at_least=2)
         first, last = np.asarray(start, dtype=np.float64), np.asarray(end, dtype=np.float64)
         return self.probe(first + np.linspace(0.0, 1.0, count)[:, None] * (last - first))
 
     def on(self, patch: str) -> Probe:
-        """Return what `probe` finds, at the nodes of a patch."""
+        """Return the result of `probe` at the nodes of a patch."""
         nodes = patch_nodes(self.mesh, patch)
         strain, stress = self.nodal_strain[nodes], self.nodal[nodes]
         return Probe(self.mesh.points[nodes], self.displacement[nodes], strain, stress)
@@ -221,7 +220,7 @@ class StressField(Shown):
 
 
 def about_cells(field: StressField) -> str:
-    """Say in one line on what cells a solution stands, why, and what error they leave."""
+    """Say in one line which cells a solution uses, why, and what error they leave."""
     record, mesh = field.record, field.mesh
     why = f" ({record.order_because})" if record.order_because else ""
     kind = "linear" if mesh.order == 1 else "quadratic"
@@ -230,12 +229,12 @@ def about_cells(field: StressField) -> str:
 
 
 def solved(stress: PartStress, purpose: str) -> StressField:
-    """Return the stress as the result of a solve, for what has to solve the part again.
+    """Return the stress as the result of a solve, for methods that must solve the part again.
 
     Raises
     ------
     InputError
-        When the stress was given; `purpose` says what cannot be done then.
+        When the stress was given; `purpose` names what is then impossible.
     """
     if not isinstance(stress, StressField):
         raise InputError(

@@ -1,9 +1,9 @@
-"""Triangular solves with a factor whose columns are kept by supernodes.
+"""Triangular solves with a factor whose columns are stored by supernodes.
 
-Columns of a sparse Cholesky factor that follow on from each other often have the same rows; such a
-supernode is a dense block, through which a solve goes without looking rows up (Davis, Direct
-Methods for Sparse Linear Systems, 2006, section 4.8). With ``A = L D L^T`` the lower factor alone
-is read: SuperLU reads the upper one, too, entry by entry.
+Consecutive columns of a sparse Cholesky factor often have the same rows. Such a supernode is a
+dense block, which a solve processes without looking up rows (Davis, Direct Methods for Sparse
+Linear Systems, 2006, section 4.8). With ``A = L D L^T`` only the lower factor is read, whereas
+SuperLU also reads the upper one, entry by entry.
 """
 
 from typing import NamedTuple
@@ -29,9 +29,9 @@ class Supernodes(NamedTuple):
     first : (s + 1,) int array
         First column of each supernode.
     starts, row_starts : (s + 1,) int arrays
-        Where its block, and its rows below the square block on the diagonal, begin.
+        Where its block begins, and where its rows below the diagonal square block begin.
     values : array
-        Blocks, column by column; in the square block the part below the diagonal, which is 1.
+        Blocks, column by column; in the square block only below the diagonal, which is 1.
     rows : int array
     """
 
@@ -52,7 +52,7 @@ class Supernodes(NamedTuple):
 
 
 def supernodes(factor: SuperLU) -> Supernodes | None:
-    """Factor of a symmetric matrix by supernodes; None where pivots lie off the diagonal.
+    """Factor of a symmetric matrix by supernodes; None if pivots are off the diagonal.
 
     Parameters
     ----------
@@ -114,7 +114,7 @@ def _subtract(total, column, factor):  # type: ignore[no-untyped-def]  # pragma:
         total[i] -= column[i] * factor
 
 
-# Four columns at a time: what they are added to is read and written once.
+# Four columns at a time: the vector they are added to is read and written once.
 @njit(cache=True, nogil=True, fastmath={"contract", "reassoc"})
 def _add_four(total, a, b, c, d, factors):  # type: ignore[no-untyped-def]  # pragma: no cover
     p, q, r, s = factors[0], factors[1], factors[2], factors[3]

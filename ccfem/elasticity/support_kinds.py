@@ -1,4 +1,4 @@
-"""What can hold a part: its patches, edges and points, rigid patches, pins, springs and beds."""
+"""Kinds of supports: patches, edges, points, rigid patches, pins, springs and elastic beds."""
 
 from dataclasses import dataclass
 from typing import Any
@@ -49,7 +49,7 @@ class Support:
 
 @dataclass(frozen=True)
 class EdgeSupport:
-    """Components held on the edge where two patches meet: at the nodes that both have.
+    """Components held at the edge where two patches meet, that is at their common nodes.
 
     Attributes
     ----------
@@ -94,12 +94,12 @@ class PointSupport:
 
 @dataclass(frozen=True)
 class SlidingSupport:
-    """A patch that slides without friction: only what goes across its surface is held.
+    """A patch that slides without friction: only motion normal to its surface is held.
 
     Attributes
     ----------
     patch : str
-        A plane of any slope; where it is curved each node slides on its own tangent plane.
+        A plane of any orientation; on a curved patch each node slides on its own tangent plane.
     normal : str or tuple of 3 floats, optional
         Direction that is held, of any length, or "x", "-z" ...; by default the outward normal of
         the patch.
@@ -119,12 +119,12 @@ class SlidingSupport:
 
 @dataclass(frozen=True)
 class PressingSupport:
-    """A patch that lies on something rigid without friction: it may lift off, not sink in.
+    """A patch on something rigid, without friction: it may lift off, but not sink in.
 
-    A wall that a bolt stands in, the ring under its head, a table. There is no gap before the load,
-    so the solution is in proportion to the load. Where two such patches meet they have to be at
-    right angles. On quadratic cells the middles of the edges bear: under even pressure the corners
-    carry nothing.
+    Examples are the wall of a bolt hole, the ring under a bolt head, and a table. There is no gap
+    before loading, so the solution is proportional to the load. Two such patches may meet only at
+    right angles. On quadratic cells the midpoints of the edges bear: under uniform pressure the
+    corners carry nothing.
 
     Attributes
     ----------
@@ -246,15 +246,15 @@ class PointSpring:
 
 @dataclass(frozen=True)
 class Foundation:
-    """An elastic bed under a patch (Winkler): traction in proportion to displacement.
+    """An elastic bed under a patch (Winkler): traction proportional to displacement.
 
-    It pulls as it presses: where it should only press, look at the sign of the reaction.
+    It pulls as well as it presses. Where it should only press, check the sign of the reaction.
 
     Attributes
     ----------
     patch : str
     normal : float, MPa/mm
-        Traction across the surface over the displacement across it.
+        Traction normal to the surface over normal displacement.
     tangential : float, MPa/mm, default 0
         The same along the surface.
     """

@@ -1,4 +1,4 @@
-"""Problems whose load cases are held in different ways, each set of supports on its own."""
+"""Problems whose load cases have different supports, split by set of supports."""
 
 from dataclasses import replace
 
@@ -9,7 +9,7 @@ __all__ = ["support_sets"]
 
 
 def support_sets(problem: Problem) -> tuple[Problem, ...]:
-    """Problems of one set of supports each, which together have the load cases of the given one.
+    """Split a problem into problems of one set of supports each, which share out its load cases.
 
     Parameters
     ----------
@@ -18,8 +18,8 @@ def support_sets(problem: Problem) -> tuple[Problem, ...]:
     Returns
     -------
     tuple of Problem
-        The given one alone where its cases share all supports. Otherwise a problem a set, in the
-        order of the load cases; the supports of cases have become supports of the problem.
+        Only the given problem if its cases share all supports. Otherwise one problem for each set,
+        in the order of the load cases, with supports of cases turned into supports of the problem.
     """
     if not problem.case_supports:
         return (problem,)

@@ -1,4 +1,4 @@
-"""Supports to held components, axes of nodes and rigid bodies, for each load case."""
+"""Conversion of supports to held components, nodal axes and rigid bodies, for each load case."""
 
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, field
@@ -59,7 +59,7 @@ def held(problem: SupportedProblem) -> Held:
 
 
 def held_in(problem: SupportedProblem, case: str, at_rest: Held) -> Held:
-    """Return what is held at the values that it takes in one load case.
+    """Return the held components at the values of one load case.
 
     Parameters
     ----------
@@ -71,7 +71,7 @@ def held_in(problem: SupportedProblem, case: str, at_rest: Held) -> Held:
     Raises
     ------
     InputError
-        For a displacement of a patch that nothing holds.
+        For a displacement of a patch that no support holds.
     """
     loads = problem.loads[case]
     moves = {load.patch: load.vector for load in loads if isinstance(load, Displacement)}
@@ -107,12 +107,12 @@ def check_support(mesh: CellMesh, fixed: BoolArray) -> None:
 
 
 def _in_space(points: FloatArray) -> FloatArray:
-    """Points of the plane as points of the plane z = 0 in space; others as they are."""
+    """Points of the plane as points with z = 0; points in space unchanged."""
     return points if points.shape[1] == 3 else np.pad(points, ((0, 0), (0, 1)))
 
 
 def _axis_holds(fixed: BoolArray) -> tuple[IntArray, FloatArray]:
-    """Nodes and directions of held components; in the plane every node is held across it."""
+    """Nodes and directions of held components; in the plane, every node is held normal to it."""
     if fixed.shape[1] == 2:
         fixed = np.pad(fixed, ((0, 0), (0, 1)), constant_values=True)
     nodes, components = np.nonzero(fixed)
@@ -121,7 +121,7 @@ def _axis_holds(fixed: BoolArray) -> tuple[IntArray, FloatArray]:
 
 @dataclass
 class _Rigid:
-    """A rigid patch: what of its motion along its axes is held, and at what."""
+    """A rigid patch: the held components of its motion along its axes, and their values."""
 
     label: str
     body: Body
@@ -131,7 +131,7 @@ class _Rigid:
 
 @dataclass
 class _Collected:
-    """What the supports of a problem hold."""
+    """Collected effect of the supports of a problem."""
 
     mesh: CellMesh
     surface: LoadedBody
@@ -161,7 +161,7 @@ class _Collected:
             self.value[nodes, k] = value[k]
 
     def holds(self) -> Holds:
-        """Directions that are held, those of springs and of supports that only press too."""
+        """Directions that are held, including those of springs and pressing supports."""
         nodes, directions = _axis_holds(~self.free)
         more = [(n, d) for n, d, _ in self.oblique] + self.pressing + self.soft
         moved = [(k, a) for k, r in enumerate(self.rigid) for a in r.body.axes.T[r.held[0]]]
@@ -180,7 +180,7 @@ class _Collected:
         )
 
     def held(self) -> Held:
-        """Held components, with the ties that oblique and rigid supports make."""
+        """Held components, with the ties due to oblique and rigid supports."""
         free, value, ties = self.free.copy(), self.value.copy(), None
         unused = np.ones(len(free), dtype=bool)
         unused[self.mesh.cells] = False
@@ -205,7 +205,7 @@ class _Collected:
         )
 
     def _check_slaves(self, ties: Ties, free: BoolArray) -> None:
-        """Raise where a node of a rigid patch is held besides, or belongs to two."""
+        """Refuse nodes of a rigid patch that are also held, or belong to two rigid patches."""
         seen = np.zeros(len(self.mesh.points), dtype=bool)
         for rigid in self.rigid:
             nodes = rigid.body.nodes
@@ -223,7 +223,7 @@ class _Collected:
 
 
 def _collect(problem: SupportedProblem, moves: Mapping[str, Sequence[float]]) -> _Collected:
-    """Collect what the supports hold, those on some patches at other values."""
+    """Collect what the supports hold; some patches take other values."""
     mesh = problem.mesh
     free = np.ones(mesh.points.shape, dtype=bool)
     collected = _Collected(mesh, problem.body, free, np.zeros(mesh.points.shape))
@@ -237,7 +237,7 @@ def _collect(problem: SupportedProblem, moves: Mapping[str, Sequence[float]]) ->
 
 
 def _moves(support: AnySupport) -> str:
-    """Patch by which a `Displacement` moves a support; empty for none."""
+    """Patch through which a `Displacement` moves a support; empty for none."""
     return getattr(support, "patch", "")
 
 
@@ -330,4 +330,4 @@ _KINDS: dict[type, Callable[..., None]] = {
     RigidPatch: _rigid,
     Pin: _pin,
 }
-"""What collects a support that does not give."""
+"""Functions that collect supports of each kind, except elastic ones."""

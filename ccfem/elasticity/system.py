@@ -1,4 +1,4 @@
-"""The equations of a problem: everything that stays when only the stiffness changes."""
+"""The equations of a problem: everything that does not depend on the stiffness."""
 
 from collections.abc import Mapping
 from dataclasses import dataclass, field
@@ -28,7 +28,7 @@ __all__ = ["System", "prepare"]
 
 @dataclass(frozen=True)
 class System:
-    """The equations of a problem: everything that stays when only the stiffness changes.
+    """The equations of a problem: everything that does not depend on the stiffness.
 
     Attributes
     ----------
@@ -36,11 +36,11 @@ class System:
     where : Pattern
         Of the stiffness matrix.
     held : Held
-        The supports, where no load case moves them.
+        The supports, as far as no load case moves them.
     forces : dict of load case name to (n, 3) array, N
-        Of the loads; of heat, what would hold the part in shape, turned round.
+        Of the loads; for heat, the reverse of the forces that would prevent expansion.
     moved : dict of load case name to (n, 3) array, mm
-        Values of the held components, where they are not those of `held`.
+        Values of the held components, where they differ from those of `held`.
     """
 
     problem: Problem
@@ -83,9 +83,9 @@ class System:
         Parameters
         ----------
         stiffness : (6, 6) or (m, 6, 6) array, MPa, optional
-            Another one than that of the problem.
+            Replaces the stiffness of the problem.
         density : (m,) array, optional
-            Another factor on it than that of the problem.
+            Replaces the density of the problem, the factor on the stiffness.
         """
         problem = self.problem
         chosen = self.stiffness if stiffness is None else stiffness
@@ -110,7 +110,7 @@ class System:
         solves : int, default 1
             Right-hand sides to expect.
         held : Held, optional
-            The supports in another contact than all.
+            The supports in another contact; default all in contact.
         """
         mesh, held = self.problem.mesh, self.held if held is None else held
         ends = _ends(mesh) if mesh.order == 2 else None
@@ -130,7 +130,7 @@ class System:
     ) -> StressField:
         """Stress, reactions and energy of a displacement (n, 3), mm.
 
-        `matrix` is what ``@`` turns a displacement (3n,) into forces (3n,), N, by.
+        ``matrix @ displacement`` gives the forces (3n,), N, of a displacement (3n,).
         """
         problem = self.problem
         scaled = self.stiffness
@@ -160,7 +160,7 @@ class System:
 
 
 def _ends(mesh: TetMesh) -> IntArray:
-    """Corners (n, 2) that each node is the middle of; a corner is its own."""
+    """Corners (n, 2) of which each node is the midpoint; a corner is its own."""
     ends = np.repeat(np.arange(len(mesh.points))[:, None], 2, axis=1)
     ends[mesh.cells[:, 4:]] = mesh.cells[:, mesh.edges]
     return ends
@@ -172,8 +172,7 @@ def prepare(problem: Problem) -> System:
     Raises
     ------
     InputError
-        For supports or loads that nothing sensible can follow from, and for load cases whose
-        supports differ.
+        For supports or loads that make no sense, and for load cases with different supports.
     """
     if problem.case_supports:
         raise InputError(

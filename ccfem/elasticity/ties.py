@@ -1,10 +1,10 @@
 """Nodes with axes of their own, and nodes that move together as a rigid body.
 
-The displacement u of all nodes hangs on that of the nodes which are left, q: ``u = T q``. A node
-with axes F has ``u = F q``; a node of a rigid body with the translation t of its centre and the
-rotation w has ``u = t + w x r``. Each rigid body adds two nodes behind those of the mesh: its
-translation, and its rotation times the size of the body, which makes that a length. The nodes of
-the body itself stay, with nothing that hangs on them.
+The displacement u of all nodes depends on that of the remaining nodes, q: ``u = T q``. A node with
+axes F has ``u = F q``. A node of a rigid body has ``u = t + w x r``, with the translation t of its
+centre and the rotation w. Each rigid body adds two nodes after those of the mesh: its translation,
+and its rotation times the size of the body, which makes it a length. The nodes of the body itself
+stay, but nothing depends on them.
 """
 
 from dataclasses import dataclass
@@ -41,7 +41,7 @@ class Body:
 
 @dataclass(frozen=True)
 class Ties:
-    """How the displacement of all nodes hangs on that of those which are left.
+    """Dependence of the displacement of all nodes on that of the remaining ones.
 
     Attributes
     ----------
@@ -60,7 +60,7 @@ class Ties:
 
     @cached_property
     def count(self) -> int:
-        """Nodes that are left, those of rigid bodies among them, n'."""
+        """Number n' of remaining nodes, including those of rigid bodies."""
         return len(self.points) + 2 * len(self.bodies)
 
     @cached_property
@@ -95,21 +95,21 @@ class Ties:
                        (n, self.count))  # fmt: skip
 
     def reduce(self, matrix: sp.bsr_array) -> sp.bsr_array:
-        """Stiffness (3 n', 3 n') of the nodes that are left: ``T^T K T``."""
+        """Stiffness (3 n', 3 n') of the remaining nodes: ``T^T K T``."""
         reduced = (self.matrix.T.tobsr((3, 3)) @ (matrix @ self.matrix)).tobsr((3, 3))
         reduced.sort_indices()
         return reduced
 
     def gather(self, forces: FloatArray) -> FloatArray:
-        """Gather forces (n, 3) to those (n', 3) on the nodes that are left."""
+        """Gather forces (n, 3) to those (n', 3) on the remaining nodes."""
         return np.asarray(self.matrix.T @ forces.reshape(-1)).reshape(-1, 3)
 
     def expand(self, left: FloatArray) -> FloatArray:
-        """Displacement (n, 3) of all nodes, of that (n', 3) of the nodes that are left."""
+        """Displacement (n, 3) of all nodes from that (n', 3) of the remaining ones."""
         return np.asarray(self.matrix @ left.reshape(-1)).reshape(-1, 3)
 
     def restrict(self, displacement: FloatArray) -> FloatArray:
-        """Displacement (n', 3) of the nodes that are left, of that (n, 3) of all.
+        """Displacement (n', 3) of the remaining nodes from that (n, 3) of all nodes.
 
         A rigid body takes the motion nearest to that of its nodes.
         """
@@ -127,21 +127,21 @@ class Ties:
         return result
 
     def touched(self, held: BoolArray) -> BoolArray:
-        """Which nodes (n,) something that is held (n', 3), or a rigid body, acts on."""
+        """Mask (n,) of nodes on which held components (n', 3), or a rigid body, act."""
         return held[: len(self.points)].any(axis=1) | self.slaves
 
     def prolongation(self, ends: IntArray) -> sp.bsr_array:
-        """From the corners of a quadratic mesh and the rigid bodies to all that is left.
+        """From the corners of a quadratic mesh and the rigid bodies to all remaining nodes.
 
         Parameters
         ----------
         ends : (n, 2) int array
-            The two corners that each node is the middle of; a corner is its own.
+            The two corners of which each node is the midpoint; a corner is its own.
 
         Returns
         -------
         bsr_array (3 n', 3 n')
-            Columns of middles are empty.
+            Columns of midpoints are empty.
         """
         n = len(self.points)
         node = np.arange(n)

@@ -57,7 +57,7 @@ def _mass_density(problem: Problem, load: Gravity) -> FloatArray:
 
 
 def free_strain(problem: Problem, case: str) -> FloatArray | None:
-    """Strain (m, 6) that heat would give each cell if nothing held it; None without heat.
+    """Free thermal strain (m, 6) of each cell; None without heat.
 
     Voigt, with engineering shear, in the global frame; of a load case or a combination.
 
@@ -90,7 +90,7 @@ def free_strain(problem: Problem, case: str) -> FloatArray | None:
 
 
 def heat_forces(problem: Problem, case: str) -> FloatArray:
-    """Find the forces at the nodes (n, 3), N, with which heat drives the part apart."""
+    """Find the nodal forces (n, 3), N, of thermal expansion."""
     free = free_strain(problem, case)
     if free is None:
         return np.zeros(problem.mesh.points.shape)
@@ -103,14 +103,14 @@ def heat_forces(problem: Problem, case: str) -> FloatArray:
 def strain_forces(mesh: TetMesh, stress: FloatArray) -> FloatArray:
     """Find the forces at the nodes (n, 3), N, of a constant stress (m, 6), MPa, in each cell.
 
-    They are ``int B^T s dV``: what an initial stress -s does to the part.
+    They are ``int B^T s dV``: the effect of an initial stress -s on the part.
     """
     s = stress[:, [0, 5, 4, 5, 1, 3, 4, 3, 2]].reshape(-1, 3, 3) * mesh.volumes[:, None, None]
     per_corner = cell_gradients(mesh) @ s
     if mesh.order == 1:
         nodes, forces = mesh.cells, per_corner
     else:
-        # Gradients of the corner functions have mean zero, those of a middle that of its corners.
+        # Gradients of corner functions have mean zero, those of a midpoint that of its corners.
         i, j = mesh.edges.T
         nodes, forces = mesh.cells[:, 4:], per_corner[:, i] + per_corner[:, j]
     result = np.zeros(mesh.points.shape)

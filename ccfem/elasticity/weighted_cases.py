@@ -1,4 +1,4 @@
-"""Several load cases of one part with what each counts: what fibre for all is planned on."""
+"""Several load cases of one part with weights, as the basis of planning for all of them."""
 
 from collections.abc import Mapping
 from dataclasses import dataclass
@@ -18,19 +18,19 @@ __all__ = ["WeightedCases"]
 class WeightedCases:
     """Solutions of one part without fibre under several load cases, and the weight of each.
 
-    The cases may be of one problem or of several, such as with other supports; the mesh is one.
+    The cases may belong to one problem or to several, such as with other supports, on one mesh.
 
     Attributes
     ----------
     fields : tuple of StressField
-        One for each case, with names of their own.
+        One for each case, with different names.
     weights : (n,) array
         Of the cases: positive, scaled so that their sum is 1.
 
     Raises
     ------
     InputError
-        For no case, two of a name, other meshes, and weights that are not positive numbers.
+        For no case, duplicate names, different meshes, and weights that are not positive numbers.
     """
 
     fields: tuple[StressField, ...]
@@ -73,7 +73,7 @@ class WeightedCases:
         ----------
         fields : mapping of name to StressField
         weights : mapping of name to float, optional
-            Positive; cases that are not named do not count. Default: all count alike.
+            Positive; cases that are not named do not count. Default: all count equally.
 
         Raises
         ------

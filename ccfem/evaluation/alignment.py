@@ -82,7 +82,7 @@ _ISOTROPIC = 1e-6
 
 
 _CRITICAL = 0.8
-"""Quantile of the tension, by length, from which on a sample counts as critical."""
+"""Quantile of the tension, by length, above which a sample counts as critical."""
 
 _ROUNDING = 1e-3
 """Samples no further than this, mm, outside the section take the stress of its edge."""

@@ -43,12 +43,12 @@ COLUMNS = (
 
 
 _SHARES = np.array([0.01, 0.5]) * (1.0 - 1e-9)
-"""Shares of `border_1` and `border_50`; a tie goes to the smaller distance, whatever rounding."""
+"""Shares of `border_1` and `border_50`, slightly reduced: ties go to the smaller distance."""
 
 
 @dataclass(frozen=True)
 class ContainmentSamples:
-    """Fibre about the border of a layer, mm.
+    """Fibre outside the section of a layer, and distances from its border, mm.
 
     Attributes
     ----------
@@ -65,7 +65,9 @@ class ContainmentSamples:
 
 
 def sample_containment(paths: PlanePaths, step: float = 1.0) -> ContainmentSamples:
-    """Fibre of a layer, but links, about the border of its polygon (the axis, without its width).
+    """Compare the fibre axis of a layer, without its width, with the polygon of the layer.
+
+    Links count for the distances from the border only.
 
     Parameters
     ----------
@@ -82,7 +84,7 @@ def sample_containment(paths: PlanePaths, step: float = 1.0) -> ContainmentSampl
     shapely.prepare(grown)
     index = np.repeat(np.arange(len(paths)), np.diff(paths.offsets))
     lines = shapely.linestrings(paths.points, indices=index)
-    # Segment by segment, since the difference of a whole path would merge what lies on itself.
+    # Segment by segment: the difference of a whole path would merge parts that lie on each other.
     segments = np.stack(_segments(lines[~shapely.covers(grown, lines)]), axis=1)
     pieces = shapely.linestrings(segments) if len(segments) else np.zeros(0, dtype=object)
     outside = shapely.difference(pieces[~shapely.covers(grown, pieces)], grown)
@@ -104,12 +106,11 @@ def _border(paths: PlanePaths, section: Region, step: float) -> tuple[FloatArray
 
 
 def _depth(lines: Shapes, section: Region) -> float:
-    """Largest distance of lines outside a polygon from it, by bisection.
+    """Largest distance from a polygon to lines outside it, by bisection.
 
-    The distance from one edge of the polygon is convex along a line, so no point of a piece is
-    further from the polygon than the further end of the piece is from any chosen edge: the one
-    nearest to its middle. Pieces that cannot beat the largest distance found are dropped, the
-    others halved.
+    Along a straight piece the distance from one edge of the polygon is convex. The larger of its
+    values at both ends is therefore a bound for the piece; the edge nearest to the middle is used.
+    Pieces that cannot exceed the largest distance found are dropped, the others halved.
     """
     a, b = _segments(lines)
     if not len(a):

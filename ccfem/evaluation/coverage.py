@@ -74,7 +74,7 @@ _HALF = 2
 """Half a fibre width, in steps of the grid, rounded down."""
 
 _SHIFT = (0.381966, 0.276393)
-"""Offset of the grid in cells: irrational, so that strands at round places do not end on it."""
+"""Offset of the grid in cells: irrational, so that strands at round numbers do not end on it."""
 
 
 @dataclass(frozen=True)
@@ -89,7 +89,7 @@ class CoverageSamples:
     laid : (1,) array, mm^2
         Length of the fibre times its width.
     area, gap : (1,) arrays, mm^2
-        Of the section, and of what is too narrow for a strand.
+        Of the section, and of its places that are too narrow for a strand.
     """
 
     tension: FloatArray

@@ -15,8 +15,8 @@ from ccfem.machine.machine import Machine
 __all__ = ["COLUMNS", "CurvatureSamples", "curvature_indices", "sample_curvature"]
 
 _SIMPLIFY = 0.02
-"""Tolerance, over the step of the resampling, of the simplification before vertices are counted:
-points that lie straight between others are not the planner's turns."""
+"""Tolerance, in resampling steps, of the simplification before vertices are counted. It removes
+points on straight stretches, which are no turns of the planner."""
 
 _FORMULA = (
     "of the curvature over the fibre's length: every path is resampled in equal steps h of about "
@@ -120,8 +120,8 @@ def _native(paths: PlanePaths, longest: float) -> FloatArray:
     """Curvature at the inner vertices of simplified paths, 1/mm.
 
     ``2 sin(a / 2) / h`` (Wang et al. 2021) is the curvature of the circle through three vertices
-    that lie equally far apart. Steps count up to `longest`, so that a corner between straight lines
-    is one however long they are; arcs of up to six times that radius have shorter steps.
+    that lie equally far apart. Steps count up to `longest`, so that a corner between long straight
+    lines still counts as one; arcs with a radius of up to six times `longest` have shorter steps.
     """
     if not len(paths):
         return np.zeros(0)

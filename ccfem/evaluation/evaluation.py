@@ -86,7 +86,7 @@ _ROUNDING = 1e-3
 
 @dataclass(frozen=True)
 class FibreSamples:
-    """Samples along the fibre of one layer: what curves are drawn of.
+    """Samples along the fibre of one layer, from which curves are drawn.
 
     Attributes
     ----------
@@ -102,7 +102,7 @@ class FibreSamples:
 class Evaluation(Shown):
     """Every index of a set of paths.
 
-    Totals are computed from the samples of all layers together: they are no means of the layers.
+    Totals are computed from the samples of all layers together; they are not means of the layers.
 
     Attributes
     ----------
@@ -172,7 +172,7 @@ def evaluate(
 ) -> Evaluation:
     """Evaluate the fibre paths of a part.
 
-    Lengths at which things are sampled follow the fibre width of the machine.
+    Sampling distances scale with the fibre width of the machine.
 
     Parameters
     ----------
@@ -188,8 +188,8 @@ def evaluate(
         How stiff the fibre is in the index of stiffness alignment; by default as in the virtual
         test. It counts where `stress` knows the material of the part.
     build : sequence of 3 floats, optional
-        Build direction, which the head's tilt on curved layers is measured from; by default the
-        mean normal of the layers. Flat layers along it are compared with (`across_flat`).
+        Build direction. The head's tilt on curved layers is measured from it, and flat layers
+        normal to it serve for comparison (`across_flat`). Default: mean normal of the layers.
 
     Returns
     -------
@@ -226,7 +226,7 @@ def evaluate(
 
 
 def _check_layers(toolpaths: Toolpaths, layers: Sequence[Layer]) -> None:
-    """Every path lies on a layer given, at its height."""
+    """Refuse paths that do not lie on a given layer, at its height."""
     known = {layer.index: layer for layer in layers}
     for index in np.unique(toolpaths.layer).tolist():
         if index not in known:
@@ -264,7 +264,7 @@ def _below(layer: Layer, layers: Sequence[Layer]) -> Layer | None:
 
 
 class _Samples(NamedTuple):
-    """Samples of one layer, or of all together: every index is computed of them."""
+    """Samples of one layer, or of all layers together, from which every index is computed."""
 
     manufacture: ManufactureSamples
     sinuosity: SinuositySamples

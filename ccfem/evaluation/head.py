@@ -19,7 +19,7 @@ __all__ = ["COLUMNS", "HeadSamples", "Printed", "head_indices", "printed", "samp
 _STEEP = 45.0
 """Tilt, degrees, from which a layer counts as overhanging."""
 _COARSE = 2.0
-"""Distance, mm, of the points that stand for what is printed, and of the samples of the fibre."""
+"""Distance, mm, between points that represent printed material, and between fibre samples."""
 _NONE = "0 on flat layers; NaN without fibre"
 
 COLUMNS = (
@@ -102,7 +102,7 @@ def printed(layers: Sequence[Layer], build: Sequence[float] | None = None) -> Pr
     points = [np.concatenate([k.points, k.points[k.triangles].mean(axis=1)]) for k in stack]
     index = np.repeat([layer.index for layer in stack], [len(each) for each in points])
     every = np.concatenate(points)
-    # In each cube the point that is printed first.
+    # Keep the point of each cube that is printed first.
     _, first = np.unique(np.floor(every / _COARSE).astype(np.int64), axis=0, return_index=True)
     first = np.sort(first)
     up = np.zeros(3)

@@ -88,7 +88,7 @@ _ROUNDING = 1e-6
 
 @dataclass(frozen=True)
 class ManufactureSamples:
-    """Lengths (k,), mm, of the fibre paths; and of a layer (1,) times, s, and its volume, mm^3."""
+    """Lengths (k,), mm, of fibre paths; times (1,), s, and volume (1,), mm^3, of a layer."""
 
     length: FloatArray
     seconds: FloatArray
@@ -112,7 +112,7 @@ def sample_manufacture(
     drawn = toolpaths.select(toolpaths.kind != TRAVEL)
     starts, ends = drawn.points[drawn.offsets[:-1]], drawn.points[drawn.offsets[1:] - 1]
     ways = float(np.linalg.norm(starts[1:] - ends[:-1], axis=1).sum())
-    # Travel that the paths spell out replaces the straight ways.
+    # Explicit travel paths replace straight travel moves.
     travel = toolpaths.of_kind(TRAVEL)
     ways = float(travel.lengths.sum()) if len(travel) else ways
     fibre, others = (drawn.select(wanted) for wanted in (drawn.kind == FIBRE, drawn.kind != FIBRE))

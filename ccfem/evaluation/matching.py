@@ -123,11 +123,11 @@ def matching_rate(
         Of the layers that count, one or more.
     reading : {"path", "energy", "stress_nearest", "stress_best"}
         "path": share of the fibre's length. "energy": the same, each length weighted with the size
-        of the stress there. "stress_nearest": share of the stress vectors by area (one a triangle
-        of the layer; those of at least 1 % of the 99th percentile by area), each against the piece
-        of fibre nearest to it, however far; of several as near, the best. "stress_best": the same,
-        each against the piece within `reach` that matches best; where there is none, it does not
-        match at any angle.
+        of the stress there. "stress_nearest": share of the stress vectors by area, each compared
+        with the nearest piece of fibre, however far away (of equally near pieces, with the best).
+        There is one vector a triangle of the layer; those below 1 % of the 99th percentile by area
+        are left out. "stress_best": the same, but each vector is compared with the piece within
+        `reach` that matches best; with no such piece it matches at no angle.
     thresholds : (k,) array, degrees
         Angles T; an angle of T matches.
     links : bool, default True

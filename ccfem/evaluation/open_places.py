@@ -1,4 +1,4 @@
-"""Where a section stays without fibre: gaps narrower than a strand, and wider places."""
+"""Places of a section without fibre: gaps narrower than a strand, and wider places."""
 
 from typing import NamedTuple
 
@@ -22,7 +22,7 @@ class OpenPlace(NamedTuple):
 
 
 class OpenPlaces(NamedTuple):
-    """What fibre leaves open of a section.
+    """The parts of a section that fibre leaves open.
 
     Attributes
     ----------
@@ -57,7 +57,7 @@ def open_places(paths: PlanePaths, width: float) -> OpenPlaces:
     lines = [shapely.simplify(line, _FINE * width) for line in lines]
     covered = shapely.union_all(shapely.buffer(lines, 0.5 * width, cap_style="flat"))
     rest = shapely.difference(shapely.force_2d(section), covered)
-    # A little less than half a width: what is exactly as wide as a strand is wide enough.
+    # Slightly less than half a width, so that a place exactly as wide as a strand counts as wide.
     disc = 0.499 * width
     wide = shapely.intersection(shapely.buffer(shapely.buffer(rest, -disc), disc), rest)
     parts = [part for part in shapely.get_parts(wide) if part.area > 0.0]

@@ -47,8 +47,8 @@ def why_not(total: Mapping[str, float], machine: Machine) -> tuple[str, ...]:
     Returns
     -------
     tuple of str
-        Each with what was found and what the machine tolerates. Index by index a value that is
-        NaN, as without fibre, breaks nothing.
+        Each names what was found and what the machine tolerates. An index that is NaN, as without
+        fibre, breaks no limit.
     """
     found = _found(total)
     broken = []

@@ -87,12 +87,12 @@ COLUMNS = (
 )
 
 _ACROSS = (-0.375, -0.125, 0.125, 0.375)
-"""Places across a band, in widths, at which it is inside or not."""
+"""Positions across a band, in widths, that are tested for lying inside."""
 
 
 @dataclass(frozen=True)
 class RoomSamples:
-    """Parts of the strands of a layer, about a quarter of a width long, and runs on nothing.
+    """Parts of the strands of a layer, about a quarter of a width long, and unsupported runs.
 
     Attributes
     ----------
@@ -103,13 +103,13 @@ class RoomSamples:
     fraction : (s,) array
         Fibre volume fraction.
     free : (f,) array, mm
-        Lengths of the runs on nothing.
+        Lengths of the runs that lie on nothing.
     overlap : (1,) array, mm^2
         Area of all bands less that of their union.
     fibre, volume : (1,) arrays, mm^3
         Of the fibre in the section, and of the part that the layer stands for.
     late : (1,) array
-        Paths that come after one of a higher layer.
+        Number of paths printed after one of a higher layer.
     """
 
     length: FloatArray
@@ -138,7 +138,7 @@ def sample_room(
     below : Layer, optional
         The layer under it; by default it lies on the bed.
     late : int
-        Paths that come after one of a higher layer.
+        Number of paths printed after one of a higher layer.
     """
     layer, width = paths.layer, machine.fibre_width
     lines = paths.in_part

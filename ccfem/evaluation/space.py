@@ -1,4 +1,4 @@
-"""The fibre in space: its angle to the strongest stress itself, its bends, the joints it links."""
+"""The fibre in space: its angle to the strongest principal stress, its bends, the linked joints."""
 
 from collections.abc import Sequence
 from dataclasses import dataclass
@@ -27,7 +27,7 @@ __all__ = ["COLUMNS", "SpaceSamples", "sample_space", "space_indices"]
 
 _ANGLES = (10, 20, 30)
 _REACH = 10.0
-"""Distance, in fibre widths, within which a strand holds a joint."""
+"""Distance, in fibre widths, within which a strand counts as linking a joint."""
 
 _ANGLE = (
     "of the angle in space between the fibre and the principal stress of the largest size, tension "

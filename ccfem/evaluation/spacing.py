@@ -37,8 +37,8 @@ COLUMNS = (
 )
 
 _ROUNDING = 0.01
-"""Strands nearer than the fibre width by no more than this share of it keep their distance: two
-paths in even steps each lie within 0.005 widths of where they were planned."""
+"""Share of the fibre width by which strands may be nearer than it and still keep their distance:
+two paths in even steps each lie within 0.005 widths of where they were planned."""
 
 
 @dataclass(frozen=True)
@@ -56,9 +56,9 @@ def sample_spacing(paths: PlanePaths, width: float) -> SpacingSamples:
     ----------
     paths : PlanePaths
     width : float, mm
-        Fibre width W. Samples lie 0.2 W apart; the same path counts from 5 W of arc on (round a
-        closed path the shorter way); the search ends at 5 W, so that a strand on its own, and a
-        straight one, whose own points are that far away, have the spacing 5 W.
+        Fibre width W. Samples lie 0.2 W apart. A path is its own neighbour from 5 W of arc on
+        (round a closed path the shorter way). The search ends at 5 W: a lone strand has the spacing
+        5 W, and so has a straight one, whose own points are at least that far away.
     """
     paths = paths.in_part
     if not len(paths):
@@ -97,7 +97,7 @@ def _nearest(
     period: FloatArray,
     reach: float,
 ) -> FloatArray:
-    """Distance of each sample to the nearest foreign piece, at most `reach`; `reach` of own arc."""
+    """Distance, at most `reach`, from each sample to the nearest piece, own ones beyond `reach`."""
     distance = np.empty(len(points))
     for q in range(len(points)):
         x, y = points[q, 0], points[q, 1]

@@ -63,7 +63,7 @@ COLUMNS = (
 )
 
 _CAP = 0.995
-"""Quantile of the energies that counts as the largest: point loads have no finite one."""
+"""Quantile of the energies that counts as the largest: at point loads the energy is infinite."""
 
 
 def agreement(angle: FloatArray) -> FloatArray:
@@ -86,9 +86,9 @@ def performance_index(
     energy : (s,) array >= 0
         Strain energy of the sample with the fibre along the principal direction.
     reading : {"weighted", "literal", "harmonic"}
-        ``sum f w / sum w`` with ``w = 1 + e^3``; ``mean(f e^3) + 1``, as printed; and
-        ``sum E / sum (E / f)``, which is not the paper's: the energy of the benchmark's stress in
-        the turned material. e is `energy` over its 99.5th percentile, at most 1.
+        ``sum f w / sum w`` with ``w = 1 + e^3``; ``mean(f e^3) + 1``, as printed; or
+        ``sum E / sum (E / f)``, which is ours: E / f is the energy of the benchmark's stress in the
+        turned material. e is `energy` over its 99.5th percentile, at most 1.
     weight : (s,) array, optional
         What each sample stands for; default equal.
 

@@ -1,7 +1,7 @@
-"""Tension across layers beside that of flat ones.
+"""Tension across layers, compared with that across flat layers.
 
-H. Kipping, T. Schueppstuhl, Materials 16 (2023) 998: layers are weakest across, so they are to be
-square to the least principal stress.
+H. Kipping, T. Schueppstuhl, Materials 16 (2023) 998: layers are weakest along their normal, so this
+should be the direction of the least principal stress.
 """
 
 from dataclasses import dataclass
@@ -18,11 +18,11 @@ __all__ = ["COLUMNS", "TensionSamples", "sample_tension", "tension_indices"]
 _STEPS = 8
 """Steps on a quarter turn between the planes that are tried for the best."""
 _BLOCK = 2048
-"""Tensors that are turned to all planes at a time: few enough for the memory near the processor."""
+"""Tensors that are turned to all planes at a time: few enough for the processor's cache."""
 _NONE = "NaN without tension"
 _NO_LEAST = "NaN without tension, or where the lesser principal stresses are equal everywhere"
 _EQUAL = 1e-6
-"""Difference of principal stresses over the tension that is taken for rounding."""
+"""Difference of principal stresses, over the tension, that counts as rounding error."""
 
 COLUMNS = (
     Column(
@@ -72,13 +72,13 @@ class TensionSamples:
     tension : (t,) array, N
         Largest principal value.
     flat : (t,) array, N
-        What acts along the build direction, 0 where negative.
+        Tension along the build direction; 0 where that is in compression.
     gap : (t,) array, N
         Difference of the two lesser principal values, at most `tension`.
     least : (t, 3) array
         Unit vector along the least principal stress.
     angle, angle_flat : (t,) arrays, degrees
-        Between that and the normal of the layer, and the build direction.
+        From `least` to the normal of the layer, and from `least` to the build direction.
     """
 
     tensor: FloatArray
@@ -149,7 +149,7 @@ def _acting_along(directions: FloatArray, tensor: FloatArray) -> FloatArray:
 
 
 def _around(axes: FloatArray) -> FloatArray:
-    """Directions (k, 3) even over half a sphere, their own mirror images in the planes of axes."""
+    """Directions (k, 3) evenly over half a sphere, symmetric about the planes of the axes."""
     found = []
     for height in np.linspace(0.0, 0.5 * np.pi, _STEPS + 1):
         count = max(round(_STEPS * np.cos(height)), 1)

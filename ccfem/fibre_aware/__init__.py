@@ -1,1 +1,1 @@
-"""Planning by what fibre does to the part: the best possible, pruning, and field design."""
+"""Planning with the fibre's effect on the part: stiffness bounds, pruning and field design."""

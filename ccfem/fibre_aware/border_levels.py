@@ -1,8 +1,8 @@
-"""Levels that run along a stretched border as near to it as whole strands can.
+"""Cost that draws the levels of a field to stretched borders, as near as whole strands can lie.
 
-Strands keep half a width off the border. Where the first lies farther from it, the strip between
-them goes without fibre, by up to a width, and along the border stress is highest. Fields that are
-designed without regard to where their levels lie leave half a width on average.
+Strands keep half a width off the border. If the first strand lies farther away, the strip in
+between, up to a width wide, has no fibre, although the stress is highest along the border. Fields
+designed without this cost leave half a width open on average.
 """
 
 from collections.abc import Sequence
@@ -22,20 +22,20 @@ _UPRIGHT = 0.1
 """Largest cosine of a wall's normal to that of the layers at which it counts as upright."""
 
 _DEPTH = 0.53
-"""Distance, in widths, of the first strand from the border: what rounding takes off is not cut."""
+"""Distance, in widths, of the first strand from the border, with a margin against rounding."""
 
 _OBLIQUE = float(np.tan(np.radians(20.0)))
-"""Slope of strands to the border from which on none of them is the first one."""
+"""Slope of strands to the border above which none of them counts as the first one."""
 
 _CONSTANTS = 40
-"""Constants of a field that are tried."""
+"""Number of constants added to a field that are tried."""
 
 _SHARE = 0.5
-"""Of the work of the fibre that the strip could hold: what it costs to have none there."""
+"""Cost of an empty strip, as a share of the work of the fibre that it could hold."""
 
 
 class _Posed(Protocol):
-    """What of a `ccfem.fibre_aware.stream_design.StreamProblem` says where levels lie."""
+    """The parts of `ccfem.fibre_aware.stream_design.StreamProblem` that are used here."""
 
     @property
     def part(self) -> SmearedPart: ...
@@ -56,10 +56,10 @@ class _Posed(Protocol):
 
 @dataclass(frozen=True)
 class BorderLevels:
-    """What it costs that no whole number of the field lies half a width inside stretched borders.
+    """Cost of fields without a whole number half a width inside stretched borders.
 
     The cost is ``sum of weight * sin^2(pi s)`` over places half a width inside upright walls. The
-    weight is half of the share that fibre on a strip a width wide would have in the compliance; it
+    weight is half of the share in the compliance that fibre on a strip a width wide would have; it
     falls to zero where strands meet the border at 20 degrees.
 
     Attributes
@@ -80,7 +80,7 @@ class BorderLevels:
 
     @classmethod
     def of(cls, problem: _Posed, field: FloatArray, solution: SmearedSolution) -> "BorderLevels":
-        """Weights at a field (c,) and its solution."""
+        """Weights for a field (c,) and its solution."""
         part, grid, mesh = problem.part, problem.grid, problem.part.mesh
         area, normal = mesh.facet_areas(mesh.boundary)
         upright = np.flatnonzero(np.abs(normal @ part.frame[2]) < _UPRIGHT)
@@ -107,7 +107,7 @@ class BorderLevels:
 
     @classmethod
     def side_by_side(cls, levels: Sequence["BorderLevels"]) -> "BorderLevels":
-        """Of several fields, one after the other; their costs add up."""
+        """Combine several fields, one after the other; their costs add up."""
         values = sp.block_diag([one.values for one in levels], format="csr")
         weight = np.concatenate([one.weight for one in levels])
         return cls(values, weight, sp.block_diag([one.blocks for one in levels]).toarray())
@@ -119,11 +119,11 @@ class BorderLevels:
         return float(self.weight @ np.sin(angle) ** 2), np.asarray(self.values.T @ slope)
 
     def curvature(self) -> Any:
-        """Second derivative (c, c) of the cost where it is least, and half of that."""
+        """Half of the second derivative (c, c) of the cost at its minimum."""
         return np.pi**2 * (self.values.T * self.weight) @ self.values
 
     def lifted(self, field: FloatArray) -> FloatArray:
-        """Field (c,) with the constant on each group that costs least."""
+        """Field (c,) plus the constant on each group that makes the cost least."""
         for block in self.blocks.T:
             tried = [field + k / _CONSTANTS * block for k in range(_CONSTANTS)]
             field = tried[int(np.argmin([self.cost(one)[0] for one in tried]))]

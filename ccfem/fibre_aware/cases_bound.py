@@ -5,14 +5,14 @@ displacements u_i,
 
     sum v_i C_i >= (sum v_i f_i.u_i)^2 / (sum v_i u_i.K u_i + EA S),
 
-where S is the most that fibre of that length can gather: the cells of the largest
-``max_t sum v_i max(t.eps_i t, 0)^2``, filled until the length is used. No principal direction is
-known for several strains: 360 angles are tried, with a margin for those between. A case that moves
-supports in place of forces has a compliance too: see `SmearedPart.pull`.
+where S is the largest sum that fibre of that length can collect: cells are filled in the order of
+``max_t sum v_i max(t.eps_i t, 0)^2``, largest first, until the length is used up. Several strains
+have no common principal direction, so 360 angles are tried, with a margin for those in between. A
+case in which supports move instead of forces has a compliance too: see `SmearedPart.pull`.
 
-What counts of a case is C_i over the least that any paths could make of it alone, or over that of
-the part without fibre. The factors that raise the bound of the largest of these are found by
-growing those of the cases that are worst off; whatever they are, the bound holds.
+Each case counts by C_i over the least compliance that any paths can reach in it alone, or over the
+compliance of the part without fibre. The sharpest bound on the largest of these ratios is found by
+increasing the factors of the worst cases. The bound holds for any factors.
 """
 
 from collections.abc import Sequence
@@ -48,11 +48,11 @@ __all__ = [
 ]
 
 WORST, SUM, LEAST = OBJECTIVES = ("worst", "sum", "least")
-"""What is made small: the largest of ``bound_i / ratio_i``, their weighted mean, or the largest of
-``1 / ratio_i``: the least ratio is made large."""
+"""What is minimised: the largest of ``bound_i / ratio_i``, their weighted mean, or the largest of
+``1 / ratio_i``, so that the least ratio is made large."""
 
 _SINGLE_ITERATIONS = 30
-"""Of the bounds of each case alone, at most."""
+"""Most iterations for the bound of each case alone."""
 _ANGLES = 24
 _CERTIFIED_ANGLES = 360
 _FULL_STEPS = 10
@@ -73,11 +73,11 @@ class CasesBound:
     case_weights : (n,) array
         Weights of the cases; their sum is 1.
     least : float
-        Certified: no paths bring the objective below it.
+        Certified: no paths can bring the objective below this.
     reached : float
-        Objective of the best density found: the sharpest bound lies between the two.
+        Objective of the best density found. The sharpest bound lies between `least` and this.
     factors : (n,) array
-        Of the cases that certify; their sum is 1.
+        Factors of the cases in the certificate; their sum is 1.
     """
 
     objective: str
@@ -94,7 +94,7 @@ class CasesBound:
 
     @property
     def duality_gap(self) -> float:
-        """Share by which what a density of fibre reaches lies above what is certified."""
+        """Share by which `reached` lies above what is certified."""
         return self.reached / self.least - 1.0
 
     def value(self, ratios: ArrayLike) -> float:
@@ -140,9 +140,10 @@ def cases_bound(
         Stiffness of a strand; default rho = EA/E = 4 mm^2.
     objective : {"worst", "sum", "least"}
     iterations : int, optional
-        Maximum number, a solve a case each; at least 1. Default as `upper_bound`.
+        Maximum number of iterations, with one solve for each case; at least 1. Default as in
+        `upper_bound`.
     gap : float, default 0.01
-        They stop where what is reached lies no farther than this share above the bound.
+        Iterations stop where `reached` lies no farther than this share above the bound.
 
     Raises
     ------
@@ -223,7 +224,7 @@ def single_bounds(
     strand: Strand | None = None,
     iterations: int = 7,
 ) -> FloatArray:
-    """Stiffness ratio (n,) of each case alone that no paths exceed; parameters as `upper_bound`."""
+    """Stiffness ratio (n,) that no paths exceed in each case alone; parameters as `upper_bound`."""
     smeared_cases(cases.fields, layers[0].plane.frame)  # one factorisation for all
     found = (
         upper_bound(field, layers, length, machine, strand, iterations=iterations)
@@ -240,7 +241,7 @@ def cases_certificate(
     most: FloatArray,
     length: float,
 ) -> float:
-    """Least ``sum of factor * compliance`` that displacements prove, whatever they are, N mm.
+    """Lower bound of ``sum of factor * compliance``, N mm, from any displacements.
 
     Parameters
     ----------
@@ -273,10 +274,10 @@ def cases_certificate(
 
 
 def largest_gathered(strains: FloatArray, factors: FloatArray) -> FloatArray:
-    """Bound from above ``max over t of sum of factor * max(t.eps t, 0)^2`` in each cell, (m,).
+    """Bound ``max over t of sum of factor * max(t.eps t, 0)^2`` from above in each cell, (m,).
 
-    Between two of the angles that are tried the sum, whose slope is zero where it is largest,
-    cannot rise by more than half its largest curvature times the square of half their distance.
+    At its maximum the sum has slope zero. Between two angles that are tried it therefore exceeds
+    the larger value by at most half its largest curvature times the square of half their distance.
 
     Parameters
     ----------

@@ -1,7 +1,7 @@
 """Design of stream functions for several load cases: one field a case, all designed together.
 
-Field k is laid in a share of the layers, evenly over the height, so that every cell has the fibre
-of all fields. What each case makes of that fibre is one solve; L-BFGS moves all fields at once.
+Each field is laid in its share of the layers, evenly over the height, so every cell contains fibre
+of all fields. One solve for each case gives its compliance; L-BFGS changes all fields at once.
 """
 
 from collections.abc import Sequence
@@ -34,10 +34,10 @@ __all__ = [
 ]
 
 DESIGN_POWERS = {WORST: 4.0, SUM: 1.0, LEAST: 4.0}
-"""Power of ``bound / ratio`` in the sum over the cases, by the objective that is planned for."""
+"""Power of ``bound / ratio`` in the sum over the cases, for each objective."""
 
 Pull: TypeAlias = tuple[FloatArray, FloatArray]
-"""Derivatives (m,) each by the components of a field's slope in the cells."""
+"""Derivatives (m,) by the two components of a field's gradient in the cells."""
 
 
 @dataclass(frozen=True)
@@ -160,7 +160,7 @@ class CasesProblem:
         return np.array(found)
 
     def worth(self, ratios: FloatArray) -> tuple[float, FloatArray]:
-        """Objective of stiffness ratios (n,) without penalties, and how much each counts in it."""
+        """Objective at stiffness ratios (n,) without penalties, and the weight of each case."""
         terms = self.bounds / ratios
         powers = self.weights * (terms / terms.max()) ** self.power
         return float(np.log(terms.max()) + np.log(powers.sum()) / self.power), powers / powers.sum()
@@ -168,7 +168,7 @@ class CasesProblem:
     def pulls(
         self, laid: Sequence[Laid], solutions: Sequence[SmearedSolution], counts: FloatArray
     ) -> list[Pull]:
-        """Derive -log(stiffness), the cases counting (n,), by each field, were it in all layers."""
+        """Derive -log(stiffness), the cases weighted (n,), by each field if in all layers."""
         found = []
         for one in laid:
             x, y = zip(*(self.problem.pull(one, each) for each in solutions), strict=True)
@@ -183,16 +183,16 @@ class CasesProblem:
         value: float,
         pulls: Sequence[Pull],
     ) -> CasesObjective:
-        """Objective of a value that has no penalties yet.
+        """Objective from a value without penalties.
 
         Parameters
         ----------
         field : (n * c,) array
         laid, solutions
-            Its fibre, and what each case makes of that.
+            Fibre of the field, and the solution of each case with it.
         value : float
         pulls : sequence of two (m,) arrays
-            Derivatives of the value by the slope of each field, were it in all layers.
+            Derivatives of the value by the gradient of each field, if it were in all layers.
         """
         problem, fields, shares = self.problem, field.reshape(len(self.shares), -1), self.shares
         length = sum(share * problem.length(one) for share, one in zip(shares, laid, strict=True))
@@ -209,7 +209,7 @@ class CasesProblem:
         return self.worth(self.ratios(solutions))[1]
 
     def curvature(self, field: FloatArray, solutions: tuple[SmearedSolution, ...]) -> Any:
-        """Block of each field: the mean of `StreamProblem.curvature` by how much cases count."""
+        """Matrix with a block for each field: mean over the cases of `StreamProblem.curvature`."""
         counts, blocks = self._counts(solutions), []
         for share, own in zip(self.shares, field.reshape(len(self.shares), -1), strict=True):
             each = [self.problem.curvature(own, one) for one in solutions]
@@ -218,7 +218,7 @@ class CasesProblem:
         return sp.block_diag(blocks, format="csc")
 
     def levels(self, field: FloatArray, solutions: tuple[SmearedSolution, ...]) -> BorderLevels:
-        """Weigh what levels cost that keep farther from borders than they need, over all cases."""
+        """Cost, over all cases, of levels that lie farther from the border than they need to."""
         counts, found = self._counts(solutions), []
         for share, own in zip(self.shares, field.reshape(len(self.shares), -1), strict=True):
             each = [self.problem.levels(own, one) for one in solutions]
@@ -249,8 +249,8 @@ class CasesDesign:
 def design_cases(problem: CasesProblem, start: FloatArray, evaluations: int = 50) -> CasesDesign:
     """Improve fields (n * c,) of several cases as `stream_design.design` does those of one.
 
-    The unknowns have the curvature of all cases, and levels of each field are drawn to the borders
-    that any case stretches along it.
+    The unknowns are scaled with the curvature of all cases. The levels of each field are drawn to
+    the borders that any case stretches along it.
     """
     field, found, ratios = designed_fields(problem, start, evaluations)
     return CasesDesign(field.reshape(len(problem.shares), -1), found, ratios)
@@ -259,7 +259,7 @@ def design_cases(problem: CasesProblem, start: FloatArray, evaluations: int = 50
 def start_fields(
     problem: CasesProblem, fields: Sequence[Any], layers: Sequence[Layer], cap: float, tilt: float
 ) -> FloatArray:
-    """Fields (n * c,) to start with: each follows the tension of its own case most.
+    """Make fields (n * c,) to start with: each mainly follows the tension of its own case.
 
     Field k follows ``sum over i of v_i s_i t_i t_i^T / sqrt(C_i)``, s_i the tension along t_i and
     C_i the compliance without fibre, v_i the tilt for its own case and equal for the others.
@@ -274,7 +274,7 @@ def start_fields(
     cap : float
         As in `start_field`.
     tilt : float in (0, 1]
-        Weight of a field's own case. At 1 the fields do not know of each other at the start; at
+        Weight of a field's own case. At 1 the initial fields are independent of each other; at
         1 / n they start alike, and stay so.
     """
     count = len(fields)

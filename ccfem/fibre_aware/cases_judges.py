@@ -1,4 +1,4 @@
-"""What tests under several load cases say of paths."""
+"""Tests of paths under several load cases, and what they say the fibre is worth."""
 
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass
@@ -67,9 +67,9 @@ class CasesGoal:
         return np.asarray(counts / counts.sum())
 
     def merit(self, ratios: FloatArray) -> float:
-        """Mean of ratio over bound that counts each case as `counts` does.
+        """Mean of ratio over bound, weighted by `counts`.
 
-        With the objectives "worst" and "least" it is near to the worst.
+        With the objectives "worst" and "least" it is close to the value of the worst case.
         """
         power, shares = _POWERS[self.objective], self.weights / self.weights.sum()
         return float(shares @ (self.bounds / np.asarray(ratios)) ** power) ** (-1.0 / power)
@@ -96,7 +96,7 @@ class CasesTested:
 
 
 def cases_tests(goal: CasesGoal, strand: Strand | None) -> Callable[[Strands], CasesTested]:
-    """Test of strands under all load cases, each from where the last one ended."""
+    """Return a test of strands under all load cases; each test starts from the last solutions."""
     parts = goal.parts
     axial = (Strand() if strand is None else strand).stiffness(parts[0].modulus)
     before = np.array([2.0 * part.unreinforced.strain_energy for part in parts])
@@ -137,12 +137,12 @@ def cases_strength_judge(
     strength: float,
     for_both: bool = True,
 ) -> Judge:
-    """Judge of paths by the stiffness in all load cases, and by the one that fails first.
+    """Judge of paths by the stiffness in all load cases and the load at first failure.
 
     The value is ``merit^(1 - strength) factor^strength``, the factor being the least load at first
-    failure over the load of its case. Where supports move that load is the one which they ask of
-    the part without fibre. What fibre is worth by its strain is said for both, or else for the
-    stiffness alone.
+    failure over the load of its case. Where supports move, the latter is the load that they take in
+    the part without fibre. With `for_both` the worth of fibre by its strain is that for both,
+    else that for the stiffness alone.
     """
     known: list[FloatArray] = []
     worth, axial = Worth.of(goal.parts, strand, strength), strand.stiffness(goal.parts[0].modulus)
@@ -176,7 +176,7 @@ def cases_strength_judge(
 def _stiff_worths(
     counts: FloatArray, displacements: Sequence[FloatArray]
 ) -> tuple[StrainWorth, ...]:
-    """Worth of fibre by its strain that counts so much in the stiffness of each load case."""
+    """Worth of fibre by its strain, where each load case has this weight in the stiffness."""
     pairs = zip(counts.tolist(), displacements, strict=True)
     return tuple(StrainWorth(count, displacement) for count, displacement in pairs)
 

@@ -1,8 +1,8 @@
-"""Cutting paths to a length in several ways, of which a test chooses, and moving what is left.
+"""Paths cut to a length in several ways; a test chooses the best, and its strands are moved.
 
-What fibre is worth for the load at first failure is known for small changes only, and a cut is a
-large one. So where strength counts fibre is cut for the stiffness alone, for the strength as asked
-for, and for half of that.
+The worth of fibre for the load at first failure is known for small changes only, and a cut is a
+large one. Where strength counts, fibre is therefore cut three ways: for the stiffness alone, for
+the strength as asked for, and for half of that.
 """
 
 from collections.abc import Callable, Sequence
@@ -22,16 +22,16 @@ from ccfem.virtual_testing.strand import Strand
 __all__ = ["best_cut", "prune_and_move", "prune_and_move_cases"]
 
 _SHARES = (0.0, 0.5, 1.0)
-"""Of the strength asked for, with which fibre is cut."""
+"""Shares of the `strength` asked for with which fibre is cut."""
 
 _ALL_WAYS = 2
-"""Candidates that are cut in all these ways; the others are cut for the stiffness alone."""
+"""Number of candidates cut in all these ways; others are cut for the stiffness alone."""
 
 _FOR_BOTH = (False, True)
-"""Whether moves follow stiffness and strength: once the stiffness alone, and once both."""
+"""Whether moves follow the strength too: tried once for the stiffness alone, and once for both."""
 
 _Cut = Callable[[Toolpaths, float, int], Toolpaths]
-"""Cuts toolpaths to a length, with how much strength counts, by a number of tests."""
+"""Cuts toolpaths to a length; takes toolpaths, weight of the strength and number of tests."""
 
 
 def prune_and_move(
@@ -46,11 +46,12 @@ def prune_and_move(
     moves: int,
     tight: float = 1.0,
 ) -> Toolpaths:
-    """Cut fibre to a length, mm in all, move what is left, and cut what has become longer.
+    """Cut fibre to a length, mm in all, move the rest, and cut it again to the length.
 
-    Of several candidates each is cut, and the stiffest moved; with strength that of most worth,
-    once for the stiffness and once for both: a test chooses. Parameters as of
-    `ccfem.fibre_aware.prune.prune` and `ccfem.fibre_aware.strand_moves.moved`.
+    Each candidate is cut, and the best one is moved: the stiffest, or with strength the one of
+    highest value. With strength it is moved once for the stiffness and once for both, and a test
+    chooses. Parameters as in `ccfem.fibre_aware.prune.prune` and
+    `ccfem.fibre_aware.strand_moves.moved`.
     """
 
     def cut(toolpaths: Toolpaths, share: float, tests: int) -> Toolpaths:
@@ -79,8 +80,8 @@ def prune_and_move_cases(
 ) -> Toolpaths:
     """Cut fibre for several load cases, as `prune_and_move` does it for one.
 
-    Parameters as of `ccfem.fibre_aware.prune_cases.prune_cases`. Where strength counts, the load
-    case does that fails first.
+    Parameters as in `ccfem.fibre_aware.prune_cases.prune_cases`. For the strength, the load case
+    counts that fails first.
     """
 
     def cut(toolpaths: Toolpaths, share: float, tests: int) -> Toolpaths:
@@ -98,18 +99,18 @@ def prune_and_move_cases(
 def best_cut(
     candidates: Sequence[Toolpaths], cut: _Cut, judge: Judge, strength: float, rounds: int
 ) -> Toolpaths:
-    """Cut candidates, and return what is worth most.
+    """Cut candidates, and return the result of highest value.
 
     Parameters
     ----------
     candidates : sequence of Toolpaths
         Those beyond the second are cut for the stiffness alone.
     cut : callable
-        Cuts toolpaths, with how much the load at first failure counts, by a number of tests.
+        Cuts toolpaths, given the weight of the load at first failure and the number of tests.
     judge : callable
-        Tests what is left.
+        Tests the cut paths.
     strength : float in [0, 1]
-        How much the load at first failure counts; at 0 each is cut once.
+        Weight of the load at first failure; at 0 each candidate is cut once.
     rounds : int
         Tests of each cut.
     """
@@ -134,9 +135,9 @@ def _moved(
     moves: int,
     tight: float,
 ) -> Toolpaths:
-    """Move what was kept, once as each judge says, and cut what has become longer.
+    """Move the paths once for each judge, and cut those that have become longer.
 
-    Of several judges the first says which is worth most, or that what was kept is.
+    With several judges the first one chooses among the results and the unmoved paths.
     """
     radius, found = kept_radius(machine, tight), []
     for judge in judges:

@@ -1,9 +1,10 @@
-"""Ascent to the density of fibre that makes a part stiffest, of a given length in all.
+"""Search for the density of fibre, of given total length, that makes a part stiffest.
 
-The compliance is convex in the densities, and its slope is the squared strain along each direction.
-The optimality criterion multiplies each density by a power of that (mirror ascent), and then all by
-one factor so that the length is met. Each step goes on along the last one, as in Nesterov's method,
-and starts anew where the part gets softer: without that hundreds of solves would be needed.
+The compliance is convex in the densities, and its derivative is proportional to the squared strain
+along each direction. The optimality criterion multiplies each density by a power of the strain
+(mirror ascent) and then scales all densities so that the length is met. Each step continues the
+last one, as in Nesterov's method; this momentum restarts where the part gets softer. Without it
+hundreds of solves would be needed.
 """
 
 from dataclasses import dataclass
@@ -15,20 +16,20 @@ from ccfem.arrays import FloatArray, freeze
 __all__ = ["DensityAscent"]
 
 _EXPONENT = 1.4
-"""Of the strain in the optimality criterion. 1 is exact where the stress in the fibre is given;
-where its strain is given larger ones are quicker. From 2 on densities swing to and fro."""
+"""Exponent of the strain in the optimality criterion. 1 is exact where the stress in the fibre is
+given; where its strain is given, larger ones converge faster. From 2 on densities oscillate."""
 
 _MOST_MOMENTUM = 0.9
 
 _TRACE = 1e-9
-"""Least share of the largest density that stays in each direction: a density of 0 would stay 0."""
+"""Least density in each direction as a share of the largest: a density of 0 would stay 0."""
 
 _BISECTIONS = 60
 
 
 @dataclass(frozen=True)
 class DensityAscent:
-    """Densities of fibre in cells and directions on their way to the optimum.
+    """Densities of fibre in cells and directions during the search for the optimum.
 
     Attributes
     ----------
@@ -42,9 +43,9 @@ class DensityAscent:
     stepped : (m, k) array, optional
         The density that the last step would have ended at without momentum.
     steps : int
-        Since the momentum began.
+        Number of steps since the momentum began.
     merit : float
-        Of the last density; the larger the better.
+        Merit of the last density; larger is better.
     """
 
     volume: FloatArray
@@ -62,7 +63,7 @@ class DensityAscent:
     def even(
         cls, volume: FloatArray, most: FloatArray, length: float, directions: int
     ) -> "DensityAscent":
-        """Begin with the same share of its room in every cell, and as much in each direction."""
+        """Start with the same share of its room in every cell, equally in all directions."""
         share = length / float(volume @ most) / directions
         return cls(volume, most, length, np.repeat(share * most[:, None], directions, axis=1))
 
@@ -74,7 +75,7 @@ class DensityAscent:
         stretch : (m, k) array
             Strain along each direction at the present density, not negative.
         merit : float
-            What the present density reaches: stiffness, or less compliance.
+        Merit of the present density, which grows with the stiffness.
         """
         steps = self.steps + 1 if merit >= self.merit else 1
         power = (stretch / (float(stretch.max()) or 1.0)) ** _EXPONENT
@@ -85,7 +86,7 @@ class DensityAscent:
         return DensityAscent(self.volume, self.most, self.length, density, stepped, steps, merit)
 
     def _fitted(self, weight: FloatArray) -> FloatArray:
-        """Densities in proportion to weights (m, k), of the length and within the room."""
+        """Densities proportional to weights (m, k), with the given length and within the room."""
         total = weight.sum(axis=1)
         low, high = 1e-12, 1e12
         for _ in range(_BISECTIONS):

@@ -1,8 +1,8 @@
-"""Fields for much fibre, designed for less of it first.
+"""Design of fields for much fibre, which starts from a design for less.
 
-A field that starts as dense as much fibre asks for has strands everywhere, also where nothing is
-stretched, and they hold on to each other: no small change of the field turns or thins them, and it
-ends up softer than one for less fibre. Where that one has settled there is room for the rest.
+A field that starts at high density has strands everywhere, even where nothing is stretched. They
+block each other: no small change of the field turns them or thins them out, and the result is
+softer than a design for less fibre. Once that design has converged there is room for the rest.
 """
 
 from collections.abc import Callable
@@ -19,10 +19,10 @@ _USUAL = 0.45 * (1.0 + 1e-9)
 """Coverage up to which a field is designed in one step."""
 
 _FIRST = 0.5
-"""Share of the room for fibre that is designed for first: that coverage, and a tenth over."""
+"""Share of the room for fibre that is designed for first, with a tenth more as budget."""
 
 _THEN = 0.6
-"""Evaluations of the second step over those of the first."""
+"""Evaluations of the second step, over those of the first."""
 
 
 def designed_in_steps(
@@ -31,7 +31,7 @@ def designed_in_steps(
     evaluations: int,
     coverage: float,
 ) -> StreamDesign:
-    """Design a field for half of the room, and on from there for much fibre.
+    """Design a field for half of the room first, and for much fibre from there.
 
     Parameters
     ----------
@@ -39,10 +39,10 @@ def designed_in_steps(
     start : callable
         Coefficients (c,) of the first field for a problem.
     evaluations : int
-        Most evaluations of the objective in the first step; where there is another it has 0.6 times
-        as many.
+        Largest number of evaluations of the objective in the first step. A second step has 0.6
+        times as many.
     coverage : float
-        Share of the layers that is to be covered; the budget is for more, of which some is cut off.
+        Share of the layers to be covered. The budget is larger, since some fibre is cut off later.
     """
     most = _FIRST * float(problem.room.sum())
     if coverage <= _USUAL or problem.budget <= most:

@@ -1,4 +1,4 @@
-"""Paths of several lengths from as few designs as will do."""
+"""Paths of several lengths from as few designs as possible."""
 
 from collections.abc import Callable, Sequence
 from dataclasses import replace
@@ -14,17 +14,17 @@ from ccfem.toolpaths import Toolpaths
 __all__ = ["designed_to_lengths"]
 
 _ENOUGH = 0.99
-"""Share of a wanted length below which the design is made once more."""
+"""Share of a wanted length below which the design is repeated."""
 
 _NEAR = 0.95
-"""Share of the largest length above which shorter ones are cut from its design."""
+"""Share of the largest length above which shorter lengths are cut from its design."""
 
 _MORE = 1.03
-"""By how much more it then asks for than by proportion."""
+"""Factor on the length asked for in the repeated design, on top of the proportional increase."""
 
 
 class _Strategy(Protocol):
-    """A strategy that designs fields for a coverage, and for more by its overfill."""
+    """A strategy that designs fields for a coverage, and for more fibre by its overfill."""
 
     __dataclass_fields__: ClassVar[dict[str, Any]]
     amount: ClassVar[Amount]
@@ -46,7 +46,7 @@ def designed_to_lengths(
     cut: Callable[[Designed, Sequence[float]], list[Toolpaths]],
     again: bool = True,
 ) -> list[tuple[Designed, LayerPlanner]]:
-    """Design for the largest length, and for much shorter ones anew.
+    """Design for the largest length, and again for much shorter ones.
 
     Parameters
     ----------
@@ -54,16 +54,16 @@ def designed_to_lengths(
     layers : sequence of Layer
     machine : Machine
     lengths : sequence of float, mm per layer
-        Above the most of the coverage they are taken for that.
+        Lengths that need more than the largest coverage are reduced to that coverage.
     cut : callable
-        Designs for the coverage of a strategy and cuts the paths to each of some lengths.
+        Designs for the coverage of a strategy and cuts the paths to each of the lengths.
     again : bool, default True
-        Whether to design for more fibre where the paths are too short, and to take what is longer.
+        Whether to design for more fibre where the paths are too short, and to take the longer ones.
 
     Returns
     -------
     list of (StreamFunction, LayerPlanner)
-        For each length the strategy that was told to lay it, and the plan.
+        For each length the strategy with parameters that lay it, and the plan.
     """
     full = full_length(layers, machine)
     most = max(strategy.amount.most, strategy.coverage) * full
@@ -95,5 +95,5 @@ def designed_to_lengths(
 
 
 def _designed_for(strategy: Designed, coverage: float, designed: float) -> Designed:
-    """Strategy that lays a coverage of what is designed for another, overfill included."""
+    """Strategy that lays a coverage from a design for `designed`, overfill included."""
     return replace(strategy, coverage=coverage, overfill=max(designed / coverage, 1.0))

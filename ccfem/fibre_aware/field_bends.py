@@ -1,4 +1,4 @@
-"""What it costs that levels of a field bend more tightly than fibre can follow.
+"""Cost of levels of a field that bend more tightly than fibre can follow.
 
 The curvature of a level is ``(g_y^2 s_xx - 2 g_x g_y s_xy + g_x^2 s_yy) / |g|^3``, g the gradient
 of the field s.
@@ -15,24 +15,24 @@ from ccfem.arrays import FloatArray, freeze
 __all__ = ["FieldBends"]
 
 _SMALLEST = 0.05
-"""Strands a width below which |g| is rounded off: where hardly any fibre lies no bend counts."""
+"""Strands a width below which |g| is rounded off: bends hardly count where little fibre lies."""
 
 
 @dataclass(frozen=True)
 class FieldBends:
     """Cost of bends that are tighter than a radius.
 
-    The cost is the mean over the fibre of ``sqrt(1 + e^2) - 1``, e the share by which the curvature
-    exceeds that of the radius: about e once that is large.
+    The cost is the mean over the fibre of ``sqrt(1 + e^2) - 1``. Here e is the share by which the
+    curvature exceeds that of the radius; for large e the cost is about e.
 
     Attributes
     ----------
     slopes : two sparse (m, c) arrays
-        From coefficients to the gradient in each cell, strands a width.
+        Map coefficients to the gradient in each cell, strands a width.
     seconds : three sparse (m, c) arrays
-        To the second derivatives xx, xy and yy, a width over that, 1/mm.
+        Map coefficients to the second derivatives xx, xy and yy, strands a width per mm.
     fibre : (m,) array
-        Length of fibre in each cell at one strand a width, over that of all.
+        Length of fibre in each cell at one strand a width, as a share of that in all cells.
     radius : float, mm
     """
 

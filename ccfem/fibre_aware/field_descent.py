@@ -1,4 +1,4 @@
-"""Descent on fields, in unknowns in which it takes even steps: those of a positive matrix."""
+"""Descent on fields by L-BFGS, preconditioned by a positive definite matrix."""
 
 from dataclasses import dataclass
 from typing import Any, Protocol
@@ -17,7 +17,7 @@ _MEMORY = 20
 """Steps that L-BFGS remembers."""
 
 _REACH = 1.0
-"""Radius of the filter in squares of the grid."""
+"""Radius of the filter, in squares of the grid."""
 
 TOLERANCE = 5e-3
 """Relative residual of the solves of a design. The error of the compliance is its square."""
@@ -27,9 +27,9 @@ TOLERANCE = 5e-3
 class FieldMetric:
     """Unknowns x of a field s, with ``x.x = s.A s`` for a positive definite matrix A.
 
-    A descent that knows nothing of its objective takes all directions of its unknowns for alike.
-    Where A is about the second derivative of the objective, they are. With ``A = C C^T`` the field
-    is ``A^-1 C x``.
+    A descent method that knows nothing of its objective treats all directions of its unknowns as
+    equal. They are about equal where A approximates the second derivative of the objective. With
+    ``A = C C^T`` the field is ``A^-1 C x``.
 
     Attributes
     ----------
@@ -74,7 +74,7 @@ class FieldMetric:
 
 
 class _Evaluated(Protocol):
-    """An objective that `improved` can make smaller."""
+    """An objective that `improved` can minimise."""
 
     @property
     def laplacian(self) -> Any: ...
@@ -89,10 +89,10 @@ def improved(
     metric: FieldMetric | None = None,
     solution: Any = None,
 ) -> tuple[FloatArray, Any, tuple[Any, ...]]:
-    """Coefficients, objective there, and stiffness ratios at every evaluation of L-BFGS.
+    """Return coefficients, the objective there, and stiffness ratios at all evaluations of L-BFGS.
 
-    The solves begin from a solution, if there is one. Without a metric that of
-    ``(1 + Laplacian)^2`` is taken, the Laplacian in squares of the grid.
+    The solves start from a solution, if one is given. The default metric is that of
+    ``(1 + Laplacian)^2``, with the Laplacian in squares of the grid.
     """
     if metric is None:
         smoother = sp.eye_array(len(start)) + _REACH**2 * problem.laplacian
@@ -102,7 +102,7 @@ def improved(
 
     def objective(x: FloatArray) -> tuple[float, FloatArray]:
         field = metric.field(x)
-        # The last solution is near to this one, the best one is to be returned.
+        # The last solution is near to this one; the best one is to be returned.
         last = tried[-1][1].solution if tried else solution
         found = problem.evaluate(field, last, TOLERANCE)
         ratios.append(found.ratio)

@@ -1,4 +1,4 @@
-"""Design of fields in two steps: for the stiffness alone, then also for where their levels lie."""
+"""Design of fields in two steps: for the stiffness alone, then also for levels at the border."""
 
 from dataclasses import dataclass, replace
 from typing import Any, Protocol
@@ -14,7 +14,7 @@ _AT_BORDERS = 0.4
 
 
 class _Posed(Protocol):
-    """What fields are designed for.
+    """A problem that fields are designed for.
 
     `StreamProblem` of one load case, `CasesProblem` of several, `StrengthProblem`.
     """
@@ -28,7 +28,7 @@ class _Posed(Protocol):
 
 @dataclass(frozen=True)
 class _AtBorders:
-    """The problem with the cost of levels that keep farther from the border than they need."""
+    """The problem plus the cost of levels that lie farther from the border than they need to."""
 
     problem: _Posed
     levels: BorderLevels
@@ -46,10 +46,10 @@ class _AtBorders:
 def designed_fields(
     problem: _Posed, start: FloatArray, evaluations: int
 ) -> tuple[FloatArray, Any, tuple[Any, ...]]:
-    """Improve fields by L-BFGS, in unknowns of even curvature.
+    """Improve fields by L-BFGS, in unknowns of about even curvature.
 
-    In the last evaluations whole numbers of the fields are drawn to half a width inside the border,
-    where that is stretched along strands (`BorderLevels`).
+    In the last evaluations the whole numbers of the fields are drawn to half a width inside the
+    border, where it is stretched along the strands (`BorderLevels`).
 
     Parameters
     ----------
@@ -61,7 +61,7 @@ def designed_fields(
     Returns
     -------
     field, objective, ratios
-        As of `improved`: the objective is without the cost of levels.
+        As in `improved`; the objective is given without the cost of levels.
     """
     last = int(_AT_BORDERS * evaluations)
     before = problem.evaluate(start, tolerance=TOLERANCE)
@@ -79,7 +79,7 @@ def drawn_to_borders(
 ) -> tuple[FloatArray, Any, tuple[Any, ...]]:
     """Improve fields (c,) further, and draw their whole numbers to the border.
 
-    Parameters and results as of `designed_fields`, with the solution at the fields.
+    Parameters and results as in `designed_fields`, with the solution at the fields.
     """
     levels = problem.levels(field, solution)
     lifted = levels.lifted(field)

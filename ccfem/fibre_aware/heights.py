@@ -1,4 +1,4 @@
-"""The height of a part: which cells belong to which layer, and how much the layers differ."""
+"""Layers over the height of a part: which cells belong to each, and how much the layers differ."""
 
 from collections.abc import Sequence
 
@@ -43,7 +43,7 @@ def group_layers(layers: Sequence[Layer], groups: int) -> IntArray:
 
 
 def alike_share(part: SmearedPart, stress: FloatArray, size: float) -> float:
-    """How much of the stress in the plane is the same at all heights, in [0, 1].
+    """Share of the in-plane stress that is the same at all heights, in [0, 1].
 
     Parameters
     ----------

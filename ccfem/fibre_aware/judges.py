@@ -1,4 +1,4 @@
-"""What a test says of paths: how good they are, and what strains their fibre."""
+"""Tests of paths: their value, and the worth of their fibre by its strain."""
 
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass
@@ -27,15 +27,15 @@ _TOLERANCE = 1e-4
 
 @dataclass(frozen=True)
 class Judged:
-    """What a test of paths says.
+    """Result of a test of paths.
 
     Attributes
     ----------
     value : float
-        What is to grow.
+        Value to be maximised.
     strain_worths : callable
-        Says what fibre is worth by its strain, for each load case. With strength that takes further
-        solves, so nobody is told who does not ask.
+        Returns the worth of fibre by its strain, for each load case. With strength this takes
+        further solves, so it is computed only when called.
     """
 
     value: float
@@ -72,9 +72,9 @@ def strength_judge(
 ) -> Judge:
     """Judge of paths by the stiffness and the load at first failure.
 
-    The value is ``ratio^(1 - strength) load^strength``: a share of the one is worth as much as one
-    of the other where `strength` is a half. What fibre is worth by its strain is said for both, or
-    else for the stiffness alone.
+    The value is ``ratio^(1 - strength) load^strength``: at a strength of one half, relative changes
+    of both count equally. With `for_both` the worth of fibre by its strain is that for both,
+    else that for the stiffness alone.
     """
     worth = Worth.of((part,), strand, strength)
 
@@ -97,7 +97,7 @@ def strength_judge(
 
 
 def stiffest(candidates: Sequence[Toolpaths], judge: Judge) -> Toolpaths:
-    """Return the toolpaths of most value to a judge, the first of equal ones; one is not judged."""
+    """Return the toolpaths of highest value, the first of equal ones; one alone is not tested."""
     laid = [one for one in candidates if len(one)]
     if len(laid) < 2:
         return laid[0] if laid else candidates[0]

@@ -1,4 +1,4 @@
-"""Which layer is for which load case: by weight, the cases taking turns over the height."""
+"""Assignment of layers to load cases by weight, alternating over the height."""
 
 from collections.abc import Sequence
 
@@ -28,10 +28,10 @@ def layer_counts(weights: FloatArray, count: int) -> IntArray:
 
 
 def layers_by_case(weights: FloatArray, layers: Sequence[Layer]) -> IntArray:
-    """Case of each layer, (layers,): those of each are spread evenly over the height.
+    """Case of each layer, (layers,); the layers of each case are spread evenly over the height.
 
-    From the bottom up a layer goes to the case that is farthest behind its share; the first one
-    where several are.
+    From the bottom up each layer goes to the case that is farthest behind its share; if several
+    are, to the first of them.
     """
     count = len(layers)
     counts = layer_counts(weights, count)

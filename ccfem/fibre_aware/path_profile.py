@@ -1,4 +1,4 @@
-"""What the pieces of a fibre path are worth, and which of them a price of fibre keeps."""
+"""Worth of the pieces of a fibre path, and the pieces that are worth more than a price of fibre."""
 
 from collections.abc import Sequence
 from dataclasses import dataclass
@@ -13,19 +13,19 @@ __all__ = ["Profile", "least_price"]
 _BISECTIONS = 50
 
 _EQUAL = 1e-12
-"""Share of the largest gain of a piece by which one choice has to be better than another."""
+"""Least difference by which one choice has to be better, as a share of a piece's largest gain."""
 
 
 @dataclass(frozen=True)
 class Profile:
-    """What each piece of one fibre path is worth.
+    """Worth of each piece of one fibre path.
 
     Attributes
     ----------
     path : int
         Number of the path in the toolpaths.
     value : (n,) array
-        Mean value per length of equal pieces; of a closed path, from its least valuable place on.
+        Mean value per length of equal pieces. A closed path starts at its least valuable place.
     step : float, mm
         Length of a piece.
     origin : float, mm
@@ -43,9 +43,9 @@ class Profile:
         return min(max(pieces, 1), len(self.value))
 
     def kept(self, price: float, minimum: float, cut_cost: float) -> tuple[BoolArray, float]:
-        """Pieces to keep where a mm of fibre costs `price`, and what they are worth beyond it.
+        """Pieces to keep where a mm of fibre costs `price`, and their worth beyond that cost.
 
-        Of all ways to part the path into stretches no shorter than `minimum`, mm, the one with the
+        Of all divisions of the path into stretches no shorter than `minimum`, mm, take that of
         largest ``sum of (value - price) * length - cut_cost * price * (stretches - 1)``.
         """
         least = self.least(minimum)
@@ -60,7 +60,7 @@ class Profile:
 def _best_stretches(gain, least, cost, equal, keep):  # type: ignore[no-untyped-def]  # pragma: no cover
     """Mark the pieces to keep and return their gain: dynamic programming over the pieces.
 
-    `free[i]` is the most that the first i pieces can gain, `held[i]` the most where piece i is
+    `free[i]` is the largest gain of the first i pieces, `held[i]` the largest gain if piece i is
     kept. Stretches are at least `least` pieces long; each but the first costs `cost`.
     """
     n = len(gain)
@@ -97,7 +97,7 @@ def _best_stretches(gain, least, cost, equal, keep):  # type: ignore[no-untyped-
 def least_price(
     along: Sequence[Profile], length: float, minimum: float, cut_cost: float = 20.0
 ) -> float:
-    """Smallest price of fibre at which no more than a length, mm, is worth keeping."""
+    """Smallest price of fibre at which no more than the given length, mm, is worth keeping."""
     values = [one.value for one in along]
     pieces = np.array([len(value) for value in values], dtype=np.int64)
     value, ends = np.concatenate([np.zeros(0), *values]), np.cumsum(pieces)

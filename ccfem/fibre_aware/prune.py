@@ -1,8 +1,8 @@
-"""Taking fibre off where it carries least, until a wanted length is left.
+"""Pruning: the fibre that carries least is removed until a wanted length is left.
 
-Where a piece of stretched fibre is taken away the compliance grows, to first order, by ``EA eps^2``
-per length. The paths are tested with their fibre, the pieces worth least are taken off, and what is
-left is tested again, for it takes over the load.
+Removing a piece of stretched fibre increases the compliance, to first order, by ``EA eps^2`` per
+length. The paths are tested with their fibre and the pieces worth least are removed. The rest is
+tested again, since it takes over the load.
 """
 
 from dataclasses import replace
@@ -25,20 +25,20 @@ from ccfem.virtual_testing.strands import Strands, cut_strands
 __all__ = ["fibre_length", "profiles", "prune", "taken_off"]
 
 _STATION = 1.0
-"""Length of path, mm, that is kept or taken off as a whole."""
+"""Length of path, mm, that is kept or removed as a whole."""
 
 _SAME = 1e-9
-"""Distance along a path, mm, within which the middles of two pieces are one."""
+"""Distance along a path, mm, within which the middles of two pieces are the same place."""
 
 _WINDOW = 10
-"""Stations over which the least valuable place of a closed path is looked for."""
+"""Stations over which the value is averaged to find the least valuable place of a closed path."""
 
 _TILT = 1e-6
-"""Share by which the first piece of the first path is worth more than its strain says, others in
-proportion: of equally good pieces the last go first, whatever rounding makes of their values."""
+"""Share by which the value of the first piece of the first path is raised, and of later pieces
+proportionally less. Of equally good pieces the last go first, independent of rounding."""
 
 _ENOUGH = 0.95
-"""Share of the wanted length below which fibre that is worth less than nothing is kept, too."""
+"""Share of the wanted length below which fibre of negative value is kept too."""
 
 
 def prune(
@@ -51,11 +51,11 @@ def prune(
     strength: float = 0.0,
     tight: float = 1.0,
 ) -> Toolpaths:
-    """Take the least valuable fibre off until no more than a wanted length is left.
+    """Remove the least valuable fibre until no more than a wanted length is left.
 
-    Paths are planned too long on purpose and pruned: what goes is the fibre that helps least.
-    Each round tests the part with fibres that carry tension only, and takes off half of the
-    excess, the last one all of it.
+    Paths are planned too long on purpose and pruned, so that the fibre that helps least is removed.
+    Each round tests the part with fibres that carry tension only, and removes half of the excess;
+    the last round removes all of it.
 
     Parameters
     ----------
@@ -66,22 +66,22 @@ def prune(
     length : float, mm
         Largest total length of fibre that remains.
     machine : Machine
-        Every stretch that remains has its minimum length; shorter paths stay or go as a whole.
+        Every remaining stretch has its minimum length; shorter paths stay or go as a whole.
     strand : Strand, optional
         Stiffness of a strand; default rho = EA/E = 4 mm^2.
     rounds : int, default 2
         Virtual tests, at least 1.
     strength : float in [0, 1], default 0
-        How much the load at first failure counts beside the stiffness
+        Weight of the load at first failure against the stiffness
         (`ccfem.fibre_aware.strength_value`).
     tight : float in [0, 1], default 1
-        Largest share of the fibre's length in bends tighter than the machine's radius. Where less
-        is allowed than the paths have, the least valuable bends go, and what that leaves too short.
+        Largest share of the fibre's length in bends tighter than the machine's radius. Where the
+        paths have more, the least valuable bends go, and pieces that are then too short.
 
     Returns
     -------
     Toolpaths
-        The given ones where they are short enough, and not bent too tightly.
+        The given paths where they are short enough and not bent too tightly.
 
     Raises
     ------
@@ -122,9 +122,9 @@ def taken_off(
     machine: Machine,
     tight: float = 1.0,
 ) -> Toolpaths:
-    """Take the fibre of least value off.
+    """Remove the fibre of least value.
 
-    Fibre of negative value goes, too, but no more of it than leaves 95 % of the wanted length.
+    Fibre of negative value is removed too, unless less than 95 % of the wanted length would remain.
 
     Parameters
     ----------
@@ -177,7 +177,7 @@ def profiles(toolpaths: Toolpaths, strands: Strands, value: FloatArray) -> list[
 
 
 def _tilted(along: list[Profile]) -> list[Profile]:
-    """Profiles whose values shrink, all together, by a trifle from the first piece to the last."""
+    """Profiles with values raised by a trifle that falls from the first piece to the last."""
     ends = np.cumsum([0, *(len(one.value) for one in along)])
     shares = np.split(1.0 + _TILT * (1.0 - np.arange(ends[-1]) / max(ends[-1], 1)), ends[1:-1])
     return [replace(one, value=one.value * share) for one, share in zip(along, shares, strict=True)]

@@ -1,9 +1,9 @@
-"""Taking fibre off where it carries least in all of several load cases.
+"""Pruning for several load cases: the fibre that carries least in all of them is removed.
 
-As `ccfem.fibre_aware.prune`: the paths are tested under every case, and what a piece is worth is
-the sum over the cases of ``s_i eps_i^2 / C_i``, the first-order change of the objective. How much a
-case counts, s_i, grows with its compliance over the least that any paths could make of it alone:
-where the worst case matters, with the twentieth power.
+As `ccfem.fibre_aware.prune`, but the paths are tested under every case. The worth of a piece is the
+sum over the cases of ``s_i eps_i^2 / C_i``, the first-order change of the objective. The weight s_i
+of a case grows with its compliance over the least compliance that any paths could reach in it
+alone; where the worst case matters, with the twentieth power of that.
 """
 
 import numpy as np
@@ -31,10 +31,10 @@ def prune_cases(
     strength: float = 0.0,
     tight: float = 1.0,
 ) -> Toolpaths:
-    """Take off the fibre that is least worth in all load cases, until a wanted length is left.
+    """Remove the fibre of least worth in all load cases, until a wanted length is left.
 
-    Each round tests the part under every case, with fibres that carry tension only, and takes off
-    an equal part of the excess.
+    Each round tests the part under every case, with fibres that carry tension only, and removes an
+    equal part of the excess.
 
     Parameters
     ----------
@@ -47,7 +47,7 @@ def prune_cases(
     rounds : int, default 3
         Tests under every case, at least 1.
     strength : float in [0, 1], default 0
-        How much the load at first failure counts, of the case that fails first
+        Weight of the load at first failure, in the case that fails first
         (`ccfem.fibre_aware.strength_value`).
     tight : float in [0, 1], default 1
         Largest share of the fibre's length in bends tighter than the machine's radius, as in
@@ -56,7 +56,7 @@ def prune_cases(
     Returns
     -------
     Toolpaths
-        The given ones where they are short enough, and not bent too tightly.
+        The given paths where they are short enough and not bent too tightly.
 
     Raises
     ------

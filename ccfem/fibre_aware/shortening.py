@@ -1,7 +1,7 @@
-"""Cutting fibre paths to the stretches worth most.
+"""Cutting fibre paths to the stretches that are worth most.
 
-All fibre has one price: of each path those stretches stay that are worth more. Where only so much
-of the fibre may turn more tightly than the machine allows, that has a price of its own.
+All fibre has the same price, and each path keeps the stretches that are worth more. Where only a
+share of the fibre may turn more tightly than the machine allows, such turns have an extra price.
 """
 
 from collections.abc import Sequence
@@ -20,18 +20,18 @@ from ccfem.toolpaths import FIBRE, Toolpaths
 __all__ = ["TIGHT_SHARES", "shorten", "shorten_bent", "tight_share"]
 
 TIGHT_SHARES = {"tight": 1.0, "cut": 0.0095}
-"""Share of the fibre that may turn too tightly, by the parameter `turns` of strategies."""
+"""Share of the fibre that may turn too tightly, for each value of the parameter `turns`."""
 
 _LOWER_PRICES = (0.999, 0.99, 0.97, 0.93, 0.85)
-"""Shares of the price at which room that is left is used: a path may be worth all or nothing."""
+"""Shares of the price at which remaining room is used: a path may be worth all or nothing."""
 
 _PRICES = (1e-3, 300.0)
-"""Least and largest price of a mm that turns too tightly, over the value of the best fibre."""
+"""Range of the extra price of a mm that turns too tightly, over the value of the best fibre."""
 
 _BISECTIONS = 14
 
 _TRIFLE = 1e-6
-"""Value of fibre that carries nothing, over that of the best: it stays where there is room."""
+"""Value of fibre that carries nothing, over that of the best: it stays only where there is room."""
 
 
 def shorten(
@@ -57,9 +57,9 @@ def shorten(
     Returns
     -------
     Toolpaths
-        The price of fibre is the same for all paths, and the smallest that keeps to the length;
-        what room it leaves is used path by path at slightly lower prices, by part of what these
-        would keep where all of it is too long.
+        The price is the same for all paths: the smallest at which the length is not exceeded. The
+        room it leaves is filled path by path with what slightly lower prices would keep, or with a
+        part of that where all of it is too long.
     """
     price = least_price(along, length, minimum, cut_cost)
     chosen = {one.path: one.kept(price, minimum, cut_cost)[0] for one in along}
@@ -86,7 +86,7 @@ def shorten_bent(
 ) -> Toolpaths:
     """As `shorten`, with at most a share of the fibre in bends tighter than the machine's radius.
 
-    A mm of such a bend has a price beside that of fibre, the smallest that keeps to the share.
+    A mm of such a bend has an extra price, the smallest that meets the share.
 
     Parameters
     ----------
@@ -95,7 +95,7 @@ def shorten_bent(
     machine : Machine
         With its minimum length and radius.
     tight : float in [0, 1]
-        Share of the fibre's length; 1 for any.
+        Share of the fibre's length; 1 for no limit.
     """
     least = machine.minimum_length
     if tight >= 1.0:
@@ -129,7 +129,7 @@ def shorten_bent(
 def tight_share(toolpaths: Toolpaths, machine: Machine) -> float:
     """Share of the fibre that turns more tightly than the machine's radius; 0 without fibre.
 
-    Of samples a fibre width apart, as the evaluator takes them.
+    Samples are a fibre width apart, as in the evaluator.
     """
     fibre = toolpaths.of_kind(FIBRE)
     points, offsets, closed = fibre.points, fibre.offsets, fibre.closed
@@ -153,7 +153,7 @@ def _tight_pieces(
         edges = one.origin + one.step * np.arange(len(one.value) + 1)
         size = one.step * len(one.value)
         bent = np.zeros(len(one.value))
-        # A ring's pieces begin anywhere, and a bend may go over its start.
+        # The pieces of a ring may start anywhere, and a bend may extend over its start.
         for start, end in _bends(toolpaths, one.path, machine):
             for round_ in (-size, 0.0, size):
                 last = np.minimum(edges[1:], end + round_)
@@ -163,7 +163,7 @@ def _tight_pieces(
 
 
 def _grown(kept: BoolArray, longer: BoolArray, count: int) -> BoolArray:
-    """Kept pieces (n,), and up to so many of a longer choice that follow on from them."""
+    """Kept pieces (n,), and up to `count` adjoining pieces of a longer choice."""
     grown = kept.copy()
     while count > 0:
         beside = np.concatenate([[False], grown[:-1]]) | np.concatenate([grown[1:], [False]])
@@ -207,7 +207,7 @@ def _cut(toolpaths: Toolpaths, along: Sequence[Profile], chosen: dict[int, BoolA
 def _stretches(
     line: FloatArray, profile: Profile, keep: BoolArray, closed: bool
 ) -> list[FloatArray]:
-    """Kept stretches of a line (n, 7); those on both sides of the seam of a ring are one."""
+    """Kept stretches of a line (n, 7); the two beside the seam of a ring are joined."""
     spans = runs(keep)
     if closed and len(spans) > 1 and keep[0] and keep[-1]:
         spans = np.concatenate([spans[1:-1], [[spans[-1, 0], len(keep) + spans[0, 1]]]])
@@ -216,12 +216,12 @@ def _stretches(
 
 
 def _between(line: FloatArray, start: float, end: float) -> FloatArray:
-    """Part of a line (n, 7) between two arc lengths, which may go on past the end of a ring.
+    """Part of a line (n, 7) between two arc lengths, which may pass the end of a ring.
 
     Columns are the point, its normal, and whether the step to the next point is a link.
     """
     along = along_line(line[:, :3])
-    if end > along[-1] * (1.0 + 1e-12):  # on past the seam, at most once round
+    if end > along[-1] * (1.0 + 1e-12):  # past the seam, at most once round
         line = np.concatenate([line[:-1], line[:-1], line])
         along = np.concatenate([along, along[-1] + along[1:], 2.0 * along[-1] + along[1:]])
     inside = along[(along > start + 1e-9) & (along < end - 1e-9)]

@@ -1,8 +1,8 @@
-"""Strands beside the border slid in until they keep their distance from it.
+"""Strands beside the border, slid inwards until they keep their distance from it.
 
-Where a strand comes too near to the border at a small angle, cutting it takes far more than what is
-too near, and in the places of the highest stress. It is slid in, neighbours give way, and so do the
-links that go round a hole or along an edge.
+If a strand comes too near the border at a small angle, cutting it would remove a long stretch where
+the stress is highest. Instead the strand slides inwards. Its neighbours give way, and so do links
+that go round a hole or along an edge.
 """
 
 from collections.abc import Sequence
@@ -25,20 +25,20 @@ from ccfem.toolpaths import Toolpaths
 __all__ = ["lines_to_slide_in", "slid_in"]
 
 _DEPTH = 0.8
-"""Of the distance from the border: what lies nearer is cut, the rest slides in."""
+"""Share of the distance from the border below which lines are cut; the rest of them slides in."""
 
 _ROUNDS = 2
-"""Slides, each along the normals of where the last one ended."""
+"""Number of slides, each along the normals of the paths after the last one."""
 
 _INNER, _APART = 1.01, 1.004
-"""Distances that strands slide to, over those from the border and of each other: a slide comes only
-near to what is wanted, and steps between points cut corners."""
+"""Factors on the distances that slides aim at: from the border, and between strands. A slide only
+approaches its aim, and the steps between points cut corners."""
 
 
 def lines_to_slide_in(
     lines: Sequence[FloatArray], section: Region, inset: float
 ) -> list[FloatArray]:
-    """Parts of lines that `slid_in` can bring to a distance from the border of a section.
+    """Parts of lines that `slid_in` can bring to a given distance from the border of a section.
 
     Parameters
     ----------
@@ -49,8 +49,8 @@ def lines_to_slide_in(
     Returns
     -------
     list of (n_i, 2) arrays
-        At least 0.8 times the distance off the border. Ends that run onto it are cut at all of it:
-        sideways slides do not take them farther in.
+        Parts at least 0.8 times the distance off the border. Ends that run onto the border are cut
+        at the full distance, since sideways slides do not move them inwards.
     """
     found = []
     for line in keep_off_border(lines, section, _DEPTH * inset):
@@ -63,7 +63,7 @@ def lines_to_slide_in(
 def slid_in(
     paths: Toolpaths, layer: Layer, machine: Machine, inset: float, radius: float = 0.0
 ) -> Toolpaths:
-    """Slide what lies too near to the border in, and strands apart.
+    """Slide paths inwards where they are too near the border, and slide strands apart.
 
     Parameters
     ----------
@@ -74,13 +74,13 @@ def slid_in(
     inset : float
         Least distance from the border, in strand widths.
     radius : float, mm, default 0
-        Least radius that bends are drawn to keep; 0 for any.
+        Least radius that bends are corrected to; 0 for none.
 
     Returns
     -------
     Toolpaths
-        Paths in even steps between corners. Ends that are still too near to the border are cut;
-        elsewhere strands stay too near where there is no room.
+        Paths in even steps between corners. Ends that are still too near the border are cut.
+        Elsewhere strands stay too near where there is no room.
     """
     width = machine.fibre_width
     if not len(paths):
@@ -94,7 +94,7 @@ def slid_in(
 
 
 def _back_inside(paths: Toolpaths, layer: Layer) -> Toolpaths:
-    """Paths with the points that neighbours have pushed over the border back on it."""
+    """Paths with points that neighbours have pushed over the border moved back onto it."""
     section, frame = layer.plane.polygon, layer.plane.frame[:2]
     places = shapely.points(paths.points @ frame.T)
     shapely.prepare(section)
@@ -107,7 +107,7 @@ def _back_inside(paths: Toolpaths, layer: Layer) -> Toolpaths:
 
 
 def _ends_cut(paths: Toolpaths, layer: Layer, inset: float, machine: Machine) -> Toolpaths:
-    """Paths without the ends that are nearer to the border, where they stay long enough."""
+    """Paths without ends that are too near the border, where the rest is long enough."""
     border = shapely.boundary(layer.plane.polygon)
     shapely.prepare(border)
     places = shapely.points(paths.points @ layer.plane.frame[:2].T)

@@ -1,8 +1,8 @@
-"""A part with fibre smeared over its cells, solved without assembling the fibre.
+"""Equilibrium of a part with fibre smeared over its cells, without assembling the fibre.
 
 Fibre of density m (mm of strand per mm^3) along the unit vector t in a cell of volume V adds the
-energy ``EA V m eps^2 / 2``, eps being the strain along t. Fibre lies in the planes of the layers,
-so its stiffness acts on the three strains in the plane only.
+energy ``EA V m eps^2 / 2``, with the strain eps along t. Fibre lies in the planes of the layers, so
+its stiffness acts on the three in-plane strains only.
 """
 
 from collections.abc import Callable, Sequence
@@ -28,10 +28,10 @@ _UPDATES = 40
 """Updates of the displacement after which to give up."""
 
 _PROGRESS = 1e-3
-"""What one solve leaves of the residual: the fibre in tension may be another one after it."""
+"""Factor by which one solve reduces the residual: the set of fibre in tension may then change."""
 
 _DIRECT_UNKNOWNS = 25_000
-"""Largest system that is factorised: solves are then as quick as with multigrid, and turn with the
+"""Largest system that is factorised: solves are then as fast as with multigrid, and rotate with the
 part to the last digits."""
 
 _PACKED = (np.array([0, 0, 0, 1, 1, 2]), np.array([0, 1, 2, 1, 2, 2]))
@@ -50,7 +50,7 @@ class SmearedSolution:
     work : float, N mm
         Twice the strain energy of matrix and fibre: the compliance under forces.
     residual : float
-        Relative, with the fibre that this displacement puts in tension.
+        Relative, for the fibre that is in tension under this displacement.
     iterations : int
         Of conjugate gradients.
     """
@@ -71,7 +71,7 @@ Fibre = Callable[[FloatArray], FloatArray]
 
 @dataclass(frozen=True)
 class SmearedPart:
-    """A part without fibre, ready for any number of solves with fibre smeared over it.
+    """A part without fibre, prepared for any number of solves with smeared fibre.
 
     Attributes
     ----------
@@ -92,7 +92,7 @@ class SmearedPart:
     ) -> "SmearedPart":
         """Part of a solved problem; quadratic cells are replaced by linear ones.
 
-        The field keeps it, so that all who plan on it and bound it share one factorisation.
+        The field stores it, so that planning and bounds on the field share one factorisation.
 
         Parameters
         ----------
@@ -100,7 +100,7 @@ class SmearedPart:
         frame : (3, 3) array
         backend : str, optional
             Preconditioner; default "superlu" for small systems, else "amg". Both are always
-            installed: paths do not depend on what else is.
+            installed, so that paths do not depend on optional packages.
         """
         if backend is None:
             backend = _backend(stress)
@@ -141,7 +141,7 @@ class SmearedPart:
         return self.specimen.forced
 
     def ratio(self, work: float) -> float:
-        """Stiffness over that of the part without fibre, where the load does so much work."""
+        """Stiffness over that of the part without fibre, if the load does this work."""
         before = self.unreinforced.work
         return before / work if self.forced else work / before
 
@@ -150,7 +150,7 @@ class SmearedPart:
         return self.unreinforced.work / self.ratio(work)
 
     def pull(self, solution: SmearedSolution) -> tuple[float, float]:
-        """Return what proves most of the compliance C, by ``C >= 2 w - e`` for a displacement.
+        """Return the factor and work that give the best bound ``C >= 2 w - e`` for a displacement.
 
         Returns
         -------
@@ -203,9 +203,9 @@ class SmearedPart:
     ) -> SmearedSolution:
         """Find the equilibrium with fibre whose stiffness may depend on the strain.
 
-        Newton's method on the convex energy: the fibre at the last strains is taken, and the
-        residual solved for by conjugate gradients, until the residual with the fibre at the new
-        strains meets the tolerance.
+        Newton's method on the convex energy: with the fibre at the last strains, conjugate
+        gradients reduce the residual, until the residual with the fibre at the new strains meets
+        the tolerance.
 
         Parameters
         ----------
@@ -225,7 +225,7 @@ class SmearedPart:
         begin = self.unreinforced if start is None else start
         u, strain = begin.displacement, begin.strain
         matrix, solver = specimen.matrix, specimen.solver
-        # Of the load, also where it is a moving support: the force that holds the part back.
+        # Size of the load. Where a support moves, it is the force that holds the part back.
         size = self._load_size
         iterations, residual = 0, np.inf
         for _ in range(_UPDATES):
@@ -252,7 +252,7 @@ class SmearedPart:
     ) -> FloatArray:
         """Strains (m, 3) under forces (n, 3), N, of the part with fibre of a stiffness (m, 3, 3).
 
-        Supports stay where they are: this is the adjoint solve, to a relative residual.
+        This is the adjoint solve, with supports at rest, to a relative residual `tolerance`.
         """
         operator = _Operator(self, self.pack(stiffness))
         held, solver = self.specimen.held, self.specimen.solver
@@ -268,7 +268,7 @@ class SmearedPart:
 
 @dataclass(frozen=True)
 class _Operator:
-    """Stiffness of part and fibre on the components that can move: only ``@`` is needed."""
+    """Stiffness of part and fibre on the free components, applied by ``@`` only."""
 
     part: SmearedPart
     packed: FloatArray
@@ -314,7 +314,7 @@ def _key(backend: str, frame: FloatArray) -> tuple[str, bytes]:
 
 
 def on_linear_cells(stress: StressField, backend: str = "auto") -> StressField:
-    """Solution of the same problem on linear cells; the given one where its cells are linear."""
+    """Solution of the same problem on linear cells; the given one if its cells are linear."""
     problem = stress.problem
     mesh = problem.mesh
     if mesh.order == 1:
@@ -326,7 +326,7 @@ def on_linear_cells(stress: StressField, backend: str = "auto") -> StressField:
     return solve(on_corners, backend)[case]
 
 
-# One loop each, without slices: these would double the time.
+# One loop each, without slices, which would double the time.
 @njit(cache=True)
 def _strains(cells, slopes, plane, result):  # type: ignore[no-untyped-def]  # pragma: no cover
     """Strain e11, e22 and twice e12 in the plane of each cell."""

@@ -54,14 +54,14 @@ class SplineGrid:
 
     @cached_property
     def _number(self) -> tuple[IntArray, IntArray]:
-        """Smallest (i, j), and a table from (i, j) to the coefficient, -1 where there is none."""
+        """Smallest (i, j), and a table from (i, j) to the coefficient; -1 where there is none."""
         low = self.used.min(axis=0)
         table = np.full(np.ptp(self.used, axis=0) + 1, -1, dtype=np.int64)
         table[tuple((self.used - low).T)] = np.arange(len(self.used))
         return low, table
 
     def covers(self, points: FloatArray) -> BoolArray:
-        """Whether all splines that reach each of the points (n, 2) have a coefficient, (n,)."""
+        """Whether all splines that reach a point have a coefficient, for points (n, 2): (n,)."""
         low, table = self._number
         square = np.floor((points - self.centre) @ self.axes.T / self.size).astype(np.int64) - low
         padded = np.pad(table, 2, constant_values=-1)
@@ -80,7 +80,7 @@ class SplineGrid:
         return (a * along + b * across).tocsr(), (c * along + d * across).tocsr()
 
     def derivatives(self, points: FloatArray) -> tuple[Any, ...]:
-        """Matrices (n, k) to the first two and the second three derivatives at points (n, 2).
+        """Matrices (n, k) to the two first and three second derivatives at points (n, 2).
 
         Along the sides of the squares: x, y in 1/mm, then xx, xy and yy in 1/mm^2; xx and yy jump
         at the lines of the grid.

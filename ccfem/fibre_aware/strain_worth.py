@@ -1,4 +1,4 @@
-"""What fibre is worth by its strain."""
+"""Worth of fibre as a function of its strain."""
 
 from dataclasses import dataclass
 
@@ -12,12 +12,12 @@ __all__ = ["StrainWorth"]
 
 @dataclass(frozen=True)
 class StrainWorth:
-    """What a mm of stretched fibre is worth by its strain e under one load case.
+    """Worth of a mm of stretched fibre by its strain e under one load case.
 
-    ``squared e^2 + mixed e a - peak (e / most)^16``, a being its strain in an adjoint displacement:
-    for the stiffness the first term alone; for the load at first failure also what it takes off the
-    places that fail first, and how near to failure it is itself. Fibre that is not stretched is
-    worth nothing.
+    It is ``squared e^2 + mixed e a - peak (e / most)^16``, where a is the strain in an adjoint
+    displacement. The first term is the worth for the stiffness. For the load at first failure, the
+    second says how far the fibre relieves the places that fail first, and the third how near to
+    failure it is itself. Fibre that is not stretched is worth nothing.
 
     Attributes
     ----------
@@ -25,7 +25,7 @@ class StrainWorth:
     displacement : (n, 3) array, mm
     mixed : float
     adjoint : (n, 3) array, mm, optional
-        None where nothing but the squared strain counts.
+        None where only the squared strain counts.
     peak : float
     most : float
         The largest strain of the fibre.

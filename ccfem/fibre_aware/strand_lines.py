@@ -24,36 +24,36 @@ from ccfem.toolpaths import Toolpaths
 __all__ = ["StrandLines", "strand_lines"]
 
 _STEP = 0.6
-"""Distance of the points, in strand widths."""
+"""Distance between points, in strand widths."""
 
 _CORNER = 0.3
-"""Angle, radians, from which on a turn is a corner, whose point stays one."""
+"""Turn, radians, above which a point is a corner and is kept as one."""
 
 _SAME = 1e-6
-"""Distance, in widths, up to which neighbouring points are one."""
+"""Distance, in widths, up to which neighbouring points are the same."""
 
 _TIGHT = 1.1
-"""Bends tighter than that many of the machine's least radii stay as they are, and so do what lies
+"""Bends tighter than this many minimum radii of the machine do not move, and neither do points
 within two widths of them: a turn that is squeezed gets tighter still."""
 
 _BESIDE = 2.0
 
 _SMALL_RING = 1.1
-"""Rings shorter than that many of the machine's least lengths stay: they have no ends that could be
-drawn out."""
+"""Rings shorter than this many minimum lengths of the machine do not move: they have no ends that
+could be extended."""
 
 _STRETCH, _BEND = 20.0, 200.0
-"""Weights of the squares of first and second differences from point to point."""
+"""Weights of the squared first and second differences between points."""
 
 _HELD = 1e9
-"""Weight of points that stay."""
+"""Weight of points that do not move."""
 
 
 @dataclass(frozen=True)
 class StrandLines:
-    """Points of fibre paths, which slide along the normals that the paths have to begin with.
+    """Points of fibre paths, which slide along the initial normals of the paths.
 
-    Lines that are known by a smooth slide neither fold nor run along themselves.
+    Smooth slides neither fold lines nor make them overlap themselves.
 
     Attributes
     ----------
@@ -70,10 +70,10 @@ class StrandLines:
     arc : (P,) array, mm
         Arc length of the path at each point, before it slides.
     fixed : (P,) bool array
-        Points that stay: of tight bends, of links that are marked, of rings hardly longer than the
-        machine's least length, and where a ring closes.
+        Points that do not move: of tight bends, of marked links, of rings hardly longer than the
+        machine's minimum length, and where a ring closes.
     least : (K,) array, mm
-        Length below which no slide makes a path: the machine's least one, or its own.
+        Length that slides do not reduce a path below: the machine's minimum, or its own if shorter.
     """
 
     toolpaths: Toolpaths
@@ -110,7 +110,7 @@ class StrandLines:
     def roughness(self) -> Any:
         """Matrix (P, P) of ``sum of v^2 + 20 (v')^2 + 200 (v'')^2``, by differences along paths.
 
-        Points that stay are held.
+        Fixed points are held.
         """
         first = self._differences((-1.0, 1.0))
         second = self._differences((1.0, -2.0, 1.0))
@@ -137,7 +137,7 @@ class StrandLines:
         return replace(self.toolpaths, points=self.toolpaths.points + off)
 
     def _drawn_out(self, points: FloatArray) -> FloatArray:
-        """Points (P, 2) with the ends of paths that are too short to be cut drawn out straight."""
+        """Points (P, 2), with the ends of paths that are too short extended straight."""
         step = np.linalg.norm(np.diff(points, axis=0), axis=1) * (self.path[1:] == self.path[:-1])
         length = np.bincount(self.path[1:], step, len(self.toolpaths))
         missing = self.least - length
@@ -165,8 +165,8 @@ def strand_lines(
     machine : Machine
         With its fibre width, least radius and least length.
     hold : bool, default True
-        Whether tight bends, links that are marked and small rings stay. Where a ring closes it
-        always stays.
+        Whether tight bends, marked links and small rings stay fixed. The point where a ring closes
+        always does.
     """
     fibre = fibre.select(fibre.lengths > _SAME * machine.fibre_width)
     frame, paths = layers[0].plane.frame, _in_even_steps(fibre, machine.fibre_width)
@@ -225,7 +225,7 @@ def _in_even_steps(paths: Toolpaths, width: float) -> Toolpaths:
 
 
 def _normals(points: FloatArray, offsets: IntArray, path: IntArray) -> FloatArray:
-    """Find unit vectors (P, 2) across polylines, to the left of neighbour to neighbour."""
+    """Find unit normals (P, 2) of polylines, to the left of the line between both neighbours."""
     number = np.arange(len(points))
     before = np.maximum(number - 1, offsets[:-1][path])
     after = np.minimum(number + 1, offsets[1:][path] - 1)
@@ -241,7 +241,7 @@ def _bent(line: FloatArray, closed: bool, machine: Machine) -> BoolArray:
     for start, end in tight_bends(line, along, closed, _TIGHT * machine.minimum_radius, width):
         low, high = start - _BESIDE * width, end + _BESIDE * width
         bent |= (along >= low) & (along <= high)
-        if closed:  # a bend may go over the start, from either side
+        if closed:  # a bend may extend over the start, from either side
             bent |= (along + along[-1] >= low) & (along + along[-1] <= high)
             bent |= (along - along[-1] >= low) & (along - along[-1] <= high)
     return bent

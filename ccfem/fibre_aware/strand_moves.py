@@ -1,9 +1,9 @@
-"""Strands moved sideways to where they make the part stiffer.
+"""Strands moved sideways to where they make the part better.
 
-The stiffness that a strand lends grows where it slides to fibre that is stretched more, and the
-strain of one virtual test says which way that is; with the load at first failure an adjoint solve
-does. A step along that slope is spread until strands keep their distances again, and tested: only
-what makes the part better stays.
+The stiffness that a strand adds grows where it slides towards more stretched fibre. The strain of
+one virtual test says in which direction that is; for the load at first failure an adjoint solve
+does. A step in this direction is corrected until strands keep their distances again, and is tested.
+Only steps that make the part better are kept.
 """
 
 from collections.abc import Sequence
@@ -27,22 +27,22 @@ from ccfem.toolpaths import FIBRE, Toolpaths
 __all__ = ["kept_radius", "moved"]
 
 _STEP = 0.2
-"""First step, in widths: 95 % of the points move by no more, and none by more than twice that."""
+"""First step, in widths: 95 % of the points move by at most this, and none by more than twice."""
 
 _FALL = 0.4
-"""Share of the step that is tried after one that did not help."""
+"""Factor on the step after one that did not help."""
 
 _SMALLEST = 0.01
-"""Step, in widths, below which it is left at that."""
+"""Step, in widths, below which the search ends."""
 
 _BETTER = 1e-6
-"""Share by which a step has to help."""
+"""Share by which a step has to improve the value."""
 
 _CHEAPEST = 0.1
-"""Share of the fibre, that of the least strain, whose squared strain is the price of length."""
+"""Share of the fibre, that of least strain, whose largest squared strain is the price of length."""
 
 _KEPT = 1.15
-"""Radius of bends after slides, over the machine's least: slides come only near to it."""
+"""Radius of bends that slides aim at, over the machine's minimum: they only approach it."""
 
 
 def moved(
@@ -57,9 +57,9 @@ def moved(
 ) -> Toolpaths:
     """Move fibre sideways, step by step, as long as a test says that it helps.
 
-    Strands keep a width from each other, or what they had of it, and the machine's least length.
-    Tight bends, what lies within two widths of them, and links that are marked stay where they are,
-    and so do paths of other kinds.
+    Strands keep a width from each other, or their initial distance if that is less, and the
+    machine's minimum length. Tight bends, points within two widths of them, marked links and paths
+    of other kinds do not move.
 
     Parameters
     ----------
@@ -73,16 +73,16 @@ def moved(
     judge : callable
         Tests toolpaths: one of `ccfem.fibre_aware.judges` or `ccfem.fibre_aware.cases_judges`.
     moves : int
-        Steps that are tested, at least 0.
+        Number of steps that are tested, at least 0.
     inset : float, default 0.5
-        Least distance from the border, in widths; what is nearer to begin with comes no nearer.
+        Least distance from the border, in widths. Strands that start nearer come no nearer.
     radius : float, mm, default 0
-        Least radius that bends are drawn to keep; 0 for any.
+        Least radius that bends are corrected to; 0 for none.
 
     Returns
     -------
     Toolpaths
-        The given ones where no step helped. Lengths change by some tenths of a per cent.
+        The given paths if no step helped. Lengths change by some tenths of a per cent.
 
     Raises
     ------
@@ -120,7 +120,7 @@ def moved(
 
 
 def kept_radius(machine: Machine, tight: float) -> float:
-    """Radius, mm, that slides keep where only a share of the fibre may turn too tightly."""
+    """Radius, mm, that slides keep where only a share of the fibre may turn too tightly, else 0."""
     return _KEPT * machine.minimum_radius if tight < 1.0 else 0.0
 
 
@@ -131,7 +131,7 @@ def _direction(
     judged: Judged,
     smooth: Any,
 ) -> FloatArray:
-    """Direction (P,) of slides that ascends the worth of the fibre less the price of its length.
+    """Direction (P,) of slides that increases the worth of fibre less the price of its length.
 
     95 % of the points move by at most 1, and none by more than 2.
     """

@@ -1,9 +1,9 @@
-"""Where the strain pulls strands: what stretched fibre is worth, and its gradient by their points.
+"""Sensitivity of the worth of strands to their position: the direction in which to slide them.
 
-Sliding a piece of fibre with the strain held makes the part stiffer, to first order, by what the
-energy of that piece grows; where the load at first failure counts, too, what it is worth for both
-grows (`StrainWorth`). The strain of linear cells jumps from cell to cell and has no slope in
-them; it is averaged at the corners of the cells and linear between them.
+Sliding a piece of fibre in a fixed strain field makes the part stiffer, to first order, by the
+increase of the energy of that piece. Where the load at first failure counts too, the worth for both
+replaces the energy (`StrainWorth`). The strain of linear cells jumps between cells and has no
+gradient inside them. It is therefore averaged at the corners of the cells and linear in between.
 """
 
 from collections.abc import Sequence
@@ -25,7 +25,7 @@ from ccfem.virtual_testing.near_failure import POWER
 __all__ = ["PlaneStrain", "fibre_energy", "plane_strain"]
 
 _REACH = 1.0
-"""Distance outside the mesh, mm, up to which the strain goes on as in the nearest cell."""
+"""Distance outside the mesh, mm, up to which the strain of the nearest cell is continued."""
 
 
 @dataclass(frozen=True)
@@ -38,12 +38,12 @@ class PlaneStrain:
     frame : (3, 3) array
         Axes of the layers: two in their planes, and the normal.
     values : (cases, n, 3) array
-        At the nodes, e11, e22 and e12 in the plane, times the square root of what it is worth
-        squared. Zero at nodes that are no corner of a cell.
+        At the nodes, e11, e22 and e12 in the plane, times the square root of the worth of a squared
+        strain. Zero at nodes that are no corner of a cell.
     pairs : (k, 2, n, 3) array
-        The same, as it is and of the adjoint displacement, of cases where strength counts.
+        Strains of the displacement and of the adjoint displacement, for cases with strength.
     terms : (k, 3) array
-        Their `StrainWorth.mixed`, `peak` and `most`.
+        `StrainWorth.mixed`, `peak` and `most` of these cases.
     slopes : (m, 4, 2) array, 1/mm
         Gradients of the barycentric coordinates of each cell in the plane.
     """
@@ -96,11 +96,11 @@ def plane_strain(mesh: TetMesh, worths: Sequence[StrainWorth], frame: FloatArray
 def fibre_energy(
     points: FloatArray, heights: FloatArray, offsets: IntArray, strain: PlaneStrain
 ) -> tuple[FloatArray, FloatArray, FloatArray]:
-    """Energy in the stretched segments of polylines, and how it changes with their points.
+    """Energy of the stretched segments of polylines, and its gradient by their points.
 
-    A segment d has the energy ``max(d . eps d, 0)^2 / |d|^3``, eps being the strain at its middle:
-    its length times the square of the strain along it. All load cases add. Where strength counts it
-    is the length times `StrainWorth.value`.
+    A segment d has the energy ``max(d . eps d, 0)^2 / |d|^3`` with the strain eps at its middle:
+    its length times the square of the strain along it. The energies of all load cases add up. Where
+    strength counts, the energy is the length times `StrainWorth.value`.
 
     Parameters
     ----------
@@ -180,7 +180,7 @@ def _strength(points, first, cell, weights, corners, slopes, pairs, terms, power
             continue
         square = size * size
         for k in range(len(pairs)):
-            # Strain along the segment, its slopes with the place and with the segment: of both.
+            # Strain along the segment, and its derivatives by place and by segment, for both.
             strain, px, py, tx, ty = np.zeros(2), np.zeros(2), np.zeros(2), np.zeros(2), np.zeros(2)
             for j in range(2):
                 e1, e2, e12 = 0.0, 0.0, 0.0

@@ -1,8 +1,8 @@
-"""Strands spread until they keep their distances, from each other and the border, and a radius.
+"""Strands moved apart until they keep a distance from each other and the border, and a radius.
 
-Of all smooth slides the least one is looked for that undoes what is too near. That is a sparse
-least-squares problem, solved again with what is too near then, so that a whole pack of strands
-gives way at once.
+The smallest smooth slides that remove all violations are found. This is a sparse least-squares
+problem, which is solved again for the violations that remain, so that a whole pack of strands gives
+way at once.
 """
 
 from collections.abc import Sequence
@@ -24,41 +24,41 @@ from ccfem.layers.layer import Layer
 __all__ = ["Spacing", "spacing"]
 
 _REACH = 2.0
-"""Distance, in widths, within which points are looked at."""
+"""Distance, in widths, within which points are compared."""
 
 _OWN = 5.0
-"""Arc length, in widths, from which on a strand keeps its distance from itself."""
+"""Arc length, in widths, beyond which a strand keeps its distance from itself."""
 
 _STIFF = 300.0
-"""What a missing distance counts against a slide of the same size."""
+"""Weight of a missing distance against a slide of the same size."""
 
 _STRAIGHT = 1000.0
-"""What a bend that is too tight counts: how far its middle lies off, over a slide of that size."""
+"""Weight of a bend that is too tight, by the offset of its middle, against a slide of that size."""
 
 _CHORD = 2
-"""Points from one end of a bend to its middle."""
+"""Number of points from an end of a bend to its middle."""
 
 _SHARPEST = 0.6
-"""Turn of a corner, radians, which no slide makes round."""
+"""Turn, radians, above which a bend is a corner, which no slide rounds off."""
 
 _ROUNDS = 5
-"""Times that what is too near is looked for."""
+"""Number of times that violations are searched for."""
 
 _NARROW = 2e9
-"""Multiplications up to which a band is eliminated as it is, and not by minimum degree."""
+"""Multiplications up to which a band is eliminated directly, not in minimum-degree order."""
 
 _FACING = 0.35
-"""Cosine of the largest angle between a strand's normal and that of the border at which points
-slide off the border; ends that run onto it do not."""
+"""Least cosine of the angle between the normals of strand and border at which points slide off the
+border. Ends that run onto the border do not slide."""
 
 _BORDER_STEP = 0.5
 """Longest piece of the border, in widths."""
 
 _NEAREST = 3
-"""Pieces of the border that are looked at for a point."""
+"""Nearest pieces of the border that are checked for a point."""
 
 _FAR = 1e6
-"""Distance, mm, of layers in the search for what is near."""
+"""Distance, mm, put between layers in the search for near points."""
 
 
 @dataclass(frozen=True)
@@ -69,9 +69,9 @@ class Spacing:
     ----------
     lines : StrandLines
     width : float, mm
-        That strands are apart.
+        Distance that strands keep from each other.
     inset : (P,) array, mm
-        Least depth of each point in the section; below 0 outside.
+        Least depth of each point inside the section; negative outside.
     border : (b, 2, 2) array, mm
         Pieces of the borders of all layers, the section on their left.
     inward : (b, 3, 2) array
@@ -81,7 +81,7 @@ class Spacing:
     roughness : csc_array (P, P)
         What slides cost (`StrandLines.roughness`).
     radius : float, mm
-        Of the tightest bends that stay as they are; 0 where all do.
+        Radius of the tightest bends that are left as they are; 0 leaves all.
     """
 
     lines: StrandLines
@@ -99,7 +99,7 @@ class Spacing:
         freeze(self, inset=float, border=float, inward=float)
 
     def spread(self, slide: FloatArray) -> FloatArray:
-        """Slides (P,), mm, near to given ones after which strands keep their distances."""
+        """Slides (P,), mm, close to the given ones, after which strands keep their distances."""
         lines, count = self.lines, len(self.lines.path)
         points = lines.points(slide)
         pairs = self._pairs(points)
@@ -124,7 +124,7 @@ class Spacing:
         return slide
 
     def _pairs(self, points: FloatArray) -> IntArray:
-        """Points and first points of segments (n, 2) that may come too near to each other."""
+        """Pairs (n, 2): points, and first points of segments that may come too near to them."""
         lines, width = self.lines, self.width
         paths, reach = lines.toolpaths, _REACH * width
         low = points.min(axis=0)
@@ -170,14 +170,14 @@ def spacing(
     layers : sequence of Layer
         All on which there are strands.
     width : float, mm
-        That strands are apart.
+        Distance that strands keep from each other.
     inset : float, mm
-        Least distance from the border. What lies nearer to begin with comes no nearer.
+        Least distance from the border. Points that start nearer come no nearer.
     come_in : bool, default False
-        Whether that has to keep the distance, too.
+        Whether such points have to come in to the full distance.
     radius : float, mm, default 0
-        Least radius that bends are drawn to keep; 0 for any. Corners stay: no small slide makes
-        them round.
+        Least radius that bends are corrected to; 0 for none. Corners stay: no small slide rounds
+        them off.
     """
     pieces, inward, owner = [], [], []
     for layer in layers:
@@ -247,7 +247,7 @@ def _near(points, place, layer, path, arc, whole, reach, own, heads, following, 
 
 @njit(cache=True)
 def _too_near(points, normals, pairs, least):  # type: ignore[no-untyped-def]  # pragma: no cover
-    """Points and segments that are too near: which slide, how that parts them, and what misses."""
+    """Pairs that are too near: their points, how slides part them, and how much is missing."""
     count = 0
     for write in range(2):
         if write:
@@ -277,7 +277,7 @@ def _too_near(points, normals, pairs, least):  # type: ignore[no-untyped-def]  #
 
 @njit(cache=True)
 def _from_border(x, y, near, border, inward):  # type: ignore[no-untyped-def]  # pragma: no cover
-    """Signed depth of a place in the section, and the unit vector that leads farther in."""
+    """Signed depth of a point in the section, and the unit vector that leads farther in."""
     best, gx, gy, nx, ny = np.inf, 0.0, 0.0, 0.0, 0.0
     for b in near:
         ex, ey = border[b, 1, 0] - border[b, 0, 0], border[b, 1, 1] - border[b, 0, 1]
@@ -306,7 +306,7 @@ def _depths(points, near, border, inward):  # type: ignore[no-untyped-def]  # pr
 
 @njit(cache=True)
 def _outside(points, near, border, inward, inset, normals):  # type: ignore[no-untyped-def]  # pragma: no cover
-    """How far in a slide leads, and how much farther in points should be; 0 where they are in."""
+    """How far in a unit slide leads, and how much farther in points should be; 0 if they are in."""
     off, missing = np.zeros(len(points)), np.zeros(len(points))
     for p in range(len(points)):
         depth, x, y = _from_border(points[p, 0], points[p, 1], near[p], border, inward)
@@ -318,7 +318,7 @@ def _outside(points, near, border, inward, inset, normals):  # type: ignore[no-u
 
 @njit(cache=True)
 def _too_bent(points, normals, path, radius):  # type: ignore[no-untyped-def]  # pragma: no cover
-    """Three points of bends that are too tight: what slides do to them, and how much is missing."""
+    """Bends that are too tight: their three points, the effect of slides, and what is missing."""
     count = 0
     for write in range(2):
         if write:

@@ -1,9 +1,9 @@
 """Design of a stream function: a scalar field whose isocurves make the part stiff.
 
-The unknown is the field itself. Its gradient g says everything about the fibre laid along unit
-levels: it runs across g, and there are |g| strands a mm, so that a layer of thickness h carries
-``|g| / h`` mm of fibre in a mm^3. One solve gives the compliance of the part with that fibre in it
-and the gradient of the compliance; L-BFGS does the rest.
+The unknown is the field itself. Its gradient g determines the fibre laid along its unit levels: the
+fibre runs normal to g with |g| strands a mm, so that a layer of thickness h holds ``|g| / h`` mm of
+fibre in a mm^3. One solve gives the compliance of the part with that fibre and its gradient; L-BFGS
+minimises it.
 """
 
 from dataclasses import dataclass
@@ -41,19 +41,19 @@ _BENDS = 1.0
 """Weights of the four penalties."""
 
 _SMALLEST = 0.02
-"""Strands a width below which |g| is rounded off, so that it has a gradient everywhere."""
+"""Strands a width below which |g| is rounded off, so that it is differentiable everywhere."""
 
 SLACK = 1e-3
-"""Share of their stiffness that shortened fibres keep."""
+"""Share of their stiffness that fibres in compression keep."""
 
 _SPREAD = 0.1
-"""Share of the fibre's energy that the curvature of the objective spreads evenly over the part."""
+"""Share of the fibre's energy that the curvature of the objective assumes evenly over the part."""
 
 _LEAST_ENERGY = 1e-6
-"""Least energy of the fibre for that, as a share of all: a field may lay none that is stretched."""
+"""Least energy of the fibre in that, as a share of all: a field may lay no stretched fibre."""
 
 _BENT, _HELD = 0.02, 1e-6
-"""What the curvature holds against bends of the field, and its constant, in its mean diagonal."""
+"""Terms of the curvature against bends of the field and its constant, over its mean diagonal."""
 
 
 @dataclass(frozen=True)
@@ -90,7 +90,7 @@ class Laid:
     size : (m,) array
         Its size, rounded off at zero.
     along : (m, 3) array
-        What takes strains 11, 22 and 12 in the plane to that along the fibre, times ``|g|^2``.
+        Maps strains 11, 22 and 12 in the plane to the strain along the fibre, times ``|g|^2``.
     outer : (m, 3, 3) array, MPa
         Stiffness of the fibre.
     """
@@ -102,14 +102,14 @@ class Laid:
     outer: FloatArray
 
     def stiffness(self, strain: FloatArray) -> FloatArray:
-        """Stiffness (m, 3, 3), MPa, at strains (m, 3): next to none of shortened fibre."""
+        """Stiffness (m, 3, 3), MPa, at strains (m, 3): next to none for fibre in compression."""
         stretched = np.einsum("ci,ci->c", self.along, strain) > 0.0
         return np.where(stretched, 1.0, SLACK)[:, None, None] * self.outer
 
 
 @dataclass(frozen=True)
 class StreamProblem:
-    """What a stream function is designed for.
+    """Objective that a stream function is designed for.
 
     Minimised is ``-log(stiffness) + 20 max(length / budget - 1, 0)^2 + 100 mean(max(|g| - 0.975,
     0)^2) + 0.001 mean((Laplacian s)^2)``, g in strands a width, means over the part and over the
@@ -133,7 +133,7 @@ class StreamProblem:
     budget : float, mm
         Length of fibre in the whole part.
     radius : float, mm, default 0
-        Bends of levels that are tighter have a cost; 0 for none.
+        Levels that bend more tightly have a cost; 0 for none.
     """
 
     part: SmearedPart
@@ -176,7 +176,7 @@ class StreamProblem:
 
     @cached_property
     def bends(self) -> FieldBends | None:
-        """Cost of bends, where they have one."""
+        """Cost of bends, if there is one."""
         if not self.radius:
             return None
         found = (self.of_group(one, self.group) for one in self.grid.derivatives(self.centres))
@@ -222,7 +222,7 @@ class StreamProblem:
     def gradient(
         self, field: FloatArray, laid: Laid, pull: tuple[FloatArray, FloatArray], over: float
     ) -> FloatArray:
-        """Gradient (c,) by the coefficients, penalties included.
+        """Gradient (c,) by the coefficients, with penalties.
 
         Parameters
         ----------
@@ -230,7 +230,7 @@ class StreamProblem:
         laid : Laid
             Its fibre.
         pull : two (m,) arrays
-            Derivatives by the components of g of all that are no penalties.
+            Derivatives of all terms but the penalties by the components of g.
         over : float
             Share of the budget by which the length exceeds it.
         """
@@ -245,11 +245,11 @@ class StreamProblem:
         return np.asarray(gradient)
 
     def curvature(self, field: FloatArray, solution: SmearedSolution) -> Any:
-        """Positive definite matrix (c, c) that is about the second derivative of the objective.
+        """Positive definite matrix (c, c) that approximates the second derivative of the objective.
 
-        The energy of stretched fibre, of degree one in the slope of its field, changes with a turn
-        of that by ``energy / |g|^2``. A tenth of it is taken to be spread evenly over the part.
-        Where strands are too dense, the penalty of that counts across them.
+        The energy of stretched fibre is of degree one in the gradient of its field; rotating the
+        gradient changes it by ``energy / |g|^2``. A tenth of the energy is assumed evenly over the
+        part. Where strands are too dense, that penalty counts across them.
         """
         laid = self.laid(field)
         stretch = np.maximum(np.einsum("ci,ci->c", laid.along, solution.strain), 0.0)
@@ -264,11 +264,11 @@ class StreamProblem:
         return even + size * (_BENT * square + _HELD * sp.eye_array(len(field)))
 
     def levels(self, field: FloatArray, solution: SmearedSolution) -> BorderLevels:
-        """Weigh what levels of a field (c,) cost that keep farther from borders than they need."""
+        """Cost of levels of a field (c,) that lie farther from the border than they need to."""
         return BorderLevels.of(self, field, solution)
 
     def signed(self, field: FloatArray, group: int) -> FloatArray:
-        """Coefficients (k,) of one group, with the sign that does not depend on the axes."""
+        """Coefficients (k,) of one group, with a sign that does not depend on the axes."""
         count = len(self.grid)
         field = field[group * count : (group + 1) * count]
         inside = self.group == group

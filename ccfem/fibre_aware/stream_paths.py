@@ -1,4 +1,4 @@
-"""Paths along the levels of designed fields, the stretches worth most kept."""
+"""Paths along the levels of designed fields, of which the stretches worth most are kept."""
 
 from collections.abc import Sequence
 from dataclasses import dataclass
@@ -26,31 +26,31 @@ from ccfem.virtual_testing.strands import cut_strands
 __all__ = ["CLEARANCE", "SHORTEST", "Extraction", "middle", "refined"]
 
 CLEARANCE = 0.95
-"""Least distance of strands in widths before they are linked: they are designed to be 1 / 0.975
-apart, what is cut for some hundredths of a width would be lost, and they slide apart then."""
+"""Least distance between strands before linking, in widths. They are designed 1 / 0.975 apart and
+slide apart later: what a cut for some hundredths of a width removes would be lost."""
 
 SHORTEST = 5.0
-"""Length, in strand widths, of the shortest pieces that are kept for linking."""
+"""Length, in strand widths, of the shortest pieces kept for linking."""
 
 _CUT_COST = 20.0
-"""Length, mm, of the least valuable fibre that another cut has to save."""
+"""Length, mm, of the least valuable fibre that another cut has to save to be made."""
 
 _NEAR = 0.06
-"""Share by which the value of levels may lie below the most for them to be tried as well."""
+"""Share below the largest value up to which other positions of the levels are tried as well."""
 
 _REACHES = (0.5, 1.0)
-"""Shares of the longest link up to which those worth most are looked for."""
+"""Shares of the longest link up to which the links worth most are searched for."""
 
 _BETTER = 0.003
-"""Share by which paths with such links have to be worth more for them to be tried."""
+"""Share by which paths with such links have to be worth more to be tried."""
 
 _SAME = 0.5
-"""Distance, in strand widths, up to which the borders of two sections count as the same: the levels
-that are best for one layer are then taken for the other."""
+"""Distance, in strand widths, up to which the borders of two sections count as the same. The levels
+that are best for one layer are then used for the other."""
 
 
 def middle(numbers: IntArray) -> int:
-    """Return the middle one of some numbers."""
+    """Return the middle one of the numbers."""
     return int(numbers[len(numbers) // 2])
 
 
@@ -66,16 +66,16 @@ class Extraction:
     mesh : TetMesh
         Of linear cells.
     strains_of : sequence of (float, (n, 3) array)
-        What a squared strain is worth, and the displacement, mm, that strains the paths; one for
+        Worth of a squared strain, and the displacement, mm, that strains the paths; one pair for
         each load case.
     machine : Machine
     phases : int
-        Positions of the levels of which the best is taken, for all layers of the same section; one
-        is at whole numbers of the field.
+        Number of positions of the levels that are tried; layers of the same section share the best.
+        One position is at whole numbers of the field.
     inset, link_limit : float
-        Least distance from the boundary, and of ends that are linked, in strand widths.
+        Least distance from the boundary, and largest distance of linked ends, in strand widths.
     radius : float, mm, default 0
-        Least radius that bends are drawn to keep; 0 for any.
+        Least radius that bends are corrected to; 0 for none.
     """
 
     fields: tuple[FloatArray, ...]
@@ -91,12 +91,12 @@ class Extraction:
     def candidates(
         self, layers: Sequence[Layer], group: IntArray, lengths: Sequence[float]
     ) -> list[list[Toolpaths]]:
-        """Paths of all layers, uncut, at the levels that may be the best for each length.
+        """Paths of all layers, uncut, at those positions of the levels that may be best.
 
-        The strains of the design say only about which levels are worth most. Where others are
-        worth hardly less, or whole numbers, which were drawn to the border, are not the best, those
-        are given, too; and the best once more with the links that are worth most, where these paths
-        are worth more.
+        The strains of the design say only roughly which positions are worth most. Others are given
+        too if they are worth hardly less, and so are whole numbers, which were drawn to the border.
+        The best position is given once more with the links that are worth most, if these paths are
+        worth more.
 
         Parameters
         ----------
@@ -109,7 +109,7 @@ class Extraction:
         Returns
         -------
         list of list of Toolpaths
-            For each length; those worth most first.
+            For each length; the paths worth most first.
         """
         alike = _alike(layers, group, self.machine.fibre_width)
         cut: dict[tuple[int, int], list[FloatArray]] = {}
@@ -142,7 +142,7 @@ class Extraction:
                     for numbers, phase in zip(alike, phases, strict=True)
                 )
 
-            whole = len(best) * (0,)  # drawn to the border: their links may be all they lack
+            whole = len(best) * (0,)  # drawn to the border: they may only lack such links
             linked = [(phases, r) for phases in dict.fromkeys((best, whole)) for r in _REACHES]
             gains = [gain(*way) for way in linked]
             if max(gains) > (1.0 + _BETTER) * gain(best, 0.0):
@@ -160,7 +160,7 @@ class Extraction:
     def best_phases(
         self, tried: list[list[list[Profile]]], counts: Sequence[int], length: float
     ) -> list[tuple[int, ...]]:
-        """For each kind of layers the position of the levels that is worth most, and others near.
+        """Position of the levels worth most for each kind of layer, and others close to it.
 
         Parameters
         ----------
@@ -181,7 +181,7 @@ class Extraction:
         second = others.argmax(axis=1)
         near = others[rows, second] >= (1.0 - _NEAR) * gains[rows, first]
         found = [first, np.zeros_like(first), np.where(near, second, first)]
-        if self.radius:  # which bends can stay is seen in the test only
+        if self.radius:  # only the test shows which bends can stay
             found += [np.full_like(first, phase) for phase in range(self.phases)]
         return list(dict.fromkeys(tuple(phases.tolist()) for phases in found))
 
@@ -194,26 +194,26 @@ class Extraction:
         return least_price(along, length, self.machine.minimum_length, _CUT_COST) if along else 0.0
 
     def _gain(self, along: list[Profile], price: float) -> float:
-        """Return what fibre is worth beyond its price."""
+        """Return the worth of fibre beyond its price."""
         minimum = self.machine.minimum_length
         return sum(one.kept(price, minimum, _CUT_COST)[1] for one in along)
 
     def layer_paths(self, layer: Layer, field: FloatArray, shift: float) -> Toolpaths:
-        """Paths of one layer along the levels that are `shift` above whole numbers."""
+        """Paths of one layer along the levels `shift` above whole numbers."""
         return self.linked(layer, self.strands(layer, field, shift))
 
     def strands(self, layer: Layer, field: FloatArray, shift: float) -> list[FloatArray]:
-        """Trace the levels, and cut what can neither slide off the border nor apart."""
+        """Trace the levels, and cut strands that can slide neither off the border nor apart."""
         width = self.machine.fibre_width
         lines = self.levels(layer, field, shift)
         lines = lines_to_slide_in(lines, layer.plane.polygon, self.inset * width)
         return trim_to_clearance(lines, CLEARANCE * width, SHORTEST * width)
 
     def linked(self, layer: Layer, lines: list[FloatArray], reach: float = 0.0) -> Toolpaths:
-        """Paths of one layer from its strands, linked and slid in.
+        """Link the strands of one layer, and slide the paths inwards.
 
-        Links are the shortest, or with a `reach` those worth most (`worth_links`), up to that share
-        of the longest.
+        Links are the shortest; with a `reach` they are those worth most (`worth_links`), up to that
+        share of the longest link.
         """
         width, section = self.machine.fibre_width, layer.plane.polygon
         limit, least = self.link_limit * width, self.machine.minimum_length
@@ -235,7 +235,7 @@ class Extraction:
         return isocontours(points, triangles, values, first, 1.0).lines()
 
     def _worth(self, layer: Layer, lines: Sequence[FloatArray]) -> list[Profile]:
-        """Profiles of lines on a layer, each from its first point on."""
+        """Profiles of lines on a layer, each starting at its first point."""
         closed = len(lines) * [False]
         return self.profiles(Toolpaths.from_plane(lines, layer, closed))
 
@@ -252,7 +252,7 @@ class Extraction:
 
 
 def _alike(layers: Sequence[Layer], group: IntArray, width: float) -> list[IntArray]:
-    """Numbers of the layers of each kind: of one field, and of about the same section."""
+    """Numbers of the layers of each kind, which share a field and about the same section."""
     kinds: list[list[int]] = []
     borders = [shapely.boundary(layer.plane.polygon) for layer in layers]
     for k, border in enumerate(borders):

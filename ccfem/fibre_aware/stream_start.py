@@ -1,4 +1,4 @@
-"""Where the design of a stream function starts: its grid, and a field that follows the tension."""
+"""Start of the design of a stream function: its grid, and a field that follows the tension."""
 
 from collections.abc import Sequence
 
@@ -24,10 +24,10 @@ _SPACING_WEIGHT = 0.1
 """Weight of the wanted density against the direction, as in `fields.scalar.fit_weighted`."""
 
 _FILL_LENGTH = 3.0
-"""Reach, mm, of the screened fill."""
+"""Length, mm, over which the screened fill carries the field on."""
 
 _FULLEST = 0.85
-"""Largest share of the fibre at the bound of the density that the first field is scaled to."""
+"""Largest share of the fibre at the density limit to which the first field is scaled up."""
 
 _LEAST_WEIGHT = 1e-3
 _SMOOTH = 1e-5
@@ -35,10 +35,10 @@ _REGULARISATION = 1e-9
 
 
 def plane_axes(part: SmearedPart, energy: FloatArray) -> tuple[FloatArray, FloatArray]:
-    """Centre (2,) and axes (2, 2) in the plane that turn with the part and its load.
+    """Centre (2,) and in-plane axes (2, 2) that rotate with the part and its load.
 
-    The principal axes of inertia in the plane, of the volume and the strain energy, half each:
-    where the part is symmetric its load hardly ever is.
+    They are the in-plane principal axes of inertia, of volume and strain energy in equal parts: a
+    symmetric part rarely has a load that is symmetric too.
 
     Parameters
     ----------
@@ -72,7 +72,7 @@ def start_field(
     layers : sequence of Layer
         One for each group, whose tension its field follows.
     cap : float
-        Percentile of the stress above which the density grows no more.
+        Percentile of the stress above which the density no longer increases.
 
     Returns
     -------
@@ -146,7 +146,7 @@ def _fit(problem: StreamProblem, layer: Layer, tension: Tension, top: float) -> 
 
 
 def _to_budget(problem: StreamProblem, field: FloatArray) -> FloatArray:
-    """Field times the factor that uses the budget where the density stays below its bound."""
+    """Scale a field so that it uses the budget as far as the density stays below its limit."""
     size = np.hypot(*(slope @ field for slope in problem.slopes))
     most = _FULLEST * DENSEST * float(problem.room.sum())
     low, high = 1e-2, 1e2

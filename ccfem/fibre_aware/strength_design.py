@@ -1,8 +1,8 @@
 """Design of stream functions for stiffness and the load at first failure together.
 
-As `ccfem.fibre_aware.cases_design`, with a share of the objective in how near the part is to its
+As `ccfem.fibre_aware.cases_design`, but the objective also contains how near the part is to its
 first failure (`ccfem.virtual_testing.near_failure`), under one load case or under any of several,
-one at a time. An adjoint solve for each case at every evaluation gives the gradient.
+one at a time. At every evaluation an adjoint solve for each case gives the gradient.
 """
 
 from dataclasses import dataclass, replace
@@ -35,14 +35,14 @@ _TOLERANCE = 1e-3
 """Relative residual of the adjoint solve."""
 
 _NONE = 1e-300
-"""Share in place of none: a field without layers counts for nothing over it."""
+"""Share used in place of zero: a field without layers is divided by it."""
 
 
 @dataclass(frozen=True)
 class _CasePeaks:
-    """Indices under one load case, and how the fibre of each field (f, m) counts in that of it.
+    """Indices under one load case, and the weight (f, m) of each field's fibre in the fibre index.
 
-    Where no fibre is stretched it has no index, and `counted` is zero.
+    Where no fibre is stretched there is no such index, and `counted` is zero.
     """
 
     peaks: dict[str, Peak]
@@ -52,11 +52,10 @@ class _CasePeaks:
 
 @dataclass(frozen=True)
 class StrengthProblem:
-    """What a stream function is designed for where strength counts.
+    """Objective of a stream function where strength counts.
 
-    Minimised is what `CasesProblem` minimises, with ``w log(nearness to failure) + (1 - w) x`` in
-    place of its x, which comes from the stiffness. How near the part is to failure is the largest
-    index of all load cases.
+    It is that of `CasesProblem`, with ``w log(nearness to failure) + (1 - w) x`` in place of its
+    stiffness term x. The nearness to failure is the largest index of all load cases.
 
     Attributes
     ----------
@@ -87,7 +86,7 @@ class StrengthProblem:
         field: FloatArray,
         solutions: tuple[SmearedSolution, ...],
     ) -> "StrengthProblem":
-        """Problem whose indices are the true ones at fields, and follow their norms from there.
+        """Problem whose indices are exact at the given fields, and follow their norms from there.
 
         Raises
         ------
@@ -134,13 +133,13 @@ class StrengthProblem:
         return self.problem.curvature(field, solutions)
 
     def levels(self, field: FloatArray, solutions: tuple[SmearedSolution, ...]) -> BorderLevels:
-        """Weigh what levels cost that keep farther from borders than they need."""
+        """Cost of levels that lie farther from the border than they need to."""
         return self.problem.levels(field, solutions)
 
     def _peaks(
         self, laid: tuple[Laid, ...], solutions: tuple[SmearedSolution, ...]
     ) -> list[_CasePeaks]:
-        """Find the indices under each load case, of the load on the part without fibre."""
+        """Find the indices under each load case, for the load on the part without fibre."""
         problem, alone = self.problem, self.problem.problem
         limit = self.limits.fibre / alone.axial_stiffness
         size = np.stack([one.size for one in laid])
@@ -159,7 +158,7 @@ class StrengthProblem:
                 fibre = Peak(index, norm, forces)
             normal = part.frame[2]
             peaks = judge.peaks(solution.displacement, fibre, self.limits, normal)
-            # Of the same load: it falls with the stiffness where supports move.
+            # For the same load, which falls with the stiffness where supports move.
             load = 1.0 if part.forced else part.ratio(solution.work)
             scaled = {name: peak.over(load) for name, peak in peaks.items()}
             found.append(_CasePeaks(scaled, stretch, counted))
@@ -209,16 +208,16 @@ class StrengthProblem:
         strain, adjoint : (m, 3) array
             Of the part with its fibre, and of the adjoint solution.
         own : (m,) array
-            How much the fibre of each cell itself counts.
+            Weight of the fibre of each cell in the index of the fibre itself.
         """
         alone = self.problem.problem
         stretch, other = (np.einsum("ci,ci->c", laid.along, one) for one in (strain, adjoint))
         gx, gy, size = laid.gx, laid.gy, laid.size
         share = np.where(stretch > 0.0, 1.0, SLACK)
-        # Fibre takes the work stretch * other / size^3 of both displacements in each other.
+        # The work of fibre between both displacements is stretch * other / size^3.
         factor = -alone.axial_stiffness * alone.room * share / size**3
         fall = 3.0 * stretch * other / size**2
-        # Its norm's power is room * stretch^p / size^(2 p - 1) a cell.
+        # The fibre norm to its power is room * stretch^p / size^(2 p - 1) a cell.
         power = own / np.where(stretch > 0.0, stretch, 1.0)
         thin = (2.0 - 1.0 / POWER) * own / size**2
         (ux, uy), (ax, ay) = _turned(laid, strain), _turned(laid, adjoint)
@@ -240,7 +239,7 @@ def design_for_strength(
     strength: float,
     evaluations: int = 50,
 ) -> CasesDesign:
-    """Improve a design for stiffness, so that the load at first failure counts too.
+    """Improve a design for stiffness with regard to the load at first failure too.
 
     Parameters
     ----------
@@ -250,9 +249,9 @@ def design_for_strength(
     solutions : tuple of SmearedSolution
         Of each case at that.
     strength : float in [0, 1]
-        How much a share of the load at first failure counts; one of stiffness counts the rest.
+        Weight of the load at first failure; the stiffness has the rest.
     evaluations : int, default 50
-        Of stiffness and strength, at least 1.
+        Evaluations of stiffness and strength, at least 1.
 
     Raises
     ------

@@ -1,9 +1,9 @@
-"""What fibre is worth for the stiffness and for the load at first failure together.
+"""Worth of fibre for the stiffness and for the load at first failure together.
 
-One adjoint solve, with the derivative of the indices by the displacement as its load, says what
-every piece of fibre changes: ``-EA eps eps_adjoint`` per length, and what it itself adds to the
-index of the fibre (`ccfem.virtual_testing.near_failure`). Of several load cases, one at a time, the
-one counts that fails first, at the least multiple of its load; each has its own adjoint solve.
+One adjoint solve, loaded with the derivative of the indices by the displacement, gives the effect
+of every piece of fibre: ``-EA eps eps_adjoint`` per length, plus its own part in the index of the
+fibre (`ccfem.virtual_testing.near_failure`). Of several load cases, one at a time, the case counts
+that fails first, at the least multiple of its load. Each case has its own adjoint solve.
 """
 
 from collections.abc import Sequence
@@ -35,13 +35,13 @@ from ccfem.virtual_testing.strengths import Limits
 __all__ = ["Worth", "layer_normal", "raised"]
 
 _LITTLE = 1e-3
-"""Share of the largest value below which values that are negative are raised."""
+"""Share of the largest value below which values count as little when negative ones are raised."""
 
 _TOLERANCE = 1e-4
 """Relative residual of the adjoint solve."""
 
 _NONE = 1e-300
-"""In place of nothing, where it is divided by."""
+"""Used in place of zero as a divisor."""
 
 
 def layer_normal(toolpaths: Toolpaths) -> FloatArray | None:
@@ -53,9 +53,9 @@ def layer_normal(toolpaths: Toolpaths) -> FloatArray | None:
 
 
 def raised(value: FloatArray) -> FloatArray:
-    """Values (s,) in the same order, none below zero: as long a part of all as wanted can be kept.
+    """Values (s,) in the same order, none below zero, so that any wanted length can be kept.
 
-    Negative ones come to lie between zero and the least that counts.
+    Negative values are mapped to between zero and the least value that counts.
     """
     most, least = float(value.max(initial=0.0)), float(value.min(initial=0.0))
     if not least < 0.0:
@@ -66,7 +66,7 @@ def raised(value: FloatArray) -> FloatArray:
 
 @dataclass(frozen=True)
 class Worth:
-    """What fibre in a part is worth, for any number of sets of paths.
+    """Worth of fibre in a part, for any number of sets of paths.
 
     Attributes
     ----------
@@ -75,7 +75,7 @@ class Worth:
     strand : Strand
     limits : Limits
     strength : float in [0, 1]
-        How much a share of the load at first failure counts; a share of stiffness counts the rest.
+        Weight of the load at first failure; the stiffness has the rest.
     judges : tuple of MatrixPeaks
         One for each load case.
     """
@@ -110,7 +110,7 @@ class Worth:
         normal: FloatArray | None = None,
         counts: FloatArray | None = None,
     ) -> FloatArray:
-        """Value of each piece of fibre, (s,), per mm; negative where the part is better without.
+        """Value of each piece of fibre, (s,), per mm; negative if the part is better without it.
 
         It is the first-order change of ``(1 - w) log(stiffness) + w log(load at first failure)``
         with the length of the piece. Parameters and errors as of `strain_worths`.
@@ -129,7 +129,7 @@ class Worth:
         normal: FloatArray | None = None,
         counts: FloatArray | None = None,
     ) -> tuple[StrainWorth, ...]:
-        """Find what fibre is worth by its strain in each load case: these worths add up.
+        """Find the worth of fibre by its strain in each load case; these worths add up.
 
         Parameters
         ----------
@@ -139,7 +139,7 @@ class Worth:
         normal : (3,) array, optional
             Of all layers. Without it the bond between layers does not count.
         counts : (n,) array, optional
-            How much each load case counts in the stiffness, 1 in all; default equally.
+            Weight of each load case in the stiffness, 1 in all; default equal.
 
         Raises
         ------

@@ -1,16 +1,16 @@
-"""The stiffness that no fibre paths can exceed, at a given length of fibre and number of layers.
+"""The stiffness that no fibre paths can exceed, for a given length of fibre and number of layers.
 
-Paths are replaced by a density of fibre m in each cell and direction in the plane of the layers,
-free to jump from cell to cell and to cross; at most one strand a width lies in each layer. The
-stiffest density is approached by `ccfem.fibre_aware.density_ascent`, until what it reaches and what
-no density exceeds are near each other. Whatever it finds, its displacement u proves a bound by
-duality: the compliance C of a part with fibre is the largest value over all u of
-``2 f.u - u.K u - EA int m eps^2``, so for every u, scaled best,
+Paths are replaced by a density of fibre m in each cell and direction in the plane of the layers. It
+may jump from cell to cell and cross itself, with at most one strand a width in each layer.
+`ccfem.fibre_aware.density_ascent` approaches the stiffest density, until its stiffness and the
+bound are close. Any displacement u proves a bound by duality: the compliance C of a part with fibre
+is the largest value over all u of ``2 f.u - u.K u - EA int m eps^2``, so for every u, with the best
+scale,
 
     C >= (f.u)^2 / (u.K u + EA S(u)),
 
-where S(u) is the most that fibre of that length can gather: the cells of the largest squared
-strain, filled until the length is used.
+where S(u) is the largest integral that fibre of that length can collect: cells are filled in the
+order of their squared strain, largest first, until the length is used up.
 """
 
 from collections.abc import Sequence
@@ -41,10 +41,10 @@ __all__ = [
 ]
 
 LARGEST_GAP = 0.005
-"""Share by which the bound may lie above what is reached: the iterations stop there."""
+"""Share by which the bound may lie above `reached`: the iterations stop there."""
 
 LOOSE = 0.01
-"""Share by which a bound may lie above what is reached before that is worth a word."""
+"""Share by which a bound may lie above `reached` before a remark is made."""
 
 _ANGLES = 24
 _CELL_ITERATIONS = 1_500_000
@@ -57,14 +57,14 @@ class UpperBound:
     Attributes
     ----------
     ratio : float
-        Stiffness over that of the part without fibre that no paths exceed, with strands that keep
-        their width on average in every cell.
+        Stiffness over that of the part without fibre that no paths exceed, if strands keep their
+        width on average in every cell.
     reached : float
-        Ratio of the best density found: the sharpest bound lies between the two.
+        Ratio of the best density found. The sharpest bound lies between this and `ratio`.
     density : (m, k) array, mm/mm^3
         That density, in each cell and direction.
     angles : (k,) array, radians
-        Of the directions to the first axis of the layers' frame.
+        Directions, from the first axis of the layers' frame.
     bounds : tuple of float
         Bound of the part without fibre, and of every iteration.
     """
@@ -82,15 +82,15 @@ class UpperBound:
 
     @property
     def gap(self) -> float:
-        """Share by which the bound lies above what a density of fibre reaches."""
+        """Share by which the bound lies above `reached`."""
         return self.ratio / self.reached - 1.0
 
     @property
     def tensor(self) -> FloatArray:
         """Sum of ``m t t^T`` over the directions: 11, 22 and 12 in the plane, (m, 3), mm/mm^3.
 
-        Its trace is the density in all directions, its largest principal direction the one along
-        which most of the fibre runs.
+        Its trace is the density in all directions. Most of the fibre runs along its principal
+        direction of largest value.
         """
         return self.density @ directions(len(self.angles))[1]
 
@@ -126,11 +126,11 @@ def upper_bound(
     mode : str, default "tension"
         "tension": fibres in compression carry nothing; "bonded": all fibres carry.
     iterations : int, optional
-        Maximum number of iterations, a solve each; at least 1. About 10 bring the bound within 1 %
-        of the sharpest, 15 to 40 the gap to its default. Default 60, and less for more than 25,000
-        cells: `affordable_iterations`.
+        Maximum number of iterations, with one solve each; at least 1. About 10 bring the bound
+        within 1 % of the sharpest, 15 to 40 reach the default gap. Default 60, and fewer for more
+        than 25,000 cells: `affordable_iterations`.
     gap : float, default 0.005
-        The iterations stop where the bound lies no farther than this share above what is reached.
+        Iterations stop where the bound lies no farther than this share above `reached`.
 
     Raises
     ------
@@ -178,14 +178,15 @@ def upper_bound(
 
 
 def affordable_iterations(cells: int) -> int:
-    """Return how many iterations take at most about as long as 60 of 25,000 cells; at least 10."""
+    """Return how many iterations take about as long as 60 with 25,000 cells; at least 10."""
     return max(10, min(60, _CELL_ITERATIONS // cells))
 
 
 def directions(count: int) -> tuple[FloatArray, FloatArray]:
-    """Angles (k,), radians, evenly over half a turn, and what strains along them are made of.
+    """Angles (k,), radians, evenly over half a turn, and coefficients of the strains along them.
 
-    The second (k, 3) times the strains 11, 22 and 12 (engineering shear) is the strain along each.
+    The coefficients (k, 3) times strains 11, 22 and 12 (engineering shear) give the strain along
+    each angle.
     """
     angles = np.pi * np.arange(count) / count
     cosine, sine = np.cos(angles), np.sin(angles)
@@ -200,7 +201,7 @@ def certificate(
     length: float,
     mode: str = TENSION,
 ) -> float:
-    """Bound of the stiffness ratio that a displacement proves, whatever it is.
+    """Bound of the stiffness ratio that any displacement proves.
 
     Parameters
     ----------

@@ -1,9 +1,9 @@
-"""Links chosen by what they are worth: they let paths be long enough, and are fibre themselves.
+"""Links chosen by their gain: they make paths long enough, and are fibre themselves.
 
-Taking the shortest link first joins strands that need none and leaves others without a partner.
-Here a link is worth what the most valuable stretches of the joined path gain over those of the two
-that it joins. The links worth most come first, each alone; then strands that are still too short
-are given partners of others where all together gain by it.
+If the shortest links were taken first, strands that need none would be joined, and others would be
+left without a partner. Here the gain of a link is the worth of the best stretches of the joined
+path, less that of the two paths it joins. The links of largest gain are taken first, one by one.
+Then strands that are still too short get partners from others, where the total worth increases.
 """
 
 import heapq
@@ -33,18 +33,18 @@ from ccfem.linking.possible_links import (
 __all__ = ["link_by_worth"]
 
 _HOPE = 0.5
-"""What a chain that is too short counts of its gain, times its share of the length that it needs:
-joined to the next it may be long enough."""
+"""Factor on the gain of a chain that is too short, besides its share of the length that it needs:
+joined to another one it may become long enough."""
 
 _ROUNDS, _TRIES = 2, 24
-"""Times that partners are changed, and how many are tried each time."""
+"""Rounds in which partners are changed, and number of changes tried in each."""
 
 _EQUAL = 1e-6
-"""Share of all gains up to which two are equal."""
+"""Difference, as a share of all gains, up to which two gains are equal."""
 
 _BESIDE, _ALONG, _REACH = 0.95, 0.7, 0.2
 """Distance in widths and cosine of the angle up to which a link lies beside a strand that it joins,
-and there lends nothing; and the length, mm, on both sides over which directions are taken."""
+where it adds no stiffness; and length, mm, to both sides over which directions are taken."""
 
 
 def link_by_worth(
@@ -57,10 +57,10 @@ def link_by_worth(
     worth: Callable[[Sequence[FloatArray]], Sequence[Profile]],
     cheapest: float = 0.1,
 ) -> Joined:
-    """Join ends that lie near each other by the links that are worth most.
+    """Join ends that lie near each other by the links of largest gain.
 
-    Links are those of `ccfem.linking.joining.link_ends`, have the same room, and those with corners
-    are marked and join only what is too short.
+    Links are those of `ccfem.linking.joining.link_ends` with the same clearance. Links with corners
+    are marked, and join only strands that are too short.
 
     Parameters
     ----------
@@ -75,9 +75,9 @@ def link_by_worth(
     enough : float, mm
         Length that a path needs.
     worth : callable
-        Profiles of some lines, one for each.
+        Returns the profiles of given lines, one for each.
     cheapest : float in [0, 1], default 0.1
-        Share of the lines, those worth least, that says the price of length.
+        Share of the lines, those worth least, that sets the price of length.
     """
     found = possible_links(lines, section, limit, width, radius=radius)
     order = sorted(found, key=lambda x: (not x.smooth, round(x.cost, 6), x.first, x.second))
@@ -114,7 +114,7 @@ def link_by_worth(
 
 
 def _price(along: Sequence[Profile], cheapest: float) -> float:
-    """Worth per length of the best of the cheapest part of lines; never quite nothing."""
+    """Largest worth per length in the cheapest part of lines; never quite zero."""
     value = np.concatenate([one.value for one in along])
     length = np.repeat([one.step for one in along], [len(one.value) for one in along])
     order = np.argsort(value, kind="stable")
@@ -126,7 +126,7 @@ def _price(along: Sequence[Profile], cheapest: float) -> float:
 def _beside_none(
     lines: Sequence[FloatArray], links: Sequence[Link], along: Sequence[Profile], width: float
 ) -> list[FloatArray]:
-    """For the pieces of each link 1, or 0 where they lie beside a strand that they join."""
+    """For the pieces of each link 1, or 0 where they lie beside a strand that the link joins."""
     counts = [len(one.value) for one in along]
     of = np.repeat(np.arange(len(links)), counts)
     middle = np.concatenate([(np.arange(len(one.value)) + 0.5) * one.step for one in along])
@@ -156,7 +156,7 @@ def _direction(lines: Any, at: FloatArray) -> FloatArray:
 
 @dataclass(frozen=True)
 class _Chain:
-    """Lines that are joined: gains of its pieces, from its first end to its last."""
+    """Joined lines: gains of their pieces, from the first end to the last."""
 
     pieces: FloatArray
     length: float
@@ -165,7 +165,7 @@ class _Chain:
     gain: float
 
     def read(self, end: int, last: bool, off: float) -> FloatArray:
-        """Pieces with an end of the chain last or first, without `off` mm there."""
+        """Pieces ordered with one end of the chain last or first, without `off` mm at that end."""
         pieces = self.pieces if (self.last == end) == last else self.pieces[::-1]
         count = round(off)
         return pieces[: len(pieces) - count] if last else pieces[count:]
@@ -173,7 +173,7 @@ class _Chain:
 
 @dataclass(frozen=True)
 class _Taken:
-    """Links that are taken, the lines cut back to them, the gain, and the ends of short chains."""
+    """Links taken, the lines cut back to them, the gain, and the ends of chains too short."""
 
     taken: list[int]
     lines: list[FloatArray]
@@ -219,7 +219,7 @@ class _Choice:
         return 0.0 if left is line else line_length(line) - line_length(left)
 
     def chain(self, pieces: FloatArray, length: float, first: int, last: int) -> _Chain:
-        """Chain with what its best stretches gain, or less than that where it is too short."""
+        """Chain with the gain of its best stretches, or a reduced one where it is too short."""
         if length >= self.enough:
             gain = Profile(0, pieces, 1.0, 0.0).kept(0.0, self.enough, 0.0)[1]
         else:
@@ -227,7 +227,7 @@ class _Choice:
         return _Chain(pieces, length, first, last, gain)
 
     def greedy(self, begun: Iterable[int]) -> _Taken:
-        """Take some links, then those that gain most, one by one."""
+        """Take the links given first, then those of largest gain, one by one."""
         state = _State(self)
         for k in begun:
             joined = state.joined(k, whatever=True)
@@ -247,7 +247,7 @@ class _Choice:
             joined = state.joined(k)
             if joined is None or joined[0] <= self.equal:
                 continue
-            if -round(joined[0] / self.equal) > gain:  # less than when it was offered
+            if -round(joined[0] / self.equal) > gain:  # gain has fallen since it was offered
                 offer([k])
                 continue
             for end in state.take(k, joined[1]):
@@ -255,7 +255,7 @@ class _Choice:
         return state.taken()
 
     def changed(self, before: _Taken) -> _Taken | None:
-        """Give each chain that is too short each partner: the best choice that is better."""
+        """Try every partner for each chain that is too short: the best choice, if it is better."""
         best, better = before, None
         for k in sorted({k for end in before.short for k in self.at.get(end, ())})[:_TRIES]:
             ends = {self.links[k].first, self.links[k].second}
@@ -283,7 +283,7 @@ class _State:
     def joined(self, k: int, whatever: bool = False) -> tuple[float, _Chain] | None:
         """Gain of a link, and the chain that it makes; None where it cannot be taken.
 
-        `whatever` the lengths, also where it has corners.
+        With `whatever`, lengths and corners do not matter.
         """
         choice, link = self.choice, self.choice.links[k]
         if self.barred[k] or link.first in self.used or link.second in self.used:
@@ -308,7 +308,7 @@ class _State:
         return chain.gain - one.gain - other.gain, chain
 
     def take(self, k: int, chain: _Chain) -> tuple[int, ...]:
-        """Take a link unless it crosses what it joins; the ends of the chain where it is longer."""
+        """Take a link unless it crosses what it joins; return the ends of a chain that grew."""
         link = self.choice.links[k]
         owners = sorted({link.first // 2, link.second // 2})
         cut = {owner: cut_back(self.lines[owner], link, owner) for owner in owners}
@@ -332,7 +332,7 @@ class _State:
         return chain.first, chain.last
 
     def taken(self) -> _Taken:
-        """Return what is taken."""
+        """Return the links taken so far."""
         enough = self.choice.enough
         gain = sum(chain.gain for chain in self.chains.values() if chain.length >= enough)
         short = [

@@ -1,4 +1,4 @@
-"""A curved layer laid flat with little distortion: what works in a plane works on it too.
+"""A curved layer laid flat with little distortion, so that planar methods work on it too.
 
 Least-squares conformal map (Levy et al. 2002), then the local/global iteration for maps that are as
 rigid as possible (Liu, Zhang, Xu, Gotsman, Gortler, A local/global approach to mesh
@@ -30,7 +30,7 @@ _MOST_OVER = 0.01
 _ON = 0.01
 _CHART = "_chart"
 _GAP = 10.0
-"""Distance of pieces of a layer in its chart, mm."""
+"""Distance between pieces of a layer in its chart, mm."""
 
 
 @dataclass(frozen=True)
@@ -41,9 +41,9 @@ class Chart:
     ----------
     layer : Layer
     flat : Layer
-        The same triangles in the plane z = 0; its `turns` take tensors of the part there.
+        The same triangles in the plane z = 0; its `turns` rotate tensors of the part into it.
     stretches : (t, 2) array
-        Singular values of the map on each triangle, the larger first: 1 where lengths stay.
+        Singular values of the map on each triangle, the larger first: 1 where lengths are kept.
     """
 
     layer: Layer
@@ -55,7 +55,7 @@ class Chart:
 
     @property
     def distortion(self) -> float:
-        """Largest relative change of a length that 95 % of the area stays within."""
+        """Relative change of length that 95 % of the area does not exceed."""
         worst = np.maximum(self.stretches[:, 0], 1.0 / np.maximum(self.stretches[:, 1], 1e-9))
         order = np.argsort(worst, kind="stable")
         below = np.cumsum(self.layer.areas[order])
@@ -63,7 +63,7 @@ class Chart:
         return float(worst[order[at]] - 1.0)
 
     def flattened(self, paths: Toolpaths) -> Toolpaths:
-        """Images of paths on the layer in its chart."""
+        """Images in the chart of paths on the layer."""
         found = nearest_on_triangles(self.layer.points, self.layer.triangles, paths.points)
         corners = self.flat.points[self.layer.triangles[found.triangle]]
         points = np.einsum("qk,qkd->qd", found.weights, corners)
@@ -73,19 +73,19 @@ class Chart:
     def pieces(
         self, middle: FloatArray, tangent: FloatArray
     ) -> tuple[FloatArray, FloatArray, BoolArray]:
-        """Images of small pieces of fibre, and which of them lie on the layer.
+        """Images of small pieces of fibre, and the mask of those that lie on the layer.
 
         Parameters
         ----------
         middle, tangent : (s, 3) arrays
-            Middle of each piece, of any layer, and its direction.
+            Middle and direction of each piece, on any layer.
 
         Returns
         -------
         middle, tangent : (k, 3) arrays
-            Of those within 0.01 mm of the layer.
+            Of the pieces within 0.01 mm of the layer.
         near : (s,) bool array
-            Which these are.
+            Mask of these pieces.
         """
         found = nearest_on_triangles(self.layer.points, self.layer.triangles, middle)
         near = found.distance < _ON
@@ -96,7 +96,7 @@ class Chart:
         return points, np.einsum("qij,qj->qi", self.flat.turns[triangle], tangent[near]), near
 
     def lifted(self, paths: Toolpaths) -> Toolpaths:
-        """Paths in the chart, back on the layer, with points at most half a millimetre apart."""
+        """Paths of the chart on the curved layer, with points at most half a millimetre apart."""
         if not len(paths):
             return paths
         flat, offsets, segment = subdivide(paths.points, paths.offsets, _STEP)
@@ -119,13 +119,13 @@ class Chart:
 
 
 def chart_of(layer: Layer) -> Chart:
-    """Lay a curved layer flat; the layer keeps its chart, so that it is made once.
+    """Lay a curved layer flat; the layer stores its chart, so that it is computed once.
 
     Raises
     ------
     InputError
-        When more than 1 % of the area is turned over: the layer is closed, or bends too much both
-        ways. A single sliver at the border may be.
+        When more than 1 % of the area is inverted, since the layer is closed or doubly curved too
+        strongly. Single slivers at the border may be.
     """
     known = vars(layer)
     if _CHART not in known:
@@ -140,7 +140,7 @@ def flat_view(layer: Layer) -> Layer:
 
 
 def in_charts(paths: Toolpaths, layers: Sequence[Layer]) -> Toolpaths:
-    """Paths with those on curved layers laid flat."""
+    """Paths, of which those on curved layers are laid flat."""
     if all(layer.flat is not None for layer in layers):
         return paths
     parts = []
@@ -188,7 +188,7 @@ def _laid_flat(layer: Layer) -> Chart:
 
 
 def _conformal(surface: Surface) -> FloatArray:
-    """Least-squares conformal map, (n, 2), two far points held."""
+    """Least-squares conformal map, (n, 2), with two distant points fixed."""
     n, points = len(surface.points), surface.points
     laplacian = surface.energy(surface.areas[:, None, None] * np.eye(2))
     border = _border(surface.triangles)
@@ -210,7 +210,7 @@ def _conformal(surface: Surface) -> FloatArray:
 
 
 def _rigid(surface: Surface, image: FloatArray) -> tuple[FloatArray, FloatArray]:
-    """As rigid a map as possible from a first one, and the rotation (t, 2, 2) on each triangle."""
+    """As rigid a map as possible, from a first one, and the rotation (t, 2, 2) of each triangle."""
     metric = surface.areas[:, None, None] * np.eye(2)
     matrix = sp.csr_array(surface.energy(metric))[1:]
     factor = positive_definite(matrix[:, 1:])
@@ -225,7 +225,7 @@ def _rigid(surface: Surface, image: FloatArray) -> tuple[FloatArray, FloatArray]
 
 
 def _rotations(surface: Surface, image: FloatArray) -> FloatArray:
-    """Rotation (t, 2, 2) nearest to the map on each triangle."""
+    """Rotation (t, 2, 2) nearest to the map of each triangle."""
     found: FloatArray = _nearest_rotations(surface.gradients, surface.triangles, image)
     return found
 
@@ -250,7 +250,7 @@ def _nearest_rotations(gradients, triangles, image):  # type: ignore[no-untyped-
 
 
 def _along_axes(surface: Surface, image: FloatArray) -> FloatArray:
-    """Rotation (2, 2) after which the chart lies as its mean plane would: see `plane_frame`."""
+    """Rotation (2, 2) that aligns the chart with its mean plane: see `plane_frame`."""
     normal = np.cross(surface.frames[:, 0], surface.frames[:, 1])
     mean = surface.areas @ normal
     up = mean.tolist() if np.linalg.norm(mean) > 0.0 else [0.0, 0.0, 1.0]
@@ -262,7 +262,7 @@ def _along_axes(surface: Surface, image: FloatArray) -> FloatArray:
 
 
 def _border(triangles: IntArray) -> IntArray:
-    """Border edges (b, 2) in the sense of their triangles."""
+    """Border edges (b, 2), directed as in their triangles."""
     sides = triangles[:, [[0, 1], [1, 2], [2, 0]]].reshape(-1, 2)
     count = int(triangles.max()) + 1
     forth, back = sides[:, 0] * count + sides[:, 1], sides[:, 1] * count + sides[:, 0]
@@ -270,7 +270,7 @@ def _border(triangles: IntArray) -> IntArray:
 
 
 def _at_points(layer: Layer, turns: FloatArray) -> FloatArray:
-    """Rotation (n, 3, 3) at each point: the mean of the triangles round it, made a rotation."""
+    """Rotation (n, 3, 3) at each point, nearest to the mean of the triangles round it."""
     n, corners = len(layer.points), layer.triangles.ravel()
     first = np.zeros((n, 3))
     for axis in range(3):

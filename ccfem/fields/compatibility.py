@@ -22,10 +22,9 @@ def incompatible(
     defined: BoolArray,
     rule: Incompatible = "any",
 ) -> BoolArray:
-    """Mark, (m,), the cells whose vector disagrees with those of the cells round them.
+    """Mark, (m,), cells whose vector disagrees with those of neighbouring cells.
 
-    Two cells are neighbours when they share a node; they disagree when ``v . v* <= 0.5``, the
-    paper's eta.
+    Cells that share a node are neighbours. They disagree when ``v . v* <= 0.5``, the paper's eta.
 
     Parameters
     ----------
@@ -36,8 +35,8 @@ def incompatible(
     defined : (m,) bool array
         Cells without a vector are neither marked nor compared.
     rule : {"any", "majority", "all", "none"}, default "any"
-        Which share of the neighbours has to disagree. The paper prints "for all", which marks next
-        to nothing; "any" gives its figures.
+        How many of the neighbours have to disagree. The paper prints "for all", which marks almost
+        nothing; "any" reproduces its figures.
     """
     if rule == "none":
         return np.zeros(len(cells), dtype=bool)

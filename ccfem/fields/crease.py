@@ -1,10 +1,10 @@
-"""Signs for a field of lines that no choice of signs makes continuous: the cut along the field.
+"""Signs for a field of lines that no choice of signs makes continuous: a cut along the field.
 
-Round a pin that pulls a lug the lines of tension come from the far end, turn round the hole and go
-back: once round the hole, a vector that follows them has changed its sign. Somewhere there has to
-be a cut across which neighbours oppose each other. Where the cut runs along the lines, the scalar
-field has a crease there and its isocurves stay parallel to it; where it crosses them, the isocurves
-turn aside. A spanning tree of neighbours cannot tell the two apart.
+If a pin pulls a lug, the lines of tension come from the far end, turn round the hole and go back: a
+vector that follows them once round the hole has changed its sign. So there must be a cut across
+which neighbouring vectors oppose each other. If the cut runs along the lines, the scalar field has
+a crease there, and its isocurves stay parallel to the cut. If it crosses the lines, the isocurves
+turn aside. A spanning tree of neighbours cannot tell these cases apart.
 """
 
 import numpy as np
@@ -17,7 +17,7 @@ from ccfem.fields.orientation import orient
 __all__ = ["orient_along"]
 
 _ACROSS = 3e-3
-"""Penalty of a change across the lines over that of one along them. The cut runs along the lines
+"""Penalty of a change across the lines, over that of one along them. The cut runs along the lines
 while this is below (breadth / twice the length)^2 of the strip that they fill."""
 _LEAST_WEIGHT = 1e-3
 _POWER = 0.5
@@ -25,14 +25,14 @@ _ITERATIONS = 20
 
 
 def orient_along(surface: Surface, direction: FloatArray, confidence: FloatArray) -> FloatArray:
-    """Flip vectors so that they oppose each other, if they must, across a line of the field.
+    """Flip vectors so that, where they have to oppose each other, they do so across a line.
 
-    The sign is that of a function u that is as smooth along the lines as it can be: with the signs
-    of a spanning tree s, it descends ``sum_f w_f A_f [(t . grad(s u))^2 + a |grad(s u)|^2]``, a
-    small, at a fixed ``sum_f w_f A_f |u|^(1 + p)``, by inverse iteration. With p = 1 that is an
-    eigenvector, which may live in one limb of a part and mean nothing in the others; with a
-    smaller p it has a size in all of them. Where a continuous choice of signs exists, u is
-    constant, and the result is that of `orientation.orient`.
+    The sign is that of a function u that is as smooth as possible along the lines. With the signs s
+    of a spanning tree, inverse iteration minimises ``sum_f w_f A_f [(t . grad(s u))^2 + a |grad(s
+    u)|^2]``, a small, at a fixed ``sum_f w_f A_f |u|^(1 + p)``. With p = 1 the result is an
+    eigenvector, which may be confined to one limb of a part and meaningless elsewhere; with a
+    smaller p it has a size everywhere. If a continuous choice of signs exists, u is constant, and
+    the result is that of `orientation.orient`.
 
     Parameters
     ----------
@@ -79,6 +79,6 @@ def _at_points(surface: Surface, direction: FloatArray) -> FloatArray:
 
 
 def _turned_energy(surface: Surface, metric: FloatArray, sign: FloatArray) -> sparse.csc_array:
-    """As `Surface.energy`, the value at each corner of each triangle times a sign (t, 3)."""
+    """As `Surface.energy`, with the value at each corner of each triangle times a sign (t, 3)."""
     slopes = surface.gradients * sign[:, :, None]
     return surface.matrix(np.einsum("tid,tde,tje->tij", slopes, metric, slopes))

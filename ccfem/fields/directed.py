@@ -26,7 +26,7 @@ class Directed:
     surface : Surface
     tension : Tension
     cap : float, MPa
-        Stress that the density is measured by.
+        Stress at which the density reaches its full value.
     confidence : (t,) array in [0, 1]
         Stress over the cap; 0 where the tension has no direction.
     direction : (t, 2) array
@@ -50,7 +50,7 @@ def directed(
     fill: Literal["screened", "laplacian"],
     fill_length: float,
 ) -> Directed:
-    """Fill a layer with directions from where its tension has one, and give them signs.
+    """Extend the directions of the tension to the whole layer, and orient them.
 
     Parameters
     ----------
@@ -58,11 +58,11 @@ def directed(
     tension : Tension
         On its triangles.
     cap : float
-        Percentile, by area, of the stress that the density is measured by.
+        Percentile, by area, of the stress at which the density reaches its full value.
     fill : {"screened", "laplacian"}
         See `fields.fill`.
     fill_length : float, mm
-        Of the screened fill.
+        Length over which the screened fill carries the field on.
     """
     surface = Surface.of(layer)
     percentile = np.quantile(

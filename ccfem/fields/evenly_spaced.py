@@ -23,9 +23,9 @@ __all__ = ["evenly_spaced_streamlines"]
 _STEP = 0.1
 """Step along a streamline, in separations."""
 _LEAST = 0.03
-"""As `least` of `streamlines`: where the stress is weaker, rounding decides where a line goes."""
+"""As `least` of `streamlines`: below it rounding decides where a line goes."""
 _SLACK = 1e-3
-"""Share of the separation by which a new line may be too near: rounding and finite steps."""
+"""Share of the separation by which a new line may be too near, for rounding and finite steps."""
 _MOST_POINTS = 20_000_000
 
 
@@ -38,14 +38,14 @@ def evenly_spaced_streamlines(
     closest: float = 0.5,
     least_length: float = 0.0,
 ) -> list[FloatArray]:
-    """Lines along the principal stress of the largest size, a distance apart.
+    """Lines, a distance apart, along the principal stress of largest absolute value.
 
-    The first line goes through the most stressed triangle. Others begin beside the points of lines
-    that are there, `separation` away, in the order of the lines; a line ends where it comes nearer
-    than `closest` separations to another or to itself, where it leaves the region, and where the
-    stress has no direction. Where no line is left to begin beside, the most stressed triangle that
-    is a separation away from all lines begins the next one: so that separate parts of the region,
-    and of the field, are reached too; the paper is silent on these.
+    The first line goes through the most stressed triangle. Others begin `separation` away from the
+    points of existing lines, in the order of the lines. A line ends where it comes nearer than
+    `closest` separations to another line or to itself, where it leaves the region, and where the
+    stress has no direction. When no line is left to begin beside, the next one begins in the most
+    stressed triangle that is a separation away from all lines. So separate parts of the region and
+    of the field are reached too; the paper does not treat these.
 
     Parameters
     ----------
@@ -54,17 +54,17 @@ def evenly_spaced_streamlines(
     region : shapely (Multi)Polygon, mm
         Lines stay in it.
     separation : float, mm
-        Distance at which lines begin beside each other (d_sep), > 0.
+        Distance from existing lines at which new ones begin (d_sep), > 0.
     closest : float in (0, 1), default 0.5
-        Minimum distance of lines in separations (d_test / d_sep).
+        Least distance between lines, in separations (d_test / d_sep).
     least_length : float, mm, default 0
         Shorter lines are not laid and block no other line; never below one separation.
 
     Returns
     -------
     list of (m, 2) arrays, mm
-        In the order in which they were found, in steps of a tenth of the separation; a line that
-        comes back to its start is closed: its last point is its first.
+        In the order in which they were found, in steps of a tenth of the separation. A line that
+        returns to its start is closed: its last point is its first.
     """
     check_number("separation of streamlines", separation, above=0.0, unit="mm")
     check_number("closest", closest, above=0.0, below=1.0)
@@ -102,10 +102,10 @@ def evenly_spaced_streamlines(
 
 
 class _Laid(NamedTuple):
-    """Points of lines by cells of a grid.
+    """Points of lines, sorted into the cells of a grid.
 
-    Of each point: place, unit direction, triangle, arc length from the seed (negative behind it),
-    line, and the point that was put into its cell before.
+    For each point: place, unit direction, triangle, arc length from the seed (negative behind it),
+    line, and the previous point in the same cell.
     """
 
     spot: FloatArray
@@ -137,21 +137,21 @@ def _empty(grid: SectionGrid, cell: float, room: int) -> _Laid:
 
 @njit(cache=True, nogil=True)
 def _lay(field, grid, laid, seeds, homes, centre, apart, test, step, least):  # type: ignore[no-untyped-def]
-    """Points of all lines, (start, turn, end) of each among them, and whether it is closed.
+    """Points of all lines, their (start, turn, end) among these, and whether each is closed.
 
-    From start to turn the points run ahead from the seed, from turn to end back from it. Ahead is
-    as in the line beside which a line begins, or else away from the centre: no matter how the part
-    lies, lines follow on each other in the same order.
+    From start to turn the points run ahead of the seed, from turn to end back from it. Ahead is the
+    direction of the line beside which a line begins, or else away from the centre, so that the
+    order of lines does not depend on the orientation of the part.
     """
     way = np.zeros(2)
     spans = np.empty((len(laid.line) // 4, 3), np.int64)
     closed = np.zeros(len(spans), np.bool_)
-    # Literals as arguments would be signatures of their own, compiled beside those of numbers.
+    # Literals as arguments would have signatures of their own, compiled besides those of numbers.
     lines, count, no_line = np.int64(0), np.int64(0), np.int64(-1)
     looked = tried = 0
     while looked < 2 * count or tried < len(seeds):
         if looked < 2 * count:
-            # Beside the points of lines, to both sides.
+            # On both sides of the points of lines.
             p, side = looked // 2, 1.0 - 2.0 * (looked % 2)
             x = laid.spot[p, 0] - side * apart * laid.way[p, 1]
             y = laid.spot[p, 1] + side * apart * laid.way[p, 0]
@@ -180,9 +180,9 @@ def _lay(field, grid, laid, seeds, homes, centre, apart, test, step, least):  # 
 
 @njit(cache=True, nogil=True)
 def _trace(field, grid, laid, first, number, x0, y0, way, home, test, step):  # type: ignore[no-untyped-def]
-    """Add points of a line from its seed ahead and back: end of either, and whether it is closed.
+    """Add points of a line from its seed ahead and back; return both ends, and if it is closed.
 
-    The numbers of the points start at `first`; ahead is where `way` points, more or less.
+    The numbers of the points start at `first`; ahead is roughly along `way`.
     """
     dx, dy, home, fine = direction_at(field, home, x0, y0, -1.0, way)
     count = first
@@ -199,7 +199,7 @@ def _trace(field, grid, laid, first, number, x0, y0, way, home, test, step):  # 
             along += sense * step
             if not fine or not contains(grid, x, y):
                 break
-            # Back at the seed, from behind: the same line again.
+            # Back at the seed from behind: the line is closed.
             ahead = (x0 - x) * way[0] + (y0 - y) * way[1]
             aside = abs((x0 - x) * way[1] - (y0 - y) * way[0])
             homing = abs(along) > 4.0 * test and aside < 0.2 * test
@@ -232,7 +232,7 @@ def _add(laid, p, x, y, dx, dy, home, along, number):  # type: ignore[no-untyped
 
 @njit(cache=True, nogil=True)
 def _take_back(laid, first, end):  # type: ignore[no-untyped-def]
-    """Remove points, the last ones that were added."""
+    """Remove the points that were added last."""
     for p in range(end - 1, first - 1, -1):
         i, j = _cell(laid, laid.spot[p, 0], laid.spot[p, 1])
         laid.head[i, j] = laid.following[p]
@@ -242,8 +242,8 @@ def _take_back(laid, first, end):  # type: ignore[no-untyped-def]
 def _crowded(laid, x, y, number, along, limit, homing):  # type: ignore[no-untyped-def]
     """Whether a point of another line, or of another stretch of this one, is nearer than a limit.
 
-    A line that comes home meets the stretch about its seed: that does not count. Line -1 has no
-    points yet.
+    The stretch round the seed does not count for a line that returns to it. Line -1 has no points
+    yet.
     """
     i, j = _cell(laid, x, y)
     nx, ny = laid.head.shape

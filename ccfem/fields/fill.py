@@ -1,4 +1,4 @@
-"""Direction and stress everywhere on a layer, also where the tension is undefined or noisy."""
+"""Extending direction and stress to all of a layer, where tension is undefined or noisy."""
 
 import numpy as np
 import scipy.sparse as sparse
@@ -19,8 +19,8 @@ def fill_laplacian(
 ) -> tuple[FloatArray, FloatArray]:
     """Fill by averaging over neighbouring triangles, 50 times [Chen et al. 2021, Eq. 3-4].
 
-    The triangle of the largest stress is held. The energy that this descends has a constant
-    minimiser, so more iterations keep degrading the field: `fill_screened` does not.
+    The triangle of largest stress is fixed. The minimiser of the energy is a constant, so further
+    iterations keep degrading the field; `fill_screened` does not.
 
     Parameters
     ----------
@@ -62,8 +62,8 @@ def fill_screened(
     """Fill by one screened Poisson problem at the points of the layer.
 
     Solves ``(M_c + length^2 L) x = M_c x0`` with the mass M_c weighted by the confidence and the
-    Laplacian L, for the direction in double-angle form (a line has no sign there) and for the
-    stress. Where the confidence is high the field is kept, elsewhere it is carried on from there,
+    Laplacian L, for the stress and for the direction in double-angle form (since a line has no
+    sign). The field is kept where the confidence is high; elsewhere it is carried on from there
     over about `length`.
 
     Parameters

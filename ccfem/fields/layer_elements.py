@@ -18,23 +18,23 @@ __all__ = ["Surface", "positive_definite"]
 
 
 def positive_definite(matrix: Any) -> Any:
-    """Factor a sparse symmetric positive definite matrix; the result has ``solve``."""
+    """Factorise a sparse symmetric positive definite matrix; the result has ``solve``."""
     options = {"SymmetricMode": True, "DiagPivotThresh": 0.0}
     return splu(sparse.csc_array(matrix), permc_spec="MMD_AT_PLUS_A", options=options)
 
 
 _STEEP = 0.9
-"""Cosine to a triangle's normal above which an axis is nearly square to the triangle."""
+"""Cosine to a triangle's normal above which an axis counts as almost normal to the triangle."""
 _THIN = 1e-9
-"""Triangles with less than this share of the mean area have no usable gradient: they get none."""
+"""Area, over the mean area, below which a triangle has no usable gradient and gets none."""
 
 
 @dataclass(frozen=True)
 class Surface:
     """Triangles in the plane or in space, with the operators that the fields need.
 
-    Gradients and metrics have two components: those in the plane, or in space those along the
-    `frames` of each triangle.
+    Gradients and metrics have two components: in the plane, or in space along the `frames` of each
+    triangle.
 
     Attributes
     ----------
@@ -54,8 +54,8 @@ class Surface:
     def frames(self) -> FloatArray:
         """Two unit vectors along each triangle in space, (t, 2, 3), the second left of the first.
 
-        The first is the direction, along the triangle, of the axis in which the surface is longest
-        of those that are not nearly square to it.
+        The first is the projection onto the triangle of an axis: of those not almost normal to the
+        triangle, the one along which the surface is longest.
         """
         a, b, c = np.moveaxis(self.points[self.triangles], 1, 0)
         normal = np.cross(b - a, c - a)
@@ -78,7 +78,7 @@ class Surface:
 
     @cached_property
     def areas(self) -> FloatArray:
-        """Area of each triangle, (t,), mm^2; 0 where a chart has turned it over."""
+        """Area of each triangle, (t,), mm^2; 0 where a chart inverts the triangle."""
         own = np.arange(3 * len(self.triangles)).reshape(-1, 3)
         return read_only(np.maximum(signed_areas(self._corners.reshape(-1, 2), own), 0.0))
 
@@ -94,7 +94,7 @@ class Surface:
 
     @cached_property
     def gradient_matrix(self) -> Any:
-        """Matrix (2 t, n) that takes values at the points to x and y gradients, alternating."""
+        """Matrix (2 t, n) from values at the points to x and y gradients, alternating."""
         values = np.swapaxes(self.gradients, 1, 2).ravel()
         columns = np.repeat(self.triangles, 2, axis=0).ravel()
         rows = np.arange(0, len(values) + 1, 3)
@@ -115,7 +115,7 @@ class Surface:
         Parameters
         ----------
         metric : (t, 2, 2) array
-            Symmetric, with the area of the triangle in it.
+            Symmetric, including the area of the triangle.
         """
         gx, gy = self.gradients[:, :, 0], self.gradients[:, :, 1]
         fx = metric[:, 0, 0, None] * gx + metric[:, 0, 1, None] * gy
@@ -123,7 +123,7 @@ class Surface:
         return self.matrix(gx[:, :, None] * fx[:, None, :] + gy[:, :, None] * fy[:, None, :])
 
     def matrix(self, blocks: FloatArray) -> sparse.csc_array:
-        """Sum matrices (t, 3, 3) of the triangles to one (n, n) of the points."""
+        """Assemble matrices (t, 3, 3) of the triangles to one (n, n) of the points."""
         rows = np.repeat(self.triangles, 3, axis=1).ravel()
         columns = np.tile(self.triangles, (1, 3)).ravel()
         n = len(self.points)
@@ -135,7 +135,7 @@ class Surface:
         return self._at_points(values.ravel())
 
     def lumped(self, weight: FloatArray) -> FloatArray:
-        """Lumped mass (n,) of a weight (t,) per triangle, mm^2 times its unit."""
+        """Lumped mass (n,) of a weight (t,) per triangle, in mm^2 times the unit of the weight."""
         share = np.repeat(self.areas * weight / 3.0, 3)
         return self._at_points(share)
 

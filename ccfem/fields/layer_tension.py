@@ -1,4 +1,4 @@
-"""Tension on the triangles of a layer: from the stress in its plane, or from the whole part."""
+"""Tension on the triangles of a layer, from the in-plane stress or from the whole part."""
 
 from typing import Literal
 
@@ -14,7 +14,7 @@ from ccfem.tensor import in_plane, strongest_in_plane
 __all__ = ["layer_tension", "mesh_tension"]
 
 _ANY_COMPRESSION = 1e12
-"""Limit of compression over tension that rules nothing out."""
+"""Limit of compression over tension that excludes nothing."""
 
 
 def layer_tension(
@@ -23,15 +23,15 @@ def layer_tension(
     sense: Literal["tensile", "absolute"] = "tensile",
     compression_limit: float = 3.0,
 ) -> Tension:
-    """Tension on the triangles of a layer, of the stress in its plane.
+    """Tension on the triangles of a layer from its in-plane stress.
 
     Parameters
     ----------
     stress : LayerStress
     source : {"nodal", "cell"}
-        Recovered stress, averaged over the corners of each triangle, or that of its tetrahedron.
+        Recovered stress, averaged over the corners of each triangle, or stress of its tetrahedron.
     sense : {"tensile", "absolute"}
-        Take the tensile principal stress, or the one of the largest size, whatever its sign.
+        Use the tensile principal stress, or that of largest absolute value.
     compression_limit : float, default 3.0
         See `fields.tensile.plane_tension`.
     """
@@ -54,9 +54,9 @@ def mesh_tension(
 ) -> Tension:
     """Tension in space of all tetrahedra, as Chen et al. 2021 section 4.1 processes it.
 
-    Vectors are chosen by `spatial_tension`, oriented along the minimum spanning tree over the
-    faces (cells without a tensile direction take part in that only), and undefined where the
-    filter finds them incompatible; the stress is kept there.
+    Vectors are chosen by `spatial_tension` and oriented along the minimum spanning tree over the
+    faces; cells without a tensile direction only take part in the orientation. Where the filter
+    finds vectors incompatible, they become undefined, but the stress is kept.
     """
     cells = stress.mesh.corners
     tensors = stress.stress if source == "cell" else stress.nodal[cells].mean(axis=1)

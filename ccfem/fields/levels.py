@@ -1,4 +1,4 @@
-"""How many isocurves fit: the search for their number [Chen et al. 2021, section 4.3, Eq. 7]."""
+"""Number of isocurves that fit, and its search [Chen et al. 2021, section 4.3, Eq. 7]."""
 
 import numpy as np
 import scipy.sparse as sparse
@@ -18,7 +18,7 @@ def levels_at(surface: Surface, values: FloatArray, count: int) -> Isocontours:
 
 
 def unit_levels(surface: Surface, values: FloatArray) -> Isocontours:
-    """Isocurves at whole steps of 1, as many as fit, the lowest and the highest equally far in.
+    """Isocurves at unit steps, as many as fit, equally far from both extremes.
 
     The curves are therefore the same for a field and for its negative.
     """
@@ -31,10 +31,10 @@ def unit_levels(surface: Surface, values: FloatArray) -> Isocontours:
 def extract_levels(surface: Surface, values: FloatArray, width: float) -> Isocontours:
     """Extract the largest number of isocurves whose neighbours are more than a width apart.
 
-    The number starts at `start_count`, grows while the smallest distance between neighbouring
-    isocurves exceeds the width, and then falls one by one until it does again. A number is first
-    tried on single triangles that two levels cross, and only when these allow it on all distances:
-    that changes the cost, not the result.
+    The number starts at `start_count` and grows while the smallest distance between neighbouring
+    isocurves exceeds the width. Then it falls one by one until the distance exceeds the width
+    again. A number is first checked on single triangles that two levels cross, and all distances
+    are computed only if it passes: this changes the cost, not the result.
 
     Parameters
     ----------
@@ -47,8 +47,8 @@ def extract_levels(surface: Surface, values: FloatArray, width: float) -> Isocon
     Returns
     -------
     Isocontours
-        Empty where not even one isocurve fits. "Neighbours" are curves of levels i and i + 1;
-        branches of one level may come nearer to each other.
+        Empty if not even one isocurve fits. "Neighbours" are curves of levels i and i + 1; branches
+        of the same level may come nearer to each other.
     """
     if not np.ptp(values) > 0.0:
         return levels_at(surface, np.zeros(len(values)), 1)
@@ -79,7 +79,7 @@ def extract_levels(surface: Surface, values: FloatArray, width: float) -> Isocon
 def start_count(surface: Surface, values: FloatArray, width: float) -> int:
     """Distance along mesh edges from the smallest to the largest value, in widths (Dijkstra).
 
-    Where the surface is in several parts: to the farthest point of the part of the smallest value.
+    If the surface has several parts: to the farthest point of the part with the smallest value.
     """
     edges, n = surface.edges[0], len(surface.points)
     length = np.linalg.norm(surface.points[edges[:, 0]] - surface.points[edges[:, 1]], axis=1)

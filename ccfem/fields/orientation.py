@@ -11,11 +11,11 @@ __all__ = ["orient"]
 def orient(
     direction: FloatArray, pairs: IntArray, confidence: FloatArray | None = None
 ) -> FloatArray:
-    """Flip vectors so that neighbours point the same way wherever that is possible.
+    """Flip vectors so that neighbours point the same way wherever possible.
 
-    Signs are propagated along the minimum spanning tree of the weights ``1 - |v_i . v_j|``: edges
-    are taken in the order of their weight, and a union-find that stores the sign of every element
-    relative to its root joins the trees, so that no graph is ever traversed.
+    Signs are propagated along the minimum spanning tree of the weights ``1 - |v_i . v_j|``. Edges
+    are taken in the order of their weight. The trees are joined by union-find, which stores the
+    sign of every element relative to its root, so that no graph is traversed.
 
     Parameters
     ----------
@@ -24,9 +24,9 @@ def orient(
     pairs : (e, 2) int array
         Neighbouring elements.
     confidence : (k,) array in [0, 1], optional
-        Weights become ``1 - min(c_i, c_j) |v_i . v_j|``. Where a field of lines cannot be oriented
-        throughout, there is a cut across which it flips; in a smooth field nothing but the
-        confidence says where that cut does no harm.
+        Weights become ``1 - min(c_i, c_j) |v_i . v_j|``. If a field of lines cannot be oriented
+        consistently, it flips across a cut. In a smooth field only the confidence tells where that
+        cut does no harm.
 
     Returns
     -------

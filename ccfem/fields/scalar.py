@@ -13,17 +13,17 @@ __all__ = ["fit_cone", "fit_constrained", "fit_literal", "fit_weighted"]
 
 _REGULARISATION = 1e-10
 _ITERATIONS = 20
-"""Of the alternating direction method: see `fit_constrained`."""
+"""Iterations of the alternating direction method: see `fit_constrained`."""
 _PENALTY = 1.0
 """Penalty of the alternating direction method, in units of the spacing weight."""
 _RELAXATION = 1.7
 
 
 def fit_literal(surface: Surface, vectors: FloatArray) -> FloatArray:
-    """Field whose gradient is nearest to the vectors turned by 90 degrees.
+    """Field whose gradient is nearest to the vectors rotated by 90 degrees.
 
-    Minimises ``sum_f A_f |grad s - R90 u_f|^2``. The paper prints Eq. 6 without the turn, which
-    would put the isocurves across the stress.
+    Minimises ``sum_f A_f |grad s - R90 u_f|^2``. The paper prints Eq. 6 without the rotation, which
+    would lay the isocurves across the stress.
 
     Parameters
     ----------
@@ -48,7 +48,7 @@ def fit_weighted(
     weight: FloatArray,
     spacing_weight: float = 0.1,
 ) -> FloatArray:
-    """Field, (n,) at the points, along the tension first, and of the wanted density second.
+    """Field (n,) that follows the tension first, and the wanted density second.
 
     Minimises ``sum_f w_f A_f [(t . grad s)^2 + spacing_weight (n . grad s - m)^2]`` with t the
     direction, n its normal and m the wanted density of isocurves.
@@ -62,7 +62,7 @@ def fit_weighted(
         m, in any unit: isocurves per mm up to a factor.
     weight : (t,) array
     spacing_weight : float, default 0.1
-        The smaller, the better the alignment and the less even the spacing.
+        Smaller values give better alignment and less even spacing.
     """
     metric, flux = _weighted_form(surface, direction, density, weight, spacing_weight)
     return _solve(surface, metric, flux)
@@ -78,12 +78,12 @@ def fit_constrained(
 ) -> FloatArray:
     """As `fit_weighted`, subject to ``|grad s| <= 1 / width`` on every triangle.
 
-    Isocurves at unit levels are then `width` apart wherever they run through the same triangles,
-    without any search for their number, and no hot spot sets the spacing of the whole layer. The
+    Isocurves at unit levels are then at least `width` apart where they cross the same triangles.
+    There is no search for their number, and no hot spot sets the spacing of the whole layer. The
     convex problem is solved by the alternating direction method of multipliers (Boyd et al.,
-    Foundations and Trends in Machine Learning 3 (2011) 1, section 3): one factorisation, and a
-    back-substitution and a projection an iteration. After 20 iterations the objective is within
-    1 % of the optimum and single triangles exceed the bound by some per cent, so that strands
+    Foundations and Trends in Machine Learning 3 (2011) 1, section 3): one factorisation, then one
+    back-substitution and one projection in each iteration. After 20 iterations the objective is
+    within 1 % of the optimum, and single triangles exceed the bound by a few per cent, so strands
     still have to be trimmed.
 
     Parameters
@@ -122,10 +122,10 @@ def fit_cone(
     width: float,
     spacing_weight: float = 0.1,
 ) -> FloatArray:
-    """Solve the problem of `fit_constrained` to the last digit, as a second-order cone programme.
+    """Solve the problem of `fit_constrained` to full accuracy as a second-order cone programme.
 
-    By Clarabel through cvxpy: the reference that `fit_constrained` is measured against, some fifty
-    times slower.
+    It uses Clarabel through cvxpy, and serves as the reference for `fit_constrained`; it is about
+    fifty times slower.
 
     Parameters
     ----------
@@ -135,11 +135,11 @@ def fit_cone(
     Raises
     ------
     SolveError
-        With the status of the solver when it did not find the optimum.
+        With the status of the solver if it did not find the optimum.
     """
     import cvxpy
 
-    # In widths, so that the bound is 1: the solver judges its accuracy by sizes near 1.
+    # In widths, so that the bound is 1: the solver's tolerances suit quantities near 1.
     target = np.minimum(density * width, 1.0)
     normal = np.column_stack([-direction[:, 1], direction[:, 0]])
     gx, gy = surface.gradient_matrix[0::2], surface.gradient_matrix[1::2]

@@ -1,4 +1,4 @@
-"""Streamlines of the principal stress in the plane: lines along the stress of the largest size."""
+"""Streamlines of the in-plane principal stress of largest absolute value."""
 
 from typing import NamedTuple
 
@@ -14,14 +14,14 @@ from ccfem.tensor import strongest_in_plane
 __all__ = ["LineField", "direction_at", "line_field", "streamline_step", "streamlines"]
 
 _LONGEST = 10.0
-"""Length at which a line stops in either sense, in diagonals of the points."""
+"""Length, in diagonals of the points, at which a line stops in either sense."""
 
 _SHARPEST = 0.5
-"""Cosine of the largest turn of the direction within one step: a line that turns by more than 60
+"""Least cosine of the turn of the direction within one step: a line that turns by more than 60
 degrees has changed to the other family of principal directions."""
 
 _RARE = 0.05
-"""Share of the area that may be stressed higher than the size that others are measured by."""
+"""Share of the area that may have a higher stress than the one used as a measure."""
 
 
 def streamlines(
@@ -32,12 +32,12 @@ def streamlines(
     step: float,
     least: float = 0.02,
 ) -> list[FloatArray]:
-    """Lines that follow the direction of the principal stress of the largest size.
+    """Lines that follow the principal stress of largest absolute value.
 
-    Runge-Kutta of fourth order in both senses from each start; the sign follows the step before.
-    The direction is that of the linearly interpolated stress, in double-angle form: no eigenvector
-    is ever averaged, and where tension and compression change places the direction jumps within
-    a triangle.
+    Runge-Kutta method of fourth order, in both senses from each start; the sign is that of the
+    previous step. The direction is that of the linearly interpolated stress, in double-angle form.
+    Eigenvectors are never averaged, and where the larger of tension and compression changes, the
+    direction jumps within a triangle.
 
     Parameters
     ----------
@@ -46,20 +46,20 @@ def streamlines(
     plane_stress : (n, 3) array, MPa
         s11, s22, s12 at the points.
     starts : (k, 2) array, mm
-        Those outside the triangles give an empty line.
+        Starts outside the triangles give an empty line.
     step : float, mm
         Length of a step.
     least : float in [0, 1), default 0.02
         A line stops where the difference of the two principal stresses, or the larger of their
-        sizes, is below this share of the size that a twentieth of the area exceeds: the peak at a
-        point load, which grows with every finer mesh, decides nothing.
+        absolute values, is below this share of the value that a twentieth of the area exceeds. The
+        peak at a point load, which grows with mesh refinement, therefore has no influence.
 
     Returns
     -------
     list of (m, 2) arrays, mm
-        From one end to the other; m = 0 where there is no direction at the start. A line that
-        comes back to its start within one step is closed: its last point is its first. Lines end
-        inside the triangles, less than a step from the border that they run out of.
+        From one end to the other; m = 0 if there is no direction at the start. A line that returns
+        to its start within one step is closed: its last point is its first. Other lines end inside
+        the triangles, less than a step from the border that they would cross.
     """
     check_number("step of streamlines", step, above=0.0, unit="mm")
     starts = np.asarray(starts, dtype=np.float64).reshape(-1, 2)
@@ -85,7 +85,7 @@ def streamlines(
 
 
 class LineField(NamedTuple):
-    """Plane stress on triangles, as the compiled loops read it.
+    """Plane stress on triangles, in the form that the compiled loops use.
 
     Attributes
     ----------
@@ -93,10 +93,10 @@ class LineField(NamedTuple):
     values : (t, 3, 3) array, MPa
         Mean, half the difference and shear of the stress at the corners: linear in the stress.
     beside : (t, 3) int array
-        Triangle beyond the side opposite to each corner, -1 at the border.
+        Triangle across the side opposite to each corner, -1 at the border.
     least : float, MPa
-        There is no direction where the difference of the two principal stresses, or the larger of
-        their sizes, is below this.
+        There is no direction where the difference of the principal stresses, or the larger of their
+        absolute values, is below this.
     """
 
     corners: FloatArray
@@ -125,7 +125,7 @@ def line_field(
 
 
 def _usual_size(corners: FloatArray, plane_stress: FloatArray) -> float:
-    """Size of the principal stress that `_RARE` of the area of triangles exceeds, MPa."""
+    """Absolute principal stress that `_RARE` of the area of triangles exceeds, MPa."""
     size = np.abs(strongest_in_plane(plane_stress)[0])
     a, b = np.moveaxis(corners[:, 1:] - corners[:, :1], 1, 0)
     order = np.argsort(size, kind="stable")
@@ -137,8 +137,8 @@ def _usual_size(corners: FloatArray, plane_stress: FloatArray) -> float:
 def direction_at(field, cell, x, y, sharpest, way):  # type: ignore[no-untyped-def]
     """Return the unit direction at (x, y), the triangle there, and whether there is one.
 
-    The triangle is found by walking from `cell`; `way` is where the line came from, so that the
-    sign can follow, and `sharpest` the least cosine of the turn from there: -1 at the start.
+    The triangle is found by walking from `cell`. `way` is the previous direction, which sets the
+    sign, and `sharpest` the least cosine of the turn from it: -1 at the start.
     """
     corners, values, beside, least = field
     for _ in range(len(corners)):
@@ -167,7 +167,7 @@ def direction_at(field, cell, x, y, sharpest, way):  # type: ignore[no-untyped-d
         return 0.0, 0.0, cell, False
     if mean < 0.0:
         half, shear = -half, -shear
-    # Half the angle of (half, shear), by roots: the larger component first, so none cancels.
+    # Half the angle of (half, shear), by roots: the larger component first avoids cancellation.
     if half >= 0.0:
         dx = np.sqrt(0.5 * (1.0 + half / radius))
         dy = 0.5 * shear / (radius * dx)
@@ -184,7 +184,7 @@ def direction_at(field, cell, x, y, sharpest, way):  # type: ignore[no-untyped-d
 
 @njit(cache=True, nogil=True)
 def streamline_step(field, cell, x, y, step, way):  # type: ignore[no-untyped-def]
-    """Point one step on, the triangle there, and whether there is one; turns `way`."""
+    """Point one step on, the triangle there, and whether there is one; updates `way`."""
     h = 0.5 * step
     ax, ay, cell, fine = direction_at(field, cell, x, y, _SHARPEST, way)
     if not fine:

@@ -1,4 +1,4 @@
-"""The direction and size of tension at every point [Chen et al. 2021, section 4.1]."""
+"""Direction and size of the tension at every point [Chen et al. 2021, section 4.1]."""
 
 from dataclasses import dataclass
 
@@ -20,13 +20,13 @@ class Tension:
     direction : (k, 2) array in a plane, (k, 3) in space
         Unit vectors; arbitrary where undefined.
     stress : (k,) array, MPa
-        Tensile stress along the direction, 0 where there is none: 1e-5 MPa in the paper, which
-        would weigh more, the smaller the load.
+        Tensile stress along the direction, 0 where there is none. The paper uses 1e-5 MPa, which
+        would count more, the smaller the load is.
     defined : (k,) bool array
         Whether there is a tensile direction.
     oriented : bool
-        Whether neighbouring vectors point the same way. Otherwise they are lines, and their sign
-        means nothing.
+        Whether neighbouring vectors point the same way. Otherwise they are lines, whose sign is
+        arbitrary.
     """
 
     direction: FloatArray
@@ -35,7 +35,7 @@ class Tension:
     oriented: bool = False
 
     def on(self, layer: Layer) -> "Tension":
-        """Project from tetrahedra to a flat layer: each triangle takes the values of its own."""
+        """Project from tetrahedra to a flat layer: each triangle takes the values of its cell."""
         direction = self.direction[layer.cell]
         if layer.turns is not None:
             direction = np.einsum("tij,tj->ti", layer.turns, direction)
@@ -50,9 +50,10 @@ class Tension:
 def spatial_tension(stress: FloatArray, compression_limit: float = 3.0) -> Tension:
     """Tension of stress tensors in space, by the paper's rule.
 
-    Principal stresses are sorted by size, largest magnitude first. A tensile first one is taken;
-    else a tensile second one, unless the first is more than `compression_limit` times as large;
-    else there is no tensile direction, and the first direction stands in for it.
+    Principal stresses are sorted by absolute value, largest first. The first is used if it is
+    tensile. Otherwise the second is used if it is tensile, and the first is less than
+    `compression_limit` times as large. Otherwise there is no tensile direction, and the first
+    direction replaces it.
 
     Parameters
     ----------
@@ -76,9 +77,9 @@ def spatial_tension(stress: FloatArray, compression_limit: float = 3.0) -> Tensi
 def plane_tension(plane_stress: FloatArray, compression_limit: float = 3.0) -> Tension:
     """Tension of plane stress, by the paper's rule applied in the plane of the layer.
 
-    A fibre that lies in a flat layer carries the stress in that plane only, so this is what the
-    planning uses by default; for stress in the plane it equals the projection of
-    `spatial_tension`. The plane stress (k, 3), MPa, is s11, s22, s12; the limit is the paper's mu.
+    A fibre in a flat layer carries only the stress in its plane, so planning uses this by default.
+    For in-plane stress it equals the projection of `spatial_tension`. The plane stress (k, 3), MPa,
+    is s11, s22, s12; the limit is the paper's mu.
     """
     largest, smallest, angle = largest_in_plane(plane_stress)
     defined = (largest > 0.0) & (-smallest < compression_limit * largest)

@@ -1,4 +1,4 @@
-"""Ends of strands that abut the side of another, cut back to a strand's width from its middle."""
+"""Ends of strands that abut the side of another strand, cut back to a width from its middle."""
 
 from collections.abc import Sequence
 
@@ -17,29 +17,29 @@ from ccfem.geometry.polylines import (
 __all__ = ["clear_ends"]
 
 _MOST = 1.25
-"""Largest length that is cut off an end, in distances: strands that are met at less than about 25
-degrees are run along, not into."""
+"""Largest length cut off an end, in distances: a strand that meets another at less than about 25
+degrees runs along it, not into it."""
 _STEPS = 26
 _ENOUGH = 0.995
-"""Share of the distance that is enough: strands are laid to half a per cent of their width."""
+"""Share of the distance that is sufficient: strands are laid to half a per cent of their width."""
 _END = 1e-6
-"""Distance, mm, up to which the nearest point of a strand is taken for its end."""
+"""Distance, mm, up to which the nearest point of a strand counts as its end."""
 
 
 def clear_ends(lines: Sequence[FloatArray], distance: float, first: int = 0) -> list[FloatArray]:
-    """Lines whose open ends stop at a distance before the sides of others.
+    """Lines whose open ends stop at a given distance from the sides of others.
 
-    An end is cut back by no more than brings it there; not at all where little more than the
-    distance does not. Ends of others, which it may be joined to, do not hold it off.
+    An end is cut back only as far as needed, and not at all if a cut of little more than the
+    distance is not enough. Ends of other lines do not matter, since they may be joined to it.
 
     Parameters
     ----------
     lines : sequence of (k, 2) arrays, mm
-        Closed ones repeat their first point, and stay as they are.
+        Closed ones repeat their first point and are not changed.
     distance : float, mm
         From the end to the middle of other lines.
     first : int, default 0
-        The lines before this one stay as they are.
+        Lines before this one are not changed.
     """
     cut = list(lines)
     tips = [
@@ -70,7 +70,7 @@ def _places(line: FloatArray, end: int, back: FloatArray) -> FloatArray:
 
 
 def _without_end(line: FloatArray, end: int, length: float) -> FloatArray:
-    """Line without so much of one of its ends."""
+    """Line without a given length at one of its ends."""
     head = line if end == 0 else line[::-1]
     along = along_line(head)
     start = points_along(head, along, np.array([length]))

@@ -9,7 +9,7 @@ from ccfem.geometry.buckets import Buckets
 __all__ = ["share_room"]
 
 _SLIVER = 1e-9
-"""Share of a width below which an overlap is rounding."""
+"""Share of a width below which an overlap counts as rounding error."""
 
 
 def share_room(
@@ -30,8 +30,8 @@ def share_room(
 ) -> FloatArray:
     """Share the room across each part among the bands that cover it.
 
-    A neighbouring part covers a rectangle about its middle, as long as it goes ahead and one width
-    wide. Parts of one line count from `apart` parts of it on: nearer ones are its own band.
+    A neighbouring part covers a rectangle about its middle: one width wide, and as long as the part
+    goes ahead. Parts of the same line count from `apart` parts on; nearer ones are the same band.
 
     Parameters
     ----------
@@ -40,9 +40,9 @@ def share_room(
     middle, direction, normal : (s, 3) arrays
         Of each part, mm and unit vectors.
     ahead : (s,) array, mm
-        How far each part goes ahead.
+        Distance by which each part goes ahead.
     often, fold : (s,) arrays
-        Strands that lie along the band of the part, and strands that its length amounts to.
+        Strands that lie along the band of the part, and strands that its length is equivalent to.
     layer, line : (s,) int arrays
         Of each part; parts come in the order of the lines.
     apart : (s,) int array
@@ -60,7 +60,7 @@ def share_room(
         alone, every, fill and stack of `ccfem.geometry.beads.Beads`.
     """
     half = 0.5 * width
-    # The furthest that a middle may lie whose rectangle meets the line across a part.
+    # Largest distance of a middle whose rectangle can meet the line across a part.
     reach = float(half + np.sqrt(half * half + 0.25 * ahead.max(initial=0.0) ** 2)) * (1.0 + 1e-9)
     return np.asarray(
         _shared(grid.origin, grid.cell, grid.shape, grid.starts, grid.items, middle, direction,
@@ -102,8 +102,8 @@ def _shared(  # type: ignore[no-untyped-def]
                                 between = min(between, ring[k] - between)
                             if between < apart[k]:
                                 continue
-                        # Of the middle of k along, across and above the other part, and how these
-                        # and the direction change with the way across k.
+                        # Position of the middle of k along, across and above the other part, and
+                        # how these and the direction change along the way across k.
                         along, side, above, turned, shift, cosine = 0.0, 0.0, 0.0, 0.0, 0.0, 0.0
                         for i in range(3):
                             d = middle[k, i] - middle[other, i]
@@ -168,7 +168,7 @@ def _clipped(low, high, value, slope, limit):  # type: ignore[no-untyped-def]  #
 
 @njit(cache=True, nogil=True)
 def _sort(order, at):  # type: ignore[no-untyped-def]  # pragma: no cover
-    """Sort indices by what they point at, by insertion: there are few, nearly sorted."""
+    """Sort indices by the values they refer to, by insertion: there are few, nearly sorted."""
     for e in range(1, len(order)):
         index = order[e]
         place = e

@@ -1,19 +1,19 @@
-"""Beads: the bands that strands of a layer fill, and how much of each finds room.
+"""Beads: the bands that strands of a layer fill, and how much room each has.
 
 A strand fills a band one width W wide. Where bands of strands of about the same direction overlap,
-the room is shared equally: at a point of the layer that m of them cover, each has the m-th part.
+they share the room equally: at a point of the layer covered by m of them, each gets the m-th part.
 Across a strand, with x from -W/2 to W/2,
 
-    room = 1/W integral of 1 / m(x) dx,
+    room = 1/W integral of 1 / m(x) dx.
 
-so that what strands find in all, times the width, is the area of the union of their bands: N copies
-of a line find the room of one, two strands W/2 apart that of one and a half, strands W apart or
-more all of it. Strands that cross at a larger angle lie over each other and take no room from each
-other; they do in `Beads.every`.
+The room of all strands, times the width, is thus the area of the union of their bands: N copies of
+a line have the room of one line, two strands W/2 apart that of one and a half, and strands W apart
+or more have full room. Strands that cross at a larger angle lie over each other and take no room
+from each other, except in `Beads.every`.
 
-A strand that goes back and forth along its own line takes its room as often as it passes, so that
-no more fibre finds room in a band than fits. A strand that winds has the direction of its chord
-over a width.
+A strand that goes back and forth along its own line shares its room as often as it passes, so that
+no more fibre has room in a band than fits. A strand that winds has the direction of its chord over
+a width.
 """
 
 from typing import NamedTuple
@@ -29,17 +29,17 @@ from ccfem.geometry.polylines import lengths, resample, starts_segment
 __all__ = ["SAME_DIRECTION", "Beads", "beads"]
 
 SAME_DIRECTION = np.radians(30.0)
-"""Largest angle, radians, between strands that lie beside each other and do not cross."""
+"""Largest angle, radians, between strands that lie side by side and do not cross."""
 
 _PARTS = 4
-"""Parts a width long that a strand is cut into."""
+"""Number of parts a width that a strand is cut into."""
 
 _AHEAD = _PARTS // 2
-"""Parts to either side over which the direction of a strand is taken."""
+"""Parts on either side over which the direction of a strand is measured."""
 
 
 class Beads(NamedTuple):
-    """Parts of strands, and what of their bands finds room.
+    """Parts of strands, and how much room their bands have.
 
     Attributes
     ----------
@@ -52,7 +52,7 @@ class Beads(NamedTuple):
     middle, direction, normal : (s, 3) arrays, mm and 1
         Middle of the part, unit vector along its chord over a width, unit normal of the layer.
     alone : (s,) array in (0, 1]
-        Share of the strand that finds room among strands of its direction: ``1 - alone`` lies on
+        Share of the strand that has room among strands of its direction; ``1 - alone`` lies on
         other fibre.
     every : (s,) array in (0, 1]
         As `alone`, among strands of any direction.
@@ -60,7 +60,7 @@ class Beads(NamedTuple):
         Mean number of strands, of any direction, over the width of the band; a strand that winds
         counts by its length.
     stack : (s,) array
-        Largest number of strands, of any direction, above each other in the band.
+        Largest number of strands, of any direction, on top of each other in the band.
     """
 
     line: IntArray
@@ -168,7 +168,7 @@ def _chords(own, length, line, first, closed):  # type: ignore[no-untyped-def]  
                 x, y, z = x + own[at, 0], y + own[at, 1], z + own[at, 2]
                 whole += length[at]
         size = np.sqrt(x * x + y * y + z * z)
-        # A strand that turns back on itself within a width has the direction of its own piece.
+        # A strand that turns back within a width takes the direction of its own piece.
         lost = size < 1e-3 * whole
         if lost:
             x, y, z = own[k, 0], own[k, 1], own[k, 2]

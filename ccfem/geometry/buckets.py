@@ -1,4 +1,4 @@
-"""A uniform grid of buckets that holds boxes, for finding neighbours and containers."""
+"""A uniform grid of buckets for boxes, to find neighbours and containing boxes."""
 
 from typing import NamedTuple
 
@@ -43,7 +43,7 @@ def bucket(low: FloatArray, high: FloatArray, cell: float | None = None) -> Buck
     low, high : (n, d) arrays, mm
         Corners of at least one box, d = 2 or 3.
     cell : float, mm, optional
-        Size of a cell; by default about one box a cell. Made larger where the grid would have more
+        Size of a cell; by default about one box a cell. It is increased if the grid would have more
         than four million cells.
     """
     origin = low.min(axis=0)
@@ -85,7 +85,7 @@ def _fill(first: IntArray, last: IntArray, shape: IntArray) -> tuple[IntArray, I
                         if writing:
                             items[starts[c]] = box
                         starts[c] += 1
-    # Writing moved the start of every cell to that of the next one.
+    # Writing has moved the start of every cell to that of the next one.
     for c in range(len(starts) - 1, 0, -1):
         starts[c] = starts[c - 1]
     starts[0] = 0

@@ -1,4 +1,4 @@
-"""What lies in cones: a head above its tip, and what stands round it."""
+"""Points in cones: a print head is taken as a cone above its tip."""
 
 import numpy as np
 from numba import njit
@@ -8,7 +8,7 @@ from ccfem.arrays import BoolArray, FloatArray, IntArray, seen_only
 __all__ = ["earlier_in_cones", "groups_in_cones"]
 
 _BLOCK = 32
-"""So many points, one after the other, have a common sphere that is looked at first."""
+"""Number of consecutive points with a common bounding sphere, which is checked first."""
 
 
 def groups_in_cones(
@@ -27,7 +27,7 @@ def groups_in_cones(
         Tips of the cones, and unit vectors along which they open.
     points : (p, 3) array, mm
     group : (p,) int array
-        Of each point, ascending from 0 on. Points that follow each other are best near each other.
+        Of each point, ascending from 0. Consecutive points should be near each other for speed.
     half_angle : float, degrees
         Below 90.
     length : float, mm
@@ -53,8 +53,8 @@ def earlier_in_cones(
 ) -> IntArray:
     """Point of an earlier step in each cone (n,), -1 where there is none.
 
-    Parameters and rules are those of `groups_in_cones`; points count whose `step` (p,), ascending,
-    is below the cone's own, `when` (n,).
+    Parameters and rules as in `groups_in_cones`. Only points count whose `step` (p,), ascending, is
+    below that of the cone, `when` (n,).
     """
     return _in_cones(tips, axes, when, points, step, half_angle, length, 0)[:, 0]
 

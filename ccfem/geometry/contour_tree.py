@@ -1,8 +1,8 @@
-"""Contours of the distance to the border of a section, and the tree in which they lie side by side.
+"""Contours of the distance to the border of a section, and the tree of which lie side by side.
 
 H. Kipping, T. Schueppstuhl, Load-oriented nonplanar additive manufacturing method for optimized
-continuous carbon fiber parts, Materials 16 (2023) 998, take the distance along the surface. In the
-plane, or in a chart of the layer, the contours are offsets of the border, which are exact.
+continuous carbon fiber parts, Materials 16 (2023) 998, measure the distance along the surface. In
+the plane, or in a chart of the layer, the contours are offsets of the border, which are exact.
 """
 
 from collections.abc import Sequence
@@ -22,18 +22,18 @@ from ccfem.geometry.shapes import Region
 __all__ = ["SAMPLES", "ContourTree", "contour_trees"]
 
 SAMPLES = 3
-"""Samples of a contour on a length of one spacing."""
+"""Samples of a contour per spacing of length."""
 _QUARTER = 16
-"""Segments of a quarter turn round a re-entrant corner."""
+"""Segments per quarter turn round a re-entrant corner."""
 _SHORTEST = 2.2
 """Length of the shortest contour that is kept, in spacings."""
 _NEXT, _RIDGE = 1.8, 2.1
-"""Distance, in spacings, up to which contours of neighbouring levels, and those of one level on
-both sides of a ridge, lie side by side; where contours end early, a ridge is that much wider."""
+"""Distance, in spacings, up to which contours lie side by side: of neighbouring levels, and of one
+level on both sides of a ridge. Where contours end early, the ridge is that much wider."""
 _RIDGE_COST = 3.0
 """Extra weight of a link across a ridge, in spacings."""
 _LONGER = 1e-3
-"""Weight that prefers long contours among those at one distance, in spacings."""
+"""Weight, in spacings, that prefers long contours among those at the same distance."""
 
 
 @dataclass(frozen=True)
@@ -43,12 +43,12 @@ class ContourTree:
     Attributes
     ----------
     contours : tuple of (n, 2) arrays, mm
-        Closed rings, evenly sampled, `SAMPLES` points or a few less on a spacing; the first point
-        is not repeated.
+        Closed rings, evenly sampled, with `SAMPLES` points or slightly fewer a spacing; the first
+        point is not repeated.
     level : (k,) int array
-        How many spacings further inside each lies than the outermost.
+        Distance of each contour inside the outermost one, in spacings.
     parent : (k,) int array
-        The contour that each hangs on; -1 for the outermost, which is the first.
+        The contour that each is attached to; -1 for the outermost one, which is the first.
     """
 
     contours: tuple[FloatArray, ...]
@@ -59,7 +59,7 @@ class ContourTree:
 def contour_trees(
     section: Region, spacing: float, start: FloatArray, closest: float, radius: float = 0.0
 ) -> list[ContourTree]:
-    """Trees of the contours at half a spacing from the border and at every spacing further in.
+    """Trees of the contours at half a spacing from the border and at every further spacing inwards.
 
     Parameters
     ----------
@@ -68,11 +68,11 @@ def contour_trees(
     start : (2,) array, mm
         Every contour begins at its point nearest to this.
     closest : float
-        Least distance of opposite sides of a contour, in spacings, from 0 to 1: where a contour
-        is narrower it ends, and falls into pieces at a neck.
+        Least distance between opposite sides of a contour, in spacings, from 0 to 1. A contour ends
+        where it is narrower, and splits at a neck.
     radius : float, mm, default 0
-        Least radius of the corners in which a contour runs. The contours stay a spacing apart, so
-        that the corners of the section stay open.
+        Least radius of the inner corners of contours. The contours stay a spacing apart, so the
+        corners of the section stay open.
 
     Returns
     -------
@@ -100,10 +100,10 @@ def contour_trees(
 
 
 def _level(section: Region, distance: float, narrow: float, radius: float) -> Region:
-    """Return what lies a distance from the border, its corners rounded, and is wide enough.
+    """Return the region at a distance from the border, with rounded corners, that is wide enough.
 
-    All in mm. A border is rounded by the discs of a radius that fit to the side of the material,
-    whatever other borders are near: so what is rounded further in lies a distance further in.
+    All in mm. A border is rounded by the discs of the radius that fit on the material's side,
+    regardless of other borders. So a border rounded further in lies further in by that distance.
     """
     inner = shapely.buffer(section, -distance, quad_segs=_QUARTER)
     if radius > 0.0:
@@ -117,7 +117,7 @@ def _level(section: Region, distance: float, narrow: float, radius: float) -> Re
 
 
 def _opened(region: Any, radius: float) -> Any:
-    """Return what discs of a radius, mm, reach inside; below 0, what they do not reach outside."""
+    """Return what discs of a radius, mm, reach inside; if negative, what they miss outside."""
     if radius == 0.0:
         return region
     inner = shapely.buffer(region, -radius, quad_segs=_QUARTER)
@@ -125,7 +125,7 @@ def _opened(region: Any, radius: float) -> Any:
 
 
 def _sampled(ring: FloatArray, spacing: float) -> FloatArray:
-    """Ring in even steps of at least a third of a spacing, its first point not repeated."""
+    """Ring in even steps of at least a third of a spacing, without repeating its first point."""
     count = max(int(line_length(ring) * SAMPLES / spacing), 4)
     points, _ = resample(ring, np.array([0, len(ring)]), line_length(ring) / count * (1.0 + 1e-9))
     return points[:-1]
@@ -134,7 +134,7 @@ def _sampled(ring: FloatArray, spacing: float) -> FloatArray:
 def _grown(
     found: Sequence[FloatArray], level: IntArray, spacing: float, reach: float
 ) -> list[ContourTree]:
-    """Trees of contours: least spanning trees over those that lie side by side."""
+    """Trees of contours: minimum spanning trees over those that lie side by side."""
     lines = np.array([shapely.linearrings(ring) for ring in found])
     one, other = shapely.STRtree(lines).query(lines, "dwithin", reach * spacing)
     kept = (one < other) & (np.abs(level[one] - level[other]) <= 1)

@@ -1,4 +1,4 @@
-"""Shortest curves between two poses that turn no tighter than a radius (Dubins).
+"""Shortest curves between two poses with a least radius of turn (Dubins).
 
 L. E. Dubins, On curves of minimal length with a constraint on average curvature, and with
 prescribed initial and terminal positions and tangents, American Journal of Mathematics 79 (1957)
@@ -21,7 +21,7 @@ WORDS: IntArray = np.array(
 """Turns of the three pieces of each word, (6, 3): 1 to the left, -1 to the right, 0 straight."""
 
 _NO_TURN = 1e-6
-"""Angle, radians, up to which an arc may turn the other way instead of almost all the way round."""
+"""Angle, radians, by which an arc may turn the other way instead of almost a full turn."""
 _TOUCHING = 1e-10
 """Distance in radii below which circles coincide, or touch."""
 
@@ -89,7 +89,7 @@ def _sample(pose, turns, sizes, parts, radius):  # type: ignore[no-untyped-def]
 
 @njit(cache=True, nogil=True)
 def advance(x, y, heading, turn, size, radius):  # type: ignore[no-untyped-def]
-    """Pose after a piece: an arc by the chord and its direction, which no cancellation spoils."""
+    """Pose after a piece; arcs by their chord and its direction, which avoids cancellation."""
     half = 0.5 * turn * size / radius
     chord = size if turn == 0 else 2.0 * radius * np.sin(abs(half)) * np.sign(size)
     return (

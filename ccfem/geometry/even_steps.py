@@ -1,4 +1,4 @@
-"""Polylines in steps of about one length: curves without needless points, straight lines cut."""
+"""Polylines in steps of about one length: fewer points on curves, more on straight lines."""
 
 import numpy as np
 from numba import njit
@@ -9,10 +9,10 @@ from ccfem.geometry.polylines import merge_repeated, subdivide
 __all__ = ["OFF", "even_steps"]
 
 OFF = 0.005
-"""Largest deviation of paths, as they leave the planner, from those planned, in their steps."""
+"""Largest deviation of final paths from planned ones, in steps."""
 
 _REPEATED = 1e-6
-"""Points nearer than this share of the step to the one before them are the same point."""
+"""Distance, as a share of the step, below which a point equals the one before it."""
 
 
 def even_steps(
@@ -21,8 +21,8 @@ def even_steps(
     """Polylines in steps no longer than a length, and shorter only where they bend.
 
     Points that lie within the tolerance of the chord between their neighbours are left out (Douglas
-    and Peucker 1973), and what is longer than the step is cut into equal parts. Corners and ends
-    stay where they are; no step has no length.
+    and Peucker 1973), and steps that are too long are cut into equal parts. Corners and ends do not
+    move, and no step has zero length.
 
     Parameters
     ----------
@@ -31,11 +31,11 @@ def even_steps(
     offsets : (K + 1,) int array
         As in CSR; each polyline has at least one point.
     fixed : (P,) bool array
-        Points that stay in any case.
+        Points that are always kept.
     step : float, mm
         Longest step, > 0.
     tolerance : float, mm
-        Largest distance of a point that is left out from the new polyline.
+        Largest distance between a point left out and the new polyline.
 
     Returns
     -------
@@ -54,7 +54,7 @@ def even_steps(
     merged, ends, first = merge_repeated(points, offsets, _REPEATED * step)
     last = np.append(first[1:], len(points)) - 1  # of the points that are one
     held = np.bitwise_or.reduceat(fixed, first) if len(first) else fixed
-    # A polyline ends at its last point, whichever points near to it are one.
+    # A polyline ends at its last point, whichever points near it are merged.
     long = np.diff(ends) > 1
     merged[ends[1:][long] - 1] = points[offsets[1:][long] - 1]
     keep = _needed(np.ascontiguousarray(merged), ends, held, tolerance)

@@ -14,14 +14,14 @@ from ccfem.geometry.shapes import Region
 __all__ = ["extend_free_ends", "strips"]
 
 _STEEPEST = 25.0
-"""Minimum angle, degrees, at which an extended strand may meet what is ahead: a strip between
-strands that run side by side takes another strand along its middle instead."""
+"""Least angle, degrees, at which an extended strand may meet what is ahead. A strip between strands
+that run side by side gets another strand along its middle instead."""
 _LEAST = 0.3
 """Minimum length, in pitches, by which an end is extended."""
 
 
 def strips(lines: Sequence[FloatArray], pitch: float) -> Region:
-    """Area that strands take, a pitch wide each, ends cut square: a (Multi)Polygon, mm."""
+    """Area of strands a pitch wide each, with ends cut square: a (Multi)Polygon, mm."""
     found = shapely.buffer(
         shapely.multilinestrings([shapely.LineString(line) for line in lines]),
         0.5 * pitch,
@@ -31,7 +31,7 @@ def strips(lines: Sequence[FloatArray], pitch: float) -> Region:
     )
     if shapely.is_valid(found):
         return found
-    # Mitred corners may leave a border that touches itself; differences with it would fail.
+    # Mitred corners may leave a border that touches itself, for which differences would fail.
     parts = shapely.get_parts(shapely.make_valid(found))
     areas = parts[shapely.get_dimensions(parts) == 2]
     return shapely.union_all(areas)
@@ -40,9 +40,9 @@ def strips(lines: Sequence[FloatArray], pitch: float) -> Region:
 def extend_free_ends(
     lines: Sequence[FloatArray], region: Region, pitch: float, closest: float, reach: float
 ) -> tuple[list[FloatArray], Region]:
-    """Extend the free ends of strands straight to what lies ahead, where that is near.
+    """Extend the free ends of strands straight to what lies ahead, if that is near.
 
-    Where two strands would take the same place the longer one goes first.
+    If two extensions compete for the same place, the longer strand goes first.
 
     Parameters
     ----------
@@ -62,7 +62,7 @@ def extend_free_ends(
     lines : list of (k, 2) arrays, mm
         In the order of those given.
     rest : shapely (Multi)Polygon, mm
-        What their strips leave of the region.
+        Region without the strips of the strands.
     """
     led = list(lines)
     rest = shapely.difference(region, strips(lines, pitch)) if led else region
@@ -116,7 +116,7 @@ def _parts_round(area: Region, points: FloatArray) -> dict[int, shapely.Polygon]
 
 
 def _first_exit(ray: shapely.LineString, space: Region) -> FloatArray | None:
-    """Place where a straight ray first leaves a space, None where it starts outside."""
+    """Point where a straight ray first leaves a region; None if it starts outside."""
     start = shapely.get_point(ray, 0)
     for part in shapely.get_parts(shapely.intersection(ray, space)):
         if part.geom_type == "LineString" and part.distance(start) < 1e-9:

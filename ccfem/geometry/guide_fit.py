@@ -1,8 +1,8 @@
-"""Guides: curves that parallel strands start from, apart from each other, with room for strands.
+"""Guides: curves from which parallel strands start, spaced so that whole strands fit between them.
 
-Strands lie at whole multiples of the pitch from their guide. What is left between the last of them
-and the border, or the strands of the next guide, is a gap or an overlap of up to half a pitch along
-its whole length; where the guide lies decides how much of it there is. So guides move sideways.
+Strands lie at whole multiples of the pitch from their guide. Between the last of them and the
+border, or the strands of the next guide, a gap or overlap of up to half a pitch remains along the
+whole length. Its size depends on the position of the guide, so guides are shifted sideways.
 """
 
 from collections.abc import Sequence
@@ -19,14 +19,14 @@ from ccfem.geometry.shapes import Region, open_lines
 __all__ = ["fitted_guides", "spaced_guides"]
 
 _SHIFTS = np.array([0.0, 0.5, 0.25, -0.25, 0.125, -0.125, 0.375, -0.375])
-"""Shifts sideways that are tried, in pitches, the preferred ones first."""
+"""Sideways shifts that are tried, in pitches, preferred ones first."""
 _BETTER = 0.01
-"""Mean misfit a side, in pitches, by which a shift must be better than one before it."""
+"""Mean misfit a side, in pitches, by which a shift must be better than an earlier one."""
 _STEP = 1.0
 _FAR = 30.0
-"""Distance of samples along a guide, and length of the rays to both sides of it, in pitches."""
+"""Distance between samples along a guide, and length of the rays to both sides, in pitches."""
 _ROUNDS = 3
-"""A guide is fitted between its neighbours, and these move too: times that all are fitted."""
+"""Number of times that all guides are fitted, since the neighbours of a guide move too."""
 
 
 def spaced_guides(
@@ -36,16 +36,16 @@ def spaced_guides(
     distance: float,
     least_length: float,
 ) -> list[FloatArray]:
-    """Clip curves to a region and cut each where it comes near to itself or one before it.
+    """Clip curves to a region, and cut each where it comes near itself or an earlier one.
 
-    Of each curve at most one piece, a (m, 2) array in mm, is left.
+    At most one piece of each curve, a (m, 2) array in mm, remains.
 
     Parameters
     ----------
     curves : sequence of (m, 2) arrays, mm
         In the order of their importance; empty ones are left out.
     seeds : (k, 2) array, mm
-        Point of each curve that its guide has to hold.
+        Point of each curve that its guide must contain.
     region : shapely (Multi)Polygon, mm
     distance : float, mm
         Minimum distance between guides.
@@ -72,7 +72,7 @@ def spaced_guides(
 
 
 def fitted_guides(guides: Sequence[FloatArray], region: Region, pitch: float) -> list[FloatArray]:
-    """Guides moved sideways by at most half a pitch, so that gaps and overlaps are smallest.
+    """Shift guides sideways by at most half a pitch, to minimise gaps and overlaps.
 
     Parameters
     ----------
@@ -85,8 +85,8 @@ def fitted_guides(guides: Sequence[FloatArray], region: Region, pitch: float) ->
     Returns
     -------
     list of (k, 2) arrays, mm
-        Instead of a guide that moves by half a pitch there are two, half a pitch to either side:
-        the strands beside it are the same, and a symmetric part stays so.
+        A guide that moves by half a pitch is replaced by two, half a pitch to either side: the
+        strands beside it are the same, and symmetric parts stay symmetric.
     """
     border = straight_pieces(rings(region))
     shifts = np.zeros(len(guides))
@@ -133,10 +133,10 @@ def _rays(guide: FloatArray, pitch: float) -> tuple[FloatArray, FloatArray]:
 def _first_hits(
     start: FloatArray, normal: FloatArray, pieces: FloatArray, pitch: float
 ) -> tuple[FloatArray, FloatArray]:
-    """Distance (2, n) to the first piece at the left and at the right, and how parallel it is.
+    """Distance (2, n) to the first piece on the left and on the right, and how parallel it is.
 
-    Infinite where there is none; the second value is the squared cosine of the angle between piece
-    and guide, 0 above 45 degrees.
+    Infinite if there is none. The second value is the squared cosine of the angle between piece and
+    guide, 0 above 45 degrees.
     """
     n = len(start)
     gap, parallel = np.full((2, n), np.inf), np.zeros((2, n))

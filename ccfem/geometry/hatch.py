@@ -14,7 +14,7 @@ __all__ = ["Hatch", "hatch", "link_hatch", "zigzag"]
 
 @dataclass(frozen=True)
 class Hatch:
-    """Parallel lines clipped to a section, in coordinates turned so that they run along x.
+    """Parallel lines clipped to a section, in coordinates rotated so that they run along x.
 
     Line s runs from its left end ``2 s`` to its right end ``2 s + 1``.
 
@@ -25,7 +25,7 @@ class Hatch:
     row : (s,) int array
         Which of the parallel lines each piece belongs to.
     pitch : float, mm
-        Distance of the rows.
+        Distance between the rows.
     angle : float, radians
         Direction of the lines in the coordinates of the section.
     border : tuple of (k, 2) arrays, mm
@@ -33,7 +33,7 @@ class Hatch:
     ring : (2 s,) int array
         The ring that each end lies on.
     position : (2 s,) array
-        Where on it: segment number plus the share of the segment.
+        Position on the ring: segment number plus the share of the segment.
     """
 
     ends: FloatArray
@@ -58,7 +58,7 @@ class Hatch:
 
 
 def _turn(angle: float) -> FloatArray:
-    """Matrix that turns row vectors by `angle`."""
+    """Matrix that rotates row vectors by `angle`."""
     c, s = np.cos(angle), np.sin(angle)
     return np.array([[c, s], [-s, c]])
 
@@ -72,7 +72,7 @@ def hatch(section: Region, angle: float, pitch: float) -> Hatch:
     angle : float, radians
         Direction of the lines to the first axis.
     pitch : float, mm
-        Distance of the lines, > 0; the first one is half of it inside the section's extent.
+        Distance between the lines, > 0; the first one is half of it inside the section's extent.
 
     Returns
     -------
@@ -112,11 +112,11 @@ def hatch(section: Region, angle: float, pitch: float) -> Hatch:
 def link_hatch(lines: Hatch, section: Region, width: float) -> list[FloatArray]:
     """Link the ends of hatch lines into as few paths as a sweep finds.
 
-    A link joins two ends that follow each other on a border ring, so that no link crosses a line
-    or another link. It is straight where that stays in the section and follows the border
-    elsewhere; where the border is nearly parallel to the lines, the longer line ends early, so
-    that the link does not lie on it. Ends of one row (at both sides of a hole or notch) are linked
-    only where the link keeps `width` from the next row.
+    A link joins two consecutive ends on a border ring, so that no link crosses a line or another
+    link. It is straight if that stays in the section, and otherwise follows the border. Where the
+    border is nearly parallel to the lines, the longer line ends early, so that the link does not
+    lie on it. Ends of one row (at both sides of a hole or notch) are linked only if the link keeps
+    `width` from the next row.
 
     Paths are (k, 2) arrays, mm, in the coordinates of the section.
     """
@@ -141,7 +141,7 @@ def zigzag(
     width : float, mm
         Minimum distance between strands; parts narrower than it stay empty.
     pitch : float, mm
-        Distance of the lines.
+        Distance between the lines.
     angle : float, radians
         Direction of the lines to the first axis.
     """
@@ -153,7 +153,7 @@ Links = list[dict[int, FloatArray]]
 """For each end, the ends that it may be linked to, with the points (k, 2) from one to the other."""
 
 _FLATTEST = 1.5
-"""Longest run of a straight link along the lines over their pitch: 34 degrees to the lines."""
+"""Longest run of a straight link along the lines, in pitches: 34 degrees to the lines."""
 
 
 def _links(lines: Hatch, section: Region, width: float) -> Links:
@@ -192,7 +192,7 @@ def _links(lines: Hatch, section: Region, width: float) -> Links:
 
 
 def _clipped(lines: Hatch, pairs: IntArray) -> FloatArray:
-    """Straight links (n, 2, 2) between ends; too flat ones cut up to half of the longer line."""
+    """Straight links (n, 2, 2) between ends; too flat ones cut off up to half the longer line."""
     chords = lines.ends[pairs]
     side = np.where(pairs % 2 == 1, 1.0, -1.0)
     x = chords[:, :, 0] * side
@@ -213,10 +213,10 @@ def _along(lines: Hatch, e: int, f: int) -> FloatArray:
 
 
 def _sweep(lines: Hatch, links: Links, direction: int, side: int) -> list[list[int]]:
-    """Chains of ends (entry, exit, entry, ...): follow links, to the rows ahead first.
+    """Chains of ends (entry, exit, entry, ...), following links to the rows ahead first.
 
-    The sweep goes up (direction 1) or down (-1); a chain starts at the left end (side 0) or the
-    right one (1) of a line.
+    The sweep goes up (direction 1) or down (-1). A chain starts at the left end (side 0) or the
+    right end (1) of a line.
     """
     row = (direction * lines.row).tolist()
     used = [False] * len(row)

@@ -14,12 +14,12 @@ _TOUCH = 1e-9
 
 
 def find_crossings(points: FloatArray, offsets: IntArray, closed: BoolArray) -> IntArray:
-    """Pairs of segments at which polylines go from one side of a polyline to the other.
+    """Pairs of segments at which polylines cross from one side of a polyline to the other.
 
     Counted are proper crossings of two segments, and crossings through points of the polylines: of
-    a segment through a point, or of two polylines through a common point. Ends that touch, corners
-    that touch without passing to the other side, and stretches that run on top of each other are
-    no crossings. Points within 1e-9 mm of a segment lie on it.
+    a segment through a point, or of two polylines through a common point. Not counted are ends that
+    touch, corners that touch without crossing, and stretches on top of each other. Points within
+    1e-9 mm of a segment lie on it.
 
     Parameters
     ----------
@@ -38,7 +38,7 @@ def find_crossings(points: FloatArray, offsets: IntArray, closed: BoolArray) -> 
     if total == 0.0:
         return np.zeros((0, 2), dtype=np.int64)
     extent = points.max(axis=0) - points.min(axis=0)
-    # At most a cell a point, so that few points share one however near they lie along a line.
+    # At most one cell a point, so that few points share a cell even if they are dense on a line.
     spread = float(np.sqrt(extent[0] * extent[1] / len(points)))
     longest = max(spread, 2.0 * total / len(points))
     pieces, ends, segment = subdivide(points, offsets, longest)
@@ -57,8 +57,8 @@ def _near(
 ) -> IntArray:
     """Pairs of segments of a cell, not neighbours in their polyline, that meet or nearly do.
 
-    Their boxes overlap, and neither has both its ends clearly on one side of the other. A pair
-    comes once for every cell that it shares.
+    Their boxes overlap, and neither has both ends clearly on one side of the other. A pair is
+    listed once for every cell that it shares.
     """
     found = 0
     pairs = np.empty((64, 2), np.int64)

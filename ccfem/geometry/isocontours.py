@@ -76,7 +76,7 @@ def isocontours(
         Sorted by level. Open curves end on the boundary.
     """
     scaled = (values - first) / step
-    # A level exactly through a node would cross none or all of its edges.
+    # A level exactly at a node would cross none or all of its edges.
     scaled = np.where(scaled == np.round(scaled), scaled + 1e-9, scaled)
     ends, of_triangle = triangle_edges(triangles) if edges is None else edges
     low = np.ceil(np.minimum(scaled[ends[:, 0]], scaled[ends[:, 1]])).astype(np.int64)
@@ -174,7 +174,7 @@ def least_distance(curves: Isocontours, reach: float, enough: float) -> float:
     if not len(start):
         return reach
     a, b = curves.points[start], curves.points[start + 1]
-    # So that a point has all pieces within reach in its own cell.
+    # Each point then has all pieces within reach in its own cell.
     grid = bucket(np.minimum(a, b) - reach, np.maximum(a, b) + reach, reach)
     level = np.repeat(curves.level, np.diff(curves.offsets))
     return float(_least_distance(*grid, start, curves.points, level, reach, enough))

@@ -24,8 +24,7 @@ def locate(
         Of either orientation; flat ones are never found.
     queries : (q, d) array, mm
     reach : float, mm, default 0
-        A query outside every simplex takes the one whose sides it oversteps least, if by no more
-        than this.
+        A query outside every simplex takes the one whose sides it exceeds least, by at most this.
 
     Returns
     -------

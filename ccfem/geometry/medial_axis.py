@@ -1,9 +1,9 @@
 """Medial axis of a section: the centres of its largest inscribed discs, as a graph of curves.
 
-Voronoi diagram of points along the border (Brandt, Convergence and continuity criteria for
-discrete approximations of the continuous planar skeleton, CVGIP 59, 1994); spurs are told apart
-from limbs by the angle under which the border is seen from the axis, or by the way along the border
-against its chord.
+It follows from the Voronoi diagram of points along the border (Brandt, Convergence and continuity
+criteria for discrete approximations of the continuous planar skeleton, CVGIP 59, 1994). Spurs are
+distinguished from limbs by the angle that the nearest border points subtend at the axis, or by the
+ratio of the length along the border to its chord.
 """
 
 from collections import Counter
@@ -25,9 +25,9 @@ from ccfem.mesh.measures import connected
 __all__ = ["MedialAxis", "MedialSegment", "medial_axis"]
 
 _SAME = 1e-4
-"""Points of the axis nearer than this share of the sampling step are one."""
+"""Distance, as a share of the sampling step, below which points of the axis are the same."""
 _NEARER = 1e-3
-"""Share by which another sample may be nearer to a Voronoi vertex than its own: rounding."""
+"""Share by which, due to rounding, another sample may be nearer to a Voronoi vertex."""
 
 
 @dataclass(frozen=True)
@@ -41,10 +41,10 @@ class MedialSegment:
     radius : (m,) array, mm
         Distance of each point to the border.
     left, right : (m - 1, 2) arrays, mm
-        Points of the border nearest to the middle of each step, at the two sides of the walking
+        Points of the border nearest to the middle of each step, on both sides of the walking
         direction.
     ends : tuple of 2 ints
-        Nodes of `MedialAxis` at both ends; the same one of a closed curve, -1 where that has none.
+        Nodes of `MedialAxis` at both ends; twice the same for a closed curve, -1 if it has none.
     """
 
     points: FloatArray
@@ -74,7 +74,7 @@ class MedialAxis:
     Attributes
     ----------
     nodes : (k, 2) array, mm
-        Ends, junctions, and the centres of parts that have a point for an axis (discs).
+        Ends, junctions, and the centres of parts whose axis is a point (discs).
     radius : (k,) array, mm
         Distance of each node to the border.
     segments : tuple of MedialSegment
@@ -101,15 +101,15 @@ def medial_axis(
     ----------
     section : shapely (Multi)Polygon, mm
     step : float, mm
-        Largest distance of the samples along the border, below the thickness of the part. Both
-        ends of every straight side are among them, the rest at equal distances, so that a
-        symmetric section has symmetric samples.
+        Largest distance between samples of the border, below the thickness of the part. Both ends
+        of every straight side are samples, and the others are equally spaced, so that a symmetric
+        section has symmetric samples.
     object_angle : float, degrees, optional
-        Ends of the axis are removed as long as they see their two nearest points of the border
-        under less than this; 105 removes the spurs of corners of 90 degrees. None: no such rule.
+        Ends of the axis are removed while their two nearest border points subtend an angle below
+        this; 105 removes the spurs of 90 degree corners. None: no such rule.
     arc_chord : float, optional
-        Ends are removed as long as the border between their two nearest points is no longer than
-        this many chords, or than 6 steps; a square corner has 1.41.
+        Ends are removed while the border between their two nearest points is no longer than this
+        many chords, or than 6 steps; a square corner has 1.41.
     prune : float, default 1
         Branches with a free end that are shorter than this many radii of the disc at their
         junction are removed.
@@ -144,7 +144,7 @@ def medial_axis(
 
 @dataclass(frozen=True)
 class _Border:
-    """Samples of the border: ring and way along it of each, and its neighbours on the ring."""
+    """Samples of the border: ring and arc length of each, and its neighbours on the ring."""
 
     points: FloatArray
     ring: IntArray
@@ -219,7 +219,7 @@ class _Graph:
             return None
         edges = np.asarray(diagram.ridge_vertices, dtype=np.int64)
         sites = np.asarray(diagram.ridge_points, dtype=np.int64)
-        # A copy: a prepared geometry must not be seen by another thread, and a section may be.
+        # A copy: prepared geometries must not be shared between threads, but sections may be.
         prepared = shapely.force_2d(section)
         shapely.prepare(prepared)
         inner = shapely.contains_xy(prepared, diagram.vertices)
@@ -234,7 +234,7 @@ class _Graph:
         kept[kept] = shapely.contains(prepared, ways)
         sites, edges = sites[kept], (np.cumsum(inner) - 1)[edges[kept]]
         points, nearest = diagram.vertices[inner], nearest[:-1][inner]
-        # Samples on one circle give several vertices in one place.
+        # Samples on one circle give several vertices at the same place.
         size = np.linalg.norm(points[edges[:, 0]] - points[edges[:, 1]], axis=1)
         tiny = edges[size < _SAME * step]
         place = connected(tiny, len(points))
@@ -260,7 +260,7 @@ def _equidistant(
 ) -> BoolArray:
     """Which wanted Voronoi vertices have no site nearer than their own.
 
-    Qhull puts vertices that it cannot place, of sites in a row, at (-10.101, -10.101).
+    Qhull places undetermined vertices, of collinear sites, at (-10.101, -10.101).
     """
     found = np.zeros(len(vertices), dtype=bool)
     least, _ = cKDTree(sites).query(vertices[wanted])
@@ -270,7 +270,7 @@ def _equidistant(
 
 
 def _without_soft_ends(edges: IntArray, firm: BoolArray, count: int) -> BoolArray:
-    """Edges that stay when free ends that are not firm are removed until there are none."""
+    """Edges that remain when free ends that are not firm are removed repeatedly."""
     kept = np.ones(len(edges), dtype=bool)
     while True:
         degree = np.bincount(edges[kept].ravel(), minlength=count)
@@ -329,13 +329,13 @@ def _pruned(graph: _Graph, chains: list[list[int]], prune: float, step: float) -
 
 
 def _from_widest(chain: list[int], radius: FloatArray) -> list[int]:
-    """Return a closed chain from its place of the largest radius on."""
+    """Return a closed chain that starts at its place of largest radius."""
     widest = int(np.argmax(np.round(radius[chain[:-1]], 6)))
     return [*chain[widest:-1], *chain[: widest + 1]]
 
 
 def _as_axis(section: Region, graph: _Graph, chains: list[list[int]]) -> MedialAxis:
-    """Values of the chains, and a node for every part of the section that has none."""
+    """Values of the chains, and a node for every part of the section without one."""
     ends = {end for chain in chains if chain[0] != chain[-1] for end in (chain[0], chain[-1])}
     starts = shapely.points(graph.points[[chain[0] for chain in chains]])
     for part in shapely.get_parts(section):

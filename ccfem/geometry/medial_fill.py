@@ -1,4 +1,4 @@
-"""Strands along the medial axis of a section, and concentric ones in the rest."""
+"""Strands along the medial axis of a section, and concentric strands in the rest."""
 
 from collections.abc import Sequence
 
@@ -19,11 +19,11 @@ _BETTER = 0.05
 
 
 def medial_fill(section: Region, pitch: float, closest: float) -> list[FloatArray]:
-    """Strands along the medial axis and parallel to it, and concentric ones in what they leave.
+    """Strands along the medial axis and parallel to it, and concentric strands in the rest.
 
-    Each is a (k, 2) array, mm. Where the section is as wide as an even number of strands, two run
-    beside the axis and none on it. Parallel strands follow until the first of them would touch the
-    border. A section without a medial axis (a disc) is filled by concentric strands alone.
+    Each is a (k, 2) array, mm. If the width of the section suits an even number of strands, two run
+    beside the axis and none on it. Further parallel strands are laid until one would touch the
+    border. A section without a medial axis (a disc) gets concentric strands only.
 
     Parameters
     ----------
@@ -46,8 +46,8 @@ def medial_fill(section: Region, pitch: float, closest: float) -> list[FloatArra
 def _pair(segments: Sequence[MedialSegment], pitch: float) -> bool:
     """Whether two strands half a pitch beside the axis leave less gap and overlap than one on it.
 
-    Beside the axis there is room for `radius` / pitch strands, less the half of one that lies on
-    it. What is over, along the whole length, is a gap or an overlap.
+    Beside the axis there is room for `radius` / pitch strands, less half a strand if one lies on
+    it. The fractional part is a gap or an overlap along the whole length.
     """
     room = np.concatenate([s.radius for s in segments]) / pitch
     weight = np.concatenate([_shares(s.points) for s in segments])
@@ -56,7 +56,7 @@ def _pair(segments: Sequence[MedialSegment], pitch: float) -> bool:
 
 
 def _misfit(room: FloatArray) -> FloatArray:
-    """Distance of numbers of strands from whole ones."""
+    """Distance of numbers of strands from whole numbers."""
     return np.abs(room - np.round(room))
 
 

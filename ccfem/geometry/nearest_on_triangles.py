@@ -1,4 +1,4 @@
-"""The points of a triangulated surface that are nearest to other points."""
+"""Nearest points on a triangulated surface."""
 
 from dataclasses import dataclass
 
@@ -12,11 +12,11 @@ __all__ = ["Nearest", "nearest_on_triangles"]
 
 _FIRST = (40,)
 _ROUNDS = (1, *(8 * 4**k for k in range(14)))
-"""Triangles that are looked at: of all sizes at first, then of one size after the other."""
+"""Numbers of triangles that are checked: of all sizes first, then of one size after another."""
 _EXACT = 0.01
 """Share of the distance by which another triangle may be nearer."""
 _AT_ONCE = 4_000_000
-"""Pairs of a query and a triangle that are kept at a time."""
+"""Number of pairs of a query and a triangle that are processed at a time."""
 
 
 @dataclass(frozen=True)
@@ -41,8 +41,8 @@ class Nearest:
 def nearest_on_triangles(points: FloatArray, triangles: IntArray, queries: FloatArray) -> Nearest:
     """Find the points of a surface that are nearest to given ones.
 
-    Triangles may be of any sizes. Points of the surface are found exactly; of two triangles whose
-    distances from a query differ by less than 1 % it may be either.
+    Triangles may be of any size. Points of the surface are found exactly. If the distances of two
+    triangles from a query differ by less than 1 %, either may be returned.
 
     Parameters
     ----------
@@ -71,7 +71,7 @@ def nearest_on_triangles(points: FloatArray, triangles: IntArray, queries: Float
 
 @dataclass(frozen=True)
 class _Surface:
-    """A triangulated surface, and how far its triangles reach from their middles, mm."""
+    """A triangulated surface, and the extent of its triangles from their middles, mm."""
 
     points: FloatArray
     triangles: IntArray
@@ -87,9 +87,9 @@ def _look(
     rounds: tuple[int, ...],
     found: Nearest,
 ) -> IntArray:
-    """Look at some triangles for some queries; of which the nearest one is not yet sure.
+    """Check some triangles for some queries; return those whose nearest one is not yet certain.
 
-    `found` takes what is nearer than what it holds. Each round looks at so many triangles whose
+    `found` is updated where a triangle is nearer. Each round checks a number of triangles whose
     middles are nearest.
     """
     tree = cKDTree(surface.middles[members])

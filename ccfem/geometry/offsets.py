@@ -13,14 +13,14 @@ from ccfem.geometry.shapes import Region
 __all__ = ["inset", "join_rings", "offset_rings", "ring_from", "rings"]
 
 _QUARTER = 8
-"""Segments of a quarter turn where an opened corner is rounded."""
+"""Segments per quarter turn where an opened corner is rounded."""
 
 _SAME = 1e-9
 """Points nearer than this, mm, are one."""
 
 _RAMPS = (2.0, 1.0, 0.0)
-"""Lengths of the ramp from one ring to the next over their spacing, the first that fits: turns of
-27, 45 and 90 degrees."""
+"""Lengths that are tried for the ramp between rings, over their spacing: turns of 27, 45 and 90
+degrees."""
 
 
 def inset(section: Region, distance: float, width: float = 0.0) -> Region:
@@ -32,9 +32,9 @@ def inset(section: Region, distance: float, width: float = 0.0) -> Region:
     distance : float, mm
         Distance to the border, >= 0. Corners are kept (mitre joins).
     width : float, mm, default 0
-        With a width, only what a disc of that diameter reaches is kept (morphological opening),
-        so that opposite sides of the result are at least that far apart (to 0.1 %, so that a
-        part of exactly that width is kept).
+        With a width, only what a disc of that diameter reaches is kept (morphological opening).
+        Opposite sides of the result are then at least that far apart. The tolerance of 0.1 % keeps
+        parts of exactly that width.
 
     Returns
     -------
@@ -62,7 +62,7 @@ def rings(section: Region) -> list[FloatArray]:
 def offset_rings(
     section: Region, first: float, spacing: float, width: float, count: int | None = None
 ) -> list[list[FloatArray]]:
-    """Rings parallel to the border of a section, every one measured from the border itself.
+    """Rings parallel to the border of a section, each measured from the border itself.
 
     Parameters
     ----------
@@ -72,7 +72,7 @@ def offset_rings(
     spacing : float, mm
         Distance of neighbouring rings, > 0.
     width : float, mm
-        Minimum distance of opposite sides of one ring; there is a gap where the section is
+        Least distance between opposite sides of one ring; a gap remains where the section is
         narrower.
     count : int, optional
         Number of rings; by default as many as fit.
@@ -110,8 +110,8 @@ def join_rings(
 ) -> list[FloatArray]:
     """Join nested rings by ramps, so that one strand lays several of them.
 
-    Each ring is opened for a `gap` before its start and for the ramp to the ring one level
-    further in; a ring without a partner stays closed. A ramp that would touch any ring is left out.
+    Each ring is opened for a `gap` before its start and for the ramp to the ring one level further
+    in. A ring without a partner stays closed. Ramps that would touch a ring are left out.
 
     Parameters
     ----------

@@ -1,4 +1,4 @@
-"""Lines up to where they come near themselves."""
+"""Lines, cut where they come near themselves."""
 
 import numpy as np
 from numba import njit
@@ -9,20 +9,20 @@ from ccfem.geometry.polylines import is_closed
 __all__ = ["until_itself"]
 
 _OWN = 3.0
-"""Length along the seed line, in fibre widths, within which it is not in its own way."""
+"""Length along the seed line, in fibre widths, within which it may be near itself."""
 
 
 def until_itself(line: FloatArray, start: FloatArray, width: float) -> FloatArray:
-    """Line (n, 2) from a point on it ahead, then back, to where it meets itself within a width.
+    """Cut a line (n, 2), from a point on it ahead and back, where it comes near itself.
 
-    Streamlines go round a hole many times, a little aside each time. A closed line stays closed
-    where only its ends meet.
+    Streamlines may circle a hole many times, slightly displaced each time. A closed line stays
+    closed if only its ends meet.
 
     Parameters
     ----------
     line : (n, 2) array, mm
     start : (2,) array, mm
-        The point of the line that is nearest to it is kept.
+        The point of the line nearest to this is kept.
     width : float, mm
     """
     if len(line) < 2:
@@ -34,7 +34,7 @@ def until_itself(line: FloatArray, start: FloatArray, width: float) -> FloatArra
 
 @njit(cache=True, nogil=True)
 def _own_way(line, seed, closed, width, own):  # type: ignore[no-untyped-def]
-    """First and last point that keep a distance from all others, `own` mm of arc left aside."""
+    """First and last point that keep a distance from all others more than `own` mm of arc away."""
     count = len(line)
     along = np.zeros(count)
     for p in range(1, count):

@@ -1,4 +1,4 @@
-"""Strands parallel to given curves, outward from them, and strands in the rest."""
+"""Strands parallel to given curves, laid outwards from them, and strands in the rest."""
 
 from collections.abc import Sequence
 from itertools import pairwise
@@ -15,18 +15,18 @@ from ccfem.geometry.shells import concentric
 __all__ = ["grow", "lengthened"]
 
 _ARC = 16
-"""Segments of a quarter turn round an end or a corner of a curve."""
+"""Segments per quarter turn round an end or a corner of a curve."""
 _LEAST_REST = 1.0
 """Smallest rest that is filled, in squares of the pitch."""
 _SLIVER = 0.19
-"""Half of the width, in pitches, below which a strip is no rest."""
+"""Half the width, in pitches, below which a strip is not filled."""
 _OFF = 0.02
-"""Deviation of the distance to the nearest curve, in pitches, up to which a piece of a border
-counts as parallel to that curve."""
+"""Error of the distance to the nearest curve, in pitches, up to which a piece of a border counts as
+parallel to that curve."""
 _REACH = 2.0
 """Maximum length, in pitches, by which the free end of a strand is extended."""
 _ROUND = 1.5
-"""Least radius, in pitches, of the convex corners of what is filled with concentric strands."""
+"""Least radius, in pitches, of the convex corners of regions filled with concentric strands."""
 _TOLERANCE = 2e-3
 """Deviation, in pitches, up to which points of a curve are left out."""
 
@@ -40,7 +40,7 @@ def grow(
     whole: bool = False,
     pair: bool = False,
 ) -> list[FloatArray]:
-    """Fill a region with strands: curves, strands parallel to them, concentric ones in the rest.
+    """Fill a region with curves, strands parallel to them, and concentric strands in the rest.
 
     Parameters
     ----------
@@ -55,8 +55,8 @@ def grow(
     count : int, optional
         Number of parallel strands at each side; by default until the region is full.
     whole : bool, default False
-        Whether strands go round the free ends of curves and on from one curve to the next. By
-        default each belongs to one curve, and nothing is laid beyond the ends of that.
+        Whether strands go round the free ends of curves and continue from one curve to the next. By
+        default each belongs to one curve, and nothing is laid beyond the ends of that curve.
     pair : bool, default False
         Whether strands lie half a pitch to both sides of the curves, and none on them.
 
@@ -88,7 +88,7 @@ def grow(
     core = shapely.Polygon() if whole else _opened(rest, _ROUND * pitch)
     if shapely.is_empty(core):
         return lines + _fill_rest(rest, pitch, closest)
-    # Ends stand in steps where one curve takes over from another: they go on to a smooth border.
+    # Where one curve takes over from another the ends form steps: extend them to a smooth border.
     outside = shapely.difference(region, core)
     lines, rest = extend_free_ends(lines, outside, pitch, closest, _REACH * pitch)
     inner = _fill_rest(core, pitch, closest)
@@ -99,7 +99,7 @@ def grow(
 def _kept_off(
     lines: list[FloatArray], others: Sequence[FloatArray], distance: float
 ) -> list[FloatArray]:
-    """Lines where they keep a distance from others."""
+    """Parts of lines that keep a distance from others."""
     if not lines or not others:
         return lines
     taken = shapely.union_all(shapely.buffer(strings(others), distance))
@@ -107,12 +107,12 @@ def _kept_off(
 
 
 def _opened(rest: Region, radius: float) -> Region:
-    """Morphological opening: what a disc reaches of a rest."""
+    """Morphological opening: the part of a region that a disc reaches."""
     return shapely.buffer(shapely.buffer(rest, -radius), radius)
 
 
 def _without_crossings(lines: list[FloatArray], gap: float) -> list[FloatArray]:
-    """Lines, the shorter of two that cross cut back by a gap: ends that meet head on overlap."""
+    """Lines, the shorter of two crossing ones cut back by a gap: ends that meet head on overlap."""
     curves = strings(lines)
     one, other = shapely.STRtree(curves).query(curves, predicate="crosses")
     for k, j in zip(one.tolist(), other.tolist(), strict=True):
@@ -131,11 +131,11 @@ def _parallels(
     whole: bool,
     first: float,
 ) -> list[FloatArray]:
-    """Lines in a region a pitch apart, from `first` pitches off the nearest of several curves on.
+    """Lines in a region at multiples of the pitch, from `first` pitches off the nearest curve on.
 
-    The borders of the buffers of all curves together, so that lines of different distance never
-    come nearer to each other than the pitch; where two fronts of one distance come nearer than
-    `closest` pitches neither is laid. Parameters as in `grow`.
+    They are borders of the buffers of all curves together, so lines of different distance are never
+    nearer to each other than the pitch. Where two fronts of equal distance come nearer than
+    `closest` pitches, neither is laid. Parameters as in `grow`.
     """
     if not len(curves):
         return []
@@ -150,7 +150,7 @@ def _parallels(
     shapely.prepare(near)
     lines: list[FloatArray] = []
     level = idle = 0
-    # Where a channel is closed there may be no line at one distance and some at the next.
+    # After a channel closes, one distance may have no line and the next one some.
     while (count is None or level < count) and idle < 3:
         level += 1
         distance = (level - 1 + first) * pitch
@@ -186,16 +186,16 @@ def _owners(
     distance: float,
     pitch: float,
 ) -> list[IntArray]:
-    """Curve that each step of some rings lies at a distance from, -1 where it is none.
+    """Curve at whose distance each step of some rings lies; -1 if there is none.
 
     `sides` holds the straight pieces of all curves, `owners` the curve of each. Straight ends of
-    buffers and rounded cusps have none, and nothing has one that lies far from a region.
+    buffers and rounded cusps have no owner, and neither has anything far from a region.
     """
     if not rings:
         return []
     steps = straight_pieces(rings)
     owner = np.full(len(steps), -1)
-    # Steps that end far from the region may still lead through it.
+    # Steps whose ends are far from the region may still cross it.
     inside = np.flatnonzero(shapely.intersects(near, shapely.linestrings(steps)))
     middle = shapely.points(steps[inside].mean(axis=1))
     (_, side), gaps = sides.query_nearest(middle, return_distance=True, all_matches=False)
@@ -220,13 +220,13 @@ def _own_pieces(ring: FloatArray, owner: IntArray, least: float) -> list[FloatAr
 
 
 def _without_hooks(line: FloatArray, least: float) -> FloatArray:
-    """Line without steps shorter than `least` at its ends: corners of buffers turn off there."""
+    """Line without short steps, below `least`, at its ends: corners of buffers cause them."""
     long = np.flatnonzero(np.linalg.norm(np.diff(line, axis=0), axis=1) >= least)
     return line[long[0] : long[-1] + 2] if len(long) else line
 
 
 def _fill_rest(rest: Region, pitch: float, closest: float) -> list[FloatArray]:
-    """Concentric strands in what other strands leave, but for narrow strips and specks."""
+    """Concentric strands where other strands leave room, except in narrow strips and specks."""
     rest = shapely.buffer(rest, -_SLIVER * pitch, join_style="mitre")
     rest = shapely.buffer(rest, _SLIVER * pitch, join_style="mitre")
     parts = shapely.get_parts(rest)
@@ -237,17 +237,17 @@ def _fill_rest(rest: Region, pitch: float, closest: float) -> list[FloatArray]:
 
 
 def lengthened(line: FloatArray, region: Region, near: float, length: float) -> FloatArray:
-    """Open line made longer, straight, at ends that lie near the border of a region.
+    """Extend an open line straight at ends that lie near the border of a region.
 
     Parameters
     ----------
     line : (m, 2) array, mm
-        Returned as it is when closed.
+        Returned unchanged if closed.
     region : shapely (Multi)Polygon, mm
     near : float, mm
-        Distance to the border up to which an end is made longer.
+        Distance to the border up to which an end is extended.
     length : float, mm
-        By how much.
+        Length of the extension.
     """
     if is_closed(line):
         return line

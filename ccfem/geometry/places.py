@@ -14,7 +14,7 @@ INSIDE, VOID, OUTSIDE = range(3)
 """In the section; in a hole of it, or anywhere else within its outer rings; beyond those."""
 
 TOLERANCE = 1e-4
-"""What is no further than this, mm, from the section is inside: rounding of coordinates."""
+"""Distance, mm, from the section up to which points count as inside, for rounded coordinates."""
 
 
 class Pieces(NamedTuple):
@@ -25,7 +25,7 @@ class Pieces(NamedTuple):
     step : (q,) int array
         Step that each piece belongs to.
     begin, end : (q,) arrays in [0, 1]
-        Share of the step at which the piece begins and ends; the pieces of a step fill it.
+        Shares of the step at which the piece begins and ends; the pieces of a step fill it.
     place : (q,) int array
         INSIDE, VOID or OUTSIDE.
     """
@@ -37,7 +37,7 @@ class Pieces(NamedTuple):
 
 
 def section_places(points: FloatArray, section: Region) -> IntArray:
-    """Where points lie relative to a section; those up to `TOLERANCE` from it are inside.
+    """Places of points relative to a section; points up to `TOLERANCE` from it are inside.
 
     INSIDE, VOID or OUTSIDE for each of the points (n, 2), mm: an (n,) int array.
     """
@@ -69,7 +69,7 @@ def cut_at_section(
     shapely.prepare(boundary)
     lines = shapely.linestrings(np.stack([starts, ends], axis=1))
     met = np.flatnonzero(shapely.intersects(boundary, lines))
-    # Where a step runs along the boundary, the ends of that stretch.
+    # If a step runs along the boundary, the ends of that stretch.
     at, number = shapely.get_coordinates(
         shapely.intersection(lines[met], boundary), return_index=True
     )

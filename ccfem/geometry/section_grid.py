@@ -1,4 +1,4 @@
-"""A section for compiled loops: where a point lies, and how far it is at least from the border."""
+"""A section for compiled loops: the place of a point, and a lower bound of its border distance."""
 
 from typing import NamedTuple
 
@@ -30,7 +30,7 @@ class SectionGrid(NamedTuple):
     places : (nx, ny) int array
         INSIDE, VOID or OUTSIDE: of the middle of each cell.
     room : (nx, ny) array, mm
-        No point of the border is nearer to any point of a cell; 0 close to the border.
+        Radius round any point of the cell that is free of border; 0 close to the border.
     starts, edges : (ny + 1,) int and (e, 4) arrays, mm
         Row j meets ``edges[starts[j]:starts[j + 1]]``, as x, y of both ends.
     outer : (e,) bool array
@@ -53,12 +53,12 @@ def section_grid(section: Region, margin: float) -> SectionGrid:
     ----------
     section : shapely (Multi)Polygon, mm
     margin : float, mm
-        By how much the grid is larger than the section on every side.
+        Width by which the grid exceeds the section on every side.
 
     Returns
     -------
     SectionGrid
-        Of cells of 0.5 mm, or larger ones where these would be more than a million. Room is known
+        With cells of 0.5 mm, or larger ones if these would be more than a million. Room is known
         where the section and its voids are wider than a cell.
     """
     parts = shapely.get_parts(section)
@@ -116,7 +116,7 @@ def _fill_places(grid):  # type: ignore[no-untyped-def]
 
 @njit(cache=True, nogil=True)
 def place(grid, x, y):  # type: ignore[no-untyped-def]
-    """INSIDE the section, in a VOID within its outer rings, or OUTSIDE, of a point."""
+    """Place of a point: INSIDE the section, in a VOID within its outer rings, or OUTSIDE."""
     j = int(np.floor((y - grid.origin[1]) / grid.cell))
     if j < 0 or j >= grid.room.shape[1]:
         return OUTSIDE
@@ -139,7 +139,7 @@ def contains(grid, x, y):  # type: ignore[no-untyped-def]
 
 @njit(cache=True, nogil=True)
 def _place(about, around):  # type: ignore[no-untyped-def]
-    """Place by how often all rings, and the outer ones, wind round it."""
+    """Place from the winding numbers of all rings, and of the outer rings."""
     if about != 0:
         return INSIDE
     return VOID if around != 0 else OUTSIDE
@@ -147,9 +147,9 @@ def _place(about, around):  # type: ignore[no-untyped-def]
 
 @njit(cache=True, nogil=True)
 def place_and_room(grid, x, y):  # type: ignore[no-untyped-def]
-    """Place of a point, and the distance round it that is free of border; 0 close to the border.
+    """Place of a point, and the radius round it that is free of border; 0 close to the border.
 
-    Where that is 0 the place is that of the middle of the cell.
+    If the radius is 0, the place is that of the middle of the cell.
     """
     i = int(np.floor((x - grid.origin[0]) / grid.cell))
     j = int(np.floor((y - grid.origin[1]) / grid.cell))

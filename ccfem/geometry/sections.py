@@ -1,4 +1,4 @@
-"""Sections as their corners alone, so that equal layers of a part are equal to the last bit."""
+"""Sections reduced to their corners, so that equal layers of a part are exactly equal."""
 
 import numpy as np
 import shapely
@@ -11,14 +11,14 @@ __all__ = ["corners_only"]
 _STRAIGHT = 1e-6
 """Turn of the border, radians, below which a point lies on a straight side."""
 _DECIMALS = 11
-"""Of coordinates, mm: above the errors of slicing, below what any rule of a pattern resolves."""
+"""Decimals of coordinates, mm: above the errors of slicing, below what any pattern resolves."""
 
 
 def corners_only(section: Region) -> Region:
     """Section without the points on its straight sides, which slicing leaves where edges cross.
 
-    Layers of an extruded part come out equal: what depends on the section alone can be planned
-    once for all of them.
+    Layers of an extruded part become equal, so that everything that depends only on the section can
+    be planned once for all of them.
 
     Parameters
     ----------

@@ -1,4 +1,4 @@
-"""Shapely geometry: its types, and the way from polylines to it and back."""
+"""Shapely geometry: types, and conversion from and to polylines."""
 
 from collections.abc import Sequence
 
@@ -25,7 +25,7 @@ def strings(lines: Sequence[FloatArray]) -> Shapes:
 
 
 def open_lines(shapes: shapely.Geometry | Shapes) -> list[FloatArray]:
-    """Lines of geometries as (k, 2) arrays, pieces that touch end to end joined."""
+    """Lines of geometries as (k, 2) arrays; pieces that touch end to end are joined."""
     found = []
     for shape in np.atleast_1d(shapes):
         merged = shape if shape.geom_type == "LineString" else shapely.line_merge(shape)

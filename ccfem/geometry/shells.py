@@ -1,4 +1,4 @@
-"""Concentric strands: rings along the border, and lines along the middle of what they leave."""
+"""Concentric strands: rings along the border, and lines along the middle of the remaining strip."""
 
 import numpy as np
 import shapely
@@ -13,10 +13,10 @@ from ccfem.geometry.shapes import Region
 __all__ = ["concentric", "shells"]
 
 _LEAST_GAP = 0.5
-"""Narrowest strip, in pitches, that a strand is laid along, overlapping its neighbours: the sum of
+"""Narrowest strip, in pitches, that gets a strand, which then overlaps its neighbours: the sum of
 gap and overlap is then smallest."""
 _SAME = 1e-4
-"""Neighbouring points of a ring nearer than this, in widths, are one."""
+"""Distance, in widths, below which neighbouring points of a ring are the same."""
 _STRAIGHT = 0.03
 """Deviation, in pitches, up to which points of a middle line are left out."""
 
@@ -24,13 +24,13 @@ _STRAIGHT = 0.03
 def shells(
     section: Region, width: float, pitch: float, count: int, closest: float
 ) -> tuple[list[FloatArray], Region]:
-    """Rings along every border of a section, and what they leave inside.
+    """Rings along every border of a section, and the region inside them.
 
     Parameters
     ----------
     section : shapely (Multi)Polygon, mm
     width : float, mm
-        Of a strand; the first ring lies half of it inside the border.
+        Width of a strand; the first ring lies half of it inside the border.
     count : int
         Number of rings. Parts thinner than twice as many are filled by them.
     pitch, closest
@@ -39,7 +39,7 @@ def shells(
     Returns
     -------
     lines : list of (k, 2) arrays, mm
-        Closed rings, and open lines along the middle of parts that the rings leave no room in.
+        Closed rings, and open lines along the middle of parts without room for rings.
     interior : shapely (Multi)Polygon, mm
         The rest of the section, half a pitch inside the innermost rings.
     """
@@ -47,7 +47,7 @@ def shells(
     if count == 0:
         return [], section
     interior = inset(section, 0.5 * width + (count - 0.5) * pitch)
-    parts = shapely.get_parts(interior)  # without those that only rounding gives a width
+    parts = shapely.get_parts(interior)  # without parts whose width is only rounding error
     wide = ~shapely.is_empty(shapely.buffer(parts, -1e-3 * pitch, join_style="mitre"))
     interior = interior if wide.all() else shapely.multipolygons(parts[wide])
     return concentric(section, pitch, closest, 0.5 * width, count), interior
@@ -69,21 +69,21 @@ def concentric(
     pitch : float, mm
         Distance of neighbouring rings.
     closest : float
-        Minimum distance of opposite sides of a ring, in pitches; where the section is narrower the
-        ring is cut short.
+        Least distance between opposite sides of a ring, in pitches. A ring is cut short where the
+        section is narrower.
     first : float, mm, optional
         Distance of the first ring to the border; default half a pitch.
     count : int, optional
         Number of rings; by default as many as fit.
     walls : bool, default True
-        Whether the border is that of the part, which no strand oversteps. The border of other
+        Whether the border is that of the part, which no strand may exceed. The border of other
         strands may be overlapped where the section is narrower than a pitch.
 
     Returns
     -------
     list of (k, 2) arrays, mm
-        Closed rings from the border inward, then lines along the middle of what they leave; those
-        that go round a hole are closed.
+        Closed rings from the border inwards, then lines along the middle of the remaining strips;
+        lines round a hole are closed.
     """
     first = 0.5 * pitch if first is None else first
     section = corners_only(section)
@@ -106,7 +106,7 @@ def concentric(
 def _opened(section: Region, distance: float, width: float) -> Region:
     """Part of a section inside a distance, without channels narrower than a width.
 
-    As `inset`, but corners stay sharp: strands fill them at the price of lying closer there.
+    As `inset`, but corners stay sharp: strands fill them, at the cost of lying closer there.
     """
     radius = 0.4995 * width
     core = shapely.buffer(section, -(distance + radius), join_style="mitre")
@@ -137,11 +137,11 @@ def _middle_lines(
     count: int | None,
     walls: bool,
 ) -> list[FloatArray]:
-    """Lines along the medial axis of a section where the rings that are laid leave a strip.
+    """Lines along the medial axis of a section, where the rings leave a strip.
 
-    Between the innermost rings at both sides of the axis there is a strip, at most two pitches
-    wide; a strand is laid along its middle where it is at least half a pitch wide, and with a
-    `count` only where there is room for fewer rings. Parameters as in `concentric`.
+    Between the innermost rings on both sides of the axis there is a strip at most two pitches wide.
+    A strand is laid along its middle if it is at least half a pitch wide; with a `count`, only if
+    there is room for fewer rings. Parameters as in `concentric`.
     """
     pieces = []
     degree = np.bincount([end for s in axis.segments for end in s.ends if end >= 0])
@@ -173,7 +173,7 @@ def _middle_lines(
 def _to_the_end(
     points: FloatArray, depth: FloatArray, wanted: BoolArray, free: BoolArray
 ) -> tuple[FloatArray, BoolArray]:
-    """Line made longer, straight, at its free ends, up to the end of the strip that it lies in."""
+    """Line extended straight at its free ends, up to the end of the strip that it lies in."""
     before, after = points[:1], points[-1:]
     if free[0]:
         way = points[0] - points[1]

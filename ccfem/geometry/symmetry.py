@@ -13,9 +13,9 @@ __all__ = ["Mirror", "mirror_image", "mirror_lines", "mirrors_of", "reflected"]
 _ALIKE = 1e-3
 """Share of its area by which a symmetric region may differ from its mirror image."""
 _EQUAL = 1e-3
-"""Share by which principal moments of inertia differ that say nothing of an axis."""
+"""Relative difference of principal moments of inertia below which they define no axis."""
 _STEPS = 24
-"""Directions that are tried then, over half a turn."""
+"""Number of directions that are then tried, over half a turn."""
 
 
 class Mirror(NamedTuple):
@@ -26,9 +26,9 @@ class Mirror(NamedTuple):
 
 
 def mirrors_of(region: Region) -> tuple[int, ...]:
-    """Find the axes, 0 for x and 1 for y, along which a region is its own mirror image.
+    """Find the axes, 0 for x and 1 for y, along which a region equals its mirror image.
 
-    The mirror goes through the middle of its extent.
+    The mirror passes through the middle of its extent.
     """
     found = []
     for axis in (0, 1):
@@ -46,11 +46,11 @@ def mirror_image(points: FloatArray, region: Region, axis: int) -> FloatArray:
 
 
 def mirror_lines(region: Region) -> tuple[Mirror, ...]:
-    """Find lines through the centroid, at most two, at which a region is its own mirror image.
+    """Find lines through the centroid, at most two, in which a region equals its mirror image.
 
-    They are principal axes of inertia. Where both moments are equal, as those of a square or a
-    gear, lines every 7.5 degrees from the points of the border farthest from the centroid and
-    nearest to it are tried instead.
+    They are principal axes of inertia. If both moments are equal, as for a square or a gear, lines
+    every 7.5 degrees from the border points farthest from and nearest to the centroid are tried
+    instead.
     """
     if region.is_empty or not region.area > 0.0:
         return ()
@@ -81,7 +81,7 @@ def mirror_lines(region: Region) -> tuple[Mirror, ...]:
 
 
 def _middle(region: Region, centre: FloatArray, along: FloatArray) -> FloatArray:
-    """Point on a line through the centroid; on one along x or y, the middle of the extent."""
+    """Point on a line through the centroid; for a line along x or y, the middle of the extent."""
     left, bottom, right, top = region.bounds
     box = np.array([0.5 * (left + right), 0.5 * (bottom + top)])
     return np.where(along == 0.0, box, centre) if (along == 0.0).any() else centre

@@ -1,4 +1,4 @@
-"""Where a line turns more tightly than a radius."""
+"""Stretches of a line that turn more tightly than a radius."""
 
 import numpy as np
 
@@ -16,7 +16,7 @@ from ccfem.geometry.polylines import (
 __all__ = ["tight_bends", "tight_samples"]
 
 _SAMPLES = 8
-"""Places a width at which curvature is looked at."""
+"""Number of samples of the curvature a width."""
 
 
 def tight_bends(
@@ -24,7 +24,7 @@ def tight_bends(
 ) -> FloatArray:
     """Stretches of a line that are bent more tightly than a radius.
 
-    A line turns as tightly as the angle between its chords of a width before and behind a place,
+    The curvature of a line is the angle between its chords of a width before and behind a place,
     over the width. A corner is a bend of up to two widths.
 
     Parameters
@@ -34,14 +34,14 @@ def tight_bends(
     along : (n,) array, mm
         Arc length at its points.
     closed : bool
-        Whether it turns where it closes, too.
+        Whether the line also turns where it closes.
     radius, width : float, mm
 
     Returns
     -------
     (k, 2) array, mm
-        Start and end of each by arc length; on a closed line one may end beyond its length. None
-        for a closed line that is bent all the way round.
+        Start and end of each stretch by arc length; on a closed line one may end beyond its length.
+        Empty for a closed line that is bent all the way round.
     """
     size = float(along[-1])
     step = size / np.ceil(size * _SAMPLES / width)
@@ -60,12 +60,12 @@ def tight_bends(
     tight = over >= 0.0
     if closed and tight.all():
         return np.zeros((0, 2))
-    first = int(np.argmin(tight)) if closed else 0  # no bend goes over the start
+    first = int(np.argmin(tight)) if closed else 0  # no bend extends over the start
     over = np.roll(over, -first)
     found = runs(over >= 0.0)
 
     def crossing(outside: IntArray, inside: IntArray) -> FloatArray:
-        """Places between two samples where the limit is met: the same wherever samples lie."""
+        """Places between two samples where the limit is met, independent of the sampling."""
         last = len(over) - 1
         o, i = np.clip(outside, 0, last), np.clip(inside, 0, last)
         share = np.divide(over[i], over[i] - over[o], out=np.zeros(len(o)), where=over[o] < 0.0)
@@ -80,15 +80,15 @@ def tight_bends(
 
 
 def tight_samples(line: FloatArray, closed: bool, radius: float, width: float) -> FloatArray:
-    """Places at which the evaluator finds a line no straighter than a radius.
+    """Places at which the evaluator finds a line to be as tight as the radius, or tighter.
 
-    It looks at the ends of equal steps of about a width, as many as are nearest to the length.
+    It checks the ends of equal steps of about a width; their number is nearest to the length.
 
     Parameters
     ----------
     line : (n, d) array, mm
     closed : bool
-        Whether it turns where it closes, too.
+        Whether the line also turns where it closes.
     radius, width : float, mm
 
     Returns

@@ -1,4 +1,4 @@
-"""How much of the tension acts across layers, where they are weakest."""
+"""Share of the tension that acts across layers, where they are weakest."""
 
 from dataclasses import dataclass
 
@@ -9,17 +9,17 @@ from ccfem.arrays import BoolArray, FloatArray
 __all__ = ["Across", "across_layers", "best_plane"]
 
 _DIRECTIONS = 2000
-"""Directions of planes that are tried, over half a sphere: 3 degrees apart."""
+"""Number of plane directions that are tried, over half a sphere: 3 degrees apart."""
 
 
 @dataclass(frozen=True)
 class Across:
-    """Stress across layers, mean by volume over the critical cells.
+    """Stress across layers, averaged by volume over the critical cells.
 
     Attributes
     ----------
     tension : float
-        Of the traction square to the layer, where it pulls, over the largest principal stress.
+        Tensile traction normal to the layer, over the largest principal stress.
     angle : float, degrees
         Between the normal of the layer and the direction of the least principal stress.
     """

@@ -1,8 +1,8 @@
-"""Fields whose layers keep within a range of thickness in every cell, and rise in every cell.
+"""Fields whose layers stay within a range of thickness, and rise, in every cell.
 
-The nearest field to a given one under bounds of the gradient in each cell, by the alternating
-direction method of multipliers (Boyd et al., Foundations and Trends in Machine Learning 3 (2011)
-1): the equations stay the same, so that a step costs one solve with known factors.
+The field nearest to a given one, under bounds on the gradient in each cell, is found by the
+alternating direction method of multipliers (Boyd et al., Foundations and Trends in Machine Learning
+3 (2011) 1). The equations stay the same, so each step costs one solve with known factors.
 """
 
 from collections.abc import Callable
@@ -16,11 +16,12 @@ from ccfem.arrays import BoolArray, FloatArray
 __all__ = ["Bounds", "bounded"]
 
 _WEIGHTS = (1.0, 5.0, 30.0)
-"""Of the bounds against the target: low at first, for the nearest field, then high to get there."""
+"""Weights of the bounds against the target: low first, for the nearest field, then high, to meet
+the bounds."""
 _STEPS = 40
-"""Most steps with each."""
+"""Most steps with each weight."""
 _INSIDE = 0.02
-"""Share of a bound by which the aim lies within it."""
+"""Share of a bound by which the aim lies inside it."""
 
 
 @dataclass(frozen=True)
@@ -30,9 +31,9 @@ class Bounds:
     Attributes
     ----------
     least, most : float
-        Of its length.
+        Of its size.
     up : (3,) array
-        Unit vector along which it may not fall.
+        Unit vector along which it must not fall.
     """
 
     least: float
@@ -40,13 +41,13 @@ class Bounds:
     up: FloatArray
 
     def outside(self, gradient: FloatArray) -> BoolArray:
-        """Which gradients (m, 3) do not lie within."""
+        """Mask of the gradients (m, 3) that are outside the bounds."""
         size = np.linalg.norm(gradient, axis=1)
         falling = gradient @ self.up < 0.0
         return np.asarray((size < self.least) | (size > self.most) | falling)
 
     def nearest(self, gradient: FloatArray) -> FloatArray:
-        """Gradients (m, 3) within the bounds, and a little off them."""
+        """Nearest gradients (m, 3) within the bounds, slightly inside them."""
         along = gradient @ self.up
         floor = _INSIDE * self.least
         rise = np.maximum(floor - along, 0.0)
@@ -74,22 +75,22 @@ def bounded(
     solve: Callable[[FloatArray], F],
     enough: Callable[[F], bool] | None = None,
 ) -> F:
-    """Find the field near to a target whose gradient is within bounds.
+    """Find the field nearest to a target whose gradient is within bounds.
 
     Parameters
     ----------
     target : (m, 3) array
-        Gradient in the cells that is aimed at.
+        Wanted gradient in the cells.
     bounds : Bounds
     solve : callable
         Returns the field whose gradient is nearest to a target.
     enough : callable, optional
-        Whether a field will do; by default one that is within the bounds in every cell.
+        Whether a field is good enough; by default if it is within the bounds in every cell.
 
     Returns
     -------
     Field
-        Within the bounds, or after the last step as near as it came.
+        Within the bounds, or as near as it came in the last step.
     """
     found = solve(target)
     lag, before = np.zeros_like(target), _WEIGHTS[0]

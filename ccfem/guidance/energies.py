@@ -15,7 +15,7 @@ __all__ = [
 ]
 
 _NEAREST = 0.3
-"""Least distance of the centres of neighbouring cells that counts, in the cube root of the mean
+"""Least distance between the centres of neighbouring cells that is used, in cube roots of the mean
 volume (half a mean edge): flat cells would otherwise outweigh all others."""
 
 
@@ -77,7 +77,7 @@ def smoothness_energy(
     """Matrix of ``sum_f A_f / h_f |grad G - grad' G|^2`` (eq. 2), over the faces between cells.
 
     With h_f, the distance of the centres, it approximates the integral of the squared second
-    derivatives times a length squared, whatever the mesh.
+    derivatives times a length squared, independent of the mesh.
 
     Parameters
     ----------
@@ -102,10 +102,10 @@ def smoothness_energy(
 def faces_between(
     points: FloatArray, cells: IntArray, faces: IntArray, across: IntArray
 ) -> tuple[IntArray, IntArray, FloatArray, FloatArray]:
-    """Find both cells of each face between cells, its area vector (f, 3), and how far they lie.
+    """Find both cells of each inner face, its area vector (f, 3), and the distance of the cells.
 
-    Parameters as in `smoothness_energy`; the distance (f,), mm, is that of the centres, but not
-    less than `_NEAREST` says.
+    Parameters as in `smoothness_energy`. The distance (f,), mm, is that of the centres, but at
+    least that of `_NEAREST`.
     """
     first, side = np.nonzero(across > np.arange(len(cells))[:, None])
     second = across[first, side]
@@ -128,7 +128,7 @@ def _jumps(  # type: ignore[no-untyped-def]
 ):
     """Weighted jump of the gradient across each face as a form of its five nodes (f, 5).
 
-    Both gradients are the same along the face, so the jump is along its normal.
+    Both gradients are equal along the face, so the jump is normal to it.
     """
     nodes = np.empty((len(first), 5), np.int64)
     jump = np.zeros((len(first), 5))

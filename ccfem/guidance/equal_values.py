@@ -11,7 +11,7 @@ __all__ = ["equal_value_energy", "slabs"]
 def slabs(
     points: FloatArray, nodes: IntArray, direction: FloatArray, height: float
 ) -> tuple[IntArray, int]:
-    """Group nodes by slabs across a direction: number of the group of each, and of groups.
+    """Group nodes by slabs normal to a direction; return each node's group and their number.
 
     Parameters
     ----------
@@ -34,8 +34,8 @@ def equal_value_energy(
 ) -> sp.csr_array:
     """Matrix of ``weight / N sum_groups sum_v (G_v - M_group)^2`` (Fang et al. 2024, eq. 3).
 
-    The values M of the groups are unknowns after those of the nodes: at the minimum they are the
-    means of their groups, and the matrix stays sparse.
+    The values M of the groups are unknowns after those of the nodes. At the minimum they are the
+    means of their groups; the matrix stays sparse.
 
     Parameters
     ----------
@@ -45,7 +45,7 @@ def equal_value_energy(
     weight : float
         Of all N nodes together, mm.
     first : int
-        Place of the first group among the unknowns.
+        Index of the first group among the unknowns.
     n : int
         Number of unknowns.
     """

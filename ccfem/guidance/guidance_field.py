@@ -1,7 +1,7 @@
 """The guidance field: one linear solve for a scalar field whose level surfaces are the layers.
 
-Fang et al. 2024 (arXiv:2311.17265), section 2.3, minimise an energy of the field
-that has no scale of its own: the constant field is its minimum. Here the joints give the scale.
+Fang et al. 2024 (arXiv:2311.17265), section 2.3, minimise an energy of the field that has no scale
+of its own, so that a constant field minimises it. Here the joints set the scale.
 """
 
 import itertools
@@ -31,34 +31,34 @@ __all__ = ["GuidanceField", "JointForm", "Weights", "guidance_field"]
 JointForm = Literal["axis", "ring", "literal"]
 
 _MOST_SIGNS = 12
-"""Joints up to which all signs are tried; above it each is flipped in turn."""
+"""Number of joints up to which all signs are tried; above it each is flipped in turn."""
 _RESIDUAL = 1e-6
 _UP = read_only(np.array([0.0, 0.0, 1.0]))
 _FREE = 0.05
-"""Directions whose share of the stress is within this of the least are as good as that."""
+"""Share of the stress by which a direction may exceed the least stressed one and count as equal."""
 _ANCHOR = 0.01
-"""Weight of the direction of least stress where no joint has an axis."""
+"""Weight of the direction of least stress if no joint has an axis."""
 _TIE = 0.005
-"""Energies within this share of the lowest tie with it: joints that lie far apart hardly feel each
-other's signs (on the T-bracket of the paper, all combinations are within 0.3 %), and on parts with
-a mirror plane they come in pairs. Of those that tie the one counts whose layers are stacked along
-the build direction most."""
+"""Share of the lowest energy within which energies tie with it. Joints that are far apart hardly
+influence each other's signs (on the T-bracket of the paper, all combinations are within 0.3 %), and
+on parts with a mirror plane they come in pairs. Of tied combinations, the one is taken whose layers
+are stacked most along the build direction."""
 
 
 @dataclass(frozen=True)
 class Weights:
-    """What the field is to weigh.
+    """Weights of the terms of the field.
 
     Attributes
     ----------
     stress : float
         Layers along the strongest stress.
     smoothness : float
-        Gradients alike in neighbouring cells.
+        Equal gradients in neighbouring cells.
     joints : float
-        Layers square to the axes of the joints, or of one value round them.
+        Layers normal to the axes of the joints, or of one value round them.
     length : float, mm
-        Over which smoothness counts.
+        Length over which smoothness acts.
     """
 
     stress: float
@@ -75,12 +75,12 @@ class GuidanceField:
     ----------
     mesh : TetMesh
     values : (n,) array, mm
-        At the nodes; its gradient has a mean size of 1. Zero at nodes that no cell has as corner.
+        At the nodes; the mean size of its gradient is 1. Zero at nodes that are no cell's corner.
     gradient : (m, 3) array
     signs : tuple of int
         Sense, 1 or -1, in which the field rises along the direction of each joint.
     energies : mapping of signs to float
-        Energy of every combination of signs that was tried, without its constant.
+        Energy of every combination of signs that was tried, without its constant term.
     """
 
     mesh: TetMesh
@@ -105,7 +105,7 @@ def guidance_field(
     slab: float = 0.5,
     build: FloatArray = _UP,
 ) -> GuidanceField:
-    """Find the field: gradients square to the stress, alike in neighbours, along the joints' axes.
+    """Find the field: gradients normal to the stress, smooth, and along the joints' axes.
 
     Minimises
 
@@ -115,11 +115,11 @@ def guidance_field(
 
     * "axis": ``w_b sum_k sum_e V_e |g_e - s_k a_k|^2`` over the cells of each joint, s_k = 1 or -1;
     * "literal": one value in each joint, as the paper prints it (eq. 3);
-    * "ring": one value in each slab of a joint across its direction.
+    * "ring": one value in each slab of a joint normal to its direction.
 
-    The last two set no scale; that is set by a mean gradient along the axes. Joints without a
-    direction have no say in "axis". Where no joint has one, ``0.01 sum_e V_e |g_e - d|^2`` stands
-    in, with the direction d in which the stress is least.
+    The last two set no scale, so it is set by a mean gradient along the axes. Joints without a
+    direction have no effect in "axis". If no joint has a direction, ``0.01 sum_e V_e |g_e - d|^2``
+    is used instead, with the direction d of least stress.
 
     Parameters
     ----------
@@ -127,7 +127,7 @@ def guidance_field(
     tension : (m, 3) array
         Direction tau of the strongest stress.
     importance : (m,) array
-        omega: 0 where the stress is to have no say.
+        omega: 0 where the stress has no effect.
     joints : sequence of Joint
     weights : Weights
     form : {"axis", "ring", "literal"}
@@ -145,7 +145,7 @@ def guidance_field(
     Raises
     ------
     InputError
-        When neither stress nor joints say how the layers are to lie, or the signs do not suit.
+        When neither stress nor joints determine the layers, or the signs do not fit.
     SolveError
         When the solve misses its tolerance.
     """
@@ -203,7 +203,7 @@ def _groups(
     form: JointForm,
     slab: float,
 ) -> list[tuple[IntArray, IntArray, int]]:
-    """Nodes of each joint, the group of each and the number of groups; none for "axis"."""
+    """Nodes of each joint, the group of each node, and the number of groups; none for "axis"."""
     found: list[tuple[IntArray, IntArray, int]] = []
     for joint in joints if form != "axis" else ():
         nodes = np.unique(cells[joint.region])
@@ -222,7 +222,7 @@ def _groups(
 def _lowest(energies: dict[tuple[int, ...], float], rising: FloatArray) -> tuple[int, ...]:
     """Signs of the lowest energy; of those that tie with it, the first of those that rise most.
 
-    `rising`, (k,), is by how much the field of each joint rises along the build direction.
+    `rising`, (k,), is the rise of the field of each joint along the build direction.
     """
     least = min(energies.values())
     limit = least + _TIE * abs(least)
@@ -234,7 +234,7 @@ def _lowest(energies: dict[tuple[int, ...], float], rising: FloatArray) -> tuple
 
 
 def _least_stressed(tension: FloatArray, weight: FloatArray, build: FloatArray) -> FloatArray:
-    """Direction that the stress has least to do with; of several the nearest to the build's."""
+    """Direction of least stress; of several equal ones, the nearest to the build direction."""
     total = np.einsum("e,ei,ej->ij", weight, tension, tension)
     if not np.trace(total) > 0.0:
         raise InputError("the layers have nothing to follow: give a stress, or name joints")
@@ -247,7 +247,7 @@ def _least_stressed(tension: FloatArray, weight: FloatArray, build: FloatArray) 
 
 
 def _factorised(matrix: sp.csr_array) -> Any:
-    """Solver of the matrix with the first node held at zero; every residual is checked."""
+    """Solver of the matrix with the first node fixed at zero; every residual is checked."""
     inner = sp.csc_array(matrix[1:, 1:])
     options = {"SymmetricMode": True}
     try:
@@ -275,8 +275,8 @@ def _factorised(matrix: sp.csr_array) -> Any:
 def _energies(product: FloatArray, wanted: Sequence[int] | None) -> dict[tuple[int, ...], float]:
     """Energy of combinations of signs: ``-s^T P s`` with ``P_jk = b_j . G_k``.
 
-    The field of signs s is ``sum s_k G_k``, so that no combination needs a solve of its own. One
-    sign is fixed, since turning all round turns the field round.
+    The field of signs s is ``sum s_k G_k``, so no combination needs a solve of its own. One sign is
+    fixed, since flipping all signs flips the field.
     """
     count = len(product)
 

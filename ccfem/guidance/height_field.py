@@ -1,8 +1,8 @@
-"""A scalar field whose gradient is as near to given directions as it can be.
+"""A scalar field whose gradient is as near as possible to given directions.
 
-Kipping and Schueppstuhl 2023 (Materials 16, 998), section 2.4: a Poisson equation. The blend with
-one direction is ours, the least that leaves no cell upside down, and so are the bounds that keep
-the distance of layers within a range.
+Kipping and Schueppstuhl 2023 (Materials 16, 998), section 2.4, solve a Poisson equation. Two things
+are ours: the blend with one direction, which is the least that leaves no cell upside down, and the
+bounds that keep the distance of layers within a range.
 """
 
 from collections.abc import Callable
@@ -22,13 +22,13 @@ from ccfem.mesh.tet_mesh import TetMesh
 __all__ = ["HeightField", "height_field", "inverted_share"]
 
 _LARGEST = 64.0
-"""Blend above which the field is as good as flat."""
+"""Blend above which the field is practically flat."""
 _CLOSE = 0.02
 """Accuracy of the least blend."""
 _BLENDS = (0.0, 0.1, 0.25, 0.5, 1.0, 2.0, 4.0, 64.0)
-"""Blends that are tried where the gradient is kept within bounds."""
+"""Blends that are tried when the gradient is kept within bounds."""
 _LEFT = 5e-4
-"""Share of the volume that may be left outside them."""
+"""Share of the volume that may stay outside the bounds."""
 
 
 @dataclass(frozen=True)
@@ -38,13 +38,13 @@ class HeightField:
     Attributes
     ----------
     values : (n,) array, mm
-        At the nodes, zero at their least; zero at nodes that no cell has as a corner.
+        At the nodes, with a minimum of zero; zero at nodes that are no cell's corner.
     gradient : (m, 3) array
-        In the cells; 1 where the layers keep their distance.
+        In the cells; of size 1 where the layers have their nominal distance.
     up : (3,) array
         Unit vector along the mean gradient.
     blend : float
-        How much of that direction was added to the directions given.
+        Weight of that direction added to the given directions.
     """
 
     values: FloatArray
@@ -68,15 +68,15 @@ def height_field(
     ----------
     mesh : TetMesh
     direction : (m, 3) array
-        Unit vectors that the gradient is to follow.
+        Unit vectors that the gradient should follow.
     blend : float, optional
-        Weight of the mean gradient of the field without a blend, added to each direction. By
-        default the least with which every cell rises along it, to 0.02; with `lengths` the least
-        of eight with which the bounds can be kept.
+        Weight of the mean gradient of the field without blend, added to each direction. By default
+        the least for which every cell rises along it, to within 0.02; with `lengths`, the least of
+        eight values for which the bounds can be kept.
     lengths : tuple of 2 floats, optional
-        Range in which the length of the gradient is kept in every cell, which may not fall along
-        the mean gradient either, at the least cost in direction; 0.05 % of the volume may be left
-        outside.
+        Range in which the size of the gradient is kept in every cell, at the least cost in
+        direction. The field must not fall along the mean gradient either. 0.05 % of the volume may
+        stay outside.
     """
     solve = _poisson(mesh)
     plain = solve(direction)
@@ -145,7 +145,7 @@ def _mixed(direction: FloatArray, up: FloatArray, blend: float) -> FloatArray:
 
 
 def _poisson(mesh: TetMesh) -> Callable[[FloatArray], HeightField]:
-    """Return what solves ``min sum_e V_e |grad g - v_e|^2`` for directions v: one factorisation."""
+    """Return a solver of ``min sum_e V_e |grad g - v_e|^2`` for directions v: one factorisation."""
     gradients, cells, n = cell_gradients(mesh), mesh.corners, len(mesh.points)
     volume, m = mesh.volumes, len(mesh.corners)
     rows = np.repeat(np.arange(3 * m).reshape(m, 1, 3), 4, axis=1)

@@ -1,4 +1,4 @@
-"""The stress lines between joints, traced once for all that asks for them on the same stress."""
+"""Stress lines between joints, traced once and shared by all that use the same stress."""
 
 from collections.abc import Sequence
 from typing import NamedTuple
@@ -14,14 +14,14 @@ _KNOWN = "_joint_lines"
 
 
 class JointLines(NamedTuple):
-    """Strongest stress of the cells, and where the lines along it join joints."""
+    """Strongest stress of the cells, and the region where lines along it join joints."""
 
     strongest: Strongest
     region: CriticalRegion
 
 
 def joint_lines(stress: PartStress, joints: Sequence[Joint], keep: Keep) -> JointLines:
-    """Trace the lines of the strongest stress from every cell; the stress keeps the result.
+    """Trace the lines of the strongest stress from every cell; the stress stores the result.
 
     Parameters
     ----------
@@ -33,7 +33,7 @@ def joint_lines(stress: PartStress, joints: Sequence[Joint], keep: Keep) -> Join
     Raises
     ------
     InputError
-        As of `critical_region`.
+        As in `critical_region`.
     """
     known = vars(stress).setdefault(_KNOWN, {})
     key = (tuple(joint.name for joint in joints), keep)

@@ -18,7 +18,7 @@ __all__ = ["Joint", "joining_pairs", "joint_of", "joints_of"]
 _FLAT = 0.02
 """Share of a patch's squared normals that may lie along the axis of a cylinder."""
 _ROUND = 0.05
-"""Largest distance of a cylinder's nodes from it, in its radius."""
+"""Largest distance of a cylinder's nodes from its surface, in radii."""
 
 
 @dataclass(frozen=True)
@@ -30,12 +30,12 @@ class Joint:
     name : str
         Of the patch that it was found from.
     wall : (k,) int array
-        Nodes on the wall: of a cylinder all round, also where the patch covers a part of it.
+        Nodes on the wall; for a cylinder the whole wall, even if the patch covers only a part.
     region : (r,) int array
-        Cells all of whose nodes are within so many edges of the wall.
+        Cells all of whose nodes are within a number of edges of the wall.
     direction : (3,) array or None
-        Unit vector that the layers are to be square to: the axis of the hole, or what the user
-        says. Its sign means nothing. None where the wall is no cylinder and nobody says.
+        Unit vector normal to the wanted layers: the axis of the hole, or as the user specifies. Its
+        sign is arbitrary. None where the wall is no cylinder and nothing is specified.
     radius : float, mm
         Of the hole; 0 where the patch is no cylinder.
     """
@@ -64,9 +64,9 @@ def joint_of(
     name : str
         Patch: the wall of a hole, or a part of it; or any other patch.
     rings : int, default 4
-        How many edges round the wall its region reaches (Fang et al. 2024: 4).
+        Extent of its region in edges round the wall (Fang et al. 2024: 4).
     direction : (3,) array, optional
-        Instead of the axis of the hole.
+        Replaces the axis of the hole.
 
     Raises
     ------
@@ -129,7 +129,7 @@ def joints_of(
 
 
 def joining_pairs(joints: Sequence[Joint], stress: PartStress) -> list[tuple[int, int]] | None:
-    """Pairs of a held joint and a loaded one; None where these are not told apart."""
+    """Pairs of a held and a loaded joint; None if it is not known which these are."""
     loaded = [set(np.unique(stress.mesh.patch(name)).tolist()) for name in stress.loaded]
     if not loaded:
         return None
@@ -144,15 +144,15 @@ def joining_pairs(joints: Sequence[Joint], stress: PartStress) -> list[tuple[int
 
 
 def _cylinder(mesh: TetMesh, facets: IntArray) -> tuple[FloatArray, FloatArray, float] | None:
-    """Axis, a point on it and radius of the cylinder that facets lie on; None where there is none.
+    """Axis, a point on it and radius of the cylinder that facets lie on; None if there is none.
 
-    The axis is square to all normals; the circle is fitted to the nodes (Kasa, IEEE Trans. Instrum.
+    The axis is normal to all normals; the circle is fitted to the nodes (Kasa, IEEE Trans. Instrum.
     Meas. 25 (1976) 8-14).
     """
     area, normal = mesh.facet_areas(facets)
     spread = np.einsum("f,fi,fj->ij", area / area.sum(), normal, normal)
     values, vectors = np.linalg.eigh(spread)
-    # Of a plane the two smallest vanish.
+    # For a plane the two smallest values vanish.
     if values[0] > _FLAT or values[1] < 2.0 * _FLAT:
         return None
     frame = vectors[:, ::-1].T
@@ -174,7 +174,7 @@ def _cylinder(mesh: TetMesh, facets: IntArray) -> tuple[FloatArray, FloatArray, 
 def _whole_wall(
     mesh: TetMesh, nodes: IntArray, axis: FloatArray, centre: FloatArray, radius: float
 ) -> IntArray:
-    """Nodes of the boundary on the cylinder that hang together with the nodes given."""
+    """Boundary nodes on the cylinder that are connected to the given nodes."""
     facets = mesh.boundary
     away = mesh.points - centre
     away = away - (away @ axis)[:, None] * axis
@@ -195,7 +195,7 @@ def _whole_wall(
 
 
 def _cells_within(mesh: TetMesh, nodes: IntArray, rings: int) -> IntArray:
-    """Cells all of whose corners are within so many edges of the nodes."""
+    """Cells all of whose corners are within a number of edges of the nodes."""
     corners, n = mesh.corners, len(mesh.points)
     reached = np.zeros(n, dtype=bool)
     reached[nodes] = True

@@ -1,8 +1,8 @@
-"""Normals of layers in the whole part, filled in between regions where they are given.
+"""Layer normals in the whole part, filled in between regions where they are given.
 
 Kipping and Schueppstuhl 2023 (Materials 16, 998), equations 4 and 5, with weights that approximate
-an integral (area over distance of centres). The sense of each region is the one with which
-neighbours agree best; the filled field is linear in the senses, so that each costs no solve.
+an integral (area over distance of centres). The sense of each region is chosen so that neighbours
+agree best. The filled field is linear in the senses, so that trying one costs no solve.
 """
 
 import itertools
@@ -23,16 +23,16 @@ from ccfem.mesh.tet_mesh import TetMesh
 __all__ = ["NormalField", "normal_field"]
 
 _MOST_TRIED = 10
-"""Regions up to which all senses are tried; above, so many that are best by a quadratic form."""
+"""Regions up to which all senses are tried; above, this number of the best by a quadratic form."""
 _NOTHING = 1e-6
 """Length of a filled vector below which it has no direction."""
 _STARTS = 20
-"""Random starts from which senses are flipped one by one, for the quadratic form."""
+"""Random starts for the quadratic form, from which senses are flipped one by one."""
 
 
 @dataclass(frozen=True)
 class NormalField:
-    """Directions that the layers are to be square to.
+    """Directions that the layers should be normal to.
 
     Attributes
     ----------
@@ -60,8 +60,8 @@ def normal_field(mesh: TetMesh, regions: StressRegions, build: FloatArray) -> No
     mesh : TetMesh
     regions : StressRegions
     build : (3,) array
-        Unit vector: the direction of pieces of the part without a region. The field as a whole
-        does not point against it.
+        Unit vector, used as the direction of pieces of the part without a region. The field as a
+        whole does not point against it.
     """
     one, other, vector, apart = faces_between(mesh.points, mesh.corners, mesh.faces, mesh.across)
     area = np.linalg.norm(vector, axis=1)
@@ -83,7 +83,7 @@ def normal_field(mesh: TetMesh, regions: StressRegions, build: FloatArray) -> No
 def _filled(
     regions: StressRegions, one: IntArray, other: IntArray, weight: FloatArray, build: FloatArray
 ) -> FloatArray:
-    """Fields (r + 1, m, 3) of each region alone, and last of the pieces without a region."""
+    """Fields (r + 1, m, 3): of each region alone, and last of the pieces without a region."""
     m, count = len(regions.region), regions.count
     half = sp.coo_array((weight, (one, other)), shape=(m, m))
     graph = sp.csr_array(half + half.T)
@@ -107,7 +107,7 @@ def _filled(
 def _candidates(
     parts: FloatArray, one: IntArray, other: IntArray, area: FloatArray
 ) -> Iterable[tuple[int, ...]]:
-    """Senses to be tried: all, or those of the least sums of area times squared jump."""
+    """Senses to be tried: all, or those with the least sums of area times squared jump."""
     count = len(parts) - 1
     if count <= _MOST_TRIED:
         return ((1, *rest) for rest in itertools.product((1, -1), repeat=count - 1))
@@ -118,7 +118,7 @@ def _candidates(
     found: dict[tuple[int, ...], float] = {}
     for sense in starts:
         while True:
-            # What a flip changes: 4 times the sum of the row without its diagonal, and its sign.
+            # Change by a flip: 4 times the sum of the row without its diagonal, times its sign.
             gain = -4.0 * sense * (form @ sense) + 4.0 * np.diag(form)
             best = int(gain.argmin())
             if not gain[best] < -1e-12 * abs(float(sense @ form @ sense)):
@@ -134,7 +134,7 @@ def _candidates(
 
 
 def _agreeing(form: FloatArray) -> FloatArray:
-    """Senses with which the regions that feel each other most agree, along a spanning tree."""
+    """Senses for which the most strongly coupled regions agree, along a spanning tree."""
     feel = np.abs(form)
     tree = minimum_spanning_tree(sp.csr_array(np.triu(2.0 * feel.max() - feel, 1)))
     order, before = breadth_first_order(tree, 0, directed=False)

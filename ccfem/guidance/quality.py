@@ -1,4 +1,4 @@
-"""How good a guidance field is, before anything is cut."""
+"""Quality of a guidance field, before anything is cut."""
 
 from dataclasses import dataclass
 
@@ -10,7 +10,7 @@ from ccfem.guidance.guidance_field import GuidanceField
 __all__ = ["FieldQuality", "field_quality"]
 
 _RANGE = (0.4, 1.5)
-"""Local thickness, over the nominal one, that can be printed."""
+"""Range of the local thickness, over the nominal one, that can be printed."""
 
 
 @dataclass(frozen=True)
@@ -20,15 +20,15 @@ class FieldQuality:
     Attributes
     ----------
     thickness_5, thickness_50, thickness_95 : float, mm
-        Percentiles by volume of the distance of neighbouring layers.
+        Percentiles by volume of the distance between neighbouring layers.
     thickness_outside : float
-        Share of the volume where it is outside 0.4 to 1.5 times the nominal thickness.
+        Share of the volume in which it is outside 0.4 to 1.5 times the nominal thickness.
     folded : float
-        Share of the area between cells across which the field turns back.
+        Share of the area between cells across which the field reverses.
     angle_mean, angle_95 : float, degrees
         Between the strongest stress and the layer, by volume over the critical region.
     angle_mean_weighted, angle_95_weighted : float, degrees
-        The same, each cell weighted with its importance too.
+        The same, with each cell also weighted by its importance.
     within_10, within_10_weighted : float
         Share of the critical region where that angle is at most 10 degrees.
     """
@@ -61,9 +61,9 @@ def field_quality(
     tension : (m, 3) array
         Direction of the strongest stress.
     importance : (m,) array
-        The critical region is where it is above 0; nan in the angles where there is none.
+        The critical region is where this is above 0; without one the angles are nan.
     step : float
-        Of the field's value from layer to layer.
+        Difference of the field between layers.
     nominal : float, mm
         Wanted thickness.
     """

@@ -1,8 +1,8 @@
-"""Regions of critical stress, with the direction across which the stress has least to do.
+"""Regions of critical stress, with the direction of the least principal stress.
 
 H. Kipping, T. Schueppstuhl, Load-oriented nonplanar additive manufacturing method for optimized
-continuous carbon fiber parts, Materials 16 (2023) 998, section 2: layers are weakest across, so
-their normal is to follow the least principal stress where the largest is high.
+continuous carbon fiber parts, Materials 16 (2023) 998, section 2: layers are weakest along their
+normal, which should follow the least principal stress where the largest is high.
 """
 
 from dataclasses import dataclass
@@ -18,23 +18,24 @@ from ccfem.mesh.tet_mesh import TetMesh
 __all__ = ["StressRegions", "stress_regions"]
 
 _FEWEST = 10
-"""Cells of the smallest region that counts."""
+"""Number of cells of the smallest region that counts."""
 _EVEN = 1e-6
-"""Weight of an edge between cells with the same direction, so that it counts as one."""
+"""Weight of an edge between cells with equal directions, so that it counts as an edge."""
 
 
 @dataclass(frozen=True)
 class StressRegions:
-    """Where the layers are to follow the stress.
+    """Regions where the layers should follow the stress.
 
     Attributes
     ----------
     critical : (m,) bool array
         Cells whose largest principal stress is high.
     region : (m,) int array
-        Number of the region of each cell, from the largest on; -1 outside.
+        Number of the region of each cell, largest first; -1 outside.
     direction : (m, 3) array
-        Of the least principal stress, smoothed and of one sense in each region; zero outside.
+        Direction of the least principal stress, smoothed and of one sense in each region; zero
+        outside.
     largest : (m,) array, MPa
         Largest principal stress.
     """
@@ -73,20 +74,20 @@ def stress_regions(
     build : (3,) array
         The mean direction of a region does not point against it.
     share : float, default 0.16
-        A cell is critical where its largest principal stress is above this share of the peak.
+        A cell is critical if its largest principal stress is above this share of the peak.
     quantile : float, default 0.995
-        The peak is exceeded in the rest of the volume; with 1, as published, it is the largest of
-        all, which one cell at the rim of a hole decides.
+        Quantile, over the volume, that is taken as the peak. With 1, as published, it is the
+        maximum, which a single cell at the rim of a hole decides.
     gap : float, default 0.1
         Critical cells whose middle and least principal stress differ by less than this share of
-        the largest have no direction of their own, and belong to no region; published: 0.
+        the largest have no distinct direction and belong to no region; published: 0.
     alignment : float, default 0.75
-        Cosine of the angle between the directions of neighbours, or of neighbours of neighbours,
-        from which they belong to one region.
+        Least cosine of the angle between the directions of neighbours, or of neighbours of
+        neighbours, that belong to one region.
     most : int, default 10
-        So many of the largest regions are kept, none with less than 10 cells.
+        Largest number of regions that are kept, largest first; none has less than 10 cells.
     smoothing : int, default 200
-        Passes in which each direction takes on that of its neighbours in the region.
+        Passes in which each direction is averaged with those of its neighbours in the region.
 
     Raises
     ------
@@ -124,7 +125,7 @@ def stress_regions(
 
 
 def _peak(values: FloatArray, volume: FloatArray, quantile: float) -> float:
-    """Value that the rest of the volume exceeds."""
+    """Value that is exceeded in the rest of the volume."""
     order = np.argsort(values, kind="stable")
     along = np.cumsum(volume[order]) / volume.sum()
     at = min(int(np.searchsorted(along, quantile)), len(order) - 1)
@@ -142,9 +143,9 @@ def _neighbours(mesh: TetMesh) -> sp.csr_array:
 def _grown(
     mesh: TetMesh, cells: IntArray, axis: FloatArray, alignment: float
 ) -> tuple[IntArray, FloatArray]:
-    """Label the cells by what grows together, and turn their axes to one sense in each.
+    """Label connected aligned cells, and give their axes one sense in each region.
 
-    Senses follow the spanning tree of the pairs that are aligned best.
+    Senses follow the spanning tree of the best-aligned pairs.
     """
     near = _neighbours(mesh)
     second = sp.csr_array(near + near @ near)[cells][:, cells].tocoo()
@@ -182,7 +183,7 @@ def _numbered(label: IntArray, volume: FloatArray, most: int) -> IntArray:
 def _smoothed(
     mesh: TetMesh, cells: IntArray, number: IntArray, axis: FloatArray, passes: int
 ) -> FloatArray:
-    """Directions after each took on that of its neighbours in the region, so many times."""
+    """Directions after a number of passes of averaging over neighbours in the region."""
     near = _neighbours(mesh)[cells][:, cells].tocoo()
     same = number[near.row] == number[near.col]
     n = len(cells)

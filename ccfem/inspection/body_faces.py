@@ -1,4 +1,4 @@
-"""The smooth faces of a body, with the numbers that part files choose them by."""
+"""Smooth faces of a body, with the numbers by which part files select them."""
 
 import os
 from dataclasses import dataclass
@@ -31,11 +31,11 @@ class BodyFaces:
     ----------
     points : (n, 3) array, mm
     triangles : (t, 3) int array
-        Outward.
+        Oriented outwards.
     faces : tuple of Face
         Face 1 first.
     names : tuple of str
-        Of the faces of a CAD file, where it has any.
+        Names of the faces of a CAD file, if it has any.
     """
 
     points: FloatArray
@@ -57,11 +57,11 @@ class BodyFaces:
 
     @property
     def doubt(self) -> str:
-        """What to say of a body so small that its lengths look like metres; else nothing."""
+        """Remark on a body so small that its lengths look like metres; else empty."""
         return in_metres(self.points)
 
     def to_frame(self) -> "pd.DataFrame":
-        """One row a face: its number, area, what it is, and its name where it has one."""
+        """One row a face: its number, area, shape, and its name if it has one."""
         import pandas as pd
 
         columns = {
@@ -83,9 +83,9 @@ def faces(
     body : path, str or Case
         Surface, CAD or mesh file, part file, or a case.
     angle : float, degrees
-        Feature angle: that from which an edge separates two faces.
+        Feature angle: edges of at least this angle separate two faces.
     scale : float, default 1
-        Factor on the coordinates of a file, to make them mm.
+        Factor that converts the coordinates of a file to mm.
 
     Raises
     ------

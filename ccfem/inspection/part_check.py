@@ -1,4 +1,4 @@
-"""Everything that is known of a part before it is solved."""
+"""Everything that is known about a part before it is solved."""
 
 import os
 from collections.abc import Sequence
@@ -32,7 +32,7 @@ if TYPE_CHECKING:
 __all__ = ["Check", "check"]
 
 _ALL, _SOME = 1.0 - 1e-9, 0.02
-"""Share of a load on held nodes from which it does nothing, and from which it is worth a word."""
+"""Shares of a load on held nodes from which it has no effect, and from which there is a remark."""
 
 
 @dataclass(frozen=True)
@@ -43,16 +43,16 @@ class Check(Shown):
     ----------
     case : Case
     facts : tuple of str
-        Size, cells, quality, pieces, and what a solve will take.
+        Size, cells, quality, pieces, and the cost of a solve.
     patches : tuple of PatchRow
     loads : tuple of LoadRow
     warnings : tuple of str
-        What may not be meant, each with its cure.
+        Things that may be unintended, each with its cure.
     fibre : tuple of Layer
-        Layers that get fibre, where the part says which (`Case.fibre`) and they do not follow from
-        the stress.
+        Layers that get fibre, if the part selects them (`Case.fibre`) and they do not depend on the
+        stress.
     mistakes : tuple of str
-        What keeps the part from being solved.
+        What prevents the part from being solved.
     """
 
     case: Case
@@ -117,24 +117,24 @@ class Check(Shown):
 
 
 def check(part: str | os.PathLike[str] | Case, **parameters: Any) -> Check:
-    """Look at a part without solving it.
+    """Inspect a part without solving it.
 
     Parameters
     ----------
     part : str, path or Case
         As `ccfem.read` takes it.
     **parameters
-        Of a case by name.
+        Parameters of a case by name.
 
     Returns
     -------
     Check
-        ``print(check(...))`` says it all; `Check.to_frame` is the table of the patches.
+        ``print(check(...))`` shows all of it; `Check.to_frame` is the table of the patches.
 
     Raises
     ------
     InputError
-        For a part that cannot be read; `InputError.mistakes` holds all that is wrong with it.
+        For a part that cannot be read; `InputError.mistakes` lists all that is wrong with it.
     """
     case = read(part, **parameters)
     problem, found = case.problem, Mistakes()
@@ -167,7 +167,7 @@ def check(part: str | os.PathLike[str] | Case, **parameters: Any) -> Check:
 
 
 def _load_rows(problem: Problem, found: Mistakes, named: bool) -> list[LoadRow]:
-    """Rows of the loads on one set of supports; what is wrong is noted, with the case if named."""
+    """Rows of the loads on one set of supports; mistakes are recorded, with the case if named."""
     at_rest: Held | None = None
     rows = []
     with found.noted(f"load case '{next(iter(problem.loads))}': " if named else ""):
@@ -231,7 +231,7 @@ def _about_fibre(case: Case, layers: Sequence[Layer]) -> tuple[str, ...]:
 
 
 def _only_told(finding: str) -> bool:
-    """Whether a finding tells how the mesh was made, and nothing to be mended."""
+    """Whether a finding only tells how the mesh was made, and needs no action."""
     return finding.startswith("meshed by") and ": shorten" not in finding
 
 
@@ -254,7 +254,7 @@ def _carried(case: Case) -> dict[str, list[str]]:
 
 
 def _warnings(case: Case, rows: Sequence[LoadRow]) -> list[str]:
-    """Say what may not be meant."""
+    """List what may be unintended."""
     problem = case.problem
     lines = [line for line in case.findings if not _only_told(line)]
     sliver = about_slivers(problem.mesh)

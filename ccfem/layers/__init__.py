@@ -1,4 +1,4 @@
-"""Layers, flat or curved, the stress on them, and slicers that make them."""
+"""Layers, flat or curved, the stress on them, and the slicers that make them."""
 
 from ccfem.layers import slicing
 from ccfem.layers.layer import Layer

@@ -1,7 +1,7 @@
-"""Cleaning the triangles of a level surface: short edges collapsed, thin pairs flipped.
+"""Cleaning the triangles of a level surface: short edges collapse, thin pairs are flipped.
 
-Points are only removed, never moved: those that stay lie where the mesh was cut, and the border
-keeps its course. Hoppe et al., Mesh optimization, SIGGRAPH 1993.
+Points are only removed, never moved: the remaining points lie where the mesh was cut, and the
+border keeps its shape. Hoppe et al., Mesh optimization, SIGGRAPH 1993.
 """
 
 import numpy as np
@@ -12,9 +12,9 @@ from ccfem.arrays import BoolArray, FloatArray, IntArray
 __all__ = ["clean"]
 
 _FAN = 32
-"""Most triangles at a point; a collapse that would need more is left out."""
+"""Most triangles at a point; collapses that would need more are skipped."""
 _TILT = 0.8
-"""Least cosine between a triangle's normal before and after."""
+"""Least cosine of the angle between a triangle's normals before and after."""
 _THIN = 0.2
 """Height of a triangle over its longest side below which a collapse must not make it thinner."""
 _ROUNDS = 4
@@ -35,13 +35,13 @@ def clean(
     points : (n, 3) array, mm
     triangles : (t, 3) int array
     cell : (t,) int array
-        Kept with each triangle.
+        Cell of each triangle, kept with it.
     fixed : (n,) bool array
-        Points that have to stay.
+        Points that must stay.
     shortest : float, mm
-        Edges shorter than this are collapsed where that turns nothing over.
+        Shorter edges are collapsed where that inverts no triangle.
     sag : float, mm
-        Distance by which the border may change.
+        Largest distance by which the border may change.
 
     Returns
     -------
@@ -81,7 +81,7 @@ def _gather(triangles, fan, size):  # type: ignore[no-untyped-def]
 
 @njit(cache=True, nogil=True)
 def _find_border(triangles, fan, size, border, locked):  # type: ignore[no-untyped-def]
-    """Write the border neighbours before and after each point; lock where borders touch."""
+    """Write the border neighbours before and after each point; lock points where borders touch."""
     for p in range(len(fan)):
         if size[p] > fan.shape[1]:
             continue
@@ -145,7 +145,7 @@ def _off_segment(points, p, a, b):  # type: ignore[no-untyped-def]
 
 @njit(cache=True, nogil=True)
 def _shared(triangles, fan, size, u, v):  # type: ignore[no-untyped-def]
-    """Count the triangles with both points, and the points that are next to both."""
+    """Count the triangles with both points, and the points adjacent to both."""
     both, common = 0, 0
     seen = np.empty(3 * fan.shape[1], np.int64)
     known = 0
@@ -176,7 +176,7 @@ def _shared(triangles, fan, size, u, v):  # type: ignore[no-untyped-def]
 
 @njit(cache=True, nogil=True)
 def _may_move(points, triangles, fan, size, u, v, tilt):  # type: ignore[no-untyped-def]
-    """Whether no triangle round u turns over or tilts, or gets thinner than any, when u goes to v.
+    """Whether u can move to v without a triangle that inverts, tilts or gets thinner than any.
 
     Thinness is twice the area over the square of the longest side: the height over that side.
     """
@@ -196,7 +196,7 @@ def _may_move(points, triangles, fan, size, u, v, tilt):  # type: ignore[no-unty
             continue
         nx, ny, nz = _normal(points, v, p, q)
         new = np.sqrt(nx * nx + ny * ny + nz * nz)
-        # The normal of a triangle that is a needle means little.
+        # The normal of a needle-like triangle is unreliable.
         if old > 1e-3 * longest and ox * nx + oy * ny + oz * nz < tilt * old * new:
             return False
         longest = max(base, _square(points, v, p), _square(points, v, q))
@@ -336,7 +336,7 @@ def _flip(points, triangles, across, corner, tilt):  # type: ignore[no-untyped-d
             triangles[t, 0], triangles[t, 1], triangles[t, 2] = a, p, b
             triangles[u, 0], triangles[u, 1], triangles[u, 2] = a, b, q
             touched[t] = touched[u] = True
-            # Neighbours know the two by sides that have moved.
+            # Neighbours refer to the two triangles by sides that have moved.
             for k in range(3):
                 if across[t, k] >= 0:
                     touched[across[t, k]] = True

@@ -1,4 +1,4 @@
-"""A layer from a surface that another program made."""
+"""A layer from a surface made by another program."""
 
 import numpy as np
 
@@ -13,7 +13,7 @@ from ccfem.mesh.tet_mesh import TetMesh
 __all__ = ["layer_from_surface"]
 
 _ON_PATCH = 0.6
-"""Distance of both ends of a border edge from a patch, mm, up to which the edge lies on it."""
+"""Distance, mm, of both ends of a border edge from a patch up to which the edge lies on it."""
 
 
 def layer_from_surface(
@@ -24,25 +24,25 @@ def layer_from_surface(
     thickness: float,
     tolerance: float = 1.0,
 ) -> Layer:
-    """Make a curved layer of a surface in a part.
+    """Make a curved layer from a surface in a part.
 
     Parameters
     ----------
     mesh : TetMesh
-        The part: the layer takes its stress.
+        The part, whose stress the layer takes.
     points : (n, 3) array, mm
     triangles : (t, 3) int array
-        Consistently oriented; the layer is built on from the side they are counter-clockwise on.
+        Consistently oriented, counter-clockwise seen from the side on which material is added.
     index : int
         Position in the stack.
     thickness : float, mm
     tolerance : float, mm, default 1
-        The surface may be so far outside the part.
+        Largest distance by which points may lie outside the part.
 
     Raises
     ------
     InputError
-        When more than 1 % of its points lie further outside the part.
+        When more than 1 % of the points lie farther outside the part.
     """
     used, triangles = np.unique(triangles, return_inverse=True)
     points, triangles = points[used], triangles.reshape(-1, 3)

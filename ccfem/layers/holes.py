@@ -1,4 +1,4 @@
-"""Holes of a layer, found by the patches that their edges lie on."""
+"""Holes of a layer, identified by the patches that their edges lie on."""
 
 from collections.abc import Iterable
 

@@ -26,31 +26,31 @@ class Layer(Shown):
     points : (n, 3) array, mm
         In the frame of the mesh.
     triangles : (t, 3) int array
-        Counter-clockwise seen from above, that is against the normals.
+        Counter-clockwise seen from above, that is looking against the normals.
     cell : (t,) int array
         Tetrahedron that each triangle was cut from.
     nodes : (n, 2) or (n, 4) int array
-        Ends of the mesh edge that each point lies on (twice the same node where it is one), or
+        Ends of the mesh edge that each point lies on (the same node twice if it lies on a node), or
         the corners of the cell that it lies in.
     weights : (n,) array in [0, 1], or (n, 4) array
         ``points = (1 - weights) * mesh.points[nodes[:, 0]] + weights * mesh.points[nodes[:, 1]]``;
-        with four nodes the share of each.
+        with four nodes, the weight of each.
     loops : tuple of (k,) int arrays
-        Boundary loops as point indices, material on the left, first point not repeated.
+        Boundary loops as point indices, material on the left, without repeating the first point.
     index : int
         Position in the stack, 0 at the bottom.
     thickness : float, mm
-        Share of the part's height that this layer stands for; of a curved layer, its mean.
+        Share of the part's height that this layer represents; for a curved layer, its mean.
     patches : mapping of name to (k, 2) int arrays
         Boundary edges (point indices) that lie on each named patch of the mesh.
     flat : Plane, optional
-        The plane that all points lie in; none where the layer is curved. What works in a plane
-        takes the flat view `plane`.
+        The plane that all points lie in; None where the layer is curved. Methods that work in a
+        plane use the flat view `plane`.
     local_thickness : (n,) array, mm, optional
         Thickness at each point; by default `thickness` everywhere.
     turns : (t, 3, 3) array, optional
-        Of the flat view of a curved layer: rows are the axes, in the frame of the mesh, that each
-        triangle's own x, y and normal stand for. Tensors are turned by it (`stress_on`).
+        For the flat view of a curved layer. Rows are the axes, in the frame of the mesh, that the
+        x, y and normal of each triangle represent. Tensors are rotated by it (`stress_on`).
     point_turns : (n, 3, 3) array, optional
         The same at the points.
     """
@@ -104,12 +104,12 @@ class Layer(Shown):
 
     @cached_property
     def normals(self) -> FloatArray:
-        """Unit normal of each triangle, (t, 3), up; zero where a triangle has no area."""
+        """Unit normal of each triangle, (t, 3), upwards; zero where a triangle has no area."""
         return read_only(self._across / np.maximum(2.0 * self.areas, 1e-300)[:, None])
 
     @cached_property
     def point_normals(self) -> FloatArray:
-        """Unit normal at each point, (n, 3): mean of the triangles round it, by their areas."""
+        """Unit normal at each point, (n, 3): area-weighted mean of the triangles round it."""
         total = np.zeros_like(self.points)
         for axis in range(3):
             share = np.repeat(self._across[:, axis], 3)
@@ -119,7 +119,7 @@ class Layer(Shown):
 
     @cached_property
     def component(self) -> IntArray:
-        """Number of the piece that each triangle belongs to, (t,), from 0 on."""
+        """Number of the connected piece of each triangle, (t,), from 0."""
         t = self.triangles
         piece = connected(np.concatenate([t[:, :2], t[:, 1:]]), len(self.points))
         _, number = np.unique(piece[t[:, 0]], return_inverse=True)

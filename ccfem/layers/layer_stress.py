@@ -1,4 +1,4 @@
-"""Stress on a layer: all that planning on it needs to know of the part."""
+"""Stress on a layer: all that planning on it needs to know about the part."""
 
 from dataclasses import dataclass
 
@@ -39,7 +39,7 @@ class LayerStress(Shown):
 
 
 def stress_on(layer: Layer, stress: PartStress) -> LayerStress:
-    """Stress of a part on one of its layers, in the axes of the layer's own (`Layer.turns`)."""
+    """Stress of a part on one of its layers, in the axes of the layer (`Layer.turns`)."""
     cell, nodal = stress.stress[layer.cell], layer.interpolate(stress.nodal)
     if layer.turns is not None and layer.point_turns is not None:
         cell, nodal = in_axes(cell, layer.turns), in_axes(nodal, layer.point_turns)

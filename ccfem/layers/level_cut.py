@@ -1,4 +1,4 @@
-"""Cutting a tetrahedral mesh at a level of a field that is given at its nodes."""
+"""Cutting a tetrahedral mesh at a level of a nodal field."""
 
 from dataclasses import dataclass
 
@@ -19,11 +19,11 @@ class Cut:
     ----------
     points : (n, 3) array, mm
     nodes : (n, 2) int array
-        Ends of the mesh edge that each point lies on (twice the same node where it is one).
+        Ends of the mesh edge that each point lies on (the same node twice if it lies on a node).
     weights : (n,) array in [0, 1]
         Share of the second end.
     triangles : (t, 3) int array
-        In no particular sense.
+        Without consistent orientation.
     cell : (t,) int array
         Tetrahedron that each triangle was cut from.
     """
@@ -42,7 +42,7 @@ def cut_at_zero(mesh: TetMesh, signed: FloatArray, among: IntArray | None = None
     ----------
     mesh : TetMesh
     signed : (n,) array
-        At the nodes, linear in between; nodes of value 0 become points of the surface.
+        Values at the nodes, linear in between; nodes of value 0 become points of the surface.
     among : (k,) int array, optional
         Cells that may be cut, ascending; by default all.
     """
@@ -87,7 +87,7 @@ def _cut_cells(
                 below += 1
             else:
                 above += 1
-        # A face in the plane belongs to the cell above it only.
+        # A face in the plane belongs only to the cell above it.
         if corners == 3 and above == 0:
             continue
         if corners == 4 or corners + below * above < 3:
@@ -133,10 +133,10 @@ def _drop_repeated(triangles: IntArray, cell: IntArray) -> tuple[IntArray, IntAr
 
 
 def border_edges(triangles: IntArray, n: int) -> IntArray:
-    """Directed edges (e, 2) that only one triangle has; the material lies on their left.
+    """Directed edges (e, 2) that only one triangle has, with the material on their left.
 
-    Where sheets meet, so that more triangles have an edge, it is a border as often as they run
-    along it one way more than the other: borders always close.
+    An edge shared by more triangles, where sheets meet, counts as often as it is used more in one
+    sense than in the other, so that borders always close.
     """
     edges = np.concatenate([triangles[:, [0, 1]], triangles[:, [1, 2]], triangles[:, [2, 0]]])
     low, high = edges.min(axis=1), edges.max(axis=1)

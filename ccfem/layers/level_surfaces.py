@@ -1,4 +1,4 @@
-"""Curved layers: level surfaces of a field on the mesh, cleaned, each point with its thickness."""
+"""Curved layers: level surfaces of a field on the mesh, cleaned, with a thickness at each point."""
 
 from dataclasses import dataclass
 from typing import Any
@@ -18,9 +18,9 @@ from ccfem.threads import in_threads
 __all__ = ["LevelSurfaces", "level_surfaces", "thickness_at_nodes"]
 
 _SNAP = 1e-5
-"""Nodes whose value is nearer to the level than this share of the step are taken to lie on it."""
+"""Distance from the level, as a share of the step, below which nodes count as lying on it."""
 _SAG = 0.05
-"""Distance, in shortest edges, by which cleaning may straighten the border."""
+"""Largest distance, in shortest edges, by which cleaning may straighten the border."""
 _FEWEST = 4
 """Triangles of the smallest piece that is kept."""
 
@@ -33,9 +33,10 @@ class LevelSurfaces:
     ----------
     layers : tuple of Layer
     bubbles : int
-        Closed pieces, left out: they have no border, as a field with a hill inside makes them.
+        Number of closed pieces, which are left out: they have no border, as with a maximum of the
+        field inside the part.
     specks : int
-        Pieces left out since they are smaller than asked for.
+        Number of pieces left out because they are smaller than asked for.
     """
 
     layers: tuple[Layer, ...]
@@ -59,9 +60,9 @@ def level_surfaces(
     values : (n,) array
         At the nodes, linear in the cells.
     levels : (k,) array
-        Rising.
+        In ascending order.
     step : float
-        Distance of the levels.
+        Difference between the levels.
     shortest : float, mm
         Edges of the triangles shorter than this are collapsed.
     least_area : float, mm^2
@@ -70,9 +71,9 @@ def level_surfaces(
     Returns
     -------
     LevelSurfaces
-        Layers from the lowest level to the highest, counted without those that are empty.
-        Triangles are counter-clockwise seen from where the field is higher. Border edges lie on a
-        patch where both their ends do.
+        Layers from the lowest level to the highest, numbered without empty ones. Triangles are
+        counter-clockwise seen from the side where the field is higher. A border edge lies on a
+        patch if both its ends do.
     """
     gradient = np.einsum("eid,ei->ed", cell_gradients(mesh), values[mesh.corners])
     thickness = thickness_at_nodes(mesh, values, step)
@@ -94,13 +95,13 @@ def level_surfaces(
 
 
 def thickness_at_nodes(mesh: TetMesh, values: FloatArray, step: float) -> FloatArray:
-    """Distance, mm, of layers a step of the field apart, at the corner nodes (n,) of the mesh."""
+    """Distance, mm, between layers a step of the field apart, at the corner nodes (n,)."""
     gradient = np.einsum("eid,ei->ed", cell_gradients(mesh), values[mesh.corners])
     return np.asarray(step / np.maximum(_at_nodes(mesh, np.linalg.norm(gradient, axis=1)), 1e-12))
 
 
 def _at_nodes(mesh: TetMesh, values: FloatArray) -> FloatArray:
-    """Mean at the corner nodes, by volume, of values per cell."""
+    """Volume-weighted mean at the corner nodes of values per cell."""
     weight = np.repeat(mesh.volumes, 4)
     nodes, n = mesh.corners.ravel(), len(mesh.points)
     total = np.bincount(nodes, weight, n)
@@ -108,7 +109,7 @@ def _at_nodes(mesh: TetMesh, values: FloatArray) -> FloatArray:
 
 
 def _edge_keys(facets: IntArray, n: int) -> IntArray:
-    """Keys of the edges of facets, and of their nodes as edges of no length."""
+    """Keys of the edges of facets, and of their nodes as edges of zero length."""
     a = np.concatenate([facets[:, [0, 1]], facets[:, [1, 2]], facets[:, [2, 0]]])
     key = a.min(axis=1) * n + a.max(axis=1)
     nodes = np.unique(facets)
@@ -170,7 +171,7 @@ def _areas(points: FloatArray, triangles: IntArray) -> FloatArray:
 
 
 def _ends_of_patches(triangles: IntArray, member: dict[str, BoolArray], n: int) -> BoolArray:
-    """Border points at which a patch begins or ends, (n,): cleaning has to keep them."""
+    """Border points at which a patch begins or ends, (n,), which cleaning must keep."""
     border = border_edges(triangles, n)
     fixed = np.zeros(n, dtype=bool)
     for on in member.values():

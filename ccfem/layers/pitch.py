@@ -1,4 +1,4 @@
-"""The distance between layers: none lies nearer to the next than its fibre is high."""
+"""Check of the distance between layers: at least the height of their fibre."""
 
 from collections.abc import Sequence
 
@@ -12,13 +12,13 @@ from ccfem.machine.machine import Machine
 __all__ = ["check_heights", "check_pitch"]
 
 _ROUNDING = 1e-6
-"""Layers nearer than the height of a strand by no more than this share of it keep it."""
+"""Share of a strand's height by which layers may be nearer than it, because of rounding."""
 
 
 def check_pitch(layers: Sequence[Layer], machine: Machine) -> None:
-    """Refuse flat layers that lie nearer to each other than a strand of the machine is high.
+    """Refuse flat layers nearer to each other than the height of a strand of the machine.
 
-    Curved layers are not checked: their distance changes from place to place.
+    Curved layers are not checked, since their distance varies.
 
     Raises
     ------
@@ -30,7 +30,7 @@ def check_pitch(layers: Sequence[Layer], machine: Machine) -> None:
 
 
 def check_heights(heights: FloatArray, machine: Machine) -> None:
-    """Refuse rising heights, mm, of flat layers that are nearer than a strand is high.
+    """Refuse ascending heights, mm, of flat layers that are nearer than the height of a strand.
 
     Raises
     ------

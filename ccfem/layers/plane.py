@@ -13,7 +13,7 @@ __all__ = ["Plane", "plane_frame"]
 
 @dataclass(frozen=True)
 class Plane:
-    """A plane across a build direction.
+    """A plane normal to a build direction.
 
     Attributes
     ----------
@@ -39,7 +39,7 @@ class Plane:
 
 
 def plane_frame(direction: Sequence[float]) -> FloatArray:
-    """Right-handed frame of the planes across a build direction.
+    """Right-handed frame of the planes normal to a build direction.
 
     Parameters
     ----------

@@ -1,4 +1,4 @@
-"""What a slicer is."""
+"""The protocol that slicers follow."""
 
 from typing import Protocol, runtime_checkable
 
@@ -15,9 +15,9 @@ Vector = tuple[float, float, float]
 class Slicer(Protocol):
     """A frozen dataclass whose fields are the parameters, called with data.
 
-    One module of `ccfem.layers.slicing` is one slicer; the module's name is its name on the
-    command line and in part files, and the class has the same name in capitals
-    (``load_oriented`` holds ``LoadOriented``).
+    Each module of `ccfem.layers.slicing` is one slicer. The name of the module is its name on the
+    command line and in part files; the class has the same name in capitals (``load_oriented``
+    holds ``LoadOriented``).
     """
 
     def __call__(self, stress: PartStress, build: Vector, machine: Machine) -> tuple[Layer, ...]:

@@ -1,4 +1,4 @@
-"""Which way up a part of curved layers is printed."""
+"""Orientation in which a part of curved layers is printed."""
 
 from collections.abc import Sequence
 
@@ -10,16 +10,16 @@ from ccfem.layers.slicer import Vector
 __all__ = ["standing"]
 
 _DOWN = 1e-3
-"""Share of the layers' area that may look down."""
+"""Share of the layers' area that may face downwards."""
 
 
 def standing(layers: Sequence[Layer], build: Vector) -> Vector:
-    """Choose the direction, of length 1, in which layers are stacked on a bed.
+    """Choose the unit vector along which layers are stacked on a bed.
 
-    Layers that look down can be printed by no head that stands over them, and rest on no support.
-    Where layers do, as seen along the build direction, the part is stood up along their mean
-    normal, as Kipping and Schueppstuhl 2023 do with all (section 2.3). Flat layers stay as they
-    are.
+    Layers that face downwards can be printed by no head that stands over them, and rest on no
+    support. If layers do, as seen along the build direction, the part is rotated so that their mean
+    normal points up, as Kipping and Schueppstuhl 2023 do with all parts (section 2.3). Flat layers
+    stay as they are.
 
     Parameters
     ----------

@@ -1,8 +1,8 @@
-"""Layers of a field that spreads and narrows: more where they lie far apart, fewer where near.
+"""Layers of a field of varying gradient: more where they lie far apart, fewer where they are near.
 
 Kipping and Schueppstuhl 2023 (Materials 16, 998), section 2.6, cast rays from layer to layer. Here
-the distance follows from the gradient, and layers are put in, or left out, by powers of two: so
-what is put in or left out at one place is so everywhere that it has to be.
+the distance follows from the gradient. Layers are inserted, or left out, by powers of two, so that
+the choice is consistent over the whole part.
 """
 
 from dataclasses import replace
@@ -20,7 +20,7 @@ __all__ = ["layers_within"]
 _OFF = 1e-3
 """Least distance, in steps, of a layer from the ends of the field, which may be faces of cells."""
 _DEEPEST = 2
-"""How often the distance of layers is halved, or doubled, at most."""
+"""Largest number of times that the distance of layers is halved or doubled."""
 
 
 def layers_within(
@@ -41,22 +41,22 @@ def layers_within(
     values : (n,) array
         At the nodes.
     step : float
-        Of the values from layer to layer.
+        Difference of the values between layers.
     thinnest, thickest : float, mm
-        Wanted range of the thickness; the second at least twice the first.
+        Wanted range of the thickness; the second value is at least twice the first.
     shortest : float, mm
-        Edges of the triangles shorter than this are collapsed.
+        Shorter edges of the triangles are collapsed.
     least_area : float, mm^2
         Smaller pieces are left out.
     origin : float, optional
-        Value half a step below a layer, by default the lowest: layers that continue others have
-        theirs.
+        Value half a step below a layer; by default the lowest value. Layers that continue others
+        use the origin of those.
 
     Returns
     -------
     LevelSurfaces
-        With the thickness that is left at each point. Layers that were put in have only the
-        triangles of which a corner would be too thick otherwise.
+        With the resulting thickness at each point. Inserted layers only contain triangles with a
+        corner where the layers would otherwise be too thick.
     """
     low, high = (float(end) for end in np.quantile(values[mesh.corners], [0.0, 1.0]))
     start = low if origin is None else origin + step * np.ceil((low - origin) / step - 0.5)
@@ -99,14 +99,14 @@ def layers_within(
 
 
 def _left(raw: FloatArray, thinnest: float, thickest: float) -> FloatArray:
-    """Thickness that is left of a raw one, once layers are put in or left out."""
+    """Thickness that results from a raw one, once layers are inserted or left out."""
     halvings = np.clip(np.ceil(np.log2(raw / thickest)), 0.0, _DEEPEST)
     doublings = np.clip(np.ceil(np.log2(thinnest / raw)), 0.0, _DEEPEST)
     return np.asarray(raw * 2.0 ** (doublings - halvings))
 
 
 def _restricted(layer: Layer, wanted: BoolArray, least_area: float) -> Layer | None:
-    """Layer with some of its triangles; None where less than an area is left."""
+    """Layer with some of its triangles; None if less than the least area is left."""
     if wanted.all():
         return layer
     if not layer.areas[wanted].sum() >= least_area:

@@ -1,1 +1,1 @@
-"""From strands to printable paths: their order, what joins them, and where they are trimmed."""
+"""From strands to printable paths: trimming, links between strands, and print order."""

@@ -1,4 +1,4 @@
-"""Strands kept apart: what lies closer than a strand's width to a longer one is cut away."""
+"""Strands kept apart: parts closer than a strand's width to a longer strand are cut away."""
 
 from collections.abc import Sequence
 
@@ -16,8 +16,8 @@ def trim_to_clearance(
 ) -> list[FloatArray]:
     """Cut strands so that no two are closer than a clearance, the longest first.
 
-    Of each strand, only the stretches that keep the clearance from those laid before, and from
-    earlier parts of itself, remain; stretches shorter than `least_length` are dropped.
+    Each strand keeps only the stretches at the clearance from strands laid before, and from earlier
+    parts of itself. Stretches shorter than `least_length` are dropped.
 
     Parameters
     ----------
@@ -59,7 +59,7 @@ def trim_to_clearance(
 
 @njit(cache=True, nogil=True)
 def _lay(points, offsets, clearance, least_length, low, shape, head, keep):  # type: ignore[no-untyped-def]
-    """Strike from `keep` what is too near; `head` is the last point in each cell of a grid."""
+    """Clear `keep` for points that are too near; `head` is the last point in each grid cell."""
     count = len(points)
     x0, y0, nx, ny = low[0], low[1], shape[0], shape[1]
     following = np.empty(count, np.int64)
@@ -74,8 +74,8 @@ def _lay(points, offsets, clearance, least_length, low, shape, head, keep):  # t
                 along[p] = along[p - 1] + np.sqrt(dx * dx + dy * dy)
         closed = points[first, 0] == points[last - 1, 0] and points[first, 1] == points[last - 1, 1]
         whole = along[last - 1]
-        # Points are added to the grid only once the line has moved on by two clearances, so that
-        # a line is not in its own way.
+        # Points enter the grid only once the line has moved on by two clearances: otherwise a line
+        # would be too near to itself.
         waiting = first
         for p in range(first, last):
             i, j = int((points[p, 0] - x0) / clearance), int((points[p, 1] - y0) / clearance)
@@ -97,7 +97,7 @@ def _lay(points, offsets, clearance, least_length, low, shape, head, keep):  # t
             while waiting < p and along[waiting] < along[p] - 2.0 * clearance:
                 _add(points, keep, waiting, head, following, x0, y0, clearance, ny)
                 waiting += 1
-        # Stretches too short to print do not hold others off.
+        # Stretches too short to print must not displace others.
         _drop_short(keep, along, first, last, least_length, closed)
         for q in range(waiting, last):
             _add(points, keep, q, head, following, x0, y0, clearance, ny)

@@ -40,8 +40,8 @@ def lead_into(
 ) -> list[FloatArray]:
     """Cut lines back to a distance from a boundary and join the cut ends along it.
 
-    The ends lie on the curve at `distance`. Consecutive ones are joined pairwise along that curve;
-    of the ways of pairing them, the one with the smallest total length is taken.
+    The ends lie on the curve at `distance`. Neighbouring ends are joined in pairs along that curve;
+    of the possible pairings the one of smallest total length is taken.
 
     Parameters
     ----------
@@ -49,7 +49,7 @@ def lead_into(
     boundary : shapely Polygon
     distance : float, mm
     section : shapely (Multi)Polygon
-        A piece of the curve outside it joins nothing.
+        Pieces of the curve outside it join nothing.
 
     Returns
     -------
@@ -81,7 +81,7 @@ def _pairing(
         return []
     position = np.array([p for p, _ in ends])
     gap = np.mod(np.roll(position, -1) - position, ring.length)
-    # Even: two ways. Odd: one end stays free, in `count` ways.
+    # An even number can be paired in two ways. With an odd one, each of `count` ends may stay free.
     starts = range(2) if count % 2 == 0 else range(count)
     ways = [[(s + 2 * k) % count for k in range(count // 2)] for s in starts]
     best = min(ways, key=lambda way: float(gap[way].sum()))

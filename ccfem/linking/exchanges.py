@@ -1,7 +1,7 @@
-"""Order of many clusters by exchanges of stretches of it (2-opt, Or-opt).
+"""Improving the order of many clusters by exchanges (2-opt, Or-opt).
 
-Every order is judged by its best terminals, found by dynamic programming along it; only what an
-exchange changes is recomputed. See `ordering` for what a cluster is.
+Every order is evaluated with its best terminals, found by dynamic programming along it. Only the
+part that an exchange changes is recomputed. See `ordering` for what a cluster is.
 """
 
 import time
@@ -20,23 +20,23 @@ _BLOCK = 3
 _MANY = 50
 """Number of clusters above which fewer rounds are made."""
 _TIME_LIMIT = 30.0
-"""Time, s, after which no further round begins; about a hundred clusters take less."""
+"""Time, s, after which no further round starts; about a hundred clusters need less."""
 
 
 class Clusters(NamedTuple):
-    """Things with terminals, each to be visited once.
+    """Items with terminals, each to be visited once.
 
     Attributes
     ----------
     links : (t, t) array
         Cost >= 0 from leaving at a terminal to entering at another, of another cluster.
     visit : (t, t) array
-        Cost >= 0 of entering a cluster at one terminal and leaving it at another; inf where that
-        cannot be.
+        Cost >= 0 of entering a cluster at one terminal and leaving it at another; inf where that is
+        impossible.
     offsets : (p + 1,) int array
         Cluster c has the terminals ``offsets[c]`` up to ``offsets[c + 1]``.
     first, last : int
-        Terminal at which the whole way starts, and ends; -1 for any.
+        Terminals at which the whole way starts and ends; -1 for any.
     """
 
     links: FloatArray
@@ -47,7 +47,7 @@ class Clusters(NamedTuple):
 
 
 def strands(links: FloatArray, first: int = -1, last: int = -1) -> Clusters:
-    """Strands as clusters: terminals 2k and 2k + 1 are the ends of strand k, its visit is free."""
+    """Strands as clusters: terminals 2k and 2k + 1 are the ends of strand k; visits are free."""
     ends = np.arange(len(links))
     visit = np.full(links.shape, np.inf)
     visit[ends, ends ^ 1] = 0.0
@@ -56,14 +56,14 @@ def strands(links: FloatArray, first: int = -1, last: int = -1) -> Clusters:
 
 
 def improved_order(order: IntArray, clusters: Clusters, rounds: int) -> IntArray:
-    """Terminals (p, 2) entered and left in an order that is no worse than a given one (p,).
+    """Terminals (p, 2) entered and left, in an order no worse than the given one (p,).
 
-    Each round disturbs the best order and makes exchanges until none helps. The same input gives
-    the same order.
+    Each round perturbs the best order and makes exchanges until none helps. Unless the time limit
+    is reached, the same input gives the same order.
     """
     best, count = order.copy(), len(order)
     least = _exchange(best, clusters)
-    # From here: what went before may have been compiled first.
+    # The time counts from here: compiling may have taken some before.
     begun = time.monotonic()
     random = np.random.default_rng(0)
     fixed, free = int(clusters.first >= 0), count - int(clusters.last >= 0)
@@ -71,7 +71,7 @@ def improved_order(order: IntArray, clusters: Clusters, rounds: int) -> IntArray
     for _ in range(round(rounds * min(1.0, (_MANY / count) ** 2))):
         if time.monotonic() - begun > _TIME_LIMIT:
             break
-        # Two neighbouring stretches change places: what exchanges of one do not undo.
+        # Swap two neighbouring stretches: exchanges of single stretches do not undo that.
         i, j, k = np.sort(random.integers(fixed, free + 1, 3))
         trial = np.concatenate([best[:i], best[j:k], best[i:j], best[k:]])
         cost = _exchange(trial, clusters)
@@ -103,7 +103,7 @@ def greedy_order(clusters: Clusters) -> IntArray:
 
 @njit(cache=True, nogil=True)
 def _step(value, c, d, clusters, entry, out):  # type: ignore[no-untyped-def]
-    """Costs of leaving cluster d into `out`, from those of leaving c in `value`; the least."""
+    """Write costs of leaving cluster d to `out`, given those of leaving c; return the least."""
     links, visit, offsets, _, _ = clusters
     least = np.inf
     for a in range(offsets[d], offsets[d + 1]):
@@ -121,7 +121,7 @@ def _step(value, c, d, clusters, entry, out):  # type: ignore[no-untyped-def]
 
 @njit(cache=True, nogil=True)
 def _begin(c, clusters, out):  # type: ignore[no-untyped-def]
-    """Costs of leaving the first cluster c of a way into `out`; the least."""
+    """Write costs of leaving the first cluster c of a way to `out`; return the least."""
     _, visit, offsets, first, _ = clusters
     least = np.inf
     for b in range(offsets[c], offsets[c + 1]):
@@ -135,7 +135,7 @@ def _begin(c, clusters, out):  # type: ignore[no-untyped-def]
 
 @njit(cache=True, nogil=True)
 def _table(order, clusters, ahead, behind):  # type: ignore[no-untyped-def]
-    """Fill costs of leaving each cluster from the start, and from entering it to the end."""
+    """Fill tables of costs: from the start to leaving each cluster, from entering it to the end."""
     links, visit, offsets, first, last = clusters
     entry = np.empty(len(links))
     _begin(order[0], clusters, ahead)
@@ -166,8 +166,8 @@ def _table(order, clusters, ahead, behind):  # type: ignore[no-untyped-def]
 def _rearranged(window, variant, out):  # type: ignore[no-untyped-def]
     """Fill `out` with the window reversed, or with a block moved from one of its ends to the other.
 
-    Variant 0 reverses; then, for 1 to 3 clusters: from the front, from the back, each as it is or
-    reversed. Returns whether the variant is a new one for a window of this size.
+    Variant 0 reverses. Then, for 1 to 3 clusters: a block from the front, from the back, each as it
+    is or reversed. Returns whether the variant is a new one for a window of this size.
     """
     size = len(window)
     if variant == 0:

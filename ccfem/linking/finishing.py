@@ -1,4 +1,4 @@
-"""From curves to paths that can be printed: kept off the border, linked, short ones dropped."""
+"""From curves to printable paths: kept off the border, linked, and without short ones."""
 
 from collections.abc import Sequence
 
@@ -13,12 +13,12 @@ from ccfem.linking.joining import Joined, link_ends
 __all__ = ["close_short_ring", "keep_off_border", "linked_paths", "long_enough"]
 
 _OVERLAP = 0.1
-"""Largest part of a ring's length that is laid twice [Chen et al. 2021: the ring round a hole of
+"""Largest share of a ring's length that is laid twice [Chen et al. 2021: the ring round a hole of
 10.9 mm is 40.8 mm long, against a minimum of 42 mm]."""
 
 
 def keep_off_border(lines: Sequence[FloatArray], section: Region, inset: float) -> list[FloatArray]:
-    """Parts of lines that keep a distance from the border of a section.
+    """Parts of lines that keep a given distance from the border of a section.
 
     Parameters
     ----------
@@ -71,8 +71,8 @@ def linked_paths(
     along_boundary : bool, default True
         Whether links may follow the boundary; otherwise all are straight.
     radius : float, mm, default 0
-        Least radius of a turn: links with corners then join only what is too short to be cut
-        alone, and are marked. 0 for any.
+        Least radius of a turn; 0 for any. Above 0, links with corners join only strands too short
+        to be cut alone, and are marked.
     """
     joined = link_ends(lines, section, link_limit, width, 1.0, along_boundary, radius, least_length)
     return long_enough(joined, least_length)
@@ -98,19 +98,19 @@ def long_enough(joined: Joined, least_length: float) -> Joined:
 
 
 def _run_on(link: BoolArray, again: int) -> BoolArray:
-    """Mark the steps of a ring that runs on over the first `again` of them."""
+    """Mark the steps of a ring that is continued over its first `again` steps."""
     longer = np.concatenate([link[:-1], link[: again + 1]])
     longer[-1] = False  # no step leaves the last point
     return longer
 
 
 def close_short_ring(line: FloatArray, least_length: float) -> FloatArray:
-    """Let a closed line that is too short by up to a tenth run on over its own start.
+    """Continue a closed line that is up to a tenth too short over its own start.
 
     Parameters
     ----------
     line : (n, 2) array, mm
-        Returned as it is when it is open, long enough, or shorter than that.
+        Returned unchanged if it is open, long enough, or even shorter.
     least_length : float, mm
 
     Returns

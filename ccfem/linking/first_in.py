@@ -1,9 +1,9 @@
-"""First in, spiral out: the contours of a section as one strand that begins at its middle.
+"""First in, spiral out: the contours of a section as one strand that starts in its middle.
 
 H. Kipping, T. Schueppstuhl, Load-oriented nonplanar additive manufacturing method for optimized
-continuous carbon fiber parts, Materials 16 (2023) 998. The supplement that holds their algorithm is
-not at hand: the strand is laid out here by dynamic programming over the places where the contours
-are opened, so that it steps from each to the next where they lie side by side.
+continuous carbon fiber parts, Materials 16 (2023) 998. The supplement with their algorithm is not
+available. Here dynamic programming chooses the places where the contours are opened, so that the
+strand steps from each contour to the next where they lie side by side.
 """
 
 from collections.abc import Mapping, Sequence
@@ -21,41 +21,41 @@ from ccfem.geometry.polylines import line_length
 __all__ = ["first_in_spiral_out"]
 
 _STEP = 1.8
-"""Longest step from one contour to the next, in spacings; beyond, all contours are merged."""
+"""Longest step from one contour to the next, in spacings; if one is longer, all are merged."""
 _NEIGHBOURS = 8
-"""Points of the next contour that a step may lead to."""
+"""Number of points of the next contour that a step may lead to."""
 _CANDIDATES = 12
-"""Places where two contours are tried to be merged."""
+"""Number of places that are tried for merging two contours."""
 _APART = 2 * SAMPLES
-"""Samples beside a gap that no other gap touches."""
+"""Samples beside a gap that no other gap may touch."""
 _LIPS = 4 * SAMPLES
-"""Samples beside the opening of a lap that no gap touches."""
+"""Samples beside the opening of a lap that no gap may touch."""
 _CUBE = 3.0
-"""Power of the length of a step that is made least in sum."""
+"""Power of the step lengths whose sum is minimised."""
 _NEAR = 1e-3
-"""Cost of a spacing between a place and the start, in spacings: it decides among equal places."""
+"""Cost of the distance from the start, per spacing: it decides between otherwise equal places."""
 _WIDEST = 3.1
-"""Longest link of a merged contour on average, in spacings: across a ridge that stays open."""
+"""Longest mean link of a merged contour, in spacings: enough for a ridge that stays open."""
 _BEND = 10.0
-"""Cost of a place where a contour bends away from the chord of a ramp by a spacing."""
+"""Cost of a place where the contour lies a spacing off the chord of a ramp."""
 _RAMP = 6.0
-"""Squared length of a ramp over its radius and its height."""
+"""Squared length of a ramp, over its radius times its height."""
 _TURN = 12
-"""Least number of ramps that would go round a contour."""
+"""Least number of ramps that would fit round a contour."""
 _PASSES = 2
 """Passes of smoothing."""
 
 
 @dataclass(frozen=True)
 class _Loop:
-    """A closed line of samples (n, 2), which of them no gap may touch, and where it is opened."""
+    """A closed line of samples (n, 2), the samples no gap may touch, and where it is opened."""
 
     points: FloatArray
     kept: BoolArray
     opening: BoolArray
 
     def rolled(self, first: int) -> "_Loop":
-        """Return the same from another sample on."""
+        """Return the same loop starting at another sample."""
         points = np.roll(self.points, -first, axis=0)
         return _Loop(points, np.roll(self.kept, -first), np.roll(self.opening, -first))
 
@@ -70,33 +70,33 @@ def first_in_spiral_out(
 ) -> list[FloatArray]:
     """Join the contours of a tree to one open strand from the innermost to the outermost.
 
-    The contours on the way from the outermost to the highest maximum of the distance become laps,
-    each opened by a spacing where the next one is near; as each stops at its opening, one lap runs
-    against the next. All others are merged into the contour that they hang on: both are opened by
-    a spacing at one place and joined crosswise.
+    The contours from the outermost one to the highest maximum of the distance become laps. Each is
+    opened by a spacing where the next one is near, and the strand steps there from lap to lap. All
+    other contours are merged into their parent: both are opened by a spacing at one place and
+    joined crosswise.
 
     Parameters
     ----------
     tree : ContourTree
     spacing : float, mm
     start : (2,) array, mm
-        Among places that cost the same the outermost contour is opened nearest to this.
+        Of places with equal cost, the outermost contour is opened at the one nearest to this.
     entry : bool, default False
-        Whether the strand begins at the outermost contour as well, and goes straight to the middle
-        through the openings, which are two spacings wide then; where it would cross a lap on that
-        way, it begins at the middle all the same.
+        Whether the strand also starts at the outermost contour, and goes straight to the middle
+        through the openings, which are then two spacings wide. If it would cross a lap on the way,
+        it starts in the middle all the same.
     radius : float, mm, default 0
-        With a radius laps all run in one sense, and ramps with no smaller radius lead from each to
-        the next; without `entry`. Where contours are merged, turns stay half a spacing wide.
+        Above 0 all laps run in one sense, and ramps of at least this radius lead from each to the
+        next; not with `entry`. Turns where contours are merged are still half a spacing wide.
     alone_from : float, mm, default inf
-        Length from which on contours that are no laps stay closed curves of their own, for turns
-        half a spacing wide would merge them.
+        Length from which contours that are not laps stay separate closed curves, since merging
+        would need turns half a spacing wide.
 
     Returns
     -------
     list of (n, 2) arrays, mm
-        One strand; besides it contours that nowhere lie side by side with another for the length
-        of a gap.
+        One strand, and contours that lie nowhere side by side with another for the length of a
+        gap.
     """
     chain = _chain(tree)
     gap = 2 * SAMPLES if entry else SAMPLES
@@ -125,7 +125,7 @@ def first_in_spiral_out(
 
 
 class _Openings(NamedTuple):
-    """Where the laps are opened: the samples before, and the places (k, 2), mm."""
+    """Where the laps are opened: the sample before each opening, and the places (k, 2), mm."""
 
     before: list[int]
     points: FloatArray
@@ -146,9 +146,9 @@ def _chain(tree: ContourTree) -> list[int]:
 def _openings(
     rings: Sequence[FloatArray], gap: int, spacing: float, start: FloatArray
 ) -> _Openings:
-    """Choose openings, as wide as some samples, whose steps have the least sum of cubes.
+    """Choose openings of a width in samples for which the sum of cubed steps is least.
 
-    A wide one costs how far the contour bends away from its chord, too.
+    For a wide opening the distance of the contour from its chord is added to the cost.
     """
     middles = [_middles(ring) for ring in rings]
     own = [_NEAR / spacing * np.linalg.norm(line - start, axis=1) for line in middles]
@@ -182,7 +182,7 @@ def _merged(
     start: FloatArray,
     alone_from: float,
 ) -> tuple[list[_Loop], list[FloatArray]]:
-    """Laps, or the outermost contour alone, with all that hangs on them; contours left alone."""
+    """Laps, or else the outermost contour, with contours merged into them; contours left alone."""
     loops: dict[int, _Loop] = {}
     for k, ring in enumerate(tree.contours):
         opening = np.zeros(len(ring), dtype=bool)
@@ -194,7 +194,7 @@ def _merged(
             kept[np.arange(at - beside + 1, at + beside + 1) % len(ring)] = True
         loops[k] = _Loop(ring, kept, opening)
     alone = []
-    # Parents come before their children: from the last on, every contour has all of its own.
+    # Parents come before their children: going backwards, every contour already holds all of its.
     for k in range(len(tree.contours) - 1, 0, -1):
         if k in laps:
             continue
@@ -210,7 +210,7 @@ def _merged(
 
 
 def _joined(line: _Loop, other: _Loop, spacing: float, start: FloatArray) -> _Loop | None:
-    """Two closed lines as one, opened and joined where the two links are shortest; None nowhere."""
+    """Two closed lines joined to one where both links are shortest; None if there is no place."""
     mine, theirs = (np.flatnonzero(~_touched(each.kept)) for each in (line, other))
     if min(len(line.points), len(other.points)) < SAMPLES + 2 or not (len(mine) and len(theirs)):
         return None
@@ -238,7 +238,7 @@ def _joined(line: _Loop, other: _Loop, spacing: float, start: FloatArray) -> _Lo
 
 
 def _links(line: FloatArray, i: int, other: FloatArray, j: int, turned: bool) -> float:
-    """Length of both links of two lines opened about the steps from samples i and j."""
+    """Total length of both links between two lines opened about the steps from samples i and j."""
     lips = [other[(j + 2) % len(other)], other[j - 1]]
     to, back = reversed(lips) if turned else lips
     here, on = line[i - 1], line[(i + 2) % len(line)]
@@ -251,12 +251,12 @@ def _middles(ring: FloatArray) -> FloatArray:
 
 
 def _touched(kept: BoolArray) -> BoolArray:
-    """Whether a gap about the step from each sample would touch one that is kept."""
+    """Whether a gap about the step from each sample would touch a sample in `kept`."""
     return kept | np.roll(kept, 1) | np.roll(kept, -1) | np.roll(kept, -2)
 
 
 def _gap(loop: _Loop, at: int) -> _Loop:
-    """Open a loop by three samples about the step from one sample: its ends are the lips."""
+    """Open a loop by three samples about the step from one sample; its ends are the lips."""
     opened = loop.rolled((at + 2) % len(loop.points))
     kept = opened.kept[:-2].copy()
     kept[:_APART] = kept[-_APART:] = True
@@ -264,7 +264,7 @@ def _gap(loop: _Loop, at: int) -> _Loop:
 
 
 def _opened(loop: _Loop, gap: int) -> FloatArray:
-    """Open a loop by a number of samples about its opening; where it has none, at its first."""
+    """Open a loop by a number of samples about its opening, or at its first sample."""
     at = int(np.flatnonzero(loop.opening)[0]) if loop.opening.any() else 0
     before = (gap - 1) // 2
     points = loop.rolled((at + 1 + before) % len(loop.points)).points
@@ -272,7 +272,7 @@ def _opened(loop: _Loop, gap: int) -> FloatArray:
 
 
 def _laps(lines: Sequence[FloatArray]) -> FloatArray:
-    """Lay laps one after the other, each from the end that is nearer."""
+    """Lay laps one after the other, each from its nearer end."""
     path = [lines[0]]
     if len(lines) > 1:
         ends = np.linalg.norm(lines[0][[0, -1], None] - lines[1][None, [0, -1]], axis=2)
@@ -298,7 +298,7 @@ def _ramped(lines: Sequence[FloatArray]) -> FloatArray:
 
 
 def _ramp(before: FloatArray, beyond: FloatArray) -> FloatArray:
-    """Points between two lines on the cubic that goes on smoothly from one to the other."""
+    """Points between two lines on the cubic that continues both of them smoothly."""
     (a, b), way = (before[-1], beyond[0]), float(np.linalg.norm(beyond[0] - before[-1]))
     ahead = [line[1] - line[0] for line in (before[-2:], beyond[:2])]
     u, v = (way * each / np.linalg.norm(each) for each in ahead)
@@ -309,11 +309,11 @@ def _ramp(before: FloatArray, beyond: FloatArray) -> FloatArray:
 
 
 def _entered(loops: Sequence[_Loop], places: FloatArray) -> FloatArray:
-    """Lay laps that a straight way in leads through, from the border to the innermost."""
+    """Lay laps with a straight way in through their openings, from the border to the innermost."""
     wide, way_in = 2 * SAMPLES, shapely.linestrings(places)
     inner = loops[-1]
     at = int(np.flatnonzero(inner.opening)[0])
-    # The innermost lap begins where the way in meets it, and stops a wide gap before.
+    # The innermost lap starts where the way in meets it, and stops a wide gap before that.
     ring = inner.rolled((at + 1) % len(inner.points)).points
     ring = np.stack([ring, ring[::-1]])[:, : max(len(ring) - wide + 1, 2)]
     path = [places]

@@ -36,7 +36,7 @@ class Joint:
     between : (n, 2) array, mm
         Points between them, from `first` to `second`, ends not included.
     marked : bool, default False
-        Whether the path is marked as a link there.
+        Whether the joint is marked as a link.
     """
 
     first: int
@@ -66,9 +66,9 @@ def join(lines: Sequence[FloatArray], joints: Sequence[Joint]) -> Joined:
     Parameters
     ----------
     lines : sequence of (n_i, 2) arrays, mm
-        Open polylines; closed ones simply have no joint.
+        Open polylines, and closed ones, which have no joint.
     joints : sequence of Joint
-        Each end in at most one of them.
+        Each end belongs to at most one of them.
     """
     partner: dict[int, tuple[int, FloatArray, bool]] = {}
     for joint in joints:
@@ -112,14 +112,14 @@ def link_ends(
 ) -> Joined:
     """Join ends that lie near each other by links inside the section.
 
-    A link is straight, or it follows the boundary half a strand's width inside it, where two
-    neighbouring ends lie on that boundary. Links are taken in the order of their cost: their
-    length, and `turn_cost` mm for every right angle that the path turns at its ends. A link
-    crosses nothing and stays 0.9 widths away from all strands but the two that it joins.
+    A link is straight; or, between neighbouring ends on the boundary, it follows the boundary half
+    a strand's width inside it. Links are taken in the order of their cost: their length, plus
+    `turn_cost` mm for every right angle that the path turns at its ends. A link crosses nothing and
+    stays 0.9 widths away from all strands but the two that it joins.
 
-    With a radius, curves that keep it (`smooth_links`) come first. Straight links and those along
-    the boundary have corners: they join only what is shorter than `enough` to something else, and
-    are marked as links.
+    With a radius, curves that keep it (`smooth_links`) are taken first. Straight links and those
+    along the boundary have corners: they only join paths shorter than `enough` to others, and are
+    marked as links.
 
     Parameters
     ----------
@@ -133,15 +133,15 @@ def link_ends(
     along_boundary : bool, default True
         Whether links may follow the boundary; otherwise all are straight.
     radius : float, mm, default 0
-        Least radius of a turn; 0 for any, and no links that keep one.
+        Least radius of a turn. With 0 any turn is allowed, and no smooth links are made.
     enough : float, mm, default inf
-        Length from which on a path needs no link with corners, where there is a radius.
+        With a radius: length above which a path gets no link with corners.
     one_by_one : bool, default False
-        Whether a path goes on at either of its ends until it is long enough before another one is
-        begun, from short strands to long ones: those side by side become zigzags.
+        Whether a path is continued at both ends until it is long enough before the next one is
+        started, from short strands to long ones. Strands side by side then become zigzags.
     """
     links = possible_links(lines, section, limit, width, turn_cost, along_boundary, radius)
-    # Rounding orders no equal costs: a straight link comes before the same one along the boundary.
+    # Rounding must not decide between equal costs: straight links precede those on the boundary.
     size = [line_length(line) if one_by_one else 0.0 for line in lines]
     cost = [link.cost + size[link.first // 2] + size[link.second // 2] for link in links]
     keys = [
@@ -161,7 +161,7 @@ def _accept(
     mark: bool,
     one_by_one: bool,
 ) -> Joined:
-    """Take links greedily, cheapest first, as long as they keep off everything else."""
+    """Take links greedily, cheapest first, as long as they keep clear of everything else."""
     if not links:
         return join(lines, [])
     paths = strings([link.path for link in links])
@@ -206,8 +206,8 @@ def _accept(
         far[one], far[other] = other, one
         return True
 
-    # Corners last, first between paths that are both too short. A smooth link needs no second try:
-    # nothing that stood in its way has gone.
+    # Links with corners come last, first those between two paths that are too short. A smooth link
+    # needs no second try: whatever blocked it is still there.
     rounds = [(k, 0) for k in np.flatnonzero(free).tolist()]
     if mark:
         rounds += [(k, 1) for k, _ in rounds if not links[k].smooth]

@@ -1,8 +1,8 @@
-"""Links between the ends of strands: curves no tighter than a radius, cheap where outside a part.
+"""Links between the ends of strands: curves of a least radius, cheapest outside the part.
 
 Every strand is extended straight beyond its ends; the link is a Dubins curve from one extended end
-to the other. Of several extensions and all words the cheapest counts: length, and extra for what
-runs inside the part or over its voids.
+to the other. The cheapest of several extensions and all words is taken. The cost is the length,
+plus extra for lengths inside the part or over its voids.
 """
 
 from typing import NamedTuple
@@ -17,12 +17,12 @@ from ccfem.geometry.section_grid import SectionGrid, place, place_and_room
 __all__ = ["LinkCurves", "curve_cost", "link_curve", "link_curves", "stub_points"]
 
 _SAMPLE = 0.25
-"""Step, mm, at which a curve is looked at close to the border."""
+"""Step, mm, at which a curve is sampled close to the border."""
 _STRAIGHT = np.zeros(3, dtype=np.int64)
-"""Word of a straight line: a constant, as `WORDS`, so that numba compiles one signature."""
+"""Word of a straight line, constant like `WORDS` so that numba compiles one signature."""
 _NEAR = 15.0
-"""Ends further apart than this, in radii and longest extensions, are joined by the first extension
-only: another one changes little on a long way."""
+"""Distance, in radii and longest extensions, beyond which only the first extension is tried: others
+change little on a long way."""
 
 
 class LinkCurves(NamedTuple):
@@ -35,7 +35,7 @@ class LinkCurves(NamedTuple):
     reach : (t, t) array, mm
         Straight extension at the first end; that at the second is ``reach[b, a]``.
     word : (t, t) int array
-        From the first end to the second, where the first has the smaller number.
+        Word from the end with the smaller number to the other.
     """
 
     cost: FloatArray
@@ -64,7 +64,7 @@ def link_curves(
     weights : (3,) array
         Extra cost of each mm inside the part, over its voids, and outside.
     bound : (t, t) array, mm
-        What the link costs otherwise: dearer curves are not looked for.
+        Cost of the link by other means: more expensive curves are not searched for.
     """
     return LinkCurves(*_link_curves(ends, reach, radius, grid, weights, bound))
 
@@ -72,7 +72,7 @@ def link_curves(
 def link_curve(
     ends: FloatArray, a: int, b: int, curves: LinkCurves, radius: float, step: float
 ) -> FloatArray:
-    """Points (n, 2), mm, of the link from end a to end b, both ends of it included."""
+    """Points (n, 2), mm, of the link from end a to end b, including both ends."""
     if a > b:
         return link_curve(ends, b, a, curves, radius, step)[::-1]
     first, second = curves.reach[a, b], curves.reach[b, a]
@@ -110,7 +110,7 @@ def _reversed(pose):  # type: ignore[no-untyped-def]
 
 @njit(cache=True, nogil=True)
 def curve_cost(start, turns, sizes, radius, grid, weights, limit):  # type: ignore[no-untyped-def]
-    """Length of a curve and `weights` times what of it lies in each place; inf above the limit."""
+    """Length of a curve plus `weights` times its length in each place; inf above the limit."""
     cost = abs(sizes[0]) + abs(sizes[1]) + abs(sizes[2])
     x, y, heading = start[0], start[1], start[2]
     for piece in range(3):

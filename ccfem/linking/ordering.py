@@ -1,11 +1,11 @@
-"""Order in which things with several ends are visited so that the links between them cost least.
+"""Order in which items with several ends are visited so that the links between them cost least.
 
-A cluster is visited once: entered at one of its terminals, left at another. A strand is a cluster
-of two terminals; a group of strands that are laid together is one of all their ends. The order of
-the clusters and the terminals are found together: exactly by dynamic programming over sets of
-clusters where they are few (M. Held, R. M. Karp, A dynamic programming approach to sequencing
-problems, Journal of SIAM 10 (1962) 196), else by exchanging stretches of the order (2-opt, Or-opt),
-each judged by its best terminals.
+A cluster is visited once: it is entered at one of its terminals and left at another. A strand is a
+cluster of two terminals; a group of strands that are laid together is a cluster of all their ends.
+The order of the clusters and their terminals are found together. For few clusters, dynamic
+programming over sets of clusters gives the optimum (M. Held, R. M. Karp, A dynamic programming
+approach to sequencing problems, Journal of SIAM 10 (1962) 196). Otherwise stretches of the order
+are exchanged (2-opt, Or-opt), each order being evaluated with its best terminals.
 """
 
 import numpy as np
@@ -18,7 +18,7 @@ from ccfem.linking.exchanges import Clusters, greedy_order, improved_order, stra
 __all__ = ["costs_between_ends", "order_clusters"]
 
 _EXACT = 12
-"""Maximum number of clusters for which the order is the best there is."""
+"""Maximum number of clusters for which the order is optimal."""
 
 
 def order_clusters(clusters: Clusters, exact: int = _EXACT, rounds: int = 30) -> IntArray:
@@ -28,9 +28,9 @@ def order_clusters(clusters: Clusters, exact: int = _EXACT, rounds: int = 30) ->
     ----------
     clusters : Clusters
     exact : int, default 12
-        Up to this many clusters the order is the best there is; the work is 2^p t^2.
+        Up to this many clusters the order is optimal; the work is 2^p t^2.
     rounds : int, default 30
-        Of the search above that (`improved_order`); fewer for more than fifty clusters.
+        Rounds of the search above that (`improved_order`); fewer for more than fifty clusters.
 
     Returns
     -------
@@ -40,7 +40,7 @@ def order_clusters(clusters: Clusters, exact: int = _EXACT, rounds: int = 30) ->
     Raises
     ------
     InputError
-        For arrays that do not fit together, or where there is no way.
+        For arrays that do not fit together, or where no way exists.
     """
     links, visit = (np.ascontiguousarray(cost, dtype=np.float64) for cost in clusters[:2])
     offsets = np.ascontiguousarray(clusters.offsets, dtype=np.int64)
@@ -71,8 +71,8 @@ def costs_between_ends(links: FloatArray) -> FloatArray:
     Returns
     -------
     (2k, 2k) array
-        inf where the strands cannot be laid so, as from an end to itself. For more than 12 strands
-        only the pairs of ends that a search finds to be good have a cost.
+        inf where the strands cannot be laid that way, as from an end to itself. For more than 12
+        strands only pairs of ends that a search finds to be good have a finite cost.
     """
     if len(links) <= 2 * _EXACT:
         every = range(len(links))
@@ -91,7 +91,7 @@ def costs_between_ends(links: FloatArray) -> FloatArray:
 
 @njit(cache=True, nogil=True)
 def _costs_of_sets(clusters):  # type: ignore[no-untyped-def]
-    """Least cost of having visited a set of clusters and left at a terminal of it, (2^p, t)."""
+    """Least cost of having visited a set of clusters and left at one of its terminals, (2^p, t)."""
     links, visit, offsets, first, _ = clusters
     count, terminals = len(offsets) - 1, len(links)
     best = np.full((1 << count, terminals), np.inf)

@@ -1,4 +1,4 @@
-"""Possible links of the ends of polylines, and where they have room."""
+"""Possible links between the ends of polylines, and a check for free space."""
 
 from collections.abc import Sequence
 from dataclasses import dataclass
@@ -26,32 +26,32 @@ __all__ = [
 ]
 
 CLEARANCE = 0.9
-"""Least distance of a link to other strands, in widths: ends on a slanted boundary stand a little
-nearer to each other than the strands do."""
+"""Least distance of a link from other strands, in widths. Ends on a slanted boundary are slightly
+nearer to each other than the strands are."""
 
 CLOSING_TURN = np.deg2rad(60.0)
-"""A link may close a path to a ring only where it turns less, both ends together: a path of two
-neighbouring strands that closes on itself can no longer join the next."""
+"""Largest turn, both ends together, of a link that closes a path to a ring. A path of two
+neighbouring strands that closes on itself could no longer join the next strand."""
 
 _ON_BORDER = 1e-6
-"""Distance, mm, up to which rounding may carry what lies on a border off it."""
+"""Distance, mm, by which rounding may move points off a border."""
 
 
 @dataclass(frozen=True)
 class Link:
-    """A possible link of two ends; each line is cut back to where the link leaves it.
+    """A possible link between two ends; each line is cut back to where the link leaves it.
 
     Attributes
     ----------
     cost : float, mm
     turn : float, radians
-        Both ends together.
+        Total over both ends.
     first, second : int
         The ends: line k starts with end 2 k and stops with end 2 k + 1.
     path : (n, 2) array, mm
         From the cut end of `first` to that of `second`.
     smooth : bool, default False
-        Whether it keeps the radius.
+        Whether the link keeps the radius.
     """
 
     cost: float
@@ -71,9 +71,9 @@ def possible_links(
     along_boundary: bool = True,
     radius: float = 0.0,
 ) -> list[Link]:
-    """Links of near ends: straight, along the boundary, and smooth where there is a radius.
+    """Find links between near ends: straight, along the boundary, and smooth if there is a radius.
 
-    Parameters as of `ccfem.linking.joining.link_ends`. Nothing says yet that a link has room.
+    Parameters as in `ccfem.linking.joining.link_ends`. Free space is not checked yet.
     """
     opened = [k for k, line in enumerate(lines) if not is_closed(line)]
     if not opened or limit <= 0.0:
@@ -95,8 +95,8 @@ def possible_links(
 def free_links(
     lines: Sequence[FloatArray], paths: Any, owners: Any, section: Region, clearance: float
 ) -> Any:
-    """Mask (l,) of links inside the section and clear of all strands but their own."""
-    # The link of two ends on one edge of the border lies on it: that must not be up to rounding.
+    """Mask (l,) of links inside the section and clear of all strands except their own."""
+    # The link between two ends on one edge of the border lies on it: rounding must not matter.
     grown = shapely.buffer(section, _ON_BORDER)
     shapely.prepare(grown)
     free = shapely.covers(grown, paths)
@@ -108,7 +108,7 @@ def free_links(
 
 
 def cut_back(line: FloatArray, link: Link, k: int) -> FloatArray:
-    """Line k, cut back at the ends that the link takes to where the link leaves it."""
+    """Line k, cut back to where the link leaves it at the ends that the link uses."""
     if link.first == 2 * k or link.second == 2 * k:
         line = cut_start(line, link.path[0] if link.first == 2 * k else link.path[-1])
     if link.first == 2 * k + 1 or link.second == 2 * k + 1:
@@ -131,7 +131,7 @@ def cut_start(line: FloatArray, point: FloatArray) -> FloatArray:
 
 
 def shortened(path: FloatArray, share: float = 1e-3) -> FloatArray:
-    """Path without a share of its first and last step: what may touch the lines that it joins."""
+    """Path without a share of its first and last step, which may touch the lines it joins."""
     result = path.copy()
     result[0] += share * (path[1] - path[0])
     result[-1] += share * (path[-2] - path[-1])
@@ -195,8 +195,8 @@ def _first_meetings(
 ) -> tuple[FloatArray, IntArray]:
     """Points (k, 2) where heads first meet a ring, and the numbers (k,) of the heads that do.
 
-    A head that starts on the ring meets it there: strands that are kept half a width off the border
-    end on it, and rounding puts one end just inside and the next just outside.
+    A head that starts on the ring meets it there. Strands kept half a width off the border end on
+    it, and rounding puts some ends just inside and others just outside.
     """
     starts_on = shapely.dwithin(ring, starts, _ON_BORDER)
     on, off = np.flatnonzero(starts_on), np.flatnonzero(~starts_on)
@@ -211,7 +211,7 @@ def _first_meetings(
 
 
 def ring_arc(ring: shapely.LinearRing, start: float, length: float) -> FloatArray:
-    """Points (n, 2) of a closed ring from the arc length `start` over `length`, both ends in."""
+    """Points (n, 2) of a closed ring over a `length` from arc length `start`, with both ends."""
     corners = shapely.get_coordinates(ring)
     along = along_line(corners)
     twice = np.concatenate([along[:-1], along + along[-1]])
@@ -221,7 +221,7 @@ def ring_arc(ring: shapely.LinearRing, start: float, length: float) -> FloatArra
 
 
 def _head(line: FloatArray, reach: float) -> FloatArray:
-    """Return the first `reach` mm of a line, at least its first piece."""
+    """Return the first `reach` mm of a line, or at least its first piece."""
     distance = np.cumsum(np.linalg.norm(np.diff(line, axis=0), axis=1))
     return line[: int(np.searchsorted(distance, reach)) + 2]
 

@@ -8,18 +8,18 @@ __all__ = ["nearest_end_order"]
 
 
 def nearest_end_order(starts: FloatArray, ends: FloatArray) -> tuple[IntArray, BoolArray, float]:
-    """Order of printing: always on to the path with the nearest end.
+    """Order of printing in which the path with the nearest end always comes next.
 
     Parameters
     ----------
     starts, ends : (k, 2) or (k, 3) arrays, mm
-        Ends of the paths; of a closed one the same point twice. The first path comes first.
+        Ends of the paths; for a closed path the same point twice. The first path comes first.
 
     Returns
     -------
     order : (k,) int array
     reversed : (k,) bool array
-        Whether the path at that place of the order is walked from its end.
+        Whether the path at that place of the order is printed from its end.
     travel : float, mm
         Sum of the straight ways between them.
     """

@@ -11,8 +11,8 @@ __all__ = ["step_speeds"]
 
 _REACH = 2.0
 """Least length over which curvature is taken, in fibre widths. Our choice: over less, the corners
-that a mesh gives to round borders and to isocurves count as turns, and paths fall into short slow
-pieces."""
+that a mesh gives to round borders and to isocurves would count as turns, and paths would break into
+short slow pieces."""
 
 
 def step_speeds(toolpaths: Toolpaths, machine: Machine) -> FloatArray:
@@ -27,7 +27,7 @@ def step_speeds(toolpaths: Toolpaths, machine: Machine) -> FloatArray:
     Returns
     -------
     (P,) array, mm/s
-        Of no meaning at the last point of a path.
+        Undefined at the last point of a path.
     """
     of_kind = np.array(
         [machine.fibre_speed, machine.matrix_speed, machine.matrix_speed, machine.travel_speed]

@@ -18,7 +18,7 @@ __all__ = ["RingRoutes", "ring_cost", "ring_curve", "ring_routes"]
 _DISTANCE = 5.0
 """Distance, mm, from the ring to the part; at least the radius."""
 _LEADS = (5.0, 10.0, 16.0)
-"""How far ahead on the ring, mm, a lead may end; more where turns are wide."""
+"""How far ahead on the ring, mm, a lead may end; more if turns are wide."""
 
 _NEAR = 0.01
 """Half the length, mm, of the chord taken as a tangent of the ring."""
@@ -37,7 +37,7 @@ class RingRoutes(NamedTuple):
     goal : (t, 2, v, 3) array
         Poses on the ring at which they end: anticlockwise, then clockwise.
     position : (t, 2, v) array, mm
-        Arc length on the ring of these.
+        Arc length on the ring of these poses.
     cost : (t, 2, v) array, mm
         Of the leads.
     word : (t, 2, v) int array
@@ -126,14 +126,14 @@ def _leads(starts, goal, radius, grid, weights):  # type: ignore[no-untyped-def]
 
 @njit(cache=True, nogil=True)
 def ring_cost(routes: RingRoutes) -> tuple[FloatArray, IntArray]:
-    """Cost of the way along the ring between each two ends, and which it is.
+    """Cost of the way along the ring between each two ends, and an index of that way.
 
     Returns
     -------
     cost : (t, t) array, mm
         Symmetric.
     way : (t, t) int array
-        Sense and leads, as a number that `ring_curve` reads.
+        Sense and leads, encoded as a number that `ring_curve` reads.
     """
     position, lead, length = routes.position, routes.cost, routes.length
     count, _, variants = position.shape

@@ -1,10 +1,10 @@
-"""All tracks of a section as one continuous path that turns outside the section where it can.
+"""All tracks of a section as one continuous path that turns outside the section where possible.
 
 T. Wang, N. Li, G. Link, J. Jelonnek, J. Fleischer, J. Dittus, D. Kupzik, Load-dependent path
 planning method for 3D printing of continuous fiber reinforced plastics, Composites Part A 140
-(2021) 106181: one start, one end, most sharp turns outside the part. How the links are made is not
-given there. Here they are Dubins curves or ways round the part (`link_curves`, `ring_routes`), and
-the order of the tracks is the one whose links cost least (`ordering`).
+(2021) 106181: one start, one end, most sharp turns outside the part. The paper does not say how the
+links are made. Here they are Dubins curves or ways round the part (`link_curves`, `ring_routes`),
+and the tracks are laid in the order whose links cost least (`ordering`).
 """
 
 from collections.abc import Sequence
@@ -33,20 +33,20 @@ __all__ = ["LinkedPath", "link_tracks"]
 _REACH = (1.0, 3.0, 6.0)
 """Straight extensions, mm, of tracks before a link turns."""
 _EXACT_GROUPS = 10
-"""Maximum number of groups whose order is the best there is."""
+"""Maximum number of groups whose order is optimal."""
 _ROUNDS = 15
 """Rounds of the search among single tracks."""
 _WEIGHTS = (16.0, 4.0, 0.0)
 """Extra cost of each mm of a link inside the section, over its holes, where nothing holds the
 fibre, and outside."""
 _AVOIDED = 100.0
-"""Extra cost, mm, of a link that would be left out, when the order is looked for again."""
+"""Extra cost, mm, of a link that would be left out, in the next search for an order."""
 _TRIES = 3
-"""Orders that are looked for while there are such links."""
+"""Number of orders that are tried while there are such links."""
 _STEP = 0.5
 """Longest distance, mm, between neighbouring points of a link."""
 _ON_BORDER = 1e-3
-"""Length, mm, of a link on the border that may count as inside through rounding."""
+"""Length, mm, of a link on the border that may count as inside because of rounding."""
 
 
 @dataclass(frozen=True)
@@ -70,9 +70,9 @@ class LinkedPath:
     def without_long_links(
         self, section: Region, inside: float, over_void: float = np.inf
     ) -> "list[LinkedPath]":
-        """Leave out links with more than a length, mm, inside a section or over its voids.
+        """Leave out links with more than a given length, mm, inside a section or over its voids.
 
-        The path falls into one more piece than there are such links.
+        The number of pieces is one more than the number of such links.
         """
         stretches, left_out = runs(self.link), self.long_links(section, inside, over_void)
         starts = [0, *stretches[left_out, 1]]
@@ -85,7 +85,7 @@ class LinkedPath:
         return found
 
     def long_links(self, section: Region, inside: float, over_void: float) -> BoolArray:
-        """Whether each link has more than a length, mm, inside a section or over its voids."""
+        """Whether each link has more than the given length, mm, in a section or over its voids."""
         stretches = runs(self.link)
         steps = np.flatnonzero(self.link)
         cut = cut_at_section(self.points[steps], self.points[steps + 1], section, tolerance=0.0)
@@ -108,36 +108,36 @@ def link_tracks(
 ) -> LinkedPath:
     """Join the tracks of all groups to one path.
 
-    First each group is laid without a break: the order of the tracks in a group, that of the
-    groups, and the ends at which each is begun and left are those whose links cost least, exactly
-    so for up to 12 tracks in a group and 10 groups, else as found by a search. A second search
+    First each group is laid without interruption. The order of the groups, the order of the tracks
+    in each and the ends at which they are entered and left are those of least link cost: exact for
+    up to 12 tracks in a group and 10 groups, otherwise the result of a search. A second search
     moves stretches of single tracks where that makes the links cheaper still. The same input gives
-    the same path.
+    the same path, unless a search reaches its time limit.
 
-    A link is the cheapest of the Dubins curves between the ends, extended straight, and of the ways
-    along a ring round the section. It costs its length, plus 8 mm for each mm inside the section
-    and 4 mm for each mm over a hole.
+    A link is the cheapest of the Dubins curves between the straight extensions of the ends, and of
+    the ways along a ring round the section. It costs its length, plus 16 mm for each mm inside the
+    section and 4 mm for each mm over a hole.
 
     Parameters
     ----------
     groups : sequence of sequences of (n_i, 2) arrays, mm
         One group for each main path. Tracks with fewer than two points are left out, and so are
-        repeated points; a track whose last point is its first is closed, and is opened at the same
-        place as the others of its group, with a gap for the link to the next. Tracks go on straight
-        at their ends for a millimetre at least, so these should lie on the border of the section.
+        repeated points. A track whose last point is its first is closed. It is opened at the same
+        place as the others of its group, with a gap for the link to the next. Tracks are extended
+        straight by at least a millimetre, so their ends should lie on the border of the section.
     section : shapely (Multi)Polygon, mm
     radius : float, mm
         Tightest turn of a link.
     width : float, mm
         Spacing of neighbouring tracks.
     inside, over_void : float, mm
-        As of `LinkedPath.without_long_links`: of a few orders the one whose path falls into the
-        fewest pieces there.
+        As in `LinkedPath.without_long_links`: of a few orders, the one whose path is then cut into
+        the fewest pieces is taken.
 
     Returns
     -------
     LinkedPath
-        Empty without tracks; a single track as it is.
+        Empty without tracks; a single track is returned as it is.
 
     Raises
     ------
@@ -188,7 +188,7 @@ def _opened(
 ) -> list[list[FloatArray]]:
     """Open closed tracks side by side, as near to the other groups as possible.
 
-    The gap in each is as long as two arcs that lead to the next track, one `width` sideways.
+    The gap in each is as long as two arcs to the next track, one `width` sideways.
     """
     aside = min(width, 2.0 * radius)
     gap = max(width, 1.1 * float(np.sqrt(aside * (4.0 * radius - aside))))

@@ -1,7 +1,7 @@
-"""Links that a machine's fibre can follow: no tighter than a radius, where strands go on smoothly.
+"""Links that a machine's fibre can follow: of a least radius, and in line with the strands.
 
-Each link is the shortest curve of the radius (Dubins) from one strand to another; where that is
-shorter, or keeps off a turn, it leaves the strands before their ends.
+Each link is the shortest curve of the radius (Dubins) from one strand to another. It leaves the
+strands before their ends where it is then shorter, or avoids a turn.
 """
 
 from collections.abc import Sequence
@@ -18,13 +18,13 @@ from ccfem.geometry.polylines import along_line, points_along
 __all__ = ["SmoothLink", "smooth_links"]
 
 _CUTS = np.array([0.0, 1.0, 2.0, 3.0, 4.0, 6.0])
-"""How far before its end a strand may be left, in widths."""
+"""Distances before its end at which a strand may be left, in widths."""
 _HEADING = 1.0
-"""Length, in widths, over which the heading of a strand is taken."""
+"""Length, in widths, over which the heading of a strand is measured."""
 _STEP = 0.25
 """Longest step along a link, in widths."""
 _MOST_TURN = np.radians(200.0)
-"""Links turn no further, all turns together: further round there is no strand to be met."""
+"""Largest total turn of a link: beyond it there is no strand to be met."""
 
 
 class SmoothLink(NamedTuple):
@@ -40,7 +40,7 @@ class SmoothLink(NamedTuple):
 def smooth_links(
     lines: Sequence[FloatArray], ends: IntArray, limit: float, width: float, radius: float
 ) -> list[SmoothLink]:
-    """Possible links of ends that lie near each other, one for each two of them.
+    """Find possible links between ends that lie near each other, one for each pair.
 
     Parameters
     ----------
@@ -48,7 +48,7 @@ def smooth_links(
     ends : (e,) int array
         Line k starts with end 2 k and stops with end 2 k + 1.
     limit : float, mm
-        Longest distance of two ends.
+        Largest distance between two ends.
     width : float, mm
         Of a strand.
     radius : float, mm
@@ -57,7 +57,7 @@ def smooth_links(
     Returns
     -------
     list of SmoothLink
-        The cost is the length of the link and what it leaves of the strands, mm.
+        The cost is the length of the link plus what it cuts off the strands, mm.
     """
     if len(ends) < 2:
         return []
@@ -79,13 +79,13 @@ def smooth_links(
 
 
 def _poses(line: FloatArray, side: int, cuts: FloatArray, width: float) -> FloatArray:
-    """Places (c, 2) before an end of a line and the headings there, out of the line, (c, 3)."""
+    """Poses (c, 3) at places before an end of a line, heading out of the line."""
     head = line if side == 0 else line[::-1]
     along = along_line(head)
     here = points_along(head, along, np.minimum(cuts, along[-1]))
     back = points_along(head, along, np.minimum(cuts + _HEADING * width, along[-1]))
     way = here - back
-    # Over a chord the heading is that in its middle: on a bend the end turns on by half of it.
+    # The heading of a chord is that in its middle: on a bend the end turns further by half of it.
     far = points_along(head, along, np.minimum(cuts + 2.0 * _HEADING * width, along[-1]))
     before = back - far
     bend = np.arctan2(
@@ -97,7 +97,7 @@ def _poses(line: FloatArray, side: int, cuts: FloatArray, width: float) -> Float
 
 @njit(cache=True, nogil=True)
 def _best(poses, pairs, cuts, room, radius, limit):  # type: ignore[no-untyped-def]
-    """Cost, turn and cuts of the cheapest link of each pair; an infinite cost for none."""
+    """Cost, turn and cuts of the cheapest link of each pair; infinite cost if there is none."""
     result = np.empty((len(pairs), 4))
     sizes = np.empty((6, 3))
     end = np.empty(3)

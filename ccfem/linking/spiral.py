@@ -1,4 +1,4 @@
-"""Nested closed strands joined to one spiral, so that the fibre is cut once and not at each."""
+"""Nested closed strands joined to one spiral, so that the fibre is cut once instead of for each."""
 
 from collections.abc import Callable, Sequence
 
@@ -13,7 +13,7 @@ from ccfem.linking.possible_links import ring_arc
 __all__ = ["spiral"]
 
 _STRIDE = 4
-"""Every so many points of a ring are tried as the place of the seam."""
+"""Distance, in points, between the places of a ring that are tried for the seam."""
 
 
 def spiral(
@@ -22,11 +22,11 @@ def spiral(
     cost: Callable[[FloatArray], FloatArray],
     section: Region,
 ) -> list[FloatArray]:
-    """Join closed lines that lie in each other to spirals.
+    """Join nested closed lines to spirals.
 
     Each ring is opened beside the next, and a slanted piece leads from one to the other. The place
-    is where `cost` is least along the outermost ring; the gap is two and a half times the local
-    distance of the rings, so that the path turns by about 20 degrees only.
+    is where `cost` along the outermost ring is least. The gap is two and a half times the local
+    distance between the rings, so that the path turns by about 20 degrees only.
 
     Parameters
     ----------
@@ -35,14 +35,14 @@ def spiral(
     limit : float, mm
         Largest distance between rings that are joined.
     cost : callable
-        Maps points (k, 2) to (k,) values: how much it hurts to disturb the strand there.
+        Maps points (k, 2) to values (k,): the cost of disturbing the strand there.
     section : shapely (Multi)Polygon
         The connecting pieces stay inside it.
 
     Returns
     -------
     list of (n, 2) arrays
-        Open lines first in their order, then rings and spirals from the outside in.
+        First open lines in their order, then rings and spirals from the outside in.
     """
     closed = [k for k, line in enumerate(lines) if is_closed(line)]
     rings = [_counter_clockwise(lines[k]) for k in closed]
@@ -50,7 +50,7 @@ def spiral(
     obstacles = [shapely.linestrings(line) for line in kept]
     for chain in _nested_chains(rings, limit):
         left = []
-        while chain:  # without the innermost ring, until the rest can be wound
+        while chain:  # drop the innermost ring until the rest can be wound
             joined = _wind([rings[k] for k in chain], limit, cost)
             if joined is not None and _fits(joined, obstacles, section):
                 kept.append(joined)
@@ -87,7 +87,7 @@ def _nested_chains(rings: list[FloatArray], limit: float) -> list[list[int]]:
 def _wind(
     rings: list[FloatArray], limit: float, cost: Callable[[FloatArray], FloatArray]
 ) -> FloatArray | None:
-    """Return one open line through all rings, or None where they are nowhere near enough."""
+    """Return one open line through all rings, or None if they are nowhere near enough."""
     if len(rings) < 2:
         return None
     strings = [shapely.LinearRing(ring) for ring in rings]

@@ -1,4 +1,4 @@
-"""The printer: what a path has to respect, how it prints, and what its firmware is told."""
+"""The printer: its limits for paths, how it prints, and the G-code that its firmware expects."""
 
 from ccfem.machine.gcode_profile import FeedAxes, GcodeProfile
 from ccfem.machine.kinematics import Kinematics

@@ -1,4 +1,4 @@
-"""Where five axes stand for a place and a direction of the head, and back."""
+"""Axis values for a position and direction of the head on five axes, and back."""
 
 from dataclasses import dataclass
 from typing import Literal
@@ -11,24 +11,25 @@ from ccfem.checks import check_choices, check_fields, check_number
 __all__ = ["Kinematics", "axis_values", "head_pose"]
 
 _UPRIGHT = 1e-6
-"""Sine of the tilt below which the second rotation has no meaning, and stays as it is."""
+"""Sine of the tilt below which the second rotation is undefined, and is kept."""
 
 
 @dataclass(frozen=True)
 class Kinematics:
-    """How a machine turns head and part to each other, in a part file ``[machine.kinematics]``.
+    """How a machine rotates head and part, in a part file ``[machine.kinematics]``.
 
     Attributes
     ----------
     kind : {"three_axes", "table_table", "head_head"}
-        Upright head; a table that turns about Z by C on one that turns about X by A (trunnion), the
-        head upright; or a head that turns about Y by B under one that turns about Z by C.
+        An upright head; a table that rotates about Z by C, on one that tilts about X by A
+        (trunnion), under an upright head; or a head that tilts about Y by B, on one that rotates
+        about Z by C.
     centre : tuple of 3 floats, mm
-        Of a table-table machine: where both axes meet.
+        On a table-table machine: where both axes meet.
     pivot : float, mm
-        Of a head-head machine: from the place where both axes meet to the tip of the nozzle.
+        On a head-head machine: distance from where both axes meet to the tip of the nozzle.
     tilt_limit : float, degrees
-        Most that head and part tilt to each other.
+        Largest tilt between head and part.
     """
 
     kind: Literal["three_axes", "table_table", "head_head"] = "three_axes"
@@ -45,7 +46,7 @@ class Kinematics:
 
     @property
     def letters(self) -> tuple[str, ...]:
-        """Letters of the axes that turn."""
+        """Letters of the rotary axes."""
         return {"table_table": ("A", "C"), "head_head": ("B", "C")}.get(self.kind, ())
 
 
@@ -79,7 +80,7 @@ def axis_values(
     index = np.maximum.accumulate(np.where(turned, np.arange(len(spin)), 0))
     first = int(np.argmax(turned)) if turned.any() else 0
     spin = np.where(turned.any(), spin[np.maximum(index, first)], 0.0)
-    # Half a turn more of C with the tilt the other way round is the same pose: no turn at the pole.
+    # C plus half a turn with the opposite tilt is the same pose: this avoids a turn at the pole.
     even = np.unwrap(spin, period=np.pi)
     tilt = np.where(np.round((even - spin) / np.pi) % 2.0 == 1.0, -tilt, tilt)
     spin = even

@@ -1,4 +1,4 @@
-"""What a printer tolerates: beyond one of these limits, paths cannot be printed as they are."""
+"""Limits of a printer: paths that exceed one of them cannot be printed as they are."""
 
 from dataclasses import dataclass
 
@@ -9,11 +9,11 @@ __all__ = ["Limits"]
 
 @dataclass(frozen=True)
 class Limits:
-    """Largest shares and lengths of what goes wrong that still prints.
+    """Largest shares and lengths of defects that can still be printed.
 
-    In a part file ``[machine.limits]``. All are our choice, above what was measured on the paths
-    that Chen et al. 2021 printed (Loop, "ours" and "zigzag"), and below what makes a design of
-    something that is none.
+    In a part file ``[machine.limits]``. All are our choice: above the values measured on the paths
+    that Chen et al. 2021 printed (Loop, "ours" and "zigzag"), and below values at which a design
+    makes no sense.
 
     Attributes
     ----------
@@ -30,7 +30,7 @@ class Limits:
     outside_height : float
         Share of the fibre's length at which strands stand out of the part's top or bottom.
     free_span : float, mm
-        Longest run of fibre that has nothing to lie on.
+        Longest run of fibre with nothing below it.
     links : float
         Share of the fibre's length that is marked as links.
     fraction : float

@@ -1,4 +1,4 @@
-"""The printer: what a path has to respect, and what it costs."""
+"""The printer: what paths have to respect, and what they cost."""
 
 from dataclasses import dataclass, field, fields
 
@@ -17,28 +17,28 @@ _CUTTER_DISTANCE = 42.0
 
 
 _PARTS = ("speeds", "gcode", "limits", "process", "kinematics", "pressed")
-"""Fields that are no numbers."""
+"""Fields that are not numbers."""
 
 
 @dataclass(frozen=True)
 class Machine:
     """A printer of continuous fibre.
 
-    The defaults are the machine of Chen et al. 2021 (section 5 and table 3). What the
-    paper does not state is marked "our choice".
+    The defaults are the machine of Chen et al. 2021 (section 5 and table 3). Values that the paper
+    does not state are marked "our choice".
 
     Attributes
     ----------
     fibre_width : float, mm
         W, the minimum distance between neighbouring strands.
     fibre_height : float, mm
-        Least height of a fibre layer. Where the filament's section needs more at the width of a
-        fibre, it is that: see `strand_height`.
+        Least height of a fibre layer. If the cross-section of the filament needs more height at the
+        fibre width, that height applies: see `strand_height`.
     matrix_height : float, mm
         Height of a matrix layer between two fibre layers.
     pressed : bool
-        Strands are pressed into the layer below: `fibre_height` holds though their section needs
-        more.
+        Strands are pressed into the layer below, so that `fibre_height` applies although their
+        cross-section needs more.
     filament_area : float, mm^2
         Cross-section of one strand.
     minimum_length : float, mm
@@ -63,27 +63,27 @@ class Machine:
     fibre_density, matrix_density : float, g/cm^3
         Our choice: a data sheet's value for carbon tow in thermoplastic, and that of PLA.
     fibre_tex : float, g/km, optional
-        Mass of the fibre filament, in place of its density and section.
+        Mass of the fibre filament, used instead of its density and cross-section.
     coextrusion : float
-        Share of the room in a strand's cell, `fibre_width` times the height of its layer, that the
-        fibre's head fills with matrix of its own: 0 for one that lays fibre alone.
+        Share of the free space in a strand's cell, `fibre_width` times the layer height, that the
+        fibre head fills with matrix of its own; 0 for a head that lays fibre only.
     bed_temperature : float, degrees Celsius
         Our choice, usual for PLA.
     matrix_standby, fibre_standby : float, degrees Celsius
-        Of a tool while the other one prints (Aura: 100 and 180).
+        Temperature of a tool while the other one prints (Aura: 100 and 180).
     matrix_heating, fibre_heating : float, K/s
-        How fast a nozzle gets hot again (Aura: 0.97 and 1.38).
+        How fast a nozzle heats up again (Aura: 0.97 and 1.38).
     head_angle, head_length : float, degrees and mm
-        Half of the angle at the tip of the cone that the head is taken for, and the cone's length:
-        what it would run into on curved layers. Our choice.
+        Half the tip angle, and the length, of the cone that represents the head in the search for
+        collisions on curved layers. Our choice.
     gcode : GcodeProfile
-        What its firmware wants to be told.
+        The G-code that its firmware expects.
     process : Process
         How it prints.
     kinematics : Kinematics
-        How it turns head and part to each other on curved layers.
+        How it rotates head and part relative to each other on curved layers.
     limits : Limits
-        What it tolerates: paths beyond are not printable as they are.
+        What it tolerates: paths beyond these limits are not printable as they are.
     """
 
     fibre_width: float = 1.0
@@ -138,7 +138,7 @@ class Machine:
 
     @property
     def strand_area(self) -> float:
-        """Section of what a strand lays, mm^2: the filament, and the matrix round it."""
+        """Cross-section of a laid strand, mm^2: the filament and the matrix round it."""
         room = self.fibre_width * self.strand_height - self.filament_area
         return self.filament_area + self.coextrusion * max(room, 0.0)
 

@@ -1,7 +1,7 @@
-"""Machines by name or from a file: tables of what differs, laid over each other.
+"""Machines by name or from a file: tables of differing values, merged in order.
 
-The later one wins: the defaults of `Machine`, a built-in machine that a table names as its
-``profile``, that table, the machine of a case, one named for it, single values.
+Later values override earlier ones: the defaults of `Machine`, the built-in machine that a table
+names as its ``profile``, that table, the machine of a case, a table named for it, single values.
 """
 
 import dataclasses
@@ -31,7 +31,7 @@ def machine_names() -> tuple[str, ...]:
 
 
 def machine_about(name: str | Path) -> str:
-    """Comment at the head of a built-in machine's file; nothing for other files."""
+    """Comment at the head of a built-in machine's file; empty for other files."""
     if str(name) not in machine_names():
         return ""
     lines = (_FOLDER / f"{name}.toml").read_text(encoding="utf-8").splitlines()
@@ -39,18 +39,18 @@ def machine_about(name: str | Path) -> str:
 
 
 def machine_table(name: str | Path) -> dict[str, Any]:
-    """Find what a machine sets, those that it builds on included.
+    """Find the values that a machine sets, with those of machines that it builds on.
 
     Parameters
     ----------
     name : str or Path
         Of a machine that comes with ccfem, or of a TOML file with a table ``[machine]``, as in part
-        files. A file that names its ``last_table`` ends with it, or is cut off.
+        files. A file that names its ``last_table`` must end with it; otherwise it is cut off.
 
     Raises
     ------
     InputError
-        For an unknown name, and a file that is none of a machine or is cut off.
+        For an unknown name, and for a file that describes no machine or is cut off.
     """
     text = str(name)
     if not text.endswith(".toml") and not {"/", "\\"} & set(text):
@@ -77,7 +77,7 @@ def machine_table(name: str | Path) -> dict[str, Any]:
 
 
 def _whole_table(table: Mapping[str, Any]) -> dict[str, Any]:
-    """Lay a table over the built-in machine that it names as its profile."""
+    """Merge a table over the built-in machine that it names as its profile."""
     rest = {key: value for key, value in table.items() if key != "profile"}
     if "profile" not in table:
         return rest
@@ -103,15 +103,15 @@ def machine_from(table: object, where: str = "machine") -> Machine:
 
 
 def updated(machine: Machine, *tables: Mapping[str, Any], where: str = "machine") -> Machine:
-    """Lay tables over a machine, one after the other.
+    """Merge tables over a machine, one after the other.
 
     Parameters
     ----------
     machine : Machine
     *tables : mapping
-        As `machine_table` gives them; what they do not name stays.
+        As returned by `machine_table`; values that they do not name stay.
     where : str
-        What the values came from, for messages.
+        Where the values came from, for messages.
 
     Raises
     ------
@@ -129,7 +129,7 @@ def updated(machine: Machine, *tables: Mapping[str, Any], where: str = "machine"
 
 
 def _laid_over(under: Mapping[str, Any], over: Mapping[str, Any]) -> dict[str, Any]:
-    """Join two tables; the second one wins, tables in both are joined in turn."""
+    """Merge two tables; the second one wins, and tables in both are merged in turn."""
     found = dict(under)
     for key, value in over.items():
         both = isinstance(value, Mapping) and isinstance(found.get(key), Mapping)

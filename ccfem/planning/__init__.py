@@ -1,4 +1,4 @@
-"""Planning: what a strategy is, the paths of a whole part, and equal length of fibre."""
+"""Planning: strategies, the paths of a whole part, and plans of equal fibre length."""
 
 from ccfem.planning.equal_fibre import Planned, length_per_layer, plan_to_length
 from ccfem.planning.given_paths import GivenPaths

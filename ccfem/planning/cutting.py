@@ -1,4 +1,4 @@
-"""Paths cut back to a wanted length, so that all that is left can be printed."""
+"""Paths cut back to a wanted length so that all remaining pieces can be printed."""
 
 from dataclasses import replace
 
@@ -12,13 +12,13 @@ __all__ = ["cut_to_length"]
 _ENOUGH = 1e-9
 """Length, mm, below which nothing more is cut."""
 _SAME = 1e-6
-"""Distance along a path, mm, up to which it is cut at a point that it has."""
+"""Distance along a path, mm, within which a cut is moved to a point of the path."""
 
 
 def cut_to_length(toolpaths: Toolpaths, length: float, minimum: float) -> Toolpaths:
     """Leave out and shorten fibre until no more than a length is left.
 
-    The shortest paths go as a whole, and what is then still too much is cut from the end of the
+    The shortest paths are left out as a whole. The remaining excess is cut from the end of the
     shortest path that stays long enough, or from the ends of several. No path ends in a link.
 
     Parameters
@@ -27,13 +27,13 @@ def cut_to_length(toolpaths: Toolpaths, length: float, minimum: float) -> Toolpa
     length : float, mm
         Largest total length of fibre that remains.
     minimum : float, mm
-        No path is cut to less than that.
+        Least length that a path is cut to.
 
     Returns
     -------
     Toolpaths
-        The given ones where they are short enough. A closed path that is cut is open. Less than
-        the length where paths of at least the minimum cannot sum up to it.
+        The given paths where they are short enough. A closed path becomes open when cut. The total
+        is less than the length where paths of at least the minimum cannot add up to it.
     """
     size = np.where(toolpaths.kind == FIBRE, toolpaths.lengths, 0.0)
     left = _lengths(size, length, minimum)
@@ -42,7 +42,7 @@ def cut_to_length(toolpaths: Toolpaths, length: float, minimum: float) -> Toolpa
 
 
 def _lengths(size: FloatArray, length: float, minimum: float) -> FloatArray:
-    """Lengths that are left of paths of some sizes."""
+    """Remaining lengths of paths of the given sizes."""
     left, excess = size.copy(), float(size.sum()) - length
     for k in np.argsort(np.where(size > 0.0, size, np.inf), kind="stable"):
         if excess <= _ENOUGH:
@@ -61,7 +61,7 @@ def _lengths(size: FloatArray, length: float, minimum: float) -> FloatArray:
 
 
 def _shortened(toolpaths: Toolpaths, wanted: dict[int, float], minimum: float) -> Toolpaths:
-    """Toolpaths of which some, by number, keep so much of their beginning; 0 for none."""
+    """Toolpaths, some of them cut to a wanted initial length, by path number; 0 removes a path."""
     if not wanted:
         return toolpaths
     points, keep = toolpaths.points.copy(), np.ones(len(toolpaths.points), dtype=bool)

@@ -1,4 +1,4 @@
-"""A dial for how much fibre a strategy lays, over all parameters that its amount names."""
+"""A single dial for how much fibre a strategy lays, over all parameters named in its amount."""
 
 from collections.abc import Mapping
 from dataclasses import dataclass, replace
@@ -12,11 +12,11 @@ from ccfem.planning.strategy import Strategy
 __all__ = ["Dial", "around"]
 
 _POWERS = (0.5, 3.0)
-"""Bounds of the power of the parameter that the length is taken to go with."""
+"""Bounds of the power of the parameter that the length is assumed to be proportional to."""
 
 
 def around(lengths: Mapping[float, float], target: float) -> tuple[float | None, float | None]:
-    """Find the turn with the longest length up to a target, and the one with the next above."""
+    """Find the turn of longest length up to a target, and that of the next length above."""
     low = [turn for turn in lengths if lengths[turn] <= target]
     high = [turn for turn in lengths if lengths[turn] > target]
     return (
@@ -27,11 +27,11 @@ def around(lengths: Mapping[float, float], target: float) -> tuple[float | None,
 
 @dataclass(frozen=True)
 class Dial:
-    """How much a strategy lays, from 0 (its least) over 1 (its amount at the most) to the end.
+    """Amount of fibre that a strategy lays: 0 is its least, 1 its amount's most, then `beyond`.
 
-    Between 0 and 1 the parameter of its amount goes from the least to the most, evenly in its
+    Between 0 and 1 the parameter of the amount goes from its least to its most, evenly in its
     logarithm where both are positive: the length is then about exponential in the turn of the dial.
-    From each whole number on, one of the parameters beyond goes evenly from the strategy's own
+    From each whole number on, one of the parameters in `beyond` goes evenly from the strategy's own
     value to its most.
 
     Attributes
@@ -43,7 +43,7 @@ class Dial:
 
     @cached_property
     def own(self) -> float:
-        """Where the strategy itself is; its most where its parameter is None."""
+        """Turn of the strategy itself; its most where its parameter is None."""
         value = getattr(self.strategy, self.strategy.amount.parameter)
         if value is None:
             return 1.0
@@ -54,12 +54,12 @@ class Dial:
 
     @cached_property
     def end(self) -> float:
-        """Where the strategy lays its most."""
+        """Turn at which the strategy lays its most."""
         return 1.0 + len(self.strategy.amount.beyond)
 
     @cached_property
     def _ends(self) -> tuple[float, float]:
-        """Least and most of the amount's parameter, made wider by the strategy's own value."""
+        """Least and most of the amount's parameter, extended to the strategy's own value."""
         amount = self.strategy.amount
         value = getattr(self.strategy, amount.parameter)
         ends = [amount.least, amount.most] if value is None else [amount.least, amount.most, value]
@@ -89,7 +89,7 @@ class Dial:
         return changed
 
     def says(self, strategy: Strategy) -> str:
-        """Return the parameters in which a strategy on this dial differs, or the first of them."""
+        """Return the parameters in which a strategy on this dial differs, or else the first one."""
         amount = self.strategy.amount
         names = [amount.parameter, *(name for name, _ in amount.beyond)]
         told = [n for n in names if getattr(strategy, n) != getattr(self.strategy, n)]
@@ -101,17 +101,17 @@ class Dial:
         Parameters
         ----------
         lengths : mapping of turn to float, mm
-            What is known; at least one.
+            Known lengths, at least one.
         target : float, mm
         beyond : float, default 0
-            Share by which to aim further while the length is known on one side only, so that the
-            target comes to lie between two known ones.
+            Share by which to overshoot while lengths are known on one side of the target only, so
+            that it comes to lie between two of them.
 
         Returns
         -------
         float
-            Between the nearest known lengths on either side. While one side is unknown, by
-            proportion from the nearest length, or an end.
+            A turn between the nearest known lengths on both sides. While one side is unknown, it
+            follows in proportion from the nearest length, or is an end of the dial.
         """
         low, high = around(lengths, target)
         if low is not None and high is not None:

@@ -1,8 +1,8 @@
 """Planning to a wanted length of fibre, so that strategies are compared at equal cost.
 
-A strategy that lays more fibre wins almost any comparison. Every strategy therefore names what
-sets how much it lays (`Strategy.amount`), and `plan_to_length` searches it; a `LengthStrategy`
-takes the length itself.
+A strategy that lays more fibre wins almost any comparison. Every strategy therefore names the
+parameter that sets how much it lays (`Strategy.amount`), and `plan_to_length` searches for its
+value. A `LengthStrategy` takes the length itself.
 """
 
 from collections.abc import Mapping, Sequence
@@ -35,24 +35,24 @@ __all__ = [
 ]
 
 TOLERANCE = 0.01
-"""Share of a wanted length by which one that counts as equal may differ."""
+"""Share by which a length may differ from the wanted one and still count as equal."""
 _GUESSES = 3
-"""Plans of the whole stack from a known one, before anything is searched."""
+"""Plans of the whole stack tried from a known plan before a search."""
 _CLOSE = 0.1
 """Difference of two plans on either side of the wanted length, as a share of it, up to which some
-layers may take the one and some the other without a further search."""
+layers may take one plan and some the other without further search."""
 _ROUNDS = 3
-"""Plans of the whole stack after a search on few layers."""
+"""Plans of the whole stack after a search on a few layers."""
 _STEPS = 8
-"""Plans of the few layers that stand for the stack, in each round."""
+"""Plans of the few layers that represent the stack, in each round."""
 _FINEST = 1e-5
-"""Turn of the dial below which a step in length is taken for what it is."""
+"""Turn of the dial below which a jump in length is accepted as such."""
 _BEYOND = 0.05
-"""How much further than by proportion these go while the length is known on one side only."""
+"""Overshoot of these while lengths are known on one side of the wanted one only, as a share."""
 _HALVINGS = 6
-"""Plans of the whole stack for the least that leaves no layer empty."""
+"""Plans of the whole stack in the search for the least that leaves no layer empty."""
 _FEW = 4
-"""Stacks of at most this many layers are searched as they are."""
+"""Number of layers up to which the whole stack is searched directly."""
 
 
 def length_per_layer(toolpaths: Toolpaths, layers: Sequence[Layer]) -> float:
@@ -77,28 +77,28 @@ def plan_to_length(
 ) -> Planned:
     """Plan to a wanted length of fibre.
 
-    Plans are searched on both sides of the wanted length, on a few layers where none is known of
-    the whole stack. Some layers, evenly spread, then take the one that lays more, and where that
-    leaves room strands are cut to fit it: never below the shortest that can be printed. What any
-    of the plans fills no layer is left without.
+    Plans are searched on both sides of the wanted length, on a few layers unless plans of the whole
+    stack are known. Some layers, spread evenly, then take the plan that lays more. Where that
+    leaves room, strands are cut to fit it, but never below the shortest that can be printed. No
+    layer is left empty that one of the plans fills.
 
     Parameters
     ----------
     strategy : Strategy
-        Its own value is where the search starts.
+        The search starts from its own value.
     layers : sequence of Layer
     stress : PartStress
     machine : Machine
     wanted : float, mm
-        Fibre per layer: mean over the stack. It is met within the share `tolerance`, and not
-        exceeded, wherever the least that the strategy lays is no more and the most no less;
-        otherwise that is what it lays, and `Planned.reached` and `note` say so.
+        Fibre per layer: mean over the stack. It is met within the share `tolerance` and not
+        exceeded, if it lies between the least and the most that the strategy lays. Otherwise the
+        nearer of these is laid, and `Planned.reached` and `note` say so.
     start : Planned, optional
-        The strategy's plan with its own value, where there is one already.
+        The plan of the strategy with its own value, if it exists already.
     tolerance : float, default 0.01
-        Share by which it may lay less.
+        Share by which less may be laid.
     sampled : float, mm, optional
-        What it lays with its own value on a few layers (`sampled_length`), where that is known.
+        Length on a few layers with the strategy's own value (`sampled_length`), if known.
 
     Returns
     -------
@@ -135,7 +135,7 @@ def plan_to_lengths(
     tolerance: float = TOLERANCE,
     sampled: float | None = None,
 ) -> list[Planned]:
-    """Plan to several lengths of fibre, mm per layer: what is planned for one serves the others.
+    """Plan to several lengths of fibre, mm per layer, reusing the plans for one for the others.
 
     Parameters
     ----------
@@ -143,7 +143,7 @@ def plan_to_lengths(
         As in `plan_to_length`.
     lengths : sequence of float, mm
     known : sequence of Planned
-        Plans of the strategy with its own value or at its extremes, where there are any.
+        Plans of the strategy with its own value or at its extremes, if there are any.
     tolerance : float, default 0.01
         Share by which less may be laid.
     sampled : float, mm, optional
@@ -211,7 +211,7 @@ def _meets(length: float, wanted: float, tolerance: float = TOLERANCE) -> bool:
 
 @dataclass
 class _Search:
-    """Plans of one strategy at several turns of its dial, on the way to a length."""
+    """Plans of one strategy at several turns of its dial, while a length is searched for."""
 
     dial: Dial
     layers: Sequence[Layer]
@@ -222,7 +222,7 @@ class _Search:
     sampled: dict[float, float] = field(default_factory=dict)
 
     def learn(self, known: Sequence[Planned]) -> None:
-        """Take over plans that there are."""
+        """Take over known plans."""
         for turn in (self.dial.own, 0.0, self.dial.end):
             for one in known:
                 if one.strategy == self.dial.at(turn):
@@ -230,7 +230,7 @@ class _Search:
 
     @cached_property
     def few(self) -> Sequence[Layer]:
-        """Layers that stand for the stack."""
+        """Layers that represent the stack."""
         layers = self.layers
         return layers if len(layers) <= _FEW else [layers[0], layers[len(layers) // 2], layers[-1]]
 
@@ -275,7 +275,7 @@ class _Search:
         )
 
     def least_filled(self) -> Planned:
-        """Plan with the least fibre that leaves no layer empty that another amount fills."""
+        """Plan with the least fibre that leaves no layer empty which some amount fills."""
         self.whole(0.0)
         full = [turn for turn in self.tried if self.filled(self.tried[turn])]
         low, high = 0.0, min(full, default=self.dial.end)
@@ -299,7 +299,7 @@ class _Search:
         return self.between(wanted, _CLOSE) or self.searched(wanted)
 
     def searched(self, wanted: float) -> Planned:
-        """Search on the few layers, check on the stack, and again with the ratio of the two."""
+        """Search on the few layers and check on the stack; repeat with the ratio of the two."""
         for _ in range(1 if self.few is self.layers else _ROUNDS):
             for turn in self.bracket(wanted / self.ratio(wanted)):
                 if turn is not None:
@@ -314,7 +314,7 @@ class _Search:
         return self.between(wanted, np.inf) or self.off(wanted)
 
     def ratio(self, wanted: float) -> float:
-        """Length on the stack over that on the few layers, of the nearest plan that is known."""
+        """Length on the stack over that on the few layers, for the nearest known plan."""
         off = {
             turn: abs(one.length_per_layer - wanted)
             for turn, one in self.tried.items()
@@ -326,7 +326,7 @@ class _Search:
         return self.tried[nearest].length_per_layer / self.sample(nearest)
 
     def bracket(self, target: float) -> tuple[float | None, float | None]:
-        """Find turns on either side of a length on the few layers, as near as a few steps come."""
+        """Find turns on either side of a length on the few layers, as near as a few steps allow."""
         known, enough = self.sampled, (1.0 - 0.5 * self.tolerance) * target
         turn = min(self.dial.own, 1.0)
         low = high = None
@@ -347,7 +347,7 @@ class _Search:
         return low, high
 
     def between(self, wanted: float, close: float) -> Planned | None:
-        """Plan from the known ones on either side of a length, where these are close."""
+        """Mix the known plans on either side of a length, if they are close enough."""
         below = [one for one in self.tried.values() if one.length_per_layer <= wanted * (1 + 1e-9)]
         above = [one for one in self.tried.values() if one.length_per_layer > wanted * (1 + 1e-9)]
         less = max(below, key=_length, default=None)
@@ -380,7 +380,7 @@ class _Search:
         return Planned(less.strategy, found.toolpaths, length, said, self.meets(length, wanted))
 
     def off(self, wanted: float) -> Planned:
-        """Return the extreme that is nearest to a length that the strategy does not reach."""
+        """Return the extreme plan nearest to a length that the strategy does not reach."""
         plans = [self.tried[turn] for turn in sorted(self.tried)]
         much = min(map(_length, plans)) > wanted
         best = min(plans, key=_length) if much else max(plans[::-1], key=_length)

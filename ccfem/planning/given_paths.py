@@ -1,4 +1,4 @@
-"""Paths that another program planned, as a strategy: it lays them as they are."""
+"""Paths planned by another program, as a strategy that lays them unchanged."""
 
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
@@ -17,12 +17,12 @@ from ccfem.toolpaths import Toolpaths
 __all__ = ["GivenPaths"]
 
 _SAME = 1e-3
-"""Heights nearer than this, mm, are one: the rounding of path files."""
+"""Heights nearer than this, mm, are equal: it allows for the rounding of path files."""
 
 
 @dataclass(frozen=True)
 class GivenPaths:
-    """Paths that are judged as those of strategies are, and changed by nothing.
+    """Given paths, evaluated like those of strategies, but never changed.
 
     Attributes
     ----------

@@ -1,4 +1,4 @@
-"""What strategies have in common that fill a section with strands at a spacing."""
+"""Common base of strategies that fill a section with strands at a spacing."""
 
 from abc import ABC, abstractmethod
 from collections.abc import Sequence
@@ -28,15 +28,16 @@ from ccfem.toolpaths import Toolpaths
 __all__ = ["SPACING", "Infill", "Turns", "check_fill", "check_shells", "long_enough", "with_turns"]
 
 SPACING = Amount("spacing", most=1.0, least=20.0)
-"""Of a strategy whose parameter `spacing` is the distance of strands in fibre widths."""
+"""Amount of a strategy whose parameter `spacing` is the distance of strands in fibre widths."""
 
 Turns = Literal["tight", "printable", "cut"]
-"""What becomes of turns tighter than the machine's fibre follows: strands go round them; are cut
-there if both sides are long enough for the cutter; or are cut, and what is too short goes."""
+"""How turns tighter than the machine's minimum radius are treated. "tight": strands follow them;
+"printable": they are cut if both sides are long enough for the cutter; "cut": they are all cut, and
+parts that are too short are dropped."""
 
 
 def check_fill(strategy: object) -> None:
-    """Check what all strategies with a `spacing` have: also choices and a `minimum_length`.
+    """Check the parameters of strategies with a `spacing`: also choices and a `minimum_length`.
 
     Raises
     ------
@@ -70,12 +71,12 @@ def with_turns(
     machine: Machine,
     link: Sequence[BoolArray] | None = None,
 ) -> Joined:
-    """Strands cut at turns that the machine's fibre cannot follow, if a strategy wants that.
+    """Cut strands at turns that the machine's fibre cannot follow, if the strategy says so.
 
     Parameters
     ----------
     strategy : object
-        With `turns`, and a `spacing` in fibre widths and a `minimum_length` where it has them.
+        With `turns`; optionally with a `spacing` in fibre widths and a `minimum_length`.
     lines : sequence of (n_i, 2) arrays, mm
     machine : Machine
     link : sequence of (n_i,) bool arrays, optional
@@ -87,7 +88,7 @@ def with_turns(
     if strategy.turns == "tight":
         return joined
     width, least = machine.fibre_width, getattr(strategy, "minimum_length", None)
-    least = max(machine.minimum_length, least or 0.0)  # no cut is made that the cutter cannot
+    least = max(machine.minimum_length, least or 0.0)  # the cutter cannot make shorter pieces
     spacing = strategy.spacing if strategy.amount.parameter == "spacing" else 1.0
     every, radius = strategy.turns == "cut", machine.minimum_radius
     return cut_turns(joined, radius, width, least, spacing * width, every)
@@ -96,8 +97,8 @@ def with_turns(
 class Infill(ABC):
     """A strategy that lays polylines, or paths of pixels where its `mode` is "raster".
 
-    What depends on the section of a layer alone is made once for all layers of a part with equal
-    sections: see `prepare`.
+    Everything that depends only on the section of a layer is computed once for all layers of a part
+    with equal sections: see `prepare`.
     """
 
     spacing: float
@@ -117,7 +118,7 @@ class Infill(ABC):
         return self.mode == "raster"
 
     def prepare(self, section: Region, machine: Machine) -> Any:
-        """Make what layers of equal sections share; `strands` gets it, in several threads."""
+        """Compute what layers of equal sections share; passed to `strands`, in several threads."""
         return None
 
     @abstractmethod
@@ -127,7 +128,7 @@ class Infill(ABC):
         """Strands (n_i, 2), mm, in the plane of a layer, however short."""
 
     def linked(self, lines: list[FloatArray], prepared: Any, machine: Machine) -> Joined:
-        """Strands joined at their ends, where a strategy does that, links marked; cut at turns."""
+        """Strands cut at turns; a strategy may also join their ends by marked links."""
         return with_turns(self, lines, machine)
 
     @abstractmethod
@@ -142,7 +143,7 @@ class Infill(ABC):
     def for_part(
         self, stress: PartStress | None, layers: Sequence[Layer], machine: Machine
     ) -> LayerPlanner:
-        """Prepare the sections of a part; `stress` does not matter for that."""
+        """Prepare the sections of a part; `stress` is not used for that."""
         if self.mode == "raster":
             return _Prepared(self, {})
         sections = [corners_only(layer.plane.polygon) for layer in layers]
@@ -159,7 +160,7 @@ class Infill(ABC):
 
 @dataclass(frozen=True)
 class _Prepared:
-    """An infill with what it has prepared for each layer of a part, by `Layer.index`."""
+    """An infill with its prepared data for each layer of a part, by `Layer.index`."""
 
     infill: Infill
     known: dict[int, Any]

@@ -1,4 +1,4 @@
-"""A length between those of two plans: some layers of the one, the others of the other."""
+"""Plans mixed to a length in between: some layers from one, the others from the other."""
 
 from collections.abc import Sequence
 from dataclasses import dataclass
@@ -13,22 +13,22 @@ from ccfem.toolpaths import FIBRE, Toolpaths
 __all__ = ["Mixed", "layer_lengths", "mixed"]
 
 _SPARE = 0.005
-"""Share of the wanted length that may stay unused before strands are cut for it."""
+"""Share of the wanted length that may stay unused before strands are cut to fill it."""
 _GOLDEN = 0.5 * (np.sqrt(5.0) - 1.0)
 """Multiples of the golden ratio spread any number of layers over the stack."""
 
 
 @dataclass(frozen=True)
 class Mixed:
-    """Toolpaths of some layers of a plan that lays more, and of the others of one that lays less.
+    """Toolpaths of which some layers come from the longer plan, the others from the shorter one.
 
     Attributes
     ----------
     toolpaths : Toolpaths
     more : int
-        Layers that take more.
+        Number of layers from the longer plan.
     cut : int
-        Layers on which strands are cut back.
+        Number of layers on which strands are cut back.
     """
 
     toolpaths: Toolpaths
@@ -47,21 +47,21 @@ def layer_lengths(toolpaths: Toolpaths, layers: Sequence[Layer]) -> FloatArray:
 def mixed(
     less: Toolpaths, more: Toolpaths, layers: Sequence[Layer], total: float, minimum: float
 ) -> Mixed:
-    """Mix two plans to a length, layers that take more spread evenly over the stack.
+    """Mix two plans to a length; layers from the longer plan are spread evenly over the stack.
 
-    Layers that the plan that lays less leaves empty take more in any case. Where whole layers
-    leave room for more than half a per cent, one more layer takes strands that are cut to fit it;
-    where the layers that would be empty take too much, strands are cut back on all.
+    Layers that the shorter plan leaves empty are always taken from the longer one. Where whole
+    layers leave more than half a per cent unused, one more layer takes strands that are cut to fit.
+    Where the always-taken layers already exceed the length, strands are cut back on all layers.
 
     Parameters
     ----------
     less, more : Toolpaths
     layers : sequence of Layer
     total : float, mm
-        Fibre of all layers together; the result lays no more, but for what minimum lengths on
-        layers that would be empty ask for.
+        Fibre of all layers together. The result lays no more, unless the minimum lengths on layers
+        that would be empty require it.
     minimum : float, mm
-        Shortest strand that is made by a cut.
+        Shortest strand that a cut may leave.
     """
     a, b = layer_lengths(less, layers), layer_lengths(more, layers)
     taken = (a == 0.0) & (b > 0.0)
@@ -102,7 +102,7 @@ def _cut_evenly(
     total: float,
     minimum: float,
 ) -> Mixed:
-    """Cut the strands of every layer back in the same proportion, none to nothing."""
+    """Cut the strands of every layer back in the same proportion, but none completely."""
     parts = _parts(less, more, layers, taken)
     lengths = np.array([float(part.of_kind(FIBRE).lengths.sum()) for part in parts])
     share, carried, cut = total / float(lengths.sum()), 0.0, 0

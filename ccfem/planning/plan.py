@@ -71,7 +71,7 @@ def plan_layers(
         Called from several threads at once, each with a layer of its own.
     layers : sequence of Layer
     views : sequence of Layer
-        The same layers as the planner gets them: laid flat where it works in a plane.
+        The same layers as passed to the planner: laid flat if it works in a plane.
     stress : PartStress
     machine : Machine
     """
@@ -85,7 +85,7 @@ def plan_layers(
 
 
 def check_layers(strategy: Strategy, layers: Sequence[Layer], machine: Machine) -> None:
-    """Refuse layers that no strategy, or not this one, can plan on.
+    """Refuse layers that no strategy, or not this strategy, can plan on.
 
     Raises
     ------

@@ -1,4 +1,4 @@
-"""Toolpaths of a part that were planned to a length of fibre."""
+"""Toolpaths of a part planned to a length of fibre."""
 
 from dataclasses import dataclass
 
@@ -16,14 +16,14 @@ class Planned:
     Attributes
     ----------
     strategy : Strategy
-        With the values that were found (of most layers, see `note`).
+        With the values found (for most layers, see `note`).
     toolpaths : Toolpaths
     length_per_layer : float, mm
         Fibre length divided by the number of layers.
     note : str
         Empty, or one line: which layers have another value, or why the wanted length was missed.
     reached : bool
-        Whether it lays the wanted length within the tolerance (`ccfem.planning.equal_fibre`).
+        Whether the plan lays the wanted length within the tolerance (`ccfem.planning.equal_fibre`).
     """
 
     strategy: Strategy

@@ -1,4 +1,4 @@
-"""Where a section has no room for a path of the least length, other than one that turns."""
+"""Sections without room for a path of the minimum length, unless it turns."""
 
 from collections.abc import Sequence
 
@@ -14,10 +14,10 @@ _WORTH_A_WORD = 0.1
 
 
 def short_share(layers: Sequence[Layer], machine: Machine) -> float:
-    """Share of the sections in pieces that are nowhere as long as the least path.
+    """Share of the sections in pieces that are shorter than the minimum path length.
 
-    The pieces are what the middle of a strand can reach inside the section; their length is the
-    longer side of the least rectangle about them. Curved layers do not count.
+    The pieces are the region that the middle of a strand can reach inside the section. Their length
+    is the longer side of their smallest bounding rectangle. Curved layers do not count.
     """
     half, whole, short = 0.5 * machine.fibre_width, 0.0, 0.0
     for layer in layers:
@@ -32,7 +32,7 @@ def short_share(layers: Sequence[Layer], machine: Machine) -> float:
 
 
 def about_short_pieces(layers: Sequence[Layer], machine: Machine) -> str:
-    """Words, begun with a semicolon, on a part that is short of room; none where it is not."""
+    """Words, starting with a semicolon, on a part that is short of room; empty if it is not."""
     share = short_share(layers, machine)
     if share < _WORTH_A_WORD:
         return ""
@@ -43,6 +43,6 @@ def about_short_pieces(layers: Sequence[Layer], machine: Machine) -> str:
 
 
 def _extent(piece: shapely.Polygon) -> float:
-    """Longer side of the least rectangle about a piece, mm."""
+    """Longer side of the smallest bounding rectangle of a piece, mm."""
     corners = shapely.get_coordinates(shapely.minimum_rotated_rectangle(piece))
     return float(np.linalg.norm(np.diff(corners, axis=0), axis=1).max(initial=0.0))

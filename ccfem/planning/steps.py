@@ -1,4 +1,4 @@
-"""Paths as they leave the planner: in steps of about a fibre width, none without length."""
+"""Final form of planned paths: steps of about a fibre width, and no paths of zero length."""
 
 from dataclasses import replace
 
@@ -10,23 +10,24 @@ from ccfem.toolpaths import Toolpaths
 __all__ = ["in_even_steps"]
 
 _SHORTEST = 1e-6
-"""Paths no longer than that, in steps, are none."""
+"""Length, in steps, up to which a path counts as having none."""
 
 
 def in_even_steps(toolpaths: Toolpaths, step: float) -> Toolpaths:
-    """Paths in steps no longer than a length, mm, and shorter only where they bend.
+    """Paths in steps no longer than a length, mm, and shorter only where paths bend.
 
     Parameters
     ----------
     toolpaths : Toolpaths
     step : float, mm
-        Machines that get more points than they need stutter; indices that are sampled at points
-        want no fewer.
+        Machines that get more points than they need stutter, while indices sampled at points need
+        no fewer.
 
     Returns
     -------
     Toolpaths
-        The same paths to 0.005 steps, corners and ends exactly; paths of no length are left out.
+        The same paths within 0.005 steps; corners and ends are exact. Paths of no length are left
+        out.
     """
     paths = toolpaths.select(toolpaths.lengths > _SHORTEST * step)
     if not len(paths):

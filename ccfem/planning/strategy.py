@@ -1,4 +1,4 @@
-"""What a strategy is."""
+"""The protocols that strategies follow."""
 
 from collections.abc import Sequence
 from dataclasses import dataclass
@@ -33,8 +33,8 @@ class Amount:
     most, least : float
         Values that lay the most and the least fibre.
     beyond : tuple of (str, float), default ()
-        Further parameters, each with the value that lays the most: where the first one at its most
-        lays too little, these go there one after the other, from the strategy's own values.
+        Further parameters, each with the value that lays the most. If the first parameter at its
+        most lays too little, these change in turn from the strategy's own values to that value.
     """
 
     parameter: str
@@ -56,26 +56,26 @@ class LayerStrategy(Protocol):
     """A frozen dataclass whose fields are the parameters, called for each layer with data.
 
     A strategy that works in the plane of a layer has a class variable ``in_plane = True``: `plan`
-    gives it curved layers laid flat. One that does not work so either, such as one that solves the
-    part again layer by layer, has ``flat_layers_only = True``: `plan` refuses curved layers before
-    any work.
+    then passes curved layers laid flat. A strategy that cannot plan on curved layers at all, such
+    as one that solves the part again layer by layer, has ``flat_layers_only = True``: `plan`
+    refuses curved layers before any work.
 
     Attributes
     ----------
     amount : Amount
         The parameter that sets how much fibre is laid.
     variants : mapping of str to parameters, optional
-        Other parameters than the defaults, by a short name, that the laws of strategies also run:
-        ``{"literal": {"fit": "literal"}}``. One for each branch that the defaults never take. A
-        point in them is the origin, about which the laws turn their part.
+        Further parameter sets, by a short name, that the tests common to all strategies also run:
+        ``{"literal": {"fit": "literal"}}``, one for each branch that the defaults never take. A
+        point in them must be the origin, about which these tests rotate their part.
     direction : str, optional
-        The parameter, in degrees, that gives a strategy a direction of its own.
+        The parameter, in degrees, that sets a direction independent of the stress.
     ignores_stress : bool, default False
-        Whether it lays the same under any load.
+        Whether its paths are the same under any load.
     crosses : bool, default False
-        Whether strands cross each other by intention.
+        Whether strands cross each other on purpose.
     on_axes : bool, default False
-        Whether paths keep to the axes of the layer, as those of pixels do, and so do not turn with
+        Whether paths follow the axes of the layer, as paths of pixels do, and so do not rotate with
         the part.
     """
 
@@ -88,20 +88,20 @@ class LayerStrategy(Protocol):
 
 @runtime_checkable
 class PartStrategy(Protocol):
-    """A frozen dataclass like a `LayerStrategy` that sees the whole part before its layers."""
+    """A frozen dataclass like a `LayerStrategy`, which sees the whole part before its layers."""
 
     amount: ClassVar[Amount]
 
     def for_part(
         self, stress: PartStress, layers: Sequence[Layer], machine: Machine
     ) -> LayerPlanner:
-        """Prepare what all layers share; what is returned plans each of them."""
+        """Prepare what all layers share, and return the planner of each layer."""
         ...
 
 
 @runtime_checkable
 class LengthStrategy(PartStrategy, Protocol):
-    """A `PartStrategy` that takes the length of fibre itself, so that nobody has to search it."""
+    """A `PartStrategy` that takes the length of fibre itself, so that no search is needed."""
 
     def natural_length(self, layers: Sequence[Layer], machine: Machine) -> float:
         """Length that its parameters ask for, mm per layer, known without planning."""
@@ -114,13 +114,13 @@ class LengthStrategy(PartStrategy, Protocol):
         machine: Machine,
         lengths: Sequence[float],
     ) -> "Sequence[tuple[Strategy, LayerPlanner]]":
-        """Plan to several lengths, mm per layer, by cutting one plan where that is as good.
+        """Plan to several lengths, mm per layer; one plan is cut for several where that is as good.
 
         Returns
         -------
         sequence of (Strategy, LayerPlanner)
-            For each length the strategy that lays it, and what plans the layers. None lays more
-            than asked; where even the whole plan is too short, all of it.
+            For each length, the strategy that lays it and the planner of the layers. No plan lays
+            more than asked for; if even the whole plan is too short, it is taken as a whole.
         """
         ...
 
@@ -136,7 +136,7 @@ class CasesStrategy(LengthStrategy, Protocol):
         machine: Machine,
         lengths: Sequence[float],
     ) -> "Sequence[tuple[Strategy, LayerPlanner]]":
-        """Plan for all cases; lengths and what is returned as in `to_lengths`."""
+        """Plan for all cases; lengths and result as in `to_lengths`."""
         ...
 
 

@@ -1,4 +1,4 @@
-"""What strategies have in common that plan all layers of a part at once, to a share of it."""
+"""Common parts of strategies that plan all layers of a part at once, to a share of its area."""
 
 from collections.abc import Sequence
 from dataclasses import dataclass
@@ -20,7 +20,7 @@ def full_length(layers: Sequence[Layer], machine: Machine) -> float:
 
 @dataclass(frozen=True)
 class WholePart:
-    """Paths of a whole part, handed out layer by layer: a `LayerPlanner`.
+    """Paths of a whole part, returned layer by layer: a `LayerPlanner`.
 
     Attributes
     ----------

@@ -1,1 +1,1 @@
-"""The print: layers of matrix and fibre, and all that a machine does to lay them, as a table."""
+"""The print: layers of matrix and fibre, and all machine actions that lay them, as a table."""

@@ -1,4 +1,4 @@
-"""What is laid beside a part: a skirt, a brim, a block to prime matrix on, a bar for a strand."""
+"""Auxiliary lines beside a part: skirt, brim, priming block, and a bar for a first strand."""
 
 from dataclasses import dataclass
 
@@ -15,7 +15,7 @@ from ccfem.toolpaths import FIBRE
 __all__ = ["Beside", "beside"]
 
 _GAP = 4.0
-"""From the part to the block and the bar, mm, where the head stands upright. Our choice."""
+"""Distance from the part to the block and the bar, mm, with an upright head. Our choice."""
 _UP = np.array([0.0, 0.0, 1.0])
 _BAR_LINES = 3
 """Lines of matrix under the first strand."""
@@ -33,7 +33,7 @@ class Beside:
         Loops round the first layer, the outermost first; those of the brim come last.
     block : tuple of arrays
         Loops of the block from its contour inwards, or lines to and fro; on each matrix layer as
-        many as its volume wants, at least two.
+        many as its volume needs, at least two.
     bar : tuple of arrays
         Lines of the bar, on each matrix layer below the first strand.
     strand : (2, 2) array or None
@@ -47,7 +47,7 @@ class Beside:
 
 
 def beside(plan: PrintPlan, machine: Machine) -> Beside:
-    """Choose the places of what is laid beside a part.
+    """Choose the places of the auxiliary lines beside a part.
 
     Parameters
     ----------
@@ -57,8 +57,8 @@ def beside(plan: PrintPlan, machine: Machine) -> Beside:
     Returns
     -------
     Beside
-        The block left of the part and of fibre that leaves it, the bar in front of it, the skirt
-        round all.
+        The block is left of the part and of fibre that leaves it, the bar in front of it, and the
+        skirt round all of them.
     """
     process, width = machine.process, machine.matrix_width
     low, high = plan.paths.points[:, :2].min(axis=0), plan.paths.points[:, :2].max(axis=0)
@@ -86,7 +86,7 @@ def beside(plan: PrintPlan, machine: Machine) -> Beside:
 
 
 def _head_aside(plan: PrintPlan, machine: Machine) -> float:
-    """How far a head that tilts on the part may reach beyond its tip, mm."""
+    """Reach of a tilting head beyond its tip, mm."""
     axes = poses(plan.paths.normals, _UP, machine)
     if not len(axes) or axes[:, 2].min() > 1.0 - 1e-9:
         return 0.0
@@ -96,7 +96,7 @@ def _head_aside(plan: PrintPlan, machine: Machine) -> float:
 
 
 def _block(right: float, middle: float, machine: Machine) -> list[FloatArray]:
-    """Lines of the block, whose right side lies here."""
+    """Lines of the block, given its right side."""
     process, width = machine.process, machine.matrix_width
     size = process.prime_size
     if process.prime == "block":
@@ -114,7 +114,7 @@ def _block(right: float, middle: float, machine: Machine) -> list[FloatArray]:
 
 
 def _skirt(plan: PrintPlan, others: tuple[FloatArray, ...], machine: Machine) -> list[FloatArray]:
-    """Loops round the first layer and what is laid beside it, and those that touch it."""
+    """Loops round the first layer and the lines beside it, and the loops that touch it."""
     process, width = machine.process, machine.matrix_width
     first = plan.paths.on_layer(int(plan.paths.layer.min()))
     lines = [line[:, :2] for line in first]

@@ -1,4 +1,4 @@
-"""What is laid on each curved layer, of the part or of its support."""
+"""Matrix and fibre on each curved layer, of the part or of its support."""
 
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
@@ -18,14 +18,14 @@ from ccfem.toolpaths import FIBRE, SUPPORT, Toolpaths
 __all__ = ["FilledLayer", "filled_layers", "in_order"]
 
 _LEAST = 0.2
-"""Least share of a layer's height that matrix fills, whatever its fibre takes. Our choice."""
+"""Least share of a layer's height that matrix fills, however much its fibre takes. Our choice."""
 _UNEVEN = 0.1
-"""Share by which rings are laid higher or lower than that, so that their layer comes out full."""
+"""Share by which rings may be higher or lower than that, so that their layer is exactly full."""
 
 
 @dataclass(frozen=True)
 class FilledLayer:
-    """A layer and what is laid on it.
+    """A layer, and the paths laid on it.
 
     Attributes
     ----------
@@ -37,7 +37,7 @@ class FilledLayer:
     piece : (K,) int array
         Piece of the layer (`Layer.component`) that each path lies on.
     missing : float, mm^3
-        That rings leave out, since they do not fit: below 0 what they lay in excess.
+        Volume that rings leave out because they do not fit; negative if they lay too much.
     """
 
     layer: Layer
@@ -92,7 +92,7 @@ def _on_top(layer: Layer, paths: Toolpaths) -> FilledLayer:
 
 
 def _full(filled: FilledLayer, machine: Machine) -> FilledLayer:
-    """Lower matrix by what fibre takes, and even out what rings lay too little or too much."""
+    """Reduce matrix by the volume of fibre, and correct what rings lay too little or too much."""
     layer, paths = filled.layer, filled.paths
     room = float(layer.areas @ layer.local_thickness[layer.triangles].mean(axis=1))
     strands = paths.kind == FIBRE
@@ -109,7 +109,7 @@ def _full(filled: FilledLayer, machine: Machine) -> FilledLayer:
 
 
 def in_order(paths: Toolpaths) -> tuple[Toolpaths, IntArray]:
-    """Paths in the order of printing, always on to the nearest end, and where their points were."""
+    """Paths in the order of printing, nearest end next, and the former places of their points."""
     if not len(paths):
         return paths, np.zeros(0, dtype=np.int64)
     lines = list(paths)

@@ -1,4 +1,4 @@
-"""A part of curved layers as it is printed: support, then each layer's matrix, then its fibre."""
+"""The print of a part of curved layers: support, then the matrix of each layer, then its fibre."""
 
 from collections.abc import Sequence
 from dataclasses import replace
@@ -24,7 +24,7 @@ from ccfem.toolpaths import FIBRE, Toolpaths
 __all__ = ["curved_plan"]
 
 _MISSING = 0.01
-"""Share of the part's volume that may be missing in silence."""
+"""Share of the part's volume that may be missing without a warning."""
 _UP = np.array([0.0, 0.0, 1.0])
 
 
@@ -38,15 +38,15 @@ def curved_plan(
 ) -> PrintPlan:
     """Plan the print of a part of curved layers.
 
-    Layer by layer matrix comes first, rings as high as the layer is where they lie, less the share
-    of its volume that its fibre takes; then the fibre, always on to the strand with the nearest
-    end. A layer of support is printed just before the layer of the part at its level. Pieces of
-    layers over which the head would touch others are printed before those, where nothing forbids it
+    In each layer matrix comes first, as rings of the local layer height, less the share of the
+    volume that the fibre takes. Then comes the fibre, always continuing with the strand of nearest
+    end. A layer of support is printed just before the layer of the part at its level. If the head
+    would touch other pieces while above a piece of a layer, that piece is printed first if possible
     (`ccfem.printing.islands`). The head stands along the normal of the layer, as far as
-    `Kinematics.tilt_limit` lets it, and leans where it would still touch something
-    (`ccfem.printing.head_lean`); what remains is said in the warnings. The nozzle is at the top of
-    a layer, half its thickness over its middle. The part stands in the middle of the bed, on its
-    support or on its lowest point.
+    `Kinematics.tilt_limit` allows, and leans where it would still touch something
+    (`ccfem.printing.head_lean`); remaining contact is stated in the warnings. The nozzle is at the
+    top of a layer, half its thickness above its middle. The part stands in the middle of the bed,
+    on its support or on its lowest point.
 
     Parameters
     ----------
@@ -58,10 +58,10 @@ def curved_plan(
         The part.
     machine : Machine
     build : sequence of 3 floats
-        Build direction.
-        Where layers look down from there, the part stands along their mean normal (`standing`).
+        Build direction. If layers face downwards from there, the part stands along their mean
+        normal (`standing`).
     support : SupportLayers, optional
-        Of these layers; the part stands as it does there.
+        Support of these layers; the part stands as it does there.
 
     Raises
     ------
@@ -149,7 +149,7 @@ def _of_step(
 def _shift(
     mesh: TetMesh, support: SupportLayers | None, frame: FloatArray, machine: Machine
 ) -> FloatArray:
-    """Where the origin of the printer lies, (3,), in the frame of the build direction."""
+    """Origin of the printer, (3,), in the frame of the build direction."""
     corners = mesh.points[np.unique(mesh.corners)] @ frame.T
     low, high = corners.min(axis=0), corners.max(axis=0)
     bed = float(low[2])
@@ -159,7 +159,7 @@ def _shift(
 
 
 def _stands(up: FloatArray, wanted: FloatArray, support: SupportLayers | None) -> list[str]:
-    """Say how the part stands, where it was not asked to, and on what."""
+    """Say how the part stands, if not as asked for, and on what."""
     said = []
     if up @ wanted < np.cos(np.radians(0.1)):
         x, y, z = up.tolist()

@@ -1,4 +1,4 @@
-"""How long moves take: trapezoids of speed that the corners between them allow."""
+"""Duration of moves, with trapezoidal speed profiles limited by the corners between them."""
 
 from itertools import pairwise
 
@@ -14,10 +14,10 @@ __all__ = ["durations", "waits"]
 def durations(moves: Moves, machine: Machine, heating: bool = True) -> FloatArray:
     """Seconds that each row takes.
 
-    Moves speed up and slow down at `Process.acceleration`. At a corner the nozzle is as fast as on
-    the arc that leaves it by `Process.junction` (junction deviation); it stands still where
-    filament alone is fed, at cuts and at changes of tools. Waiting tools cool and heat at their
-    rates of heating. The first heating of bed and nozzles is not counted.
+    Moves speed up and slow down at `Process.acceleration`. At a corner the speed is that on the arc
+    that deviates from it by `Process.junction` (junction deviation). The nozzle stands still while
+    only filament is fed, at cuts and at tool changes. Waiting tools cool and heat at their heating
+    rates. The first heating of bed and nozzles is not counted.
 
     Parameters
     ----------
@@ -36,7 +36,7 @@ def durations(moves: Moves, machine: Machine, heating: bool = True) -> FloatArra
     still = np.isin(moves.event, [CUT, WAIT])
     seconds[still] = moves.amount[still]
     moving = np.flatnonzero(np.isin(moves.event, [TRAVEL, LAY]) & (moves.length > 0.0))
-    # The way to the first place begins at an unknown one.
+    # The way to the first place starts at an unknown one.
     moving = moving[1:]
     halt = np.cumsum(np.isin(moves.event, [FEED, CUT, WAIT, WORK]).astype(np.int64))
     seconds[moving] = _motion(moves, moving, halt[moving], machine)
@@ -62,7 +62,7 @@ def _motion(moves: Moves, moving: IntArray, stops: IntArray, machine: Machine) -
     corner = most * process.junction * half / (1.0 - half)
     corner = np.minimum(corner, np.minimum(speed[1:], speed[:-1]) ** 2)
     corner[stops[1:] != stops[:-1]] = 0.0
-    # Squares of the speeds between the moves: what can be reached, and stopped from.
+    # Squares of the speeds between moves: reachable, and low enough to stop in time.
     square = np.concatenate([[0.0], corner, [0.0]]).tolist()
     gain = (2.0 * most * length).tolist()
     # Comparisons in place of min(): there are hundreds of thousands of moves.
@@ -104,4 +104,4 @@ def _add_heating(seconds: FloatArray, moves: Moves, machine: Machine) -> None:
         if moves.event[k] == WORK:
             seconds[k] += max(wanted[tool] - heat[tool], 0.0) / rate[tool]
             heat[tool] = max(heat[tool], wanted[tool])
-            # The time of the wait passes with the rows behind it.
+            # The time of the wait also counts for the rows after it.

@@ -1,4 +1,4 @@
-"""Lines of matrix in what a contour and a zigzag do not reach: narrow walls, and beside holes."""
+"""Lines of matrix that a contour and a zigzag leave out: in narrow walls and beside holes."""
 
 from collections.abc import Sequence
 
@@ -12,28 +12,28 @@ from ccfem.geometry.shapes import Region, open_lines, strings
 __all__ = ["gap_lines"]
 
 _NARROW = 0.3
-"""Least width of a gap that a line is laid in, in line widths. Our choice."""
+"""Least width of a gap that gets a line, in line widths. Our choice."""
 _SMALL = 1.0
 """Least area of a gap and length of a line in it, in squares of a line width and in widths."""
 _STEP = 0.2
-"""Distance of the points on the border of a gap, in line widths."""
+"""Distance between points on the border of a gap, in line widths."""
 _OPPOSITE = 0.8
-"""Points of the border face each other where their chord is this share of twice the distance to
-the middle: a line through the middle ends before it branches into corners."""
+"""Least chord between opposite points of the border, over twice the distance to the middle: a line
+through the middle ends before it branches into corners."""
 _ARC = 4
-"""Pieces of a quarter of a circle."""
+"""Segments per quarter circle."""
 
 
 def gap_lines(
     section: Region, lines: Sequence[FloatArray], width: float
 ) -> tuple[list[FloatArray], list[float]]:
-    """Lines along the middle of what lines of a width leave free of a section.
+    """Lines along the middle of the gaps that lines of a width leave in a section.
 
     Parameters
     ----------
     section : shapely (Multi)Polygon, mm
     lines : sequence of (n, 2) arrays, mm
-        What fills it so far.
+        Lines that fill it so far.
     width : float, mm
         Of a line, > 0.
 

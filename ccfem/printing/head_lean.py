@@ -1,4 +1,4 @@
-"""Leaning of the head where it would touch what is printed: as little as clears it."""
+"""Leaning of the head where it would touch printed material, by the least angle that clears it."""
 
 from dataclasses import dataclass
 
@@ -14,19 +14,19 @@ from ccfem.toolpaths import Toolpaths
 __all__ = ["Cleared", "Matter", "cleared", "touched_length"]
 
 _LEANS = (5.0, 10.0, 15.0, 20.0, 25.0, 30.0)
-"""How far, degrees, a head may lean from the normal of its layer. Our choice: half of what it may
-before its own side touches the layer (90 degrees less `Machine.head_angle`)."""
+"""Angles, degrees, by which a head may lean from the normal of its layer. Our choice: about half
+the angle at which its own side touches the layer (90 degrees less `Machine.head_angle`)."""
 _TURNS = (0.0, 30.0, -30.0, 60.0, -60.0, 90.0, -90.0, 135.0, -135.0, 180.0)
-"""Ways in which it leans, degrees from the way off what it touches."""
+"""Directions in which it leans, degrees from the direction away from the contact."""
 _RAMP = 8.0
-"""Length, mm, over which it leans and rights itself again."""
+"""Length, mm, over which it leans and returns upright."""
 _EVERY = 2.0
-"""Distance, mm, of the places along a path at which it is looked for what the head touches."""
+"""Distance, mm, between the places along a path at which contact is checked."""
 
 
 @dataclass(frozen=True)
 class Matter:
-    """Points that stand for what is printed, those of the first step first.
+    """Points that represent printed material, first step first.
 
     Attributes
     ----------
@@ -51,17 +51,17 @@ class Matter:
 
 @dataclass(frozen=True)
 class Cleared:
-    """Axes of a head that were turned, and what it touches.
+    """Axes of a head after leaning, and its remaining contact.
 
     Attributes
     ----------
     axes : (n, 3) array
         At every point of the paths.
     before, after : float, mm
-        Length of the paths along which the head touches what is printed, or the bed: along the axes
-        given, and along these.
+        Length of the paths along which the head touches printed material, or the bed: with the
+        given axes, and with these.
     place : (3,) array, mm, or None
-        Where it still does, the first one.
+        First place of remaining contact.
     """
 
     axes: FloatArray
@@ -71,7 +71,7 @@ class Cleared:
 
 
 def cleared(paths: Toolpaths, axes: FloatArray, matter: Matter, machine: Machine) -> Cleared:
-    """Let the head lean where it would touch what was printed in earlier steps.
+    """Let the head lean where it would touch material printed in earlier steps.
 
     Parameters
     ----------
@@ -109,7 +109,7 @@ def _first(tips: FloatArray, hits: BoolArray) -> FloatArray | None:
 
 
 def _samples(paths: Toolpaths) -> tuple[IntArray, FloatArray, IntArray]:
-    """Points of the paths about so far apart, the length that each stands for, and its step."""
+    """Points of the paths at about this distance, the length each stands for, and its step."""
     index, length = [np.zeros(0, dtype=np.int64)], [np.zeros(0)]
     for start, end in zip(paths.offsets[:-1].tolist(), paths.offsets[1:].tolist(), strict=True):
         along = along_line(paths.points[start:end])
@@ -139,7 +139,7 @@ def _turned(
     matter: Matter,
     machine: Machine,
 ) -> FloatArray:
-    """Axes that clear, by the least lean; those for which none does stay."""
+    """Axes that clear by the least lean; axes without any are not changed."""
     across = np.cross(axes, off)
     left = np.ones(len(tips), dtype=bool)
     found = axes.copy()
@@ -160,7 +160,7 @@ def _turned(
 
 
 def _way_off(tips: FloatArray, axes: FloatArray, at: IntArray, points: FloatArray) -> FloatArray:
-    """Direction square to each axis, away from a point that the head touches; else upright."""
+    """Direction normal to each axis, away from a point that the head touches; else upright."""
     way = np.where(at[:, None] >= 0, tips - points[np.maximum(at, 0)], [0.0, 0.0, 1.0])
     way -= np.einsum("kd,kd->k", way, axes)[:, None] * axes
     alike = np.linalg.norm(way, axis=1) < 1e-6
@@ -179,7 +179,7 @@ def _spread(paths: Toolpaths, axes: FloatArray, at: IntArray, turned: FloatArray
         away = np.abs(along[:, None] - along[at[own] - start])
         if paths.closed[number]:
             away = np.minimum(away, along[-1] - away)
-        # Full over the stretch that a sample stands for, then less and less.
+        # Full over the stretch that a sample stands for, then decreasing.
         share = np.clip(1.0 - np.maximum(away - _EVERY, 0.0) / _RAMP, 0.0, 1.0)
         total = np.maximum(share.max(axis=1), 1e-300)
         weight = share**4 / np.maximum((share**4).sum(axis=1), 1e-300)[:, None]

@@ -1,8 +1,8 @@
 """Islands, the connected pieces of curved layers, and an order in which the head clears them.
 
-Each island is printed after those that it rests on. Among the orders that this leaves, an island
-that would stand in the way of the head above another is printed after it, the worst first; what
-remains free goes layer by layer.
+Each island is printed after those that it rests on. Within this constraint, an island that would
+obstruct the head above another one is printed after it, worst cases first. The remaining order is
+layer by layer.
 """
 
 import heapq
@@ -21,11 +21,11 @@ from ccfem.printing.poses import poses
 __all__ = ["Islands", "clashes", "island_order", "islands_of", "rests_on", "steps_of"]
 
 _COARSE = 2.0
-"""Side, mm, of the cubes in each of which one point stands for an island."""
+"""Side, mm, of the cubes in which an island is represented by one point."""
 _PATCH = 6
 """Cubes along the side of a patch."""
 _LEAST = 1.0
-"""Area, mm^2, over which a head would touch another island: less is below what points resolve."""
+"""Least area, mm^2, of contact with another island: less is below the resolution of points."""
 
 
 @dataclass(frozen=True)
@@ -47,7 +47,7 @@ class Islands:
     offsets : (k + 1,) int array
         Where the points of each island begin.
     reach : (k,) array, mm
-        Within which the points of an island below lie that this one rests on.
+        Distance within which an island below has points if this one rests on it.
     """
 
     layer: IntArray
@@ -107,7 +107,7 @@ def islands_of(layers: Sequence[Layer]) -> Islands:
 
 
 def rests_on(islands: Islands) -> BoolArray:
-    """Which islands (k, k) the one of a row rests on: earlier ones near its lower side."""
+    """Mask (k, k): islands that the one of a row rests on, earlier ones near its lower side."""
     owner, found = islands.owner, np.zeros((len(islands),) * 2, dtype=bool)
     tree = cKDTree(islands.points)
     pairs = tree.query_pairs(float(islands.reach.max()), output_type="ndarray")
@@ -141,19 +141,19 @@ def clashes(islands: Islands, build: FloatArray, machine: Machine) -> FloatArray
 
 
 def island_order(rest: BoolArray, clash: FloatArray) -> IntArray:
-    """Order of islands: each after those that it rests on, with little in the way of the head.
+    """Order of islands: each after those it rests on, with few obstructions of the head.
 
     Parameters
     ----------
     rest : (k, k) bool array
-        Which the island of a row rests on; those have lower numbers.
+        Islands that the one of a row rests on; these have lower numbers.
     clash : (k, k) array, mm^2
-        Over which the head above the island of a row would touch another one.
+        Area over which the head above the island of a row would touch another one.
 
     Returns
     -------
     (k,) int array
-        Islands from the first printed to the last; ascending where nothing speaks against it.
+        Islands from the first printed to the last; in ascending order unless there is a reason.
     """
     count = len(rest)
     after = np.eye(count, dtype=bool)  # (a, b): b comes after a, or is a
@@ -175,7 +175,7 @@ def island_order(rest: BoolArray, clash: FloatArray) -> IntArray:
 
 
 def steps_of(islands: Islands, order: IntArray, clash: FloatArray) -> list[IntArray]:
-    """Islands that are printed at one go: of one layer, in a row, clear of each other."""
+    """Islands that are printed together: consecutive ones of one layer, clear of each other."""
     steps: list[list[int]] = []
     for k in order.tolist():
         last = steps[-1] if steps else []
@@ -188,7 +188,7 @@ def steps_of(islands: Islands, order: IntArray, clash: FloatArray) -> list[IntAr
 
 
 def _lowest_first(edges: Sequence[tuple[int, int]], count: int) -> IntArray:
-    """Order that obeys edges (first, then), of the free ones always the lowest number first."""
+    """Order that obeys edges (first, then); of the free ones, the lowest number comes first."""
     follow: list[list[int]] = [[] for _ in range(count)]
     waiting = [0] * count
     for first, then in edges:

@@ -1,4 +1,4 @@
-"""What is laid in one layer of a print, matrix or fibre, in the order of printing."""
+"""Paths of one layer of a print, matrix or fibre, in the order of printing."""
 
 from collections.abc import Sequence
 from dataclasses import dataclass, field
@@ -46,7 +46,7 @@ class Below:
 
 @dataclass(frozen=True)
 class LaidLayer:
-    """Paths of a layer, and what became of strands that were planned on it.
+    """Paths of a layer, and the fate of the strands planned on it.
 
     Attributes
     ----------
@@ -57,7 +57,7 @@ class LaidLayer:
         Lines of matrix in place of strands that are too short for the cutter.
     warning : str
     dropped, outside : float, mm
-        Length that is left out, and that lies outside the part.
+        Length that is left out, and length outside the part.
     """
 
     paths: Toolpaths
@@ -77,7 +77,7 @@ def matrix_layer(
     thickness: float,
     machine: Machine,
 ) -> LaidLayer:
-    """Lay matrix over what is below, and pads.
+    """Lay matrix over the layers below, and pads.
 
     Parameters
     ----------
@@ -113,7 +113,7 @@ def fibre_layer(
     thickness: float,
     machine: Machine,
 ) -> tuple[LaidLayer, Below]:
-    """Lay strands (n, 2), and matrix in place of those that are too short; and what is below then.
+    """Lay strands (n, 2), with matrix instead of those too short; also return the new `Below`.
 
     Parameters are those of `matrix_layer`, and the border of the part on the layer.
     """
@@ -135,10 +135,10 @@ def fibre_layer(
 def _sorted_by_length(
     lines: Sequence[FloatArray], machine: Machine
 ) -> tuple[list[FloatArray], list[FloatArray]]:
-    """Strands that matrix is laid instead of, and those that the cutter allows.
+    """Strands that are replaced by matrix, and those that the cutter allows.
 
-    Of a strand that is left out, and in layers too low for a line of matrix, the matrix above fills
-    the place.
+    Where strands are left out, and in layers too low for a line of matrix, the matrix above fills
+    their place.
     """
     limit = max(machine.tail, machine.minimum_length) * (1.0 - SHORT)
     whole = [line for line in lines if line_length(line) >= limit]

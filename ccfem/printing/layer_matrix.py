@@ -1,4 +1,4 @@
-"""Matrix of layers, flat or curved: rings parallel to the border that fill it."""
+"""Matrix of layers, flat or curved: rings parallel to the border that fill them."""
 
 from collections.abc import Sequence
 from dataclasses import replace
@@ -15,7 +15,7 @@ from ccfem.toolpaths import MATRIX, Toolpaths
 __all__ = ["layer_matrix"]
 
 _HALF_WIDTHS = 0.5
-"""The outermost ring lies so many widths inside the border."""
+"""Distance of the outermost ring from the border, in widths."""
 
 
 def layer_matrix(layers: Sequence[Layer], machine: Machine) -> Toolpaths:

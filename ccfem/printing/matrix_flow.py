@@ -1,13 +1,13 @@
-"""How much matrix a line lays where it passes over fibre: the layer comes out full, not more.
+"""Flow of matrix over fibre: lines are laid so that the layer comes out exactly full.
 
 Strands do not fill the layer that they lie in, and where they cross they stand higher than it. The
-matrix above fills up to its own top: at a place x with rho mm of strand to the mm^2 its height is
+matrix above fills up to its own top. At a place x with rho mm of strand per mm^2 its height is
 
     t(x) = h_m + h_f - A rho(x),
 
 with the heights h_m of the matrix layer and h_f of the fibre below it, and the section A of a
-strand. All of a layer is then scaled, by at most a tenth, so that what it lays is what its section
-has room for: a zigzag does not pass everywhere exactly once.
+strand. The whole layer is then scaled, by at most a tenth, so that its volume is the free volume of
+its section: a zigzag does not pass exactly once everywhere.
 """
 
 from collections.abc import Sequence
@@ -27,17 +27,17 @@ from ccfem.toolpaths import Toolpaths
 __all__ = ["THIN", "pad_flow", "with_flow"]
 
 _PIECE = 2.0
-"""Longest piece, mm, over which the height is taken as one."""
+"""Longest piece, mm, over which the height is constant."""
 _STEP = 0.05
 """Steps in which the height changes along a line, over that of the layer."""
 THIN = 0.05
 """Least height, mm, of matrix over a strand, where its layer is as high. Our choice."""
 _SCALE = 1.1
-"""Most by which a layer is scaled: where lines do not reach a tenth of a section, as between walls
+"""Largest factor by which a layer is scaled. If lines miss a tenth of a section, as between walls
 nearer than a line is wide, more flow would not reach it either. Our choice."""
 _THIN, _TOO_THIN = 0.01, 0.1
-"""Shares of a layer's lines that may be thinner, since fibre below stands too high, without a word
-and with a warning. Our choice."""
+"""Shares of a layer's lines that may be thinner, because fibre below stands too high: without a
+warning, and with one. Our choice."""
 
 
 def with_flow(
@@ -94,7 +94,7 @@ def with_flow(
     least = min(THIN, height)
     warning = _check(volume, length, height, below, least, machine)
     wanted = np.maximum(volume, least)
-    # Of neighbouring pieces in one step of the height only the first keeps its point.
+    # Of neighbouring pieces with the same height level only the first keeps its point.
     level = np.full(len(points), -1)
     level[start] = np.round(wanted / (_STEP * height)).astype(np.int64)
     keep = np.append(True, np.diff(segment) > 0)
@@ -166,7 +166,7 @@ def _check(
     least: float,
     machine: Machine,
 ) -> str:
-    """Raise where strands stand higher than the matrix above them on too much of the layer."""
+    """Refuse strands that stand higher than the matrix above them on too much of the layer."""
     thin = length[volume < least].sum() / length.sum()
     if thin <= _THIN:
         return ""

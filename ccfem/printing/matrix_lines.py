@@ -1,4 +1,4 @@
-"""Where the lines of matrix layers lie: a contour, a zigzag inside it, and lines in the gaps."""
+"""Lines of matrix layers: a contour, a zigzag inside it, and lines in the gaps."""
 
 from collections.abc import Sequence
 from dataclasses import dataclass, field
@@ -26,7 +26,7 @@ _OVERLAP = 0.25
 
 @dataclass(frozen=True)
 class MatrixFill:
-    """What fills a layer of matrix, on the bed.
+    """Lines that fill a layer of matrix, on the bed.
 
     Attributes
     ----------
@@ -48,7 +48,7 @@ def matrix_fills(
     origin: FloatArray,
     machine: Machine,
 ) -> list[MatrixFill | None]:
-    """Find what fills each slab of matrix; None for one of fibre.
+    """Find the lines that fill each slab of matrix; None for a slab of fibre.
 
     The zigzag turns from one layer of matrix to the next.
 
@@ -61,7 +61,7 @@ def matrix_fills(
     frame : (3, 3) array
         Rows are the axes of the bed in the frame of the mesh.
     origin : (2,) array, mm
-        What is taken off X and Y along these axes.
+        Subtracted from X and Y along these axes.
     machine : Machine
     """
     width, profile = machine.matrix_width, machine.gcode

@@ -1,4 +1,4 @@
-"""What a machine does from the first line to the last: a table, one row a move or an event."""
+"""All actions of a machine from the first line to the last: a table, one row a move or event."""
 
 from dataclasses import dataclass
 
@@ -16,12 +16,12 @@ EVENTS = (
     *("travel", "lay", "feed", "cut", "tool", "standby", "preheat", "heat", "work"),
     *("heat bed", "fan", "wait", "layer", "start", "end"),
 )
-"""What a row is: moves first, then what happens where the nozzle stands."""
+"""Kinds of rows: moves first, then events during which the nozzle stands still."""
 TRAVEL, LAY, FEED, CUT, TOOL, STANDBY, PREHEAT, HEAT, WORK = range(9)
 HEAT_BED, FAN, WAIT, LAYER, PATH_START, PATH_END = range(9, 15)
 
 ROLES = ("travel", "contour", "infill", "fibre", "tail", "block", "skirt", "pad", "short")
-"""What is laid: the tail is fibre behind its cut, short what is too short for the cutter."""
+"""Roles of laid lines: "tail" is fibre after its cut, "short" replaces strands too short to cut."""
 
 
 def role(name: str) -> int:
@@ -38,12 +38,11 @@ class Moves:
     event : (n,) int array
         Index into `EVENTS`.
     place, normal : (n, 3) arrays, mm
-        Where the nozzle is at the end of a row, rounded to 0.001 mm, and the direction that its
-        head stands in.
+        Position of the nozzle at the end of a row, rounded to 0.001 mm, and direction of its head.
     tool : (n,) int array
-        0 for matrix, 1 for fibre; of a tool's event the tool meant.
+        0 for matrix, 1 for fibre; for an event of a tool, that tool.
     feed, beside : (n,) arrays, mm
-        Filament that the row feeds: matrix by tool 0, fibre by tool 1; and matrix that the fibre's
+        Filament that the row feeds: matrix by tool 0, fibre by tool 1; and matrix that the fibre
         head feeds with it.
     speed : (n,) array, mm/s
         Of moves, and of feeds without a move.
@@ -55,7 +54,7 @@ class Moves:
         Index into `ROLES`.
     layer : (n,) int array
     strand : (n,) int array
-        Number of the strand that is laid; -1 for all else, and for strands beside the part.
+        Number of the strand that is laid; -1 for other rows, and for strands beside the part.
     """
 
     event: IntArray
@@ -91,7 +90,7 @@ class Moves:
 
     @property
     def length(self) -> FloatArray:
-        """Way of the nozzle in each row, (n,), mm."""
+        """Distance that the nozzle moves in each row, (n,), mm."""
         return np.asarray(np.linalg.norm(self.place - self.start, axis=1))
 
     @property

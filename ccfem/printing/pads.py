@@ -1,4 +1,4 @@
-"""Pads under fibre that has no part below it: columns of matrix down to the bed or to the part."""
+"""Pads under fibre without a part below it: columns of matrix down to the bed or the part."""
 
 from collections.abc import Sequence
 
@@ -15,25 +15,25 @@ from ccfem.machine.machine import Machine
 __all__ = ["border_crossings", "cut_at_border", "pad_lines", "pad_regions"]
 
 _MORE = 1.0
-"""A pad reaches so far beyond the strands on it, mm. Our choice."""
+"""Width by which a pad extends beyond the strands on it, mm. Our choice."""
 _CLEAR = 0.7
-"""From a pad to the part, mm (Aura)."""
+"""Distance from a pad to the part, mm (Aura)."""
 _SHARE = 0.25
 """Share of a pad that is filled (Aura)."""
 _SOLID = 2
-"""So many layers of matrix under a strand are solid. Our choice."""
+"""Number of solid layers of matrix under a strand. Our choice."""
 _SPAN = 2.0
-"""Longest way over the gap between a pad and the part, mm; 3 mm is what a bent strand may hang, and
-lines of matrix do not reach every corner of either."""
+"""Longest way over the gap between a pad and the part, mm. A bent strand may hang over 3 mm, and
+lines of matrix do not reach every corner of pad and part."""
 _ARC = 4
-"""Pieces of a quarter of a circle in the borders of pads."""
+"""Segments per quarter circle in the borders of pads."""
 _NONE = shapely.Polygon()
 
 
 def pad_regions(
     sections: Sequence[Region | None], strands: Sequence[Sequence[FloatArray]], machine: Machine
 ) -> list[tuple[Region, Region]]:
-    """Where each layer of matrix needs pads, and where they are solid.
+    """Regions where each layer of matrix needs pads, and where they are solid.
 
     Parameters
     ----------
@@ -69,7 +69,7 @@ def pad_regions(
         if wide.is_empty:
             found.append((_NONE, _NONE))
         else:
-            # Clear of the part, but for what lies under strands that run along its border.
+            # Clear of the part, except below strands that run along its border.
             room = shapely.buffer(section, _CLEAR, quad_segs=_ARC)
             room = shapely.union(shapely.difference(room, along), section)
             solid = _union(recent[:_SOLID])

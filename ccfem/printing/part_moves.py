@@ -1,4 +1,4 @@
-"""From a plan to all that the machine does: one chain for every file that is written."""
+"""From a plan to all actions of the machine: one sequence for every file that is written."""
 
 from dataclasses import replace
 
@@ -30,7 +30,7 @@ def part_moves(plan: PrintPlan, machine: Machine) -> Moves:
     ----------
     plan : PrintPlan
     machine : Machine
-        The one that the plan was made for.
+        The machine that the plan was made for.
 
     Raises
     ------
@@ -77,12 +77,12 @@ def _speed(below: float, machine: Machine) -> float:
 
 
 def _numbered(moves: Moves) -> Moves:
-    """Give a number to strands alone, not to the matrix between them."""
+    """Give numbers to strands only, not to the matrix between them."""
     return replace(moves, strand=np.where(moves.tool == 1, moves.strand, -1))
 
 
 class _Site:
-    """How high block and bar are by now; beside curved layers their own are so high at most."""
+    """Present height of block and bar; beside curved layers the height of their own layers."""
 
     def __init__(self, around: Beside, highest: float | None) -> None:
         self.around, self.height, self.bar = around, 0.0, 0.0
@@ -91,10 +91,10 @@ class _Site:
     def prime(
         self, recorder: Recorder, top: float, first: bool, changed: bool, machine: Machine
     ) -> None:
-        """Lay block and bar, higher by what they lack to a top; the skirt with their first layer.
+        """Lay block and bar up to a top; the skirt with their first layer.
 
-        Tops of curved layers do not grow evenly: beside them this takes several layers of the
-        block, or one more after a change of tools though the top is reached.
+        Tops of curved layers do not grow evenly. Beside them this takes several layers of the
+        block, or one more after a tool change even if the top is reached.
         """
         levels = np.array([top])
         if self.highest is not None:

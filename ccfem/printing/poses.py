@@ -1,4 +1,4 @@
-"""How a head stands on curved layers: along their normal, as far as the machine lets it tilt."""
+"""Direction of a head on curved layers: along their normal, as far as the machine can tilt."""
 
 import numpy as np
 
@@ -19,7 +19,7 @@ def poses(normals: FloatArray, build: FloatArray, machine: Machine) -> FloatArra
 
 
 def limited_tilt(normals: FloatArray, limit: float, build: FloatArray = _UP) -> FloatArray:
-    """Turn directions (n, 3) that tilt from the build direction by more than a limit, degrees."""
+    """Rotate directions (n, 3) that tilt from the build direction by more than a limit, degrees."""
     along = normals @ build
     aside = normals - along[:, None] * build
     size = np.linalg.norm(aside, axis=1)
@@ -29,7 +29,7 @@ def limited_tilt(normals: FloatArray, limit: float, build: FloatArray = _UP) -> 
 
 
 def under_bed(tips: FloatArray, axes: FloatArray, machine: Machine) -> BoolArray:
-    """Whether the side of a tilted head (n,) reaches below the bed, the plane z = 0."""
+    """Mask (n,) of tilted heads whose side reaches below the bed, the plane z = 0."""
     half = np.radians(machine.head_angle)
     lean = np.arctan2(np.hypot(axes[:, 0], axes[:, 1]), axes[:, 2])
     side = machine.head_length / np.cos(half) * np.cos(np.minimum(lean + half, np.pi))

@@ -1,4 +1,4 @@
-"""A waiting tool is heated again before it is needed, so that the other one does not wait."""
+"""Preheating of a waiting tool, so that the print does not wait for it."""
 
 from dataclasses import fields
 
@@ -12,10 +12,10 @@ __all__ = ["preheated"]
 
 
 def preheated(moves: Moves, machine: Machine) -> Moves:
-    """Put a row PREHEAT ahead of each change back to a tool that was set to standby.
+    """Insert a row PREHEAT before each change back to a tool that was set to standby.
 
-    It stands before the last row that begins the time ahead that heating takes, (work - standby)
-    over the rate, or right behind the change away where that is later.
+    It is inserted before the last row that starts at least the heating time, (work - standby) over
+    the rate, ahead of the change; or right after the change away if that is later.
 
     Parameters
     ----------
@@ -47,12 +47,12 @@ def preheated(moves: Moves, machine: Machine) -> Moves:
 
 
 def _waiting(tool: int, machine: Machine) -> float:
-    """Temperature of a tool before its first use; that of T0 is waited for at the start."""
+    """Temperature of a tool before its first use; the start of the file waits for that of T0."""
     return machine.fibre_standby if tool else machine.matrix_temperature + 1e3
 
 
 def _with_rows(moves: Moves, places: list[int], values: list[float], tools: list[int]) -> Moves:
-    """Put rows PREHEAT before those at some places."""
+    """Insert rows PREHEAT before the rows at the given places."""
     if not places:
         return moves
     found = {}

@@ -10,7 +10,7 @@ __all__ = ["create", "named"]
 
 
 def named() -> Mapping[str, type[Strategy]]:
-    """Every strategy by name: modules of this package, and entry points ``ccfem.strategies``."""
+    """Every strategy by name: modules of this package and entry points ``ccfem.strategies``."""
     return plugins.found(__name__, "ccfem.strategies")
 
 
@@ -20,7 +20,8 @@ def create(name: str, parameters: Mapping[str, Any] | None = None) -> Strategy:
     Raises
     ------
     InputError
-        For an unknown strategy or parameter, the known ones listed; for a value of a wrong type.
+        For an unknown strategy or parameter (the message lists the known ones), and for a value of
+        the wrong type.
     """
     return plugins.create("strategy", named(), name, parameters)
 

@@ -21,37 +21,37 @@ from ccfem.raster.patterns import Regions, concentric_regions
 __all__ = ["Concentric"]
 
 _CLOSEST = 0.6
-"""Least distance of filled rings, in spacings [Plocher et al. 2022]."""
+"""Least distance between filled rings, in spacings [Plocher et al. 2022]."""
 
 
 @dataclass(frozen=True)
 class Concentric(Infill):
-    """Rings parallel to every border of the section; it ignores the stress.
+    """Rings parallel to every border of the section. The stress is ignored.
 
-    The first ring lies half a fibre width inside the border; opposite sides of a ring stay a fibre
-    width apart, which leaves a gap along the middle where no further ring fits. This is the fill
-    that slicers call concentric, and model C of Chen et al. 2021, figure 3.
+    The first ring lies half a fibre width inside the border. Opposite sides of a ring stay a fibre
+    width apart, so a gap remains along the middle where no further ring fits. Slicers call this
+    fill concentric; it is model C of Chen et al. 2021, figure 3.
 
     Attributes
     ----------
     spacing : float, default 1
-        Distance of neighbouring rings in fibre widths, at least 1.
+        Distance between neighbouring rings in fibre widths, at least 1.
     rings : int, optional
         Number of rings along each border; by default as many as fit.
     joined : bool, default True
-        Whether nested rings are joined by short ramps into one strand, as printers that cut the
-        fibre do. Otherwise every ring is a closed path of its own.
+        Whether short ramps join nested rings to one strand, as on printers that cut the fibre.
+        Otherwise every ring is a closed path of its own.
     start : tuple of 2 floats, mm, optional
-        Point in the plane of the layer that the outermost rings start next to; by default the
-        middle of the first edge of the layer's border.
+        Point in the plane of the layer next to which the outermost rings start. By default it is
+        the middle of the first edge of the layer's border.
     filled : bool, default False
-        Whether the rings run sharply into corners and to within 0.6 spacings of each other, and
-        lines along the middle fill what they leave, as Plocher et al. 2022 have it: less
-        gaps, some overlap. Not with `joined`.
+        Whether rings run sharply into corners and as near as 0.6 spacings to each other, with lines
+        along the middle in what they leave open, as in Plocher et al. 2022. Gaps shrink; some
+        strands overlap. Not with `joined`.
     minimum_length : float, mm, optional
         Shorter paths are dropped; by default the shortest that the machine can cut.
     mode : {"polyline", "raster"}, default "polyline"
-        Polylines; or paths of pixels a spacing wide, as in the paper: see `ccfem.raster`.
+        Polylines; or paths of pixels one spacing wide, as in the paper: see `ccfem.raster`.
     turns : {"tight", "printable", "cut"}, default "tight"
         As in `Zigzag`.
     """
@@ -85,7 +85,7 @@ class Concentric(Infill):
     def strands(
         self, layer: Layer, stress: LayerStress, machine: Machine, prepared: None
     ) -> list[FloatArray]:
-        """Rings, or what joins them."""
+        """Rings, or the strands that join them."""
         width, spacing = machine.fibre_width, self.spacing * machine.fibre_width
         if self.filled:
             return concentric(layer.plane.polygon, spacing, _CLOSEST, 0.5 * width, self.rings)

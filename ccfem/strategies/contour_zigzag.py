@@ -1,4 +1,4 @@
-"""Baseline: contours along the border, a zigzag inside."""
+"""Baseline: contours along the border, and a zigzag inside them."""
 
 from collections.abc import Mapping
 from dataclasses import dataclass
@@ -21,15 +21,15 @@ __all__ = ["ContourZigzag"]
 
 @dataclass(frozen=True)
 class ContourZigzag:
-    """Rings along every border, and linked parallel lines in what is left.
+    """Rings along every border, and linked parallel lines inside them. The stress is ignored.
 
-    What commercial fibre slicers lay, and the load-independent paths that Chen et al. 2021 compare
-    theirs with (table 2). It ignores the stress.
+    Commercial fibre slicers lay this pattern. Chen et al. 2021 compare their paths with it as the
+    load-independent ones (table 2).
 
     Attributes
     ----------
     spacing : float, default 1
-        Distance of the zigzag's lines in fibre widths, at least 1. The contours stay one fibre
+        Distance between the zigzag's lines in fibre widths, at least 1. The contours stay one fibre
         width apart.
     contours : int, default 2
         Number of rings along each border.

@@ -1,6 +1,6 @@
-"""Lines equally spaced from one streamline of the stress a member: a strategy to compare with.
+"""Equally spaced lines beside one streamline of the stress in each member: for comparison.
 
-One of the three ways that Wang et al. 2021 show beside their own, after V. S.
+Wang et al. 2021 show three strategies beside their own; this is one of them, after V. S.
 Papapetrou, C. Patel, A. Y. Tamijani, Stiffness-based optimization framework for the topology and
 fiber paths of continuous fiber composites, Composites Part B 183 (2020) 107681 (EQS).
 """
@@ -32,39 +32,39 @@ __all__ = ["Eqs"]
 _STEP = 0.25
 """Step along the seed line, in fibre widths."""
 _CANDIDATES = 20
-"""Most stressed places whose streamlines are compared."""
+"""Number of most stressed places whose streamlines are compared."""
 _OFF = 0.005
-"""Largest deviation from the distance, in fibre widths."""
+"""Largest error of the distance between lines, in fibre widths."""
 _SEEDS = 100
-"""Most seed lines of a layer."""
+"""Largest number of seed lines on a layer."""
 _SHORTEST = 10.0
 """Shortest seed line after the first, in fibre widths."""
 _CLEAR = 0.99
-"""Share of the spacing that the lines of one seed keep from those of another."""
+"""Distance that the lines of one seed keep from those of another, in spacings."""
 _ALONG = 45.0
-"""Largest angle, degrees, from a line to the stress: beyond, it runs across its member."""
+"""Largest angle, degrees, between a line and the stress; at larger ones it crosses its member."""
 _BESIDE = 1.25
-"""Distance, in spacings, up to which a line lies beside the one before."""
+"""Distance, in spacings, up to which a line counts as beside the previous one."""
 _PIECE = 1.0
 """Length, in fibre widths, of the pieces of a line that are kept or left out."""
 
 
 @dataclass(frozen=True)
 class Eqs:
-    """Seed lines along the stress, one a member, and lines at whole multiples of the spacing.
+    """One seed line along the stress in each member, and lines at multiples of the spacing from it.
 
-    A seed line is the longest of the streamlines through the twenty most stressed places of what is
-    left of the layer, or the one through a given point; it stops where it comes within a fibre
-    width of itself, and does not wind round a hole again and again. The others are iso-lines of the
-    distance from it, to its sides: exactly parallel, each as far as it lies beside the one before
-    and within 45 degrees of the stress, so that they keep to the member. Then the next seed line is
-    laid in what is left, until none is as long as ten fibre widths. Where members meet, their lines
-    end: the joints stay open, as the paper shows.
+    A seed line is the longest of the streamlines through the twenty most stressed places in the
+    free part of the layer, or the one through a given point. It stops where it comes within a fibre
+    width of itself, so it does not circle a hole repeatedly. The other lines are iso-lines of the
+    distance from it on both sides, so they are exactly parallel. Each is kept only where it lies
+    beside the previous one and within 45 degrees of the stress, so that it stays in the member.
+    The next seed line is then laid in what is still free, until none is ten fibre widths long.
+    Lines end where members meet: the joints stay open, as in the paper.
 
     Attributes
     ----------
     spacing : float, default 1
-        Distance of neighbouring lines in fibre widths, at least 1.
+        Distance between neighbouring lines in fibre widths, at least 1.
     seed : tuple of 2 floats, mm, optional
         Point in the plane of the layer that the first seed line goes through.
     minimum_length : float, mm, optional
@@ -120,7 +120,7 @@ def _stressed_places(layer: Layer, stress: LayerStress, region: Region) -> Float
 def _seed_line(
     layer: Layer, stress: LayerStress, starts: FloatArray, region: Region, width: float
 ) -> FloatArray:
-    """Longest streamline (n, 2) through one of some places, within a region; empty without any."""
+    """Longest streamline (n, 2) in a region through one of the start points; empty if none."""
     plane = in_plane(stress.nodal, layer.plane.frame)
     lines = streamlines(layer.plane.points, layer.triangles, plane, starts, _STEP * width)
     longest = np.zeros((0, 2))
@@ -146,10 +146,10 @@ def _family(
     off = _OFF * width
     curve = shapely.simplify(shapely.LineString(seed), 0.5 * off)
     found, before = [seed], [seed]
-    # Round its ends, too, the distance has iso-lines: they run across the stress and are left out.
+    # The iso-lines also go round the ends of the seed line: there they cross the stress.
     for level in range(1, int(shapely.hausdorff_distance(region, curve) / pitch) + 1):
         distance = level * pitch
-        # Of arcs by chords: as many that these are off by no more than half of what is allowed.
+        # Chords stand for arcs: enough of them to use up no more than half of the allowed error.
         quarter = int(np.ceil(0.25 * np.pi / np.sqrt(off / distance)))
         around = shapely.boundary(shapely.buffer(curve, distance, quad_segs=max(quarter, 4)))
         curves = [shapely.LineString(line) for line in before]
@@ -164,7 +164,7 @@ def _family(
 
 
 def _along_stress(lines: list[FloatArray], stress: LayerStress, width: float) -> list[FloatArray]:
-    """Parts of lines (n, 2) that run along the stress, or where it has no direction."""
+    """Parts of lines (n, 2) that run along the stress, or where the stress has no direction."""
     if not lines:
         return []
     counts = [max(1, round(line_length(line) / (_PIECE * width))) for line in lines]

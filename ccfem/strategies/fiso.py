@@ -1,4 +1,4 @@
-"""First in, spiral out: one strand that begins in the middle of a region and winds to its border.
+"""First in, spiral out: one strand that starts in the middle of a region and winds to its border.
 
 H. Kipping, T. Schueppstuhl, Load-oriented nonplanar additive manufacturing method for optimized
 continuous carbon fiber parts, Materials 16 (2023) 998.
@@ -25,38 +25,38 @@ from ccfem.toolpaths import Toolpaths
 __all__ = ["Fiso"]
 
 _NARROW = 0.5
-"""Least distance of opposite sides of a contour, in spacings, where laps keep a radius."""
+"""Least distance between opposite sides of a contour, in spacings, where laps keep a radius."""
 
 
 @dataclass(frozen=True)
 class Fiso:
-    """Contours of a region joined to one strand, so that it is never cut inside; no stress needed.
+    """Contours of a region joined to one strand, which is never cut inside it. No stress is needed.
 
-    The contours lie half a spacing from the border and at every spacing further in. Those on the
-    way from the border to the point farthest from it become laps: the fibre begins at the
-    innermost and steps outward from each to the next, every lap against the last. All others are
-    merged into their neighbours. A region is what hangs together where it is as wide as a strand.
+    The contours lie half a spacing from the border and at every further spacing inwards. Those
+    between the border and the point farthest from it become laps: the fibre starts at the innermost
+    one and steps outwards from lap to lap. All other contours are merged into their neighbours.
+    A region is a connected part of the section that is at least as wide as a strand.
 
     Attributes
     ----------
     spacing : float, default 1
-        Distance of neighbouring contours in fibre widths, at least 1.
+        Distance between neighbouring contours in fibre widths, at least 1.
     closest : float, default 0
-        Least distance of opposite sides of a contour, in spacings, from 0 to 1. As published, 0:
-        along the ridge between two borders two strands may lie nearer than a width. With 1 none
-        does, and a gap up to three spacings wide stays open there.
+        Least distance between opposite sides of a contour, in spacings, from 0 to 1. With 0, as
+        published, two strands may lie nearer than a width along the ridge between two borders. With
+        1 none does, but a gap up to three spacings wide stays open there.
     least_radius : float, mm, default 0
-        Least radius of the corners of contours and of what leads from lap to lap, which run in one
-        sense then; it leaves the corners of the section and the middle of small regions open.
-        Where contours are merged, turns stay half a spacing wide. With 0, as published, all turns
-        are so tight.
+        Least radius of the corners of contours and of the ramps between laps. All laps then run in
+        one sense, and the corners of the section and the middle of small regions stay open. Turns
+        where contours are merged are still half a spacing wide. With 0, as published, all turns
+        are that tight.
     entry : bool, default False
-        Whether the strand begins at the border, too, and goes straight to the middle through the
+        Whether the strand also starts at the border, and goes straight to the middle through the
         openings of the laps. Not with `least_radius`.
     minimum_length : float, mm, optional
         Shorter paths are dropped; by default the shortest that the machine can cut.
     turns : {"tight", "printable", "cut"}, default "tight"
-        As in `Zigzag`. Unless "tight", contours as long as the cutter's shortest strand are not
+        As in `Zigzag`. Unless this is "tight", contours that are long enough for the cutter are not
         merged.
     """
 

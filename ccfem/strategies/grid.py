@@ -1,4 +1,4 @@
-"""Shells and parallel straight lines: the grids of Plocher et al. 2022.
+"""Shells, and parallel straight lines inside them: the grids of Plocher et al. 2022.
 
 J. Plocher, J.-B. Wioland, A. Panesar, Additive manufacturing with fibre-reinforcement: design
 guidelines and investigation into the influence of infill patterns, Rapid Prototyping Journal 28
@@ -31,30 +31,30 @@ __all__ = ["Grid"]
 
 @dataclass(frozen=True)
 class Grid(Infill):
-    """Shells along the border, and inside straight lines in two directions. It ignores the stress.
+    """Shells along the border, and straight lines in two directions inside. The stress is ignored.
 
-    Every line is a path of its own, as in the paper; `Zigzag` links them.
+    Every line is a path of its own, as in the paper; `Zigzag` links its lines.
 
     Attributes
     ----------
     spacing : float, default 1
-        Distance of neighbouring strands inside the shells in fibre widths, at least 1.
+        Distance between neighbouring strands inside the shells in fibre widths, at least 1.
     shells : int, default 3
         Number of rings along every border, a fibre width apart whatever the spacing.
     angle, turn : float, degrees, default 45 and 90
-        Direction of the first family of lines to the first axis of the layer, and its turn to the
-        second one: 45 for +-45, 0 for 0/90.
+        Angle of the first family of lines to the first axis of the layer, and the turn from it to
+        the second family: 45 for +-45, 0 for 0/90.
     families : {"alternate", "both"}, default "alternate"
-        One family a layer, in turn, or both on every layer, where they cross.
+        One family a layer, alternating; or both on every layer, where they cross.
     lines : {"printable", "paper"}, default "printable"
-        Lines at the true spacing; or as near as rows of pixels of one spacing are, every diagonal
-        a line, which overlap by a factor of sqrt 2 at 45 degrees (the paper).
+        Lines at the true spacing; or, as in the paper, lines along rows of pixels one spacing wide.
+        There every diagonal is a line, so that lines at 45 degrees overlap by a factor of sqrt 2.
     closest : float, default 0.6
         As in `Mps`, for the shells of thin parts.
     minimum_length : float, mm, optional
         Shorter paths are dropped; by default the shortest that the machine can cut.
     mode : {"polyline", "raster"}, default "polyline"
-        Polylines; or paths of pixels a spacing wide, as in the paper: see `ccfem.raster`.
+        Polylines; or paths of pixels one spacing wide, as in the paper: see `ccfem.raster`.
     turns : {"tight", "printable", "cut"}, default "tight"
         As in `Zigzag`.
     """
@@ -90,16 +90,16 @@ class Grid(Infill):
 
     @property
     def on_axes(self) -> bool:
-        """Whether paths keep to the axes of the layer, or their distance does."""
+        """Whether the paths, or the distances between them, follow the axes of the layer."""
         return self.mode == "raster" or self.lines == "paper"
 
     @property
     def crosses(self) -> bool:
-        """Whether strands cross each other by intention."""
+        """Whether strands cross each other on purpose."""
         return self.families == "both"
 
     def prepare(self, section: Region, machine: Machine) -> tuple[list[FloatArray], Region]:
-        """Shells, and what they leave."""
+        """Shells, and the region inside them."""
         width = machine.fibre_width
         return shells(section, width, width, self.shells, self.closest)
 

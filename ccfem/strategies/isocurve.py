@@ -2,8 +2,8 @@
 
 X. Chen, G. Fang, W.-H. Liao, C. C. L. Wang, Field-based toolpath generation for 3D printing
 continuous fibre reinforced thermoplastic composites, Additive Manufacturing 49 (2021) 102470
-(Chen et al. 2021). `Isocurve.literal` is the algorithm as printed; the defaults are better by what
-``ccfem/papers/chen_2021`` measures.
+(Chen et al. 2021). `Isocurve.literal` is the algorithm as printed; the defaults do better in the
+measures of ``ccfem/papers/chen_2021``.
 """
 
 import itertools
@@ -51,13 +51,13 @@ Spacing = Literal["constrained", "search", "cone"]
 
 _LEAST_WEIGHT = 1e-3
 _ROOM = 1.03
-"""Bound on the distance of isocurves, in strand widths: strands that stood just at the width would
-be trimmed wherever the numbers fall short of it."""
+"""Least distance between isocurves in the fit, in strand widths. At exactly one width strands would
+be trimmed wherever numerical error brings them slightly nearer."""
 _TRIM = 0.98
-"""What is nearer than this to a longer strand, in strand widths, is cut: curves that are led along
-each other at one width differ by their chords."""
+"""Distance to a longer strand, in strand widths, below which a strand is cut. It is less than 1:
+the chords of curves that run side by side at one width come slightly nearer."""
 _SPIRAL_LIMIT = 4.0
-"""Largest distance, in strand widths, of closed isocurves that are joined to a spiral."""
+"""Largest distance, in strand widths, between closed isocurves that are joined to a spiral."""
 
 _LITERAL: Mapping[str, Any] = {
     "cap": 100.0,
@@ -80,43 +80,42 @@ _LITERAL: Mapping[str, Any] = {
 
 @dataclass(frozen=True)
 class Isocurve:
-    """Fibre along the tension, the denser the larger the tension.
+    """Fibre along the tension; the larger the tension, the denser the strands.
 
     Attributes
     ----------
     cap : float, default 86
-        Percentile (by area of the layer) of the stress that the density is measured by: were it
-        the largest, one hot spot would set the spacing of the whole layer.
+        Percentile (by area of the layer) of the stress that counts as the largest for the density.
+        Otherwise one hot spot would set the spacing of the whole layer.
     floor : float, default 0.4
         Ends of isocurves are cut back to where the stress is at least this share of the cap.
     density : float > 0, default 1
-        The knob for how much fibre a layer gets: density of strands where the stress is at the
-        cap, in shares of what fits side by side; elsewhere in proportion to the stress to the
-        power, and nowhere more than what fits. With
-        ``spacing="search"`` the number of isocurves is scaled instead.
+        Sets how much fibre a layer gets: the density of strands where the stress is at the cap, 1
+        being strands side by side. Elsewhere it scales with the stress to the `power`; it never
+        exceeds 1. With ``spacing="search"`` the number of isocurves is scaled instead.
     power : float, default 1
-        p of Eq. 5: density as stress to this power; 0 gives uniform density.
+        p of Eq. 5: the density is proportional to the stress to this power; 0 is uniform density.
     spacing_weight : float, default 0.1
         Weight of even spacing against alignment in the fit (``fit="weighted"``).
     fill_length : float, mm, default 1.5
-        Reach of the screened fill.
+        Length over which the screened fill carries the field on.
     link_limit : float, default 5
-        Largest distance of two ends that are linked, in strand widths; the paper says 2.
+        Largest distance between two ends that are linked, in strand widths; 2 in the paper.
     rings : tuple of float, default (1.5, 2.5)
         Distances, in strand widths, of the curves round loaded and supported holes. The isocurves
         are led into the last one.
     conformal : tuple of str or "loaded", default ()
         Patches whose holes get such curves; "loaded" takes all that carry a load or a support. The
-        paper leaves the choice to the user; by the virtual test they cost stiffness.
+        paper leaves the choice to the user. In the virtual test these curves cost stiffness.
     stress : {"nodal", "cell"}
-        Recovered stress, or that of the tetrahedra (the paper).
+        Stress recovered at the nodes, or stress of the tetrahedra (the paper).
     field : {"layer", "mesh"}
-        Tension of the stress in the plane of the layer, oriented there; or that in space, oriented
-        and filtered on the tetrahedra and then projected (the paper).
+        Tension in the plane of the layer, oriented there; or tension in space, oriented and
+        filtered on the tetrahedra and then projected onto the layer (the paper).
     sense : {"tensile", "absolute"}
-        Follow tension only, or the stress of the largest size whatever its sign.
+        Follow tension only; or follow the principal stress of largest absolute value.
     compression_limit : float, default 3
-        mu of section 4.1: compression more than so many times larger rules tension out.
+        mu of section 4.1: no tension is followed where compression is more than mu times larger.
     incompatible : {"any", "majority", "all", "none"}
         Filter of Eq. 2, for ``field="mesh"``.
     fill : {"screened", "laplacian"}
@@ -124,8 +123,8 @@ class Isocurve:
     fit : {"weighted", "literal"}
         `fields.scalar.fit_weighted` or `fit_literal` (the paper, Eq. 6).
     spacing : {"constrained", "search", "cone"}
-        Bound the gradient in the fit, so that unit levels keep the width; or search for the number
-        of isocurves (the paper, section 4.3); or the bound once more, by an exact and slow solver.
+        Bound the gradient in the fit so that unit levels lie at least a width apart; or search for
+        the number of isocurves (the paper, section 4.3); or the same bound by an exact slow solver.
     spiral : bool, default True
         Join nested closed isocurves where the stress is least; not in the paper.
     boundary_links : bool, default True
@@ -133,13 +132,13 @@ class Isocurve:
     trim : bool, default True
         Cut branches that come nearer than a strand's width to a longer one.
     inset : float, default 0.5
-        Least distance of strands from the boundary, in strand widths. 0.5 keeps them in, and their
-        ends still meet the links along the boundary; at 0 they may run along it with half of their
-        width outside.
+        Least distance between strands and the boundary, in strand widths. At 0.5 whole strands lie
+        inside, and their ends still meet the links along the boundary. At 0 strands may run along
+        the boundary with half their width outside.
     smooth : bool, default True
-        Links keep the machine's minimum radius; those with corners join only what is too short to
-        be cut alone, and are marked as links. Otherwise all that are short enough are taken, as in
-        the paper.
+        Whether links keep the machine's minimum radius. Links with corners then join only strands
+        too short to be cut alone, and are marked as links. Otherwise every link that is short
+        enough is taken, as in the paper.
     turns : {"tight", "printable", "cut"}, default "tight"
         As in `Zigzag`.
     """
@@ -201,7 +200,7 @@ class Isocurve:
 
     @classmethod
     def literal(cls) -> "Isocurve":
-        """Return the algorithm as the paper prints it."""
+        """Return the algorithm as printed in the paper."""
         return cls(**_LITERAL)
 
     def for_part(
@@ -234,8 +233,8 @@ class Isocurve:
 
 
 _Known = dict[tuple[Any, ...], Directed]
-"""What is known of the layers of a part, by layer and the parameters that it depends on: however
-often a part is planned with more or less fibre, its layers are directed once."""
+"""Directions already computed for the layers of a part, by layer and the parameters they depend on.
+They are reused when the part is planned again with more or less fibre."""
 
 
 @dataclass(frozen=True)
@@ -254,7 +253,7 @@ class _Planner:
 
     def __call__(self, layer: Layer, stress: LayerStress, machine: Machine) -> Toolpaths:
         s = self.strategy
-        # What is known keeps its layer, so that no other one takes its identity.
+        # The stored value refers to its layer, so no other layer can get the same id.
         key: tuple[Any, ...] = (id(layer), s.cap, s.fill, s.fill_length, s.stress, s.field)
         key = (*key, s.sense, s.compression_limit, s.incompatible)
         if key not in self.known:
@@ -290,7 +289,7 @@ class _Planner:
     def worthwhile(
         self, curves: Isocontours, surface: Surface, confidence: FloatArray
     ) -> list[FloatArray]:
-        """Curves without the ends that lie where the stress is below the floor."""
+        """Curves without their ends where the stress is below the floor."""
         if self.strategy.floor <= 0.0:
             return curves.lines()
         enough = curves.interpolate(surface.to_points(confidence)) >= self.strategy.floor
@@ -298,8 +297,8 @@ class _Planner:
         for a, b in itertools.pairwise(curves.offsets):
             line, worth = curves.points[a:b], enough[a:b]
             if is_closed(line):
-                # A closed curve that mostly is worth its fibre stays whole: opened, it would lose
-                # the hold of its return. Any other is opened amid its longest low stretch.
+                # A closed curve that is mostly above the floor stays whole: its return anchors it.
+                # Any other is opened in the middle of its longest stretch below the floor.
                 if worth.mean() >= 0.5:
                     kept.append(line)
                     continue
@@ -319,7 +318,7 @@ class _Planner:
         patches: tuple[str, ...],
         machine: Machine,
     ) -> Joined:
-        """Curves round the chosen holes, isocurves led into them, ends linked, the rest dropped."""
+        """Rings round the chosen holes, isocurves led into them, and linked ends; short ones go."""
         s, width, section = self.strategy, machine.fibre_width, layer.plane.polygon
         rings: list[FloatArray] = []
         names = patches if s.conformal == "loaded" else s.conformal

@@ -1,4 +1,4 @@
-"""Shells, strands along the medial axis, and concentric strands in the rest: MAT.
+"""MAT: shells, strands along the medial axis, and concentric strands in the rest.
 
 J. Plocher, J.-B. Wioland, A. Panesar, Additive manufacturing with fibre-reinforcement: design
 guidelines and investigation into the influence of infill patterns, Rapid Prototyping Journal 28
@@ -25,16 +25,16 @@ __all__ = ["Mat"]
 
 @dataclass(frozen=True)
 class Mat(Infill):
-    """Shells along the border, and strands along the medial axis of what they leave.
+    """Shells along the border, and strands along the medial axis of the region inside them.
 
-    Strands parallel to the medial axis follow, until the first of them would touch a shell;
-    concentric strands fill the rest. A part without holes and limbs (a disc) is filled by
-    concentric strands alone. It ignores the stress.
+    Further strands run parallel to the medial axis until one would touch a shell. Concentric
+    strands fill the rest. A part without holes and limbs (a disc) gets concentric strands only.
+    The stress is ignored.
 
     Attributes
     ----------
     spacing : float, default 1
-        Distance of neighbouring strands inside the shells in fibre widths, at least 1.
+        Distance between neighbouring strands inside the shells in fibre widths, at least 1.
     shells : int, default 3
         Number of rings along every border, a fibre width apart whatever the spacing.
     closest : float, default 0.6
@@ -42,7 +42,7 @@ class Mat(Infill):
     minimum_length : float, mm, optional
         Shorter paths are dropped; by default the shortest that the machine can cut.
     mode : {"polyline", "raster"}, default "polyline"
-        Polylines; or paths of pixels a spacing wide, as in the paper: see `ccfem.raster`.
+        Polylines; or paths of pixels one spacing wide, as in the paper: see `ccfem.raster`.
     turns : {"tight", "printable", "cut"}, default "tight"
         As in `Zigzag`.
     """
@@ -65,7 +65,7 @@ class Mat(Infill):
         check_shells(self)
 
     def prepare(self, section: Region, machine: Machine) -> list[FloatArray]:
-        """All strands: they depend on the section alone."""
+        """All strands: they depend on the section only."""
         width, pitch = machine.fibre_width, self.spacing * machine.fibre_width
         rings, interior = shells(section, width, width, self.shells, self.closest)
         return rings + medial_fill(interior, pitch, self.closest)
@@ -77,5 +77,5 @@ class Mat(Infill):
         return prepared
 
     def regions(self, image: Bitmap, layer: Layer, stress: LayerStress) -> Regions:
-        """Shells, rings of pixels round the medial axis, and concentric ones."""
+        """Shells, rings of pixels round the medial axis, and concentric rings."""
         return medial_regions(image.mask, self.shells)

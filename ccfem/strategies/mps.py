@@ -1,4 +1,4 @@
-"""Strands along lines of the maximum principal stress, and parallel to them: MPS.
+"""MPS: strands along streamlines of the maximum principal stress, and strands parallel to them.
 
 J. Plocher, J.-B. Wioland, A. Panesar, Additive manufacturing with fibre-reinforcement: design
 guidelines and investigation into the influence of infill patterns, Rapid Prototyping Journal 28
@@ -39,18 +39,18 @@ _APART = 2.0
 _SHORTEST = 6.0
 _AT_BORDER = 1.5
 _BEYOND = 4.0
-"""Of guides, in pitches: step along the streamline, least distance from one to the next, least
-length, distance to the shells up to which an end is taken for one at the border, and by how much it
-is then made longer, so that the strands parallel to it reach a slanted border too."""
+"""Lengths for the guides, in pitches: step along the streamline; least distance between guides;
+least length of a guide; distance to the shells up to which an end counts as lying at the border;
+extension of such an end, so that strands parallel to the guide reach a slanted border too."""
 _LINK = 2.6
-"""Longest link to a strand that is too short to be cut, in pitches: to the next but one on a
-slanted border."""
+"""Longest link to a strand too short to be cut, in pitches. It reaches the second neighbour where
+the border is slanted."""
 _WORTH = 12.0
-"""Strands shorter than this, in widths, are not linked: they would be links for the most part."""
+"""Length, in widths, below which strands are not linked: they would consist mostly of links."""
 
 
 class _Inside(NamedTuple):
-    """Shells of a section, what they leave, and the middles of the segments of its medial axis."""
+    """Shells of a section, the region inside, and the middles of its medial-axis segments."""
 
     rings: list[FloatArray]
     interior: Region
@@ -59,17 +59,17 @@ class _Inside(NamedTuple):
 
 @dataclass(frozen=True)
 class Mps(Infill):
-    """Shells along the border, and inside strands parallel to streamlines of the stress.
+    """Shells along the border, and strands parallel to streamlines of the stress inside them.
 
-    The streamlines follow the principal stress of the largest size in the plane of the layer, and
-    move aside by up to half a spacing, so that whole strands fit beside them. Strands lie at whole
-    multiples of the spacing from them, each along the nearest streamline, until they meet;
-    concentric strands fill what stays open.
+    The streamlines follow the in-plane principal stress of largest absolute value. They are shifted
+    sideways by up to half a spacing so that whole strands fit beside them. Strands lie at whole
+    multiples of the spacing from a streamline, each along the nearest one, until they meet.
+    Concentric strands fill what stays open.
 
     Attributes
     ----------
     spacing : float, default 1
-        Distance of neighbouring strands inside the shells in fibre widths, at least 1.
+        Distance between neighbouring strands inside the shells in fibre widths, at least 1.
     shells : int, default 3
         Number of rings along every border, a fibre width apart whatever the spacing.
     seeds : "segments", "ends" or tuple of points, default "segments"
@@ -77,14 +77,14 @@ class Mps(Infill):
         shells; at the middle of each patch that carries a load or a support (the paper); or at
         points (x, y), mm, in the plane of the layer.
     closest : float, default 0.6
-        Least distance of strands in spacings; where they come nearer than 1 they overlap, which
-        leaves smaller gaps. 1 for no overlap.
+        Least distance between strands in spacings. Below 1 strands overlap where they converge,
+        which leaves smaller gaps; 1 allows no overlap.
     minimum_length : float, mm, optional
         Shorter paths are dropped; by default the shortest that the machine can cut. Strands that
-        are too short are first joined to those beside them, by links that are marked as such; ends
-        then stop a fibre width before the sides of other strands.
+        are too short are first joined to their neighbours by marked links; ends then stop a fibre
+        width before the sides of other strands.
     mode : {"polyline", "raster"}, default "polyline"
-        Polylines; or paths of pixels a spacing wide, as in the paper: see `ccfem.raster`.
+        Polylines; or paths of pixels one spacing wide, as in the paper: see `ccfem.raster`.
     turns : {"tight", "printable", "cut"}, default "tight"
         As in `Zigzag`.
     """
@@ -114,7 +114,7 @@ class Mps(Infill):
             )
 
     def prepare(self, section: Region, machine: Machine) -> _Inside:
-        """Shells, what they leave, and the middles of its medial axis where these are seeds."""
+        """Shells, the region inside, and the middles of its medial axis where these are seeds."""
         width, pitch = machine.fibre_width, self.spacing * machine.fibre_width
         rings, interior = shells(section, width, width, self.shells, self.closest)
         wanted = self.seeds == "segments" and not shapely.is_empty(interior)
@@ -123,7 +123,7 @@ class Mps(Infill):
     def strands(
         self, layer: Layer, stress: LayerStress, machine: Machine, prepared: _Inside
     ) -> list[FloatArray]:
-        """Shells, then guides and what is parallel to them."""
+        """Shells, then guides and the strands parallel to them."""
         pitch = self.spacing * machine.fibre_width
         interior = shapely.force_2d(prepared.interior)  # a copy: threads must not share a geometry
         guides = self._guides(layer, stress, interior, prepared.middles, pitch)
@@ -161,7 +161,7 @@ class Mps(Infill):
         seeds: FloatArray,
         pitch: float,
     ) -> list[FloatArray]:
-        """Streamlines inside the shells, moved aside so that whole strands fit beside them."""
+        """Streamlines inside the shells, shifted sideways so that whole strands fit beside them."""
         if shapely.is_empty(interior):
             return []
         if self.seeds != "segments":
@@ -180,24 +180,24 @@ class Mps(Infill):
         ]
 
     def _points(self, layer: Layer, stress: LayerStress) -> FloatArray:
-        """Points (k, 2) that are given as seeds, by patches or one by one."""
+        """Points (k, 2) given as seeds: middles of patches, or the points themselves."""
         if self.seeds == "ends":
             return _patch_middles(layer, stress.held_or_loaded)
         return np.array(self.seeds, dtype=np.float64).reshape(-1, 2)
 
 
 def _moved_inside(points: FloatArray, interior: Region, pitch: float) -> FloatArray:
-    """Points (k, 2), those outside moved to the nearest place inside, a little off the border."""
+    """Points (k, 2); those outside are moved to the nearest place slightly inside the border."""
     inner = shapely.buffer(interior, -0.1 * pitch, join_style="mitre")
     nearest = [shapely.shortest_line(inner, point) for point in shapely.points(points)]
     return shapely.get_coordinates([line.interpolate(0.0) for line in nearest])
 
 
 def _middles(interior: Region, pitch: float) -> FloatArray:
-    """Middle of each segment or point of the medial axis, that of the largest clearance first.
+    """Middle of each segment or lone node of the medial axis, largest clearance first.
 
-    A closed one has four: its place of the largest clearance, and those a quarter of the way round
-    from each to the next.
+    A closed segment has four: the place of largest clearance, and the three that lie a quarter of
+    the length apart from there.
     """
     axis = medial_axis(interior, 0.5 * pitch)
     found: list[tuple[float, FloatArray]] = []
@@ -212,15 +212,15 @@ def _middles(interior: Region, pitch: float) -> FloatArray:
     ends = {end for segment in axis.segments for end in segment.ends}
     lone = [k for k in range(len(axis.nodes)) if k not in ends]  # discs and squares
     found += zip(axis.radius[lone], axis.nodes[lone], strict=True)
-    # Equal ones of a symmetric part keep the order of the axis, which puts the longest first.
+    # Places of equal clearance in a symmetric part keep the order of the axis, longest first.
     found.sort(key=lambda item: -round(item[0] / (0.01 * pitch)))
     return np.reshape([point for _, point in found], (-1, 2))
 
 
 def _patch_middles(layer: Layer, patches: tuple[str, ...]) -> FloatArray:
-    """Node or middle of an edge nearest to the middle of each named patch, (k, 2).
+    """Node or edge midpoint nearest to the middle of each named patch, (k, 2).
 
-    Of several that are equally near, as on the border of a hole, the first.
+    Where several are equally near, as on the border of a hole, the first one is taken.
     """
     found: list[FloatArray] = []
     for name in patches:

@@ -1,6 +1,6 @@
-"""Level sets of the distance to the border, as they are: a strategy to compare with.
+"""Level sets of the distance to the border, unchanged: for comparison.
 
-One of the three ways that Wang et al. 2021 show beside their own, after V. S.
+Wang et al. 2021 show three strategies beside their own; this is one of them, after V. S.
 Papapetrou, C. Patel, A. Y. Tamijani, Stiffness-based optimization framework for the topology and
 fiber paths of continuous fiber composites, Composites Part B 183 (2020) 107681.
 """
@@ -24,21 +24,21 @@ from ccfem.toolpaths import Toolpaths
 __all__ = ["Offset"]
 
 _QUARTER = 16
-"""Segments of a quarter turn round a re-entrant corner."""
+"""Segments per quarter turn round a re-entrant corner."""
 
 
 @dataclass(frozen=True)
 class Offset:
     """Rings at half a fibre width from the border and at every spacing further in.
 
-    Each is a closed path. Unlike those of `concentric` the rings are not opened where the section
-    narrows, so that opposite sides may touch or break apart, and not joined; the middle of a member
-    stays open or is laid too densely, as its width has it.
+    Each ring is a closed path. Unlike the rings of `concentric`, they are not opened where the
+    section narrows, so opposite sides may touch or the ring may split; and they are not joined. The
+    middle of a member stays open or is filled too densely, depending on the member's width.
 
     Attributes
     ----------
     spacing : float, default 1
-        Distance of neighbouring rings in fibre widths, at least 1.
+        Distance between neighbouring rings in fibre widths, at least 1.
     minimum_length : float, mm, optional
         Shorter paths are dropped; by default the shortest that the machine can cut.
     turns : {"tight", "printable", "cut"}, default "tight"

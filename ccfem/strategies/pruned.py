@@ -1,7 +1,7 @@
-"""Any strategy, planned with too much fibre and then relieved of what helps least.
+"""Any strategy, planned with too much fibre and then cut back to the most useful fibre.
 
-Beyond the papers: the part is tested virtually with the fibre in it, and the stretches that do the
-least work go, until the wanted length is left (`ccfem.fibre_aware.prune`).
+Not from a paper: the part is tested virtually with its fibre, and the stretches that do the least
+work are removed until the wanted length is left (`ccfem.fibre_aware.prune`).
 """
 
 from collections.abc import Mapping, Sequence
@@ -32,45 +32,45 @@ from ccfem.virtual_testing.strand import RHO, Strand
 __all__ = ["Pruned"]
 
 _BASES: Mapping[str, Mapping[str, Any]] = {"isocurve": {"link_limit": 10.0}}
-"""Parameters with which strategies plan better when they are pruned."""
+"""Base parameters with which a strategy plans better when its fibre is pruned afterwards."""
 
 _SLACK = 0.05
-"""Share by which more may be planned than the overfill asks for: it is found in fewer steps."""
+"""Share by which the planned length may exceed what the overfill asks for: this saves plans."""
 
 
 @dataclass(frozen=True)
 class Pruned:
-    """The fibre of another strategy that helps most.
+    """The most useful fibre of another strategy.
 
-    The load is the one of the stress that the strategy is given; fibre is taken to carry tension
-    only.
+    The load is that of the stress given to the strategy. Fibre is taken to carry tension only.
 
     Attributes
     ----------
     of : str, default "isocurve"
-        Name of the strategy that plans.
+        Name of the base strategy.
     base : mapping of str to value, default {}
-        Parameters of that strategy other than its defaults, as ``{"floor": 0.3}``. Isocurves that
-        are pruned have ``link_limit = 10`` by default: what short pieces are worth is tested.
+        Parameters of the base strategy, as ``{"floor": 0.3}``. For isocurves ``link_limit`` is 10
+        by default, since the tests say what short pieces are worth.
     coverage : float, default 0.45
         Fibre length times strand width over area of the layers, in (0, 1].
     overfill : float, default 1.25
-        Fibre length that is planned over that kept, at least 1; up to 5 % more is taken.
+        Planned fibre length over the length kept, at least 1; up to 5 % more may be planned.
     rounds : int, default 2
-        Virtual tests; each takes off half of the excess, the last one all of it.
+        Virtual tests. Each removes half of the excess, the last one all of it.
     rho : float, mm^2, default 4
         Axial stiffness of a strand over Young's modulus of the matrix.
     strength : float, default 0
-        How much the load at first failure counts, in [0, 1]; the stiffness counts the rest. Of
-        several load cases the one counts that fails first, at the least multiple of its load.
+        Weight of the load at first failure against the stiffness, in [0, 1]: the objective is
+        ``stiffness^(1 - strength) * load^strength``. Of several load cases, the load is that of the
+        case that fails first, at the least multiple of its load.
     moves : int, default 0
-        Steps by which what is left is moved sideways, each tested
-        (`ccfem.fibre_aware.strand_moves`): 6 make a part stiffer by 1 to 2 %, for two to three
-        times the time.
+        Number of steps in which the remaining strands are moved sideways, each step tested
+        (`ccfem.fibre_aware.strand_moves`). 6 steps make a part 1 to 2 % stiffer, and planning takes
+        two to three times as long.
     turns : {"tight", "cut"}
-        Whether more than 1 % of the fibre may turn more tightly than the machine's radius.
+        Whether more than 1 % of the fibre may turn more tightly than the machine's minimum radius.
     objective : {"worst", "sum", "least"}
-        What counts of several load cases, as in `stream_function`.
+        How several load cases count, as in `stream_function`.
     """
 
     of: str = "isocurve"
@@ -105,7 +105,7 @@ class Pruned:
         check_fields(self, "moves", at_least=0)
 
     def _planner(self) -> Strategy:
-        """Strategy that plans, with its parameters."""
+        """Underlying strategy with its parameters."""
         return create(self.of, {**_BASES.get(self.of, {}), **self.base})
 
     def natural_length(self, layers: Sequence[Layer], machine: Machine) -> float:
@@ -120,7 +120,7 @@ class Pruned:
         Raises
         ------
         InputError
-            Whatever the strategy that plans raises.
+            Whatever the base strategy raises.
         """
         wanted = self.natural_length(layers, machine)
         return self.to_lengths(stress, layers, machine, (wanted,))[0][1]
@@ -132,9 +132,9 @@ class Pruned:
         machine: Machine,
         lengths: Sequence[float],
     ) -> list[tuple["Pruned", LayerPlanner]]:
-        """Plan once for the largest of some lengths, mm per layer, and prune that to each.
+        """Plan once for the largest of the lengths, mm per layer, and prune that plan to each.
 
-        Lengths above the most of the coverage are taken for that.
+        Lengths that need more than the largest coverage are reduced to that coverage.
 
         Raises
         ------
@@ -169,14 +169,14 @@ class Pruned:
         machine: Machine,
         lengths: Sequence[float],
     ) -> list[tuple["Pruned", LayerPlanner]]:
-        """Plan each layer for one load case, and prune by tests of all.
+        """Plan each layer for one load case, and prune by tests under all cases.
 
         Lengths as in `to_lengths`; tests of all say what goes (`ccfem.fibre_aware.prune_cases`).
 
         Raises
         ------
         InputError
-            Whatever the strategy that plans raises.
+            Whatever the base strategy raises.
         """
         if len(cases) == 1:
             return self.to_lengths(cases.fields[0], layers, machine, lengths)

@@ -1,8 +1,8 @@
-"""Isocurves of a field that is designed for the stiffness of the part with its fibre in it.
+"""Isocurves of a field that is optimised for the stiffness of the part with its fibre.
 
-Beyond the papers: the density of fibre and its direction follow from the gradient of one scalar
-field, as in `isocurve`, but the field is not fitted to the stress of the part without fibre. It is
-optimised for the compliance of the part with the fibre that its isocurves lay.
+Not from a paper: as in `isocurve`, the gradient of one scalar field sets the density and direction
+of the fibre. But the field is not fitted to the stress of the part without fibre: it minimises the
+compliance of the part with the fibre that its isocurves lay.
 """
 
 from collections.abc import Mapping, Sequence
@@ -55,72 +55,72 @@ from ccfem.virtual_testing.strand import RHO, Strand
 __all__ = ["StreamFunction"]
 
 _ALIKE = 0.8
-"""Share of the stress that all heights have in common, above which all layers get one field."""
+"""Share of the stress common to all heights above which all layers get one field."""
 
 _MOST_GROUPS = 6
 
 _ROUNDS = 3
-"""Virtual tests that say what to cut."""
+"""Virtual tests that decide what to cut."""
 
 _CASES_OVERFILL = 1.15
-"""Least overfill for several load cases, whose tests have more to choose between."""
+"""Least overfill for several load cases: their tests then have more fibre to choose from."""
 
 _WIDE = {"tight": 0.0, "cut": 1.3}
-"""Radius, over the machine's, below which bends of the field cost."""
+"""Radius, in machine radii, below which bends of the field have a cost."""
 
 
 @dataclass(frozen=True)
 class StreamFunction:
-    """Fibre where and along which it makes the part stiffest.
+    """Fibre placed and directed so that the part becomes as stiff as possible.
 
     All layers share one field where the stress is about the same at all heights; otherwise the
-    stack is divided into groups of layers with a field each. The fields are designed for somewhat
-    too much fibre, and of their isocurves the stretches worth most are kept. The load is the one
-    of the stress that the strategy is given; fibre is taken to carry tension only.
+    layers form groups over the height with one field each. The fields are designed for slightly too
+    much fibre; of their isocurves, the stretches that are worth most are kept. The load is that of
+    the stress given to the strategy. Fibre is taken to carry tension only.
 
     Attributes
     ----------
     coverage : float, default 0.45
         Fibre length times strand width over area of the layers, in (0, 1].
     overfill : float, default 1.1
-        Fibre length of the design over that kept, at least 1; with several load cases no less than
-        1.15.
+        Fibre length of the design over the length kept, at least 1; with several load cases at
+        least 1.15.
     rho : float, mm^2, default 4
         Axial stiffness of a strand over Young's modulus of the matrix.
     evaluations : int, default 80
-        Of the stiffness, in the design. Where more than 0.45 of the layers is to be covered 0.6
-        times as many follow (`ccfem.fibre_aware.design_in_steps`).
+        Evaluations of the stiffness in the design. If the coverage is above 0.45, 0.6 times as many
+        follow (`ccfem.fibre_aware.design_in_steps`).
     groups : int, default 0
-        Number of fields over the height of the part; 0 for one, or for at most six where the
+        Number of fields over the height of the part; 0 for one field, or for at most six where the
         stress differs over the height.
     grid : float, default 2
         Side of the squares of the field, in strand widths; never finer than the cells of the mesh.
     cap : float, default 90
-        Percentile of the stress above which the density of the first field grows no more.
+        Percentile of the stress above which the density of the initial field no longer increases.
     phases : int, default 5
-        Positions of the levels of which the best is taken, for all layers of the same section.
+        Number of positions of the levels that are tried; layers of the same section share the best.
     link_limit : float, default 10
-        Largest distance of two ends that are linked, in strand widths. Links keep the machine's
-        minimum radius; those with corners join only what is too short alone, and are marked.
+        Largest distance between two ends that are linked, in strand widths. Links keep the
+        machine's minimum radius. Links with corners join only strands too short to be cut alone,
+        and are marked as links.
     inset : float, default 0.5
-        Least distance of strands and links from the boundary, in strand widths: 0.5 keeps them in,
-        at 0 they may run along it with half of their width outside.
+        Least distance between strands or links and the boundary, in strand widths. At 0.5 whole
+        strands lie inside; at 0 they may run along the boundary with half their width outside.
     objective : {"worst", "sum", "least"}
-        What counts of several load cases: the one that is farthest from the stiffest that it could
-        be made alone, the weighted mean over the cases, or the one that gains least over the part
-        without fibre.
+        How several load cases count: the case farthest from its own stiffest design, the weighted
+        mean over the cases, or the case that gains least over the part without fibre.
     tilt : float, default 0.6
-        Weight of a layer's own case in the field that its design starts with, in (0, 1], where
-        there are several; the others share the rest.
+        With several load cases: weight of a layer's own case in its initial field, in (0, 1]; the
+        other cases share the rest.
     strength : float, default 0
-        How much the load at first failure counts, in [0, 1]; the stiffness counts the rest. A
-        share of the one is then worth as much as one of the other. Of several load cases the one
-        counts that fails first, at the least multiple of its load.
+        Weight of the load at first failure against the stiffness, in [0, 1]: the objective is
+        ``stiffness^(1 - strength) * load^strength``. Of several load cases, the load is that of the
+        case that fails first, at the least multiple of its load.
     moves : int, default 0
-        Steps by which strands are moved sideways (`moved`), each tested.
+        Number of steps in which strands are moved sideways (`moved`), each step tested.
     turns : {"tight", "cut"}
-        Whether more than 1 % of the fibre may turn more tightly than the machine's radius. What
-        cannot be laid without is left out: "cut" may lay less than it was asked for.
+        Whether more than 1 % of the fibre may turn more tightly than the machine's minimum radius.
+        With "cut", fibre that needs such turns is left out, so less may be laid than asked for.
     """
 
     coverage: float = 0.45
@@ -169,7 +169,7 @@ class StreamFunction:
     ) -> LayerPlanner:
         """Design the fields of the whole part and plan all its layers.
 
-        Layers that are not given are taken to be filled like the nearest one that is.
+        Layers that are not given are assumed to be filled like the nearest given layer.
 
         Raises
         ------
@@ -186,12 +186,12 @@ class StreamFunction:
         machine: Machine,
         lengths: Sequence[float],
     ) -> list[tuple["StreamFunction", LayerPlanner]]:
-        """Design for the largest of some lengths, mm per layer, and cut that to those near it.
+        """Design for the largest of the lengths, mm per layer; cut it to lengths near that one.
 
-        Lengths above the most of the coverage are taken for that. Where the paths of the design
-        are too short in all it is made once more, with as much more fibre. Much shorter lengths
-        are designed for anew: a design that is cut to less than it was made for ends strands
-        where they carry.
+        Lengths that need more than the largest coverage are reduced to that coverage. If the paths
+        of the design are too short in total, it is repeated with proportionally more fibre. Much
+        shorter lengths get a design of their own: a design cut far below its length would end
+        strands where they carry load.
 
         Raises
         ------
@@ -214,10 +214,11 @@ class StreamFunction:
         machine: Machine,
         lengths: Sequence[float],
     ) -> list[tuple["StreamFunction", LayerPlanner]]:
-        """Design a field for each load case, all together, and cut their paths by tests of all.
+        """Design one field for each load case, all together, and cut by tests under all cases.
 
-        Each layer follows the field of one case; those of a case are as many as its weight asks
-        for, spread evenly over the height. One case alone is planned as by `to_lengths`.
+        Each layer follows the field of one case. The number of layers of a case follows from its
+        weight, and they are spread evenly over the height. A single case is planned as by
+        `to_lengths`.
 
         Raises
         ------
@@ -242,7 +243,7 @@ class StreamFunction:
         machine: Machine,
         lengths: Sequence[float],
     ) -> list[Toolpaths]:
-        """Design for this coverage, and cut by tests to each of some lengths, mm per layer."""
+        """Design for this coverage, and cut by tests to each of the lengths, mm per layer."""
         check_tension((stress,), layers)
         field = solved(stress, "stream_function")
         problem, group, found = self.designed(field, layers, machine)
@@ -272,7 +273,7 @@ class StreamFunction:
         strains_of: Sequence[tuple[float, FloatArray]],
         machine: Machine,
     ) -> Extraction:
-        """Paths along fields, each with a block of coefficients for every group."""
+        """Paths along the fields; each field has a block of coefficients for every group."""
         blocks = [
             problem.signed(field, group) for field in fields for group in range(problem.groups)
         ]
@@ -285,7 +286,7 @@ class StreamFunction:
     def designed(
         self, stress: StressField, layers: Sequence[Layer], machine: Machine
     ) -> tuple[StreamProblem, IntArray, StreamDesign]:
-        """Design the fields for stiffness: the problem, the group of each layer, and the design."""
+        """Design for stiffness; return the problem, the group of each layer, and the design."""
         part = SmearedPart.of(stress, layers[0].plane.frame)
         problem, group = self._problem((part,), layers, machine)
         chosen = middle_layers(layers, group)
@@ -299,7 +300,7 @@ class StreamFunction:
     def designed_for_cases(
         self, cases: WeightedCases, layers: Sequence[Layer], machine: Machine, bounds: FloatArray
     ) -> tuple[CasesProblem, IntArray, CasesDesign]:
-        """Design the fields of several cases: the problem, the group of each layer, the design.
+        """Design for several cases; return the problem, the group of each layer, and the design.
 
         `bounds` (n,) are the stiffness ratios that the cases are measured by
         (`ccfem.fibre_aware.cases_bound.measures`).
@@ -316,7 +317,7 @@ class StreamFunction:
     def _problem(
         self, parts: Sequence[SmearedPart], layers: Sequence[Layer], machine: Machine
     ) -> tuple[StreamProblem, IntArray]:
-        """Return the problem of one field on the part of the first case, and each layer's group."""
+        """Return the problem of one field for the first case, and each layer's group."""
         part, mesh = parts[0], parts[0].mesh
         centres = part.centroids @ part.frame[:2].T
         size = max(self.grid * machine.fibre_width, float(np.cbrt(6.0 * mesh.volumes.mean())))
@@ -356,7 +357,7 @@ class StreamFunction:
         machine: Machine,
         lengths: Sequence[float],
     ) -> list[Toolpaths]:
-        """Design for this coverage, and cut by tests of all cases to some lengths, mm per layer."""
+        """Design for this coverage, and cut by tests of all cases to lengths, mm per layer."""
         check_tension(cases.fields, layers)
         in_all, strand = [length * len(layers) for length in lengths], Strand(self.rho)
         bounds = measures(self.objective, cases, layers, max(in_all), machine, strand)
@@ -390,8 +391,8 @@ class StreamFunction:
 def _with_first(
     strong: Sequence[Sequence[Toolpaths]], stiff: Sequence[Sequence[Toolpaths]]
 ) -> list[list[Toolpaths]]:
-    """Candidates of designs for strength and for stiffness: the first of those, and all of these.
+    """Candidates for each length: the first design for strength, and all designs for stiffness.
 
-    Each sequence has the candidates of one length.
+    Each sequence holds the candidates for one length.
     """
     return [[one[0], *others] for one, others in zip(strong, stiff, strict=True)]

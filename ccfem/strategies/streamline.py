@@ -1,8 +1,8 @@
-"""Evenly spaced streamlines of the principal stress, as they are: a strategy to compare with.
+"""Evenly spaced streamlines of the principal stress, unchanged: for comparison.
 
-One of the three ways of following the stress that Wang et al. 2021 show beside their
-own, after V. S. Papapetrou, C. Patel, A. Y. Tamijani, Stiffness-based optimization framework for
-the topology and fiber paths of continuous fiber composites, Composites Part B 183 (2020) 107681.
+Wang et al. 2021 show three strategies beside their own; this is one of them, after V. S.
+Papapetrou, C. Patel, A. Y. Tamijani, Stiffness-based optimization framework for the topology and
+fiber paths of continuous fiber composites, Composites Part B 183 (2020) 107681.
 The lines are those of B. Jobard, W. Lefer, Creating evenly-spaced streamlines of arbitrary density,
 Visualization in Scientific Computing '97, Springer (1997) 43.
 """
@@ -25,25 +25,25 @@ from ccfem.toolpaths import Toolpaths
 __all__ = ["Streamline"]
 
 _LEAST = 0.995
-"""Least distance of lines, in fibre widths: at the width itself rounding would end those that run
-side by side."""
+"""Least distance between lines, in fibre widths. At exactly one width rounding would end lines that
+run side by side."""
 _TOLERANCE = 2e-3
-"""Deviation, in fibre widths, up to which points of a streamline are left out."""
+"""Error, in fibre widths, up to which points of a streamline are left out."""
 
 
 @dataclass(frozen=True)
 class Streamline:
-    """Streamlines of the principal stress of the largest size in the plane of the layer.
+    """Streamlines of the in-plane principal stress of largest absolute value.
 
-    Where they converge lines end, where they diverge others begin; nothing joins them, and joints
-    where the direction jumps stay open. What is too short for the cutter is dropped.
+    Lines end where they converge, and new ones begin where they diverge. Nothing joins them, and
+    joints where the direction jumps stay open. Lines too short for the cutter are dropped.
 
     Attributes
     ----------
     spacing : float, default 1
-        Distance at which lines begin beside each other in fibre widths, at least 1.
+        Distance from existing lines at which new lines begin, in fibre widths, at least 1.
     closest : float, default 0.5
-        Least distance of lines in spacings; never less than a fibre width.
+        Distance at which lines end, in spacings; never less than a fibre width.
     minimum_length : float, mm, optional
         Shorter paths are dropped; by default the shortest that the machine can cut.
     """

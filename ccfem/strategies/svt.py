@@ -1,8 +1,9 @@
-"""Stress vector tracing: members of parallel strands that cross in the joints, as one path.
+"""Stress vector tracing: members of parallel strands that cross in the joints, as a single path.
 
 T. Wang, N. Li, G. Link, J. Jelonnek, J. Fleischer, J. Dittus, D. Kupzik, Load-dependent path
 planning method for 3D printing of continuous fiber reinforced plastics, Composites Part A 140
-(2021) 106181. The tracks and the links are reconstructed: the paper shows them and gives no rule.
+(2021) 106181. The tracks and the links are our reconstruction: the paper shows them but gives no
+rule.
 """
 
 from collections.abc import Mapping, Sequence
@@ -40,7 +41,7 @@ from ccfem.toolpaths import Toolpaths
 __all__ = ["Svt"]
 
 _SAMPLING = 0.5
-"""Distance of the samples of the border for the medial axis, in fibre widths."""
+"""Distance between the border samples for the medial axis, in fibre widths."""
 _LEAST = 20.0
 """Length of the shortest spiral in an open place, in fibre widths."""
 
@@ -52,48 +53,48 @@ _Marked = tuple[FloatArray, BoolArray]
 class Svt:
     """Parallel strands along the main load paths of a frame, joined to one path.
 
-    Members of the section are those of its medial axis. In every joint two members at a time are
-    joined to a main load path, where turn, misalignment with the stress and sense of the stress
-    suit best. Strands fill each main path from side to side, as many as its width asks for: where
-    it narrows they leave through its border. They cross those of other main paths in the joints,
-    as steeply as a turn of up to 60 degrees makes it, and leave the section there. Two main paths
-    share a member that leads to a clamp or a load, or that forks into them. Links outside the
-    section join them to one path for each piece of the section. A section without members (a disc,
-    a square) is filled by concentric rings.
+    The members are those of the section's medial axis. In every joint, members are joined in pairs
+    to main load paths; the best pairs have little turn, little misalignment with the stress and the
+    same sense of stress. Parallel strands fill the width of each main path; where it narrows they
+    leave through its border. In the joints they cross the strands of other main paths, turning by
+    up to 60 degrees to cross more steeply, and leave the section. Two main paths share a member
+    that leads to a clamp or a load, or that forks into both. Links outside the section join the
+    strands to one path for each piece of the section. A section without members (a disc, a square)
+    is filled with concentric rings.
 
-    It is meant for frames of slim members. In parts with wide ones joints take most of the section:
-    strands fan out there, or lie over each other, and where links would lead through the section
-    for long the path is cut.
+    The strategy is meant for frames of slim members. If members are wide, joints take up most of
+    the section: strands fan out or overlap there, and the path is cut where a link would run
+    through the section for too long.
 
     Attributes
     ----------
     mode : "graph" or "points", default "graph"
-        Whether members are joined at the joints; or load paths are traced over the points of the
-        medial axis, as the paper has it, and are laid themselves, as single strands, whatever the
-        parameters below up to `minimum_length`: that skips joints and leaves points over, so that
-        no section is filled from them.
+        "graph" joins members at the joints. "points" traces load paths over the points of the
+        medial axis, as in the paper, and lays these as single strands; the parameters below are
+        then ignored up to `minimum_length`. It skips joints and leaves points over, so it fills no
+        section.
     spacing : float, default 1
-        Distance of neighbouring strands in fibre widths, at least 1; nine tenths of that where the
-        width of a main path is no multiple of it.
+        Distance between neighbouring strands in fibre widths, at least 1. Strands may lie
+        as near as nine tenths of it where the width of a main path is no multiple of it.
     links : "outside" or "none", default "outside"
         Join all strands of a piece of the section to one path, or lay single strands.
     longest_inside : float, mm, default 6
-        Links of which more than that lies inside the section are left out: the path is cut there.
+        Links with more than this length inside the section are left out: the path is cut there.
     longest_over_void : float, mm, optional
-        Likewise of links over holes, where nothing holds the fibre. By default these stay, for
-        strands leave members into windows as they do outside, and turn there.
+        The same for links over holes, where nothing holds the fibre. By default these stay: strands
+        leave members and turn in windows as they do outside the part.
     crossings : bool, default True
         Whether strands that end in a joint cross it and leave the section on the far side, as in
-        the paper; otherwise they stop in its middle.
+        the paper. Otherwise they stop in the middle of the joint.
     aligned : bool, default True
-        Whether strands turn to the stress in joints and beside free ends; otherwise they run there
-        as the medial axis and a smooth curve across the joint have it.
+        Whether strands turn towards the stress in joints and near free ends. Otherwise they follow
+        the medial axis there, and a smooth curve across the joint.
     filled : bool, default True
-        Whether what the main paths leave open in wide places is filled by spirals.
+        Whether spirals fill the wide places that the main paths leave open.
     turn : float, default 75
         Largest turn, degrees, of a main path in a joint.
     width_ratio : float, default 2
-        Most that the widest member of a main path has over its narrowest.
+        Largest ratio of the widest to the narrowest member of a main path.
     minimum_length : float, mm, optional
         Shorter paths are dropped; by default the shortest that the machine can cut.
     turns : {"tight", "printable", "cut"}, default "tight"
@@ -130,17 +131,17 @@ class Svt:
         check_fields(self, "width_ratio", at_least=1.0)
 
     def __call__(self, layer: Layer, stress: LayerStress, machine: Machine) -> Toolpaths:
-        """Plan the paths of one layer: for each piece of its section one, or as few as can be."""
+        """Plan one layer: one path for each piece of its section, or as few as possible."""
         return self._on(layer, self._lines(layer, stress, machine), machine)
 
     def for_part(
         self, stress: PartStress, layers: Sequence[Layer], machine: Machine
     ) -> LayerPlanner:
-        """Plan layers of the same section, under stress of the same directions, once."""
+        """Plan layers of the same section and the same stress directions only once."""
         return _Alike(self, stress, alike(layers, stress))
 
     def _on(self, layer: Layer, lines: list[_Marked], machine: Machine) -> Toolpaths:
-        """Paths on a layer, the short ones dropped."""
+        """Paths on a layer, without the short ones."""
         points, marks = [each for each, _ in lines], [mask for _, mask in lines]
         cut = with_turns(self, points, machine, marks)
         paths = Toolpaths.from_plane(cut.lines, layer, link=cut.link)
@@ -208,7 +209,7 @@ class Svt:
 
 
 class _Alike:
-    """Planner of a part that plans layers that are alike once."""
+    """Planner of a part that plans identical layers only once."""
 
     def __init__(self, svt: Svt, stress: PartStress, twins: Mapping[int, Layer]) -> None:
         self._svt, self._stress, self._twins = svt, stress, twins

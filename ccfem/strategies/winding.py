@@ -2,10 +2,10 @@
 
 G. Fang, T. Zhang, Y. Huang, Z. Zhang, K. Masania, C. C. L. Wang, Exceptional mechanical performance
 by spatial printing with continuous fiber: Curved slicing, toolpath generation and physical
-verification, arXiv:2311.17265. The layer is cut along curves that join its
-holes, and strands are level lines of a field from there to the outer border. The values on both
-borders are ours: with the paper's gradients (``energy = "paper"``) the field rises and falls, and
-lines close on islands or end at the border.
+verification, arXiv:2311.17265. The layer is cut along curves that join its holes. Strands are level
+lines of a field between this cut and the outer border. The fixed values on both borders are ours:
+with the paper's gradients alone (``energy = "paper"``) the field rises and falls, and its level
+lines form islands or end at the border.
 """
 
 from collections.abc import Mapping, Sequence
@@ -42,15 +42,15 @@ from ccfem.winding.spaced import CLOSEST, kept_apart
 __all__ = ["Winding"]
 
 _CLIP = 5.0
-"""Largest weight of a triangle, in means over its layer."""
+"""Largest weight of a triangle, in mean weights of its layer."""
 _REACH = 4.0
-"""How far along the curves the lift of the holes reaches, mm."""
+"""Distance along the curves over which the lift of the holes acts, mm."""
 _KNOWN = "_wound"
-"""Where a layer keeps the fields of its pieces."""
+"""Attribute of a layer that stores the fields of its pieces."""
 _BETWEEN = (0.0, 0.125, 0.25, 0.375, 0.625, 0.75, 0.875)
-"""Levels at which strands may start, in steps."""
+"""Levels at which further strands may start, in steps."""
 _KEPT = 0.6
-"""Share of the length of the strands that keeps the spacing asked for."""
+"""Share of the strands' length that keeps the spacing asked for."""
 
 
 @dataclass(frozen=True)
@@ -60,40 +60,41 @@ class Winding:
     Attributes
     ----------
     joints : tuple of str, default ()
-        Patches where bolts sit; by default all that are held or loaded. Only those whose border
-        on a layer is a hole count there.
+        Patches where bolts sit; by default all that are held or loaded. On a layer, only patches
+        that border a hole count.
     spacing : float, default 2.2
-        Distance of strands in fibre widths that 60 % of their length keep.
+        Distance between strands in fibre widths that 60 % of their length keep.
     energy : {"annulus", "paper"}
-        What the field minimises: ours, with given values on both borders, or that of the paper
-        (eq. 5 and 6), whose lines may end at the outer border.
+        What the field minimises: our energy, with given values on both borders; or that of the
+        paper (eq. 5 and 6), whose level lines may end at the outer border.
     paper : table
         Weights of the paper's energy: stress, curves, compatible, zero.
     isotropy : float, default 0.003
-        The smaller, the closer strands follow the stress; the larger, the more even they lie.
+        Small values make strands follow the stress closely, large ones make their distances even.
     smoothness : float, mm^2, default 0.3
-        Against bends of the strands.
+        Penalty on bends of the strands.
     weight : {"lines", "stress", "even"}
-        What strands follow most: cells that many stress lines cross that join the joints (the
-        paper), cells of large stress, or all alike.
+        Which cells count most: those crossed by many of the stress lines that join the joints (the
+        paper), those of large stress, or all equally.
     lines : {"joining", "touching", "all"}
         Stress lines that count, as in the slicer `spatial`.
     even : bool, default False
         Strands end where they would lie nearer than 0.7 spacings, and more start where there is
-        room for them: what lies between 0.7 and 1.5 spacings grows, fewer strands are closed.
+        room. More of the length then lies between 0.7 and 1.5 spacings apart, but fewer strands are
+        closed.
     cut : bool, default True
         Cut the layer along the curves that join its holes, so that strands wind round all of them.
     repulsion : float, mm^2, default 4
-        How much these curves keep off the outer border.
+        How strongly these curves are kept away from the outer border.
     lift, rise : float, default 0.1 and 0.4
-        Where the field starts: below 0 on the holes, so that the innermost strand keeps off them;
-        and below 0 where curves are further from the border than the holes are, so that strands do
-        not spread there.
+        How far the field starts below 0. `lift` acts on the holes, so that the innermost strand
+        keeps off them; `rise` acts where curves are farther from the border than the holes are, so
+        that strands do not spread there.
     sharpest : float, 1/mm, default 0.115
-        Strands that bend more sharply are smoothed there.
+        Largest curvature: strands that bend more sharply are smoothed there.
     joined : int, optional
-        Joints that a piece must hold to get fibre; by default as many as any piece of the part
-        does, which are the layers that the paper lays fibre on.
+        Number of joints that a piece must hold to get fibre. By default it is the largest number in
+        any piece of the part, which selects the layers that the paper lays fibre on.
     minimum_length : float, mm, optional
         Shorter strands are dropped; by default the shortest that the machine can cut.
     turns : {"tight", "printable", "cut"}, default "tight"
@@ -139,7 +140,7 @@ class Winding:
     def for_part(
         self, stress: PartStress, layers: Sequence[Layer], machine: Machine
     ) -> LayerPlanner:
-        """Find the joints of the layers, and what weighs in each cell.
+        """Find the joints of the layers, and the weight of each cell.
 
         Raises
         ------
@@ -170,7 +171,7 @@ class Winding:
 
 
 class _Wound(NamedTuple):
-    """Field on a piece of a layer, and the size of its gradient, 1/mm, that strands go by."""
+    """Field on a piece of a layer, and the size of its gradient, 1/mm, that sets the spacing."""
 
     piece: Piece
     field: FloatArray
@@ -187,7 +188,7 @@ class _Planner:
     names : tuple of str
         Patches of the joints.
     direction : (m, 3) array
-        Of the strongest stress of each cell.
+        Direction of the strongest stress of each cell.
     weight : (m,) array
     least : int
         Joints that a piece must hold.
@@ -216,7 +217,7 @@ class _Planner:
         return long_enough(paths, self.strategy.minimum_length, machine)
 
     def fields(self, layer: Layer) -> "list[_Wound]":
-        """Fields of the pieces of a layer; the layer keeps the last, for another spacing."""
+        """Fields of the pieces of a layer, stored on the layer for reuse at another spacing."""
         same = replace(self.strategy, spacing=1.0, even=False, minimum_length=None, turns="tight")
         known: tuple[_Planner, list[_Wound]] | None = vars(layer).get(_KNOWN)
         if known is not None:
@@ -230,7 +231,7 @@ class _Planner:
         return found
 
     def field(self, piece: Piece) -> "_Wound":
-        """Field of a piece of a layer, cut or not, its values evened out."""
+        """Field of a piece of a layer, cut or not, with its level lines evenly spaced."""
         s = self.strategy
         piece = piece.joined(s.repulsion) if s.cut else piece
         surface = piece.surface
@@ -267,7 +268,7 @@ class _Planner:
         return lines + kept_apart(between, apart, least, lines, border)
 
     def lines(self, one: "_Wound", first: float, step: float, least: float) -> list[FloatArray]:
-        """Level lines of values from `least` on, where they are closed with their bends limited."""
+        """Level lines at or above `least`: closed ones, smoothed; open ones only with "paper"."""
         s, mesh = self.strategy, one.piece.mesh
         found = isocontours(mesh.points, mesh.triangles, one.field, first, step)
         open_too = s.energy == "paper"
@@ -280,7 +281,7 @@ class _Planner:
         return lines
 
     def tension(self, layer: Layer) -> FloatArray:
-        """``w t t^T`` on each triangle, (t, 3, 3), of mean trace 1: t is the stress along it."""
+        """``w t t^T`` on each triangle, (t, 3, 3), of mean trace 1; t: the stress in its plane."""
         direction, normal = self.direction[layer.cell], layer.normals
         along = direction - np.einsum("td,td->t", direction, normal)[:, None] * normal
         weight = self.weight[layer.cell]
@@ -293,7 +294,7 @@ class _Planner:
 
 
 def _median_slope(surface: Surface, field: FloatArray) -> float:
-    """Median by area of the size of a field's gradient."""
+    """Area-weighted median of the size of a field's gradient."""
     size = np.linalg.norm(surface.gradient(field), axis=1)
     order = np.argsort(size, kind="stable")
     below = np.cumsum(surface.areas[order])

@@ -22,22 +22,22 @@ __all__ = ["Zigzag"]
 class Zigzag:
     """Parallel lines at one angle a layer, linked into as few strands as possible.
 
-    What slicers call rectilinear or isotropic fibre fill, and model B of Chen et al. 2021,
-    figure 3. It ignores the stress.
+    Slicers call this rectilinear or isotropic fibre fill; it is model B of Chen et al. 2021,
+    figure 3. The stress is ignored.
 
     Attributes
     ----------
     spacing : float, default 1
-        Distance of the lines in fibre widths, at least 1.
+        Distance between the lines in fibre widths, at least 1.
     angle : float, degrees, default 45
         Direction of the lines on layer 0 to the first axis of the layer.
     turn : float, degrees, default 90
-        Turn from each layer to the next; 90 alternates between two directions as the published
-        paths of Chen et al. 2021 do, 45 goes round four.
+        Turn from each layer to the next. 90 alternates between two directions, as the published
+        paths of Chen et al. 2021 do; 45 cycles through four.
     turns : {"tight", "printable", "cut"}, default "tight"
-        Whether strands go round all turns; or are cut where they turn more tightly than the
-        machine's fibre follows, if both sides are long enough for its cutter; or are cut wherever
-        they bend so tightly, and what is too short goes.
+        "tight": strands follow every turn. "printable": strands are cut at turns tighter than the
+        machine's minimum radius, if both parts are long enough for its cutter. "cut": strands are
+        cut at all such turns, and parts that are too short are dropped.
     """
 
     spacing: float = 1.0

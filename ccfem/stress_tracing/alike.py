@@ -1,7 +1,7 @@
-"""Layers that are planned alike: of the same section, under stress of the same directions.
+"""Layers that share a plan: those of the same section with the same stress directions.
 
-Where only rounding tells layers apart, their plans should be the same; where the stress turns from
-layer to layer, as in a part that is twisted, each has its own.
+Layers that differ only by rounding should get the same plan. If the stress turns from layer to
+layer, as in a twisted part, each layer gets its own.
 """
 
 from collections.abc import Sequence
@@ -17,24 +17,25 @@ from ccfem.stress_tracing.stress_lines import plane_stress_at, stress_lines
 __all__ = ["alike", "apart"]
 
 _SAME = 1e-6
-"""Share of its area by which a section may differ from that of another layer to be the same."""
+"""Share of its area by which a section may differ from an equal one."""
 _TURNED = 0.1
-"""Squared sine of the angle between the stresses on two layers, in the mean, up to which they are
-planned alike: about 18 degrees."""
+"""Largest mean squared sine of the angle between the stresses on two layers that share a plan:
+about 18 degrees."""
 _WEAK = 0.2
-"""Share of the largest mean stress below which a layer is planned as the one that bears it: near
-the neutral plane of a part that is bent across its layers, directions are chance."""
+"""Share of the largest mean stress below which a layer takes the plan of the most stressed one:
+near the neutral plane of a part in bending, directions are random."""
 _AS_LARGE = 0.99
-"""Share of the largest mean stress from which a layer counts as bearing it; the first one does."""
+"""Share of the largest mean stress above which a layer counts as most stressed; the first is taken.
+"""
 _REACH = 1.0
-"""Distance, mm, from a layer at which its stress is still taken."""
+"""Distance, mm, from a layer up to which its stress is used."""
 
 
 def alike(layers: Sequence[Layer], stress: PartStress) -> dict[int, Layer]:
-    """Layer by whose stress each flat layer is planned, by the index of the layer.
+    """Layer whose stress is used to plan each flat layer, by the index of the layer.
 
-    Of layers of the same section, that is the first with the largest mean stress, and then likewise
-    for those whose stress points elsewhere.
+    Among layers of the same section it is the first with the largest mean stress. The same is then
+    repeated for layers whose stress has other directions.
 
     Parameters
     ----------
@@ -65,7 +66,7 @@ def alike(layers: Sequence[Layer], stress: PartStress) -> dict[int, Layer]:
 def apart(one: LayerStress, other: LayerStress) -> float:
     """Mean squared sine of the angle between the principal stresses on two layers, from 0 to 1.
 
-    Of those of the largest size, weighted by both sizes and by area; lines, without a sign.
+    The principal stress is that of largest absolute value, weighted by both values and by area.
 
     Parameters
     ----------

@@ -1,9 +1,9 @@
-"""The band of a main path: the strip between its rails, carried on through joints and free ends.
+"""The band of a main path: the strip between its rails, continued through joints and free ends.
 
-The middle between both rails and half the vector from one to the other describe the strip. Beside
-joints and free ends the rails belong to other members: there the strip is bridged by a cubic and
-extended straight. While it is made, a strip is an array (n, 5) of both vectors, and of 1 where it
-is free.
+The strip is described by the middle between both rails and half the vector from one to the other.
+Near joints and free ends the rails belong to other members; there the strip is bridged by a cubic
+or extended straight. During construction a strip is an array (n, 5): both vectors, and 1 where the
+strip is free.
 """
 
 from dataclasses import dataclass
@@ -20,17 +20,17 @@ from ccfem.stress_tracing.main_paths import MainPath
 __all__ = ["STEP", "Band", "band", "extension"]
 
 STEP = 0.5
-"""Distance of the points of a band, mm."""
+"""Distance between points of a band, mm."""
 _CLEARING = 0.9
-"""Rails nearer to a joint than this many of its radii are not those of a member."""
+"""Distance from a joint, in its radii, below which rails are not those of a member."""
 _TANGENT = (4.0, 6.0)
-"""Lengths, mm, over which the direction of a band is taken where it is bridged and extended."""
+"""Lengths, mm, over which the direction of a band is measured for bridging and extension."""
 _NORMAL = 2.0
-"""Length, mm, over which its width is taken where it is extended."""
+"""Length, mm, over which its width is measured for extension."""
 _SMOOTHING = 2.0
 """Standard deviation, mm, of the Gaussian that smooths a band."""
 _TURNED = np.array([1.0, 1.0, -1.0, -1.0, 1.0])
-"""Factors on a strip that is walked the other way."""
+"""Factors on a strip that is traversed backwards."""
 _PADDING = 10.0
 """Length, mm, that is cut off at both ends after that."""
 _INNER_RADIUS = 4.0
@@ -89,9 +89,9 @@ def band(
     path : MainPath
     frame : Frame
     crossing : bool, default True
-        Whether an end in a joint goes on beyond it; otherwise it stops in its middle.
+        Whether an end in a joint continues beyond it; otherwise it stops in the joint's middle.
     turns : 2 floats, radians, default 0
-        By which it turns there to the left, at the start and at the end, as it leaves the band.
+        Turns to the left, at the start and at the end, with which the path leaves such joints.
     """
     own = np.concatenate([_own(member, frame) for member in path.members])
     left = np.concatenate([member.left for member in path.members])[own]
@@ -129,7 +129,7 @@ def band(
 
 
 def _stub(strip: FloatArray) -> FloatArray:
-    """Strip of one step, (2, 5), for one without length: across the vector between its sides."""
+    """Strip of one step, (2, 5), for one without length, normal to the line between its sides."""
     centre = strip.mean(axis=0)
     x, y = centre[2:4]
     along = np.array([y, -x]) / np.hypot(x, y)
@@ -139,9 +139,9 @@ def _stub(strip: FloatArray) -> FloatArray:
 
 
 def _own(member: Member, frame: Frame) -> BoolArray:
-    """Mask (m,) of the points whose rails are those of a member: away from joints and free ends.
+    """Mask (m,) of points whose rails belong to a member: away from joints and free ends.
 
-    A member that is too short for any has its points farthest from them.
+    A member too short for any such points has those farthest from joints and ends.
     """
     points = member.points
     share = np.full(len(points), np.inf)
@@ -175,7 +175,7 @@ def _as_ring(strip: FloatArray, gap: BoolArray) -> tuple[FloatArray, BoolArray]:
 
 
 def _bridged(strip: FloatArray, gap: BoolArray) -> FloatArray:
-    """Fill gaps (n - 1,) by cubics that go on in the directions of the strip at both sides."""
+    """Fill gaps (n - 1,) by cubics that continue the directions of the strip on both sides."""
     along, middle = along_line(strip[:, :2]), strip[:, :2]
     gaps = np.flatnonzero(gap & (np.diff(along) > STEP))
     parts, start = [], 0
@@ -243,10 +243,10 @@ def _smoothed(strip: FloatArray, mode: str) -> FloatArray:
 
 
 def extension(strip: FloatArray, reach: float, turn: float = 0.0) -> FloatArray:
-    """Strip (m, 5) that goes on for `reach`, mm, beyond the last point of one.
+    """Extension (m, 5) of a strip by `reach`, mm, beyond its last point.
 
-    Straight, or to the left by a turn, radians, whose inner side has a radius of 4 mm; it is not
-    free there.
+    It is straight, or turns left by `turn`, radians, with an inner radius of 4 mm. It does not
+    count as free.
     """
     middle = strip[:, :2]
     tangent = middle[-1] - middle[max(len(middle) - 1 - round(_TANGENT[1] / STEP), 0)]

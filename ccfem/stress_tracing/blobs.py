@@ -1,4 +1,4 @@
-"""What the tracks of all main paths leave open in wide parts of a section, filled by spirals."""
+"""Spirals in the wide places of a section that the tracks of all main paths leave open."""
 
 from collections.abc import Sequence
 
@@ -17,7 +17,7 @@ _STEP = 0.5
 
 
 def rest_of(section: Region, lines: Sequence[FloatArray], width: float, reach: float) -> Region:
-    """Part of a section that a disc reaches between strands.
+    """Part of a section that a disc can reach between strands.
 
     Parameters
     ----------
@@ -41,7 +41,7 @@ def blobs(
     spacing: float,
     least: float,
 ) -> list[list[FloatArray]]:
-    """Fill what strands leave open by concentric rings, joined to spirals.
+    """Fill places that strands leave open with concentric rings, joined to spirals.
 
     Parameters
     ----------
@@ -56,8 +56,8 @@ def blobs(
     Returns
     -------
     list of lists of (n, 2) arrays, mm
-        The spirals of each open place, the largest place first. They begin at the border of the
-        section where they lie on it.
+        The spirals of each open place, largest place first. They start at the border of the section
+        where they touch it.
     """
     rest = rest_of(section, lines, width, 0.5 * width)
     places = [part for part in shapely.get_parts(rest) if part.area >= least * spacing]

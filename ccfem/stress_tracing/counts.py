@@ -1,7 +1,7 @@
-"""How many tracks a band has along its length: whole numbers, changed where its width asks for it.
+"""Number of tracks along the length of a band: whole numbers that follow its width.
 
-Where the number changes, tracks go out of the section through the border, on one side or on both,
-and the others spread out over a length: so the distance of tracks stays near the pitch, and they
+Where the number changes, tracks leave the section through the border, on one side or on both, and
+the others spread out over a length. So the distance between tracks stays near the pitch, and tracks
 end outside, where links turn.
 """
 
@@ -18,43 +18,43 @@ __all__ = ["places"]
 _CHANGE = 0.3
 """Cost of one track more or less: as much as a tenth of the band left open over 3 mm."""
 _CROWDED = 4.0
-"""Cost of tracks nearer than `_NEAREST`, over that of a gap as wide as they overlap."""
+"""Cost of tracks nearer than `_NEAREST`, over that of a gap as wide as their overlap."""
 _OVER = 0.02
-"""Cost of tracks that overlap, but are not nearer than `_NEAREST`, likewise."""
+"""The same for tracks that overlap but are not nearer than `_NEAREST`."""
 _ROUNDING = 1.002
-"""Distance over the pitch that is taken for one."""
+"""Distance, in pitches, that counts as one pitch."""
 _LESS = 0.3
-"""Weight of what lies in joints, which other tracks cross too."""
+"""Weight of lengths in joints, which other tracks cross too."""
 _NEAREST = 0.9
-"""Share of the pitch below which tracks are too near to each other."""
+"""Distance, in pitches, below which tracks are too near to each other."""
 _IN_JOINT = 6.0
-"""How much dearer a change is in joints."""
+"""Factor on the cost of a change in joints."""
 _CLEAR = 5.0
-"""Distance, mm, from a joint, within which a change would reach into it."""
+"""Distance, mm, from a joint within which a change would reach into it."""
 _SPREAD = 3.0
 """Standard deviation, mm, of the Gaussian over which a change of the number is spread."""
 _ON_BORDER = 0.5
-"""Distance, mm, of a side of a band from the border that it runs along."""
+"""Distance, mm, up to which a side of a band runs along the border."""
 _CLEARLY = 0.2
-"""Share of a side by which more of it lies on the outside."""
+"""Share of a side by which more of it must lie on the outer border."""
 _ONE_SIDE = 1.0
-"""How much less changes on one side must cost than even ones on both to be taken."""
+"""Factor on the cost of even changes below which changes on one side are taken."""
 
 
 def places(band: Band, pitch: float, section: Region) -> FloatArray:
-    """Place of every track across a band, as shares of half its width.
+    """Place of every track across a band, in half widths.
 
     Parameters
     ----------
     band : Band
     pitch : float, mm
-        Distance of neighbouring tracks that is wanted.
+        Wanted distance between neighbouring tracks.
     section : shapely (Multi)Polygon, mm
 
     Returns
     -------
     (k, n) array
-        From left (1) to right (-1) at each point of the band; a track lies out of it beyond.
+        From left (1) to right (-1) at each point of the band; tracks beyond lie outside it.
     """
     width = np.maximum(2.0 * np.linalg.norm(band.half, axis=1), 1e-9)
     wanted = width / pitch
@@ -66,8 +66,8 @@ def places(band: Band, pitch: float, section: Region) -> FloatArray:
 
 
 def _along(band: Band, wanted: FloatArray, pitch: float, section: Region) -> FloatArray:
-    """Places (k, n) of tracks in a band with two ends, which wants so many (n,) at a pitch, mm."""
-    # A free end goes on to the border: as far again as half its width.
+    """Places (k, n) of tracks in a band with two ends, given the wanted numbers (n,) at a pitch."""
+    # A free end continues to the border, by half its width.
     first, last = band.core.start, band.core.stop
     if not band.joined[0]:
         first = max(0, first - round(0.5 * wanted[first] * pitch / STEP))
@@ -100,8 +100,8 @@ def _along(band: Band, wanted: FloatArray, pitch: float, section: Region) -> Flo
 def _outer(band: Band, section: Region) -> float:
     """1 where tracks leave through the left side of a band, else -1.
 
-    That is the side on the outside of the section, where links lead anywhere, not into a hole; of
-    two alike the longer one.
+    This is the side on the outer border, where links have room, not that on a hole. If both are
+    equal, it is the longer side.
     """
     left, right = (band.middle[band.core] + sign * band.half[band.core] for sign in (1.0, -1.0))
     outside = shapely.union_all(shapely.get_exterior_ring(shapely.get_parts(section)))
@@ -134,15 +134,15 @@ def _round_ring(wanted: FloatArray, joint: BoolArray) -> FloatArray:
 
 
 def _numbers(wanted: FloatArray, joint: BoolArray, first: int, step: int) -> tuple[IntArray, float]:
-    """Whole numbers (n,) near to those wanted (n,) that change seldom, and what they cost.
+    """Whole numbers (n,) near the wanted ones (n,) that change seldom, and their cost.
 
-    In joints (n,) they hardly change: there is no border to leave through. They are
-    `first` plus multiples of `step`; found by dynamic programming.
+    In joints (n,) they hardly change, since there is no border to leave through. They are `first`
+    plus multiples of `step`, and are found by dynamic programming.
     """
     most = max(first, int(np.ceil(wanted.max())) + 1)
     numbers = np.arange(first, most + 1, step)
     apart = wanted[:, None] / numbers
-    # A single track may lie in what is narrower than itself.
+    # A single track may lie in a band narrower than itself.
     near = np.where(numbers == 1, 0.0, np.maximum(_NEAREST - apart, 0.0))
     over = np.maximum(1.0 - apart, 0.0)
     cost = STEP * (np.maximum(apart - _ROUNDING, 0.0) + _CROWDED * near + _OVER * over)

@@ -16,7 +16,7 @@ amplification k and eta, are 1."""
 
 @dataclass(frozen=True)
 class Criterion:
-    """What makes a step of a load path a good one.
+    """Criterion for a good step of a load path.
 
     Attributes
     ----------
@@ -35,7 +35,7 @@ class Criterion:
     def __call__(self, turn: ArrayLike, misalignment: ArrayLike, distance: ArrayLike) -> FloatArray:
         """Smoothness of steps, the smaller the better: equation 5, the product over all properties.
 
-        Each property counts by its coefficient (equation 4), which is 0.1 at 0 and 1 at the limit.
+        Each property contributes its coefficient (equation 4): 0.1 at 0, and 1 at the limit.
 
         Parameters
         ----------

@@ -1,4 +1,4 @@
-"""A section seen as a frame: members along its medial axis, and the joints where they meet."""
+"""A section as a frame: members along its medial axis, and the joints where they meet."""
 
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
@@ -17,12 +17,12 @@ FREE = -1
 """Joint of an end that meets no other member."""
 
 ARC_CHORD = 1.6
-"""Maximum ratio of the length along the border to its chord for the bisector of a corner; a square
+"""Largest ratio of the length along the border to its chord for the bisector of a corner; a square
 corner has 1.41."""
 
 _CONTRACTION = 1.25
-"""Members between two joints that are shorter than this many radii of the larger one's disc become
-one joint: two members that cross give two neighbouring junctions of the axis, one radius apart
+"""Length, in radii of the larger joint's disc, below which a member between two joints is merged
+into one joint. Two crossing members give two neighbouring junctions of the axis, one radius apart
 where they are equally wide and cross at 60 degrees."""
 
 
@@ -53,7 +53,7 @@ class Member:
 
     @cached_property
     def reversed(self) -> "Member":
-        """The same member walked the other way."""
+        """The same member in the opposite direction."""
         return Member(
             self.points[::-1], self.right[::-1], self.left[::-1], self.ends[::-1], self.closed
         )
@@ -118,7 +118,7 @@ def frame(section: Region, step: float) -> Frame:
 
 
 def _joints(axis: MedialAxis) -> tuple[IntArray, BoolArray]:
-    """Joint of each node of the axis, `FREE` of ends, and which segments lie within a joint."""
+    """Joint of each node of the axis, `FREE` for ends; and the mask of segments within joints."""
     ends = np.array([segment.ends for segment in axis.segments], dtype=np.int64).reshape(-1, 2)
     junction = np.bincount(ends[ends >= 0], minlength=len(axis.nodes)) > 2
     length = np.array([segment.length for segment in axis.segments])
@@ -133,7 +133,7 @@ def _joints(axis: MedialAxis) -> tuple[IntArray, BoolArray]:
 
 
 def _joined(members: list[Member], joint: int) -> list[Member]:
-    """Members, with the two joined that alone meet in a joint; a single one becomes a ring."""
+    """Members, merging two that are alone in a joint; a single one becomes a ring."""
     ends = ends_at(members, joint)
     if len(ends) != 2:
         return members

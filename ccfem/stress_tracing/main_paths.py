@@ -1,8 +1,8 @@
 """Main load paths: members joined through the joints that they meet in, by the paper's criterion.
 
-The paper walks greedily over the points of the medial axis (`walk.py` does that to the letter),
-which skips joints and leaves stray points. Here its criterion is evaluated for every pair of
-members at every joint instead.
+The paper walks greedily over the points of the medial axis (`walk.py` does exactly that), which
+skips joints and leaves stray points. Here its criterion is evaluated instead for every pair of
+members at every joint.
 """
 
 from dataclasses import dataclass
@@ -20,9 +20,9 @@ from ccfem.stress_tracing.stress_lines import misalignment, plane_stress_at, str
 __all__ = ["MainPath", "main_paths", "outward"]
 
 _REACH = 5.0
-"""Length, mm, beyond the disc of a joint over which the direction of a member is taken."""
+"""Length, mm, beyond the disc of a joint over which the direction of a member is measured."""
 _OTHER_SIGN = 1.5
-"""Factor on the smoothness of a pair of which one is pulled and the other pushed."""
+"""Factor on the smoothness of a pair of which one is in tension and the other in compression."""
 
 
 @dataclass(frozen=True)
@@ -60,10 +60,10 @@ def main_paths(
 ) -> list[MainPath]:
     """Join members to main load paths.
 
-    Of all pairs of ends that meet in a joint the smoothest is joined first, as long as it turns by
-    less than the limit. The misalignment is that of both members beside the joint, cut off at its
-    limit; the distance is that across the joint, the same for all. Ends that stay without a
-    partner are ends of main paths.
+    The pairs of ends that meet in a joint are joined in the order of their smoothness, if they turn
+    by less than the limit. The misalignment is that of both members beside the joint, capped at its
+    limit. The distance is that across the joint, the same for all pairs. Ends without a partner are
+    ends of main paths.
 
     Parameters
     ----------
@@ -151,7 +151,7 @@ def _candidates(
 def _chained(
     members: tuple[Member, ...], partner: dict[tuple[int, int], tuple[int, int]]
 ) -> list[MainPath]:
-    """Walk from every end without a partner, then round what is closed."""
+    """Walk from every end without a partner, then along closed paths."""
     used: set[int] = set()
     paths = []
     every = [(number, side) for number in range(len(members)) for side in (0, 1)]

@@ -1,7 +1,7 @@
-"""Stems: members that end freely, at a clamp or a load, and that two main paths run into together.
+"""Stems: members that end at a clamp or a load and are shared by two main paths.
 
-Where a main path ends in a joint beside such a member, and would run on along it, both share its
-width, each on its own side: so strands of both reach the clamp, and none lies over another.
+If a main path ends in a joint beside such a member, and would continue along it, both paths share
+its width, each on its own side. So strands of both reach the clamp, and none overlap.
 """
 
 from collections.abc import Sequence
@@ -24,7 +24,7 @@ _ALIKE = 3.0
 
 
 def with_shared_stems(paths: Sequence[MainPath], frame: Frame) -> list[MainPath]:
-    """Let main paths share members that end freely.
+    """Let main paths share members with a free end.
 
     Parameters
     ----------
@@ -34,8 +34,8 @@ def with_shared_stems(paths: Sequence[MainPath], frame: Frame) -> list[MainPath]
     Returns
     -------
     list of MainPath
-        In the same order. A shared member is divided along its length, by the widths of both; one
-        that is a path of its own, and forks into two others, goes to these.
+        In the same order. A shared member is divided along its length in proportion to both widths.
+        A member that is a path of its own and forks into two others is given to these.
     """
     found = _forked(paths, frame)
     for k in range(len(found)):
@@ -65,7 +65,7 @@ def with_shared_stems(paths: Sequence[MainPath], frame: Frame) -> list[MainPath]
 
 
 def _forked(paths: Sequence[MainPath], frame: Frame) -> list[MainPath]:
-    """Divide stems that no path runs through between the paths on both sides that end there."""
+    """Divide stems that no path runs through between the paths that end there on both sides."""
     found: list[MainPath | None] = list(paths)
     for k, whole in enumerate(paths):
         stem = whole.members[0] if whole.members[0].ends[1] == FREE else whole.members[0].reversed
@@ -102,7 +102,7 @@ def _forked(paths: Sequence[MainPath], frame: Frame) -> list[MainPath]:
 
 
 def _turned(path: MainPath, backward: bool) -> MainPath:
-    """Path, walked the other way if `backward`."""
+    """Path, reversed if `backward`."""
     if not backward:
         return path
     return replace(path, members=tuple(member.reversed for member in path.members[::-1]))
@@ -141,7 +141,7 @@ def _divided(
 
 
 def _on_left(along: FloatArray, arrival: FloatArray) -> bool:
-    """Whether one comes from the left of a direction: then one walks to the right."""
+    """Whether a path arrives from the left of a direction."""
     return bool(along[0] * arrival[1] - along[1] * arrival[0] < 0.0)
 
 

@@ -1,4 +1,4 @@
-"""The stress that load paths follow, at any points of a flat layer, as lines with a sign."""
+"""The stress that load paths follow, at any points of a flat layer, as signed lines."""
 
 from dataclasses import dataclass
 
@@ -14,16 +14,16 @@ __all__ = ["StressLines", "misalignment", "plane_stress_at", "stress_lines"]
 
 @dataclass(frozen=True)
 class StressLines:
-    """Principal stress of the largest size at k places.
+    """Principal stress of largest absolute value at k places.
 
     Attributes
     ----------
     direction : (k, 2) array
-        Unit vectors; lines, so the sign means nothing.
+        Unit vectors of lines, whose sign is arbitrary.
     value : (k,) array, MPa
         Positive in tension.
     defined : (k,) bool array
-        Whether there is one: not where both principal stresses have the same size (`tensor`).
+        False where both principal stresses have the same absolute value (`tensor`).
     """
 
     direction: FloatArray
@@ -43,7 +43,7 @@ def plane_stress_at(stress: LayerStress, points: FloatArray, reach: float) -> Fl
 
 
 def stress_lines(plane_stress: FloatArray) -> StressLines:
-    """Principal stress of the largest size of plane stress (k, 3), MPa."""
+    """Principal stress of largest absolute value of plane stress (k, 3), MPa."""
     value, angle, defined = strongest_in_plane(plane_stress)
     return StressLines(np.stack([np.cos(angle), np.sin(angle)], axis=-1), value, defined)
 

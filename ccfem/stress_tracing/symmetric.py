@@ -1,4 +1,4 @@
-"""Tracks of a symmetric section made symmetric, where they nearly are."""
+"""Tracks of a symmetric section made exactly symmetric, if they nearly are."""
 
 from collections.abc import Sequence
 
@@ -13,17 +13,17 @@ from ccfem.geometry.symmetry import mirror_lines, reflected
 __all__ = ["made_symmetric"]
 
 _LOST = 0.5
-"""Length, mm, that the ends of a track may lie beyond the border."""
+"""Length, mm, by which the ends of a track may lie beyond the border."""
 
 
 def made_symmetric(
     groups: Sequence[Sequence[FloatArray]], section: Region, near: float
 ) -> list[list[FloatArray]]:
-    """Make tracks the mirror images of each other where the section is its own.
+    """Make tracks mirror images of each other where the section is symmetric.
 
-    The medial axis, the mesh and the stress on it are symmetric to some digits only, and each is
-    followed; strands differ visibly. A group whose mirror image lies nowhere near to another, or to
-    itself, stays as it is.
+    The medial axis, the mesh and the stress on it are only approximately symmetric, and tracks
+    follow them, so that strands differ visibly. A group whose mirror image is not near another
+    group, or itself, is not changed.
 
     Parameters
     ----------
@@ -55,7 +55,7 @@ def made_symmetric(
 def _partners(
     images: Sequence[FloatArray], lines: Sequence[FloatArray], near: float
 ) -> list[int] | None:
-    """Line that each image lies on, each one once; None where some have none."""
+    """Line that each image lies on, each used once; None if some images have no line."""
     if len(images) != len(lines) or not lines:
         return None
     curves = [shapely.LineString(line) for line in lines]
@@ -74,9 +74,9 @@ def _partners(
 
 
 def _within(image: FloatArray, line: FloatArray, section: Region) -> FloatArray:
-    """Image of a line within a section that is symmetric to some digits; the line where it leaves.
+    """Image of a line, if within a nearly symmetric section; otherwise the line.
 
-    Links begin where strands leave the section, so that these must not do so elsewhere.
+    Links begin where strands leave the section, so strands must not leave it elsewhere.
     """
     curve = shapely.LineString(image)
     if shapely.covers(section, curve):

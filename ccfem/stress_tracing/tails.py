@@ -1,8 +1,8 @@
-"""Which way the tracks of a main path leave the joint that it ends in.
+"""Direction in which the tracks of a main path leave the joint that it ends in.
 
 They cross the joint and leave the section. Straight on, they would often run along another main
-path for long, over its strands or between them. Of some turns that one is taken with which they lie
-least beside strands of others, and least long in the section.
+path, over its strands or between them. Of several turns the one is taken for which they run least
+beside other strands, and least long in the section.
 """
 
 from collections.abc import Sequence
@@ -26,34 +26,34 @@ _NEAR = 0.75
 _ALONG = np.cos(np.radians(30.0))
 """where they run within 30 degrees of each other."""
 _LENGTH = 0.15
-"""Cost of a length in the section, over that beside other strands."""
+"""Cost of a length in the section, over that of a length beside other strands."""
 _TURNING = 2.0
 """Cost of a turn of a radian, in mm beside other strands, for each strand."""
 _OUTSIDE = 1.5
-"""Length, mm, outside the section, after which a tail has left it."""
+"""Length, mm, outside the section after which a tail has left it."""
 _TIED = 1e-3
-"""Share by which turns to the left and to the right must differ in cost: a path on an axis of
-symmetry stays there."""
+"""Share by which turns to the left and to the right must differ in cost, so that a path on an axis
+of symmetry stays there."""
 _NONE = np.zeros((0, 2))
 
 
 def tail_turns(
     paths: Sequence[MainPath], frame: Frame, pitch: float, section: Region
 ) -> list[tuple[float, float]]:
-    """Find the turns, radians to the left, of main paths behind the joints that they end in.
+    """Find the turns, radians to the left, of main paths beyond the joints that they end in.
 
     Parameters
     ----------
     paths : sequence of MainPath
     frame : Frame
     pitch : float, mm
-        Distance of neighbouring tracks.
+        Distance between neighbouring tracks.
     section : shapely (Multi)Polygon, mm
 
     Returns
     -------
     list of 2 floats
-        At the start and at the end of each; 0 where it ends freely.
+        At the start and at the end of each; 0 for a free end.
     """
     section = shapely.force_2d(section)
     shapely.prepare(section)
@@ -82,7 +82,7 @@ def tail_turns(
 
 
 def _best(costs: Sequence[float]) -> float:
-    """Turn that costs least; none where that to the left costs as much as that to the right."""
+    """Turn of least cost; none if turns to the left and to the right cost the same."""
     best = int(np.argmin(costs))
     # Turns come in pairs behind the first one, which is none.
     other = best + 1 if best % 2 else best - 1
@@ -121,7 +121,7 @@ def _tails(strip: Band, share: FloatArray, side: int) -> list[FloatArray]:
 def _cost(
     lines: FloatArray, tree: cKDTree, along: FloatArray, pitch: float, section: Region
 ) -> float:
-    """Length, mm, of lines (k, n, 2) beside others, and some of what lies in the section."""
+    """Length, mm, of lines (k, n, 2) beside others, plus a share of their length in the section."""
     inside = shapely.contains_xy(section, lines.reshape(-1, 2)).reshape(lines.shape[:2])
     beyond = round(_OUTSIDE / STEP) + 1
     total = 0.0

@@ -19,13 +19,13 @@ from ccfem.stress_tracing.turning import relaxed
 __all__ = ["clipped", "eased", "tracks"]
 
 _BEYOND = 6
-"""Points for which a track goes on where it leaves its band sideways."""
+"""Number of points by which a track is continued where it leaves its band sideways."""
 _OUTSIDE = 1.5
 """Length outside the section, mm, after which a track has left it for good."""
 _INSET = 0.1
-"""Distance inside the border, mm, to which a track that lies outside is pushed."""
+"""Distance inside the border, mm, to which a track outside is pushed."""
 _SPREAD = 1.5
-"""Standard deviation, mm, of the Gaussian that spreads such a push to the points beside it."""
+"""Standard deviation, mm, of the Gaussian that spreads such a push to neighbouring points."""
 _EASING = 1.0
 _ROUNDS = 60
 """Standard deviation, mm, of the Gaussian that eases sharp turns, and how often at most."""
@@ -44,18 +44,18 @@ def tracks(
     ----------
     band : Band
     pitch : float, mm
-        Distance of neighbouring tracks that is wanted.
+        Wanted distance between neighbouring tracks.
     section : shapely (Multi)Polygon, mm
     radius : float, mm, default 0
-        Tighter turns are eased; where the border leaves no room for that, they stay.
+        Tighter turns are smoothed, unless the border leaves no room for that.
     stress : LayerStress, optional
         Stress that the tracks turn to in joints and beside free ends.
 
     Returns
     -------
     list of (n, 2) arrays, mm
-        From left to right. Closed ones repeat their first point, the one nearest to the middle of
-        the section.
+        From left to right. Closed tracks repeat their first point, which is the one nearest to the
+        middle of the section.
     """
     shapely.prepare(section)
     inner = shapely.buffer(section, -_INSET)
@@ -71,7 +71,7 @@ def tracks(
         if whole:
             pieces = [ring_from(np.concatenate([line, line[:1]]), seam)]
         elif band.closed:
-            # Open where it lies farthest outside.
+            # Open it where it lies farthest outside.
             start = -int(np.argmax(np.abs(place)))
             line, place = np.roll(line, start, axis=0), np.roll(place, start)
             runs = _stretches(place, slice(0, len(line)))
@@ -129,11 +129,11 @@ def eased(line: FloatArray, radius: float, closed: bool = False) -> FloatArray:
 
 
 def clipped(line: FloatArray, section: Region, core: slice, within: slice) -> FloatArray:
-    """Part of a line round the middle of its core up to where it leaves a section for good.
+    """Part of a line round the middle of its core, up to where it leaves a section for good.
 
-    Excursions shorter than 1.5 mm do not end it: they would cut a track that grazes the border
-    into pieces. Its ends lie on the border; an end where it does not leave the section, but would
-    run on along the member behind a joint, is that of the points `within`.
+    Excursions shorter than 1.5 mm do not end it: they would cut a track that grazes the border into
+    pieces. Its ends lie on the border. If an end does not leave the section, but would run along
+    the member behind a joint, the end of the points `within` is used.
     """
     inside = shapely.contains_xy(section, line)
     own = np.flatnonzero(inside[core]) + core.start
@@ -173,7 +173,7 @@ def _way_out(inner: FloatArray, outer: FloatArray, section: Region) -> FloatArra
 
 
 def _held(line: FloatArray, section: Region, inner: Region, closed: bool) -> FloatArray:
-    """Push a line back where it leaves a section between its ends, and its neighbours less."""
+    """Push a line back where it leaves a section between its ends, and neighbouring points less."""
     step = 0.2 * STEP
     fine, _, _ = subdivide(line, np.array([0, len(line)]), step)
     ends = 0 if closed else round(STEP / step)

@@ -1,12 +1,12 @@
-"""Tracks turned to the stress where no rails guide them: in joints and beside free ends.
+"""Tracks turned towards the stress where no rails guide them: in joints and near free ends.
 
 A track may move sideways by u(s). The turned track minimises the sum, over its length, of ::
 
     cos(2 r) (u' - tan r)^2 + (c u'')^2 + (u / l)^2
 
-with the angle r from the track to the stress: misalignment, curvature, and the distance from its
-old place. That distance counts much in members, whose width the tracks fill evenly, and little in
-joints. Where r is over 45 degrees, in joints that it crosses, a track is left alone.
+with the angle r from the track to the stress. The terms are misalignment, curvature, and distance
+from the old position. The distance counts much in members, whose width the tracks fill evenly, and
+little in joints. Where r exceeds 45 degrees, in joints that it crosses, a track is not changed.
 """
 
 import numpy as np
@@ -36,7 +36,7 @@ _ROUNDS = 2
 def relaxed(
     lines: FloatArray, band: Band, stress: LayerStress, section: Region, share: FloatArray
 ) -> FloatArray:
-    """Turn the tracks of a band to the stress.
+    """Turn the tracks of a band towards the stress.
 
     Parameters
     ----------
@@ -104,7 +104,7 @@ def _least(weight: FloatArray, slope: FloatArray, hold: FloatArray, closed: bool
 
 
 def _apart(moved: FloatArray, band: Band, share: FloatArray) -> FloatArray:
-    """Find the moves (k, n) nearest to those given that keep tracks apart."""
+    """Find the moves (k, n) nearest to the given ones that keep tracks apart."""
     count = len(moved)
     size = np.linalg.norm(band.half, axis=1)
     number = np.arange(count)[:, None]

@@ -1,7 +1,7 @@
-"""Main load paths as the paper traces them: a greedy walk over the points of the medial axis.
+"""Main load paths as traced in the paper: a greedy walk over the points of the medial axis.
 
-For comparison with the paper. The walk skips joints and leaves stray points, by which main paths
-are broken up; `main_paths` evaluates the same criterion at the joints instead.
+It serves for comparison. The walk skips joints and leaves stray points, which break up main paths;
+`main_paths` evaluates the same criterion at the joints instead.
 """
 
 import numpy as np
@@ -28,10 +28,10 @@ _RULE = Criterion(90.0, 45.0, 3.0 * _STEP)
 def walk(section: Region, stress: LayerStress, sampling: float) -> list[FloatArray]:
     """Trace load paths over the points of the medial axis.
 
-    From an end of the axis under the largest stress, or else the point under the largest stress,
-    the next point is always the one with the least smoothness, within 90 degrees of turn, 45
-    degrees of misalignment and 3 mm, and without leaving the section. The walk ends where there is
-    none; a new one starts until no point is left. Joints may be passed once for every two members.
+    The walk starts at an end of the axis under the largest stress, or else at the point under the
+    largest stress. The next point is always the one of least smoothness value, within 90 degrees of
+    turn, 45 degrees of misalignment and 3 mm, without leaving the section. The walk ends if there
+    is none, and new ones start until no point is left. Joints may be passed once per two members.
 
     Parameters
     ----------

@@ -1,4 +1,4 @@
-"""Averages over a ball about each of many points, and the transpose of that."""
+"""Weighted averages over a ball round each of many points, and the transposed operation."""
 
 from typing import NamedTuple
 
@@ -43,14 +43,14 @@ def ball_averages(
 def ball_shares(
     points: FloatArray, values: FloatArray, weights: FloatArray, judged: IntArray, radius: float
 ) -> FloatArray:
-    """Derive by the values of all points what averages are given by: transposed `ball_averages`.
+    """Apply the transpose of `ball_averages`: turn derivatives by averages into those by values.
 
     Parameters
     ----------
     points, weights, judged, radius
         As there.
     values : (k, c) array
-        Of the judged points: derivatives by their averages.
+        Derivatives by the averages of the judged points.
 
     Returns
     -------
@@ -78,7 +78,7 @@ class _Boxes(NamedTuple):
 
 
 def _boxes(points: FloatArray, size: float) -> _Boxes:
-    """Put points into boxes of a size, with an empty one on every side."""
+    """Sort points into boxes of a given size, with a margin of empty boxes on every side."""
     first = points.min(axis=0)
     box = np.floor((points - first) / size).astype(np.int64) + 1
     shape = box.max(axis=0) + 2

@@ -3,8 +3,9 @@
 A piece of length l along t adds the energy ``EA l (m . strain)^2 / 2`` with ``m = (tx^2, ty^2,
 tz^2, ty tz, tx tz, tx ty)`` on Voigt strain with engineering shear. With ``b = B^T m`` that is
 the element matrix ``EA l b b^T``. In a linear cell the constant stiffness ``EA l m m^T / V`` gives
-the very same matrix. In a quadratic cell b is taken at the middle of the piece. No matrix is made:
-which pieces carry changes from solve to solve, and a product with b and its transpose is cheap.
+the very same matrix. In a quadratic cell b is taken at the middle of the piece. No matrix is
+assembled: the set of carrying pieces changes from solve to solve, and products with b and its
+transpose are cheap.
 """
 
 from dataclasses import dataclass
@@ -103,13 +104,13 @@ class Bars:
 
 
 def _seen(displacement: FloatArray) -> FloatArray:
-    """View that nobody writes through, so that loops are compiled for one kind of array."""
+    """Read-only view: loops are then compiled for one kind of array only."""
     view = np.ascontiguousarray(displacement, dtype=np.float64).view()
     view.flags.writeable = False
     return view
 
 
-# One loop each, without slices: these would double the time.
+# One loop each, without slices, which would double the time.
 @njit(cache=True)
 def _strain(nodes, slope, tangent, u, result):  # type: ignore[no-untyped-def]  # pragma: no cover
     for s in range(len(nodes)):

@@ -15,8 +15,8 @@ _TOUCH = 1e-9
 """Barycentric distance within which a piece counts as lying on a face."""
 
 _CLEAR = 1e-4
-"""Barycentric distance from edges from which on a step is followed from cell to cell: no other
-cells touch it there."""
+"""Barycentric distance from edges above which a step is followed from cell to cell: no other cells
+touch it there."""
 
 _SLIVER = 1e-12
 """Share of a step below which a piece is dropped."""
@@ -28,11 +28,11 @@ class CutSteps(NamedTuple):
     Attributes
     ----------
     step, cell : (s,) int arrays
-        That each piece belongs to, and that holds it.
+        Step that each piece belongs to, and cell that holds the piece.
     begin, end : (s,) arrays in [0, 1]
         Shares of the step at the ends of the piece.
     share : (s,) array
-        1 over the number of cells that hold it: it comes once for each.
+        1 over the number of cells that hold the piece; it is listed once for each of them.
     """
 
     step: IntArray
@@ -48,7 +48,7 @@ def cut_steps(start: FloatArray, step: FloatArray, length: FloatArray, mesh: Tet
     Parameters
     ----------
     start, step : (k, 3) arrays, mm
-        Of which neighbours that follow on from each other are cut fastest.
+        Cutting is fastest where each step starts at the end of the one before.
     length : (k,) array, mm
         Of the steps.
     mesh : TetMesh
@@ -65,7 +65,7 @@ def cut_steps(start: FloatArray, step: FloatArray, length: FloatArray, mesh: Tet
 
 
 def _tables(mesh: TetMesh) -> tuple[Any, ...]:
-    """Return what `_cut` knows of a mesh, which keeps it."""
+    """Return the tables of a mesh that `_cut` uses; the mesh stores them."""
     known = mesh.__dict__
     if "cut_tables" not in known:
         across = np.ascontiguousarray(mesh.across)
@@ -102,7 +102,7 @@ def _cut(  # type: ignore[no-untyped-def]
 
     `whole` takes segment and cell; `real` takes begin, end (parameters in [0, 1]) and share. A step
     is followed from cell to cell where it keeps clear of edges; elsewhere all cells near it are
-    looked at.
+    tested.
     """
     count, last = 0, -1
     found = np.empty(len(origin), dtype=np.int64)
@@ -178,9 +178,9 @@ def _write(whole, real, count, segment, cell, begin, end):  # type: ignore[no-un
 
 @njit(cache=True)
 def _walk(point, step, cell, origin, gradient, across, found, ends):  # type: ignore[no-untyped-def]  # pragma: no cover
-    """Cells that a step passes in turn, from where one begins, and where it leaves them.
+    """Write the cells that a step passes, and where it leaves each; return the number of cells.
 
-    0 where it comes near to an edge, runs along a face, or leaves the mesh.
+    The number is 0 where the step comes near an edge, runs along a face, or leaves the mesh.
     """
     value, slope = np.empty(4), np.empty(4)  # of the barycentric coordinates, the first one last
     number, here = 0, 0.0

@@ -25,10 +25,10 @@ _UPDATES = 30
 """Updates of the displacement after which to give up."""
 
 _SETTLING = 1e-4
-"""Residual from which on what the part touches is looked at."""
+"""Residual below which the contact with supports is checked."""
 
 _PROGRESS = 1e-2
-"""What each update leaves of the residual, as long as the set of carrying fibres may change."""
+"""Factor by which each update reduces the residual while the set of carrying fibres may change."""
 
 
 @dataclass(frozen=True)
@@ -45,7 +45,7 @@ class Equilibrium:
     carries : (s,) bool array
         Which pieces lend their stiffness.
     updates : int
-        Solves until the set of carrying fibres and the displacement were settled.
+        Solves until the set of carrying fibres and the displacement were converged.
     iterations : int
         Of conjugate gradients, over all updates.
     residual : float
@@ -80,11 +80,11 @@ def equilibrium(
 ) -> Equilibrium:
     """Find the displacement of a part with fibres.
 
-    With fibres that carry tension only the energy is convex and piecewise quadratic; Newton's
-    method on it takes the fibres that the last displacement stretches, solves, and repeats until
-    the residual with the new set meets the tolerance. Each solve is a conjugate gradient with the
-    factorisation of the part without fibres as preconditioner. What the part touches of supports
-    that only press is found in the same rounds.
+    With fibres that carry tension only, the energy is convex and piecewise quadratic. Newton's
+    method takes the fibres that the last displacement stretches, solves, and repeats until the
+    residual with the new set meets the tolerance. Each solve uses conjugate gradients, with the
+    factorisation of the part without fibres as preconditioner. The same iterations find the contact
+    with supports that only press.
 
     Parameters
     ----------
@@ -95,8 +95,8 @@ def equilibrium(
     mode : str
         "bonded" (all fibres carry) or "tension" (those that are stretched).
     known : sequence of (n, 3) arrays, mm, optional
-        Displacements of the same part with less and more of fibre, the nearest last; the mixture
-        of them that has the least energy is where to start. Default: the part without fibres.
+        Displacements of the same part with less and more fibre, the nearest last. The start is the
+        mixture of them with the least energy. Default: the part without fibres.
     tolerance : float
         Largest relative residual that is accepted.
 
@@ -158,12 +158,12 @@ def equilibrium(
 
 
 def _reduced(specimen: Specimen, held: Held) -> sp.bsr_array:
-    """Stiffness of the part without fibres on what is left free where it touches this much."""
+    """Stiffness of the part without fibres on the free components of the given contact."""
     return specimen.solver.matrix if held.presses is None else held.reduce(specimen.matrix)
 
 
 def _mixed(matrix: Reinforced, forces: FloatArray, known: Sequence[FloatArray]) -> FloatArray:
-    """Mixture of displacements (n, 3), by shares that add to 1, of least energy with a matrix."""
+    """Mixture of displacements (n, 3), by shares that add to 1, of least energy for a matrix."""
     last = known[-1]
     moves = np.array([(each - last).reshape(-1) for each in known[:-1]])
     images = np.array([matrix @ move for move in moves])

@@ -1,11 +1,11 @@
 """Strength between layers: the averaged traction on the layer against what the bond holds.
 
 The stress tensor of the matrix is averaged over a ball (averaging over a length: Whitney and
-Nuismer, J. Composite Materials 8, 1974, 253-265), and its traction on the layer judged by the
+Nuismer, J. Composite Materials 8, 1974, 253-265). Its traction on the layer is judged by the
 quadratic criterion ``f^2 = (max(t_n, 0) / Z)^2 + (t_s / S)^2``, t_n opening the layers and t_s
-sliding them on each other. What presses layers together does no harm and no good. Good for
-comparing layers of one part under the same supports, and for where layers open; not for absolute
-loads: strengths that are published for one material differ by a factor of 2.4.
+sliding them on each other. Compression across layers neither harms nor helps. The index serves to
+compare layers of one part under the same supports and to find where layers open. It does not serve
+for absolute loads: strengths published for one material differ by a factor of 2.4.
 """
 
 from collections.abc import Sequence
@@ -27,14 +27,14 @@ from ccfem.virtual_testing.zone import ZONE, distance_from_patches
 __all__ = ["ZONES", "Interlayer", "interlayer", "layer_normals"]
 
 ZONES = (ZONE, 0.5 * ZONE, 0.0)
-"""Distances, mm, from patches of loads and supports within which nothing is judged: the first
-decides; the others show how much of the result is the zone's."""
+"""Distances, mm, from patches of loads and supports within which nothing is judged. The first gives
+the result; the others show how much it depends on the zone."""
 
 _NEAREST = 6
 """Triangles of curved layers that give the normal of a cell."""
 
 _ROUNDING = 1e-6
-"""Traction over the largest averaged stress that is taken for the rounding of a solve."""
+"""Traction, over the largest averaged stress, that counts as rounding error of a solve."""
 
 
 @dataclass(frozen=True)
@@ -83,8 +83,8 @@ def interlayer(
     material : Material, optional
         With the strengths between layers; default that of the part.
     radius : float, mm, default 2
-        Of the ball. Below the mean edge of the cells the result hangs on the mesh, and a note says
-        so.
+        Radius of the ball. Below the mean edge of the cells the result depends on the mesh, and a
+        note says so.
 
     Raises
     ------
@@ -133,9 +133,9 @@ def interlayer(
 def layer_normals(layers: Sequence[Layer], places: FloatArray) -> FloatArray:
     """Find the unit normals (k, 3) of the layers at places (k, 3), of either sign.
 
-    Of flat layers that of their plane. Where layers are curved, the axis that the normals n of the
-    six nearest triangles share best: the first eigenvector of the sum of ``n n^T``. Vectors are
-    never averaged, for a normal has no sign.
+    For flat layers, the normal of their plane. For curved layers, the axis nearest to the normals n
+    of the six nearest triangles: the first eigenvector of the sum of ``n n^T``. Vectors are never
+    averaged, since a normal has no sign.
     """
     frames = [layer.flat.frame[2] for layer in layers if layer.flat is not None]
     if not layers:

@@ -1,10 +1,10 @@
-"""How near a part is to its first failure, by smooth indices with their derivatives.
+"""Smooth, differentiable indices of how near a part is to its first failure.
 
-First failure (`ccfem.virtual_testing.strength`) hangs on peaks: of the force in the fibre, of the
-stress in the matrix, of the traction between layers. Beside each peak stands a p-norm over the
-part, whose relative change is taken for that of the peak; the peaks themselves say how much each
-counts (Le, Norato, Bruns, Ha and Tortorelli, Structural and Multidisciplinary Optimization 41,
-2010, 605-620: the p-norm, and its factor that follows the true peak).
+First failure (`ccfem.virtual_testing.strength`) depends on peaks: of the force in the fibre, of the
+stress in the matrix, of the traction between layers. Each peak is paired with a p-norm over the
+part, and the relative change of the norm stands for that of the peak. The peaks themselves say how
+much each of them counts (Le, Norato, Bruns, Ha and Tortorelli, Structural and Multidisciplinary
+Optimization 41, 2010, 605-620: the p-norm, and its factor that follows the true peak).
 """
 
 from collections.abc import Hashable, Mapping, Sequence
@@ -30,10 +30,10 @@ __all__ = ["POWER", "MatrixPeaks", "Peak", "check_stretched", "nearness", "stret
 Key = TypeVar("Key", bound=Hashable)
 
 POWER = 16.0
-"""Of the norm over cells or pieces of fibre."""
+"""Power p of the norm over cells or pieces of fibre."""
 
 _BETWEEN = 8.0
-"""Power with which the largest of the indices counts."""
+"""Power of the norm over the indices, which approximates the largest of them."""
 
 _HOT = 1e-9
 """Share of the largest weight below which a cell does not count in a derivative."""
@@ -62,20 +62,20 @@ class Peak:
     __repr__ = in_brief
 
     def over(self, ratio: float) -> "Peak":
-        """Peak under a load so many times smaller."""
+        """Peak under the load divided by a ratio."""
         return replace(self, index=self.index / ratio, norm=self.norm / ratio)
 
 
 def nearness(
     peaks: Mapping[Key, Peak], factors: Mapping[Key, float]
 ) -> tuple[float, dict[Key, float]]:
-    """Logarithm of about the largest index, and how much each counts in it: the sum is 1.
+    """Logarithm of a smooth maximum of the indices, and the weight of each; the weights add to 1.
 
     Parameters
     ----------
     peaks : mapping of key to Peak
     factors : mapping of key to float
-        Index over norm, where it was taken last; what has none, or nought, does not count.
+        Index over norm when last computed. Peaks without a factor, or with 0, do not count.
     """
     known = {key: factors.get(key, 0.0) * one.norm for key, one in peaks.items()}
     logs = {key: float(np.log(index)) for key, index in known.items() if index > 0.0}
@@ -109,14 +109,14 @@ def check_stretched(strains: Sequence[FloatArray]) -> None:
 def stretched_index(
     strain: FloatArray, length: FloatArray, limit: float
 ) -> tuple[float, float, FloatArray]:
-    """Index of the fibre, its norm, and how much each piece counts in that: the sum is 1.
+    """Index of the fibre, its norm, and how much each piece counts in that; the sum is 1.
 
     Parameters
     ----------
     strain : (s,) array
-        Along pieces of fibre, stretched in one at least; others do not count.
+        Along pieces of fibre, of which at least one is stretched; the others do not count.
     length : (s,) array, mm
-        Of fibre that each stands for.
+        Length of fibre that each piece stands for.
     limit : float
         Strain at which a strand breaks.
     """
@@ -190,7 +190,7 @@ class MatrixPeaks:
     def matrix(self, displacement: FloatArray, strength: float) -> Peak:
         """Von Mises stress of the matrix, averaged over a ball, over its strength, MPa.
 
-        `displacement` is that (n, 3), mm, of the part with its fibre.
+        `displacement` (n, 3), mm, is that of the part with its fibre.
         """
         stress = self._stress(displacement)
         mises = von_mises(stress)
@@ -229,7 +229,7 @@ class MatrixPeaks:
         limits: Limits,
         normal: FloatArray | None,
     ) -> dict[str, Peak]:
-        """All indices: that of the fibre, of the matrix, and where it can be judged of the bond.
+        """All indices: of the fibre, of the matrix and, where it can be judged, of the bond.
 
         Parameters
         ----------

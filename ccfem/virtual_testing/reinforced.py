@@ -1,4 +1,4 @@
-"""The stiffness of a part with the fibres that carry, applied without a matrix of its own."""
+"""Stiffness of a part with its carrying fibres, applied without assembling a matrix."""
 
 from dataclasses import dataclass
 
@@ -37,7 +37,7 @@ class Reinforced:
 
 @dataclass(frozen=True)
 class Reduced:
-    """The same on what the supports leave free.
+    """The same stiffness on the components that the supports leave free.
 
     Attributes
     ----------

@@ -47,12 +47,12 @@ class CasesTest:
 
 @dataclass(frozen=True)
 class CasesFailure:
-    """When a part first fails that is loaded by one of several cases at a time.
+    """First failure of a part that is loaded by one of several cases at a time.
 
     Attributes
     ----------
     each : tuple of FirstFailure
-        Of each case.
+        First failure under each case.
     factors : tuple of float
         Load at first failure over the load of the case.
     case : str
@@ -98,7 +98,7 @@ def virtual_tests(
     known: Sequence[FloatArray] | None = None,
     tolerance: float = 1e-8,
 ) -> CasesTest:
-    """Test a part with its fibres under several load cases, in each those that it stretches.
+    """Test a part with its fibres under several load cases, each with the fibres that it stretches.
 
     Paths are cut at the cells once; cases of one problem share one factorisation.
 
@@ -110,7 +110,7 @@ def virtual_tests(
     strand, mode, machine, tolerance
         As in `virtual_test`.
     known : sequence of (n, 3) arrays, mm, optional
-        For each case a displacement that its own may be near to.
+        For each case a displacement near its solution, to start from.
 
     Raises
     ------

@@ -33,7 +33,7 @@ class Specimen:
     matrix : bsr_array (3n, 3n), N/mm
         Stiffness matrix without fibres.
     backend : str
-        That factorises it, once, as the preconditioner of all tests.
+        Solver that factorises the matrix, once, as the preconditioner of all tests.
     """
 
     unreinforced: StressField
@@ -47,8 +47,8 @@ class Specimen:
     def of(cls, unreinforced: StressField, backend: str = "auto") -> "Specimen":
         """Make the specimen of a solved problem, or return the one that was made before.
 
-        The field keeps it, so that all who plan and test on it share one factorisation. The
-        backend "auto" is the one that solved it.
+        The field stores it, so that all planning and testing on the field share one factorisation.
+        The backend "auto" is the one that solved the field.
 
         Raises
         ------
@@ -111,7 +111,7 @@ class Specimen:
 
     @cached_property
     def held(self) -> Held:
-        """The supports where the load case has them, in contact as without fibres."""
+        """Supports of the load case, with the contact found without fibres."""
         before = self.unreinforced
         return self.system.held_in(before.case).touching(before.displacement)
 

@@ -77,15 +77,15 @@ def cut_strands(
     Parameters
     ----------
     toolpaths : Toolpaths
-        Paths of other kinds than fibre are left out, and so is what of their links lies outside the
-        mesh: beyond the part they are cut off, and over a void nothing embeds them.
+        Fibre paths are cut, other kinds left out. Links outside the mesh are left out too: beyond
+        the part they are cut off, and over a void nothing embeds them.
     mesh : TetMesh
         Quadratic cells are taken as straight-sided.
     most_outside : float in [0, 1], default 0.01
         Share of the fibre length, links left out, that may lie outside the mesh.
     machine : Machine, optional
-        Whose strands keep their room: those of about the same direction that lie nearer than its
-        fibre width share it. Default: every strand counts in full, wherever it lies.
+        Its strands need room: those of about the same direction that lie nearer than its fibre
+        width share it. Default: every strand counts in full, wherever it lies.
 
     Returns
     -------

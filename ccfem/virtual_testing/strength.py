@@ -1,8 +1,8 @@
-"""The load at which the part first fails: matrix, fibre or bond of the layers, the first of them.
+"""The load at first failure of a part: of its matrix, its fibre or the bond between its layers.
 
-All limits scale with the load, for the solution with fibres that carry tension only and supports
-that only press does so too. Debonding of the strands is not predicted; nor is what happens after
-the first failure.
+All limits scale with the load, since the solution does: also with fibres that carry tension only
+and supports that only press. Debonding of strands and damage after the first failure are not
+predicted.
 """
 
 from collections.abc import Sequence

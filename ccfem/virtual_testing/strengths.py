@@ -1,4 +1,4 @@
-"""What fibre, matrix and the bond between layers hold."""
+"""Strengths of fibre, matrix and the bond between layers."""
 
 from dataclasses import dataclass
 
@@ -20,7 +20,7 @@ class Limits:
     matrix : float, MPa
         Von Mises stress at failure.
     bond : (float, float), MPa, optional
-        What layers hold across and in their plane; None where it is not known.
+        Strength of the bond across the layers and in their plane; None where it is not known.
     """
 
     fibre: float
@@ -31,7 +31,7 @@ class Limits:
     def of(
         cls, material: Material, strand: Strand | None = None, matrix_strength: float | None = None
     ) -> "Limits":
-        """Strengths of a material with strands in it; `matrix_strength` goes before its own.
+        """Strengths of a material with strands in it; `matrix_strength` overrides its own.
 
         Raises
         ------

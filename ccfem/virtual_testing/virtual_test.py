@@ -19,7 +19,7 @@ from ccfem.virtual_testing.strands import Strands, cut_strands
 __all__ = ["Bracket", "VirtualTest", "virtual_bracket", "virtual_test"]
 
 _SPAN_TOLERANCE = 1e-3
-"""Relative residual of the solves for the span; the ratio's error is of its square."""
+"""Relative residual of the solves for the span; the error of the ratio is of its square."""
 
 
 @dataclass(frozen=True)
@@ -50,7 +50,7 @@ class VirtualTest(Shown):
     span : tuple of (rho, ratio)
         Stiffness ratio at other values of rho, mm^2.
     updates : int
-        Solves until the set of fibres in tension was settled.
+        Solves until the set of fibres in tension was converged.
     """
 
     mode: str
@@ -127,10 +127,10 @@ def virtual_test(
     span : sequence of float, mm^2, default (2, 6)
         Further values of rho to report the ratio at; () for none.
     machine : Machine, optional
-        Whose strands keep their room, where `fibres` are Toolpaths: fibre on other fibre lends
-        nothing. Default: every strand counts in full.
+        With a machine, and `fibres` as Toolpaths, fibre that lies on other fibre adds no stiffness
+        (`ccfem.virtual_testing.strand_room`). Default: every strand counts in full.
     known : sequence of (n, 3) arrays, mm, optional
-        Displacements that this one may be near to, the nearest last.
+        Displacements near the solution, to start from; the nearest last.
     tolerance : float, default 1e-8
         Largest relative residual; the error of the stiffness is of its square.
 

@@ -1,4 +1,4 @@
-"""How far the cells of a part are from where it is held and loaded."""
+"""Distance of the cells of a part from where it is held and loaded."""
 
 from typing import Any
 

@@ -1,1 +1,1 @@
-"""Fibre that winds round the joints of a layer: what the strategy `winding` stands on."""
+"""Fibre that winds round the joints of a layer: the basis of the strategy `winding`."""

@@ -9,7 +9,7 @@ from ccfem.fields.layer_elements import Surface, positive_definite
 __all__ = ["annulus_field", "gradient_jumps"]
 
 _NEAR = 0.3
-"""Least distance between triangles that counts, in the median one."""
+"""Least distance between triangles that is used, over the median one."""
 
 
 def annulus_field(
@@ -24,7 +24,7 @@ def annulus_field(
 
     Minimises ``sum_f A_f [grad s . (T_f + isotropy) grad s] + smoothness J(s)`` with given values
     on the holes, on the curves that join them and on the outer border; J is `gradient_jumps`. No
-    level line ends inside, and none closes on itself without going round what is low.
+    level line ends inside, and none closes without going round the low region.
 
     Parameters
     ----------
@@ -33,9 +33,9 @@ def annulus_field(
     tension : (t, 3, 3) array
         ``w t t^T`` with the direction t of the tension and its weight w.
     isotropy : float > 0
-        The smaller, the closer to the tension; the larger, the more even.
+        Small values follow the tension closely, large ones give even spacing.
     smoothness : float >= 0, mm^2
-        Of bends of the level lines.
+        Weight of bends of the level lines.
     fixed : (k,) int array
         Points whose values are given.
     values : (k,) array
@@ -63,8 +63,8 @@ def annulus_field(
 def gradient_jumps(surface: Surface) -> sp.csr_array:
     """Matrix (n, n) of the form ``sum_e l/h (change of ds/dn)^2`` over the inner edges.
 
-    l is the length of an edge, h the distance of the middles of its two triangles, and the
-    derivative is across the edge, with both triangles laid flat.
+    l is the length of an edge and h the distance between the middles of its two triangles. The
+    derivative is normal to the edge, with both triangles laid flat.
     """
     triangles, pairs, n = surface.triangles, surface.neighbours, len(surface.points)
     one, other = triangles[pairs[:, 0]], triangles[pairs[:, 1]]

@@ -1,4 +1,4 @@
-"""Closed curves made smoother where they bend too sharply, and only there."""
+"""Smoothing of closed curves, only where they bend too sharply."""
 
 import numpy as np
 from numba import njit
@@ -10,10 +10,10 @@ from ccfem.geometry.polylines import resample
 __all__ = ["limit_bends"]
 
 _STEP = 0.5
-"""Distance of points, mm."""
+"""Distance between points, mm."""
 _ROUNDS = 600
 _SLACK, _LEFT = 1.05, 0.01
-"""Done when no more than this share of the points bends by more than this times the limit."""
+"""Smoothing stops when at most this share of points bends by more than this times the limit."""
 _SPREAD = np.exp(-0.5 * (np.arange(-8, 9) / 2.0) ** 2)
 """Gaussian, a millimetre in standard deviation, over which the movement fades out."""
 
@@ -21,8 +21,8 @@ _SPREAD = np.exp(-0.5 * (np.arange(-8, 9) / 2.0) ** 2)
 def limit_bends(curve: FloatArray, largest: float, smoothing: float = 0.5) -> FloatArray:
     """Smooth a closed curve where its curvature is above a limit.
 
-    Points there move against the fourth differences of the curve, which bend it less and, unlike
-    second differences, hardly shorten it.
+    Points there move against the fourth differences of the curve. This reduces bends and, unlike
+    second differences, hardly shortens the curve.
 
     Parameters
     ----------
@@ -31,13 +31,13 @@ def limit_bends(curve: FloatArray, largest: float, smoothing: float = 0.5) -> Fl
     largest : float, 1/mm
         Curvature.
     smoothing : float, mm, default 0.5
-        Standard deviation of a Gaussian filter before that: crossings of triangles' edges do not
-        lie evenly.
+        Standard deviation of a Gaussian filter applied first, since crossings with triangle edges
+        are unevenly spaced.
 
     Returns
     -------
     (m, 3) array
-        Closed, at steps of half a millimetre; of the space near the surface, no longer on it.
+        Closed, in steps of half a millimetre; near the surface, but no longer on it.
     """
     points, _ = resample(curve, np.array([0, len(curve)]), _STEP)
     if len(points) < 12:
@@ -53,7 +53,7 @@ def limit_bends(curve: FloatArray, largest: float, smoothing: float = 0.5) -> Fl
 def _straightened(  # type: ignore[no-untyped-def]
     points, largest, spread, rounds
 ):  # pragma: no cover, compiled
-    """Points of a closed curve after so many rounds, or when it bends little enough."""
+    """Points of a closed curve after a number of rounds, or once its bends are small enough."""
     n, half = len(points), len(spread) // 2
     over, wide, step = np.zeros(n), np.zeros(n + 2 * half), np.zeros((n, 3))
     for _ in range(rounds):

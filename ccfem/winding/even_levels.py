@@ -1,4 +1,4 @@
-"""A field's values changed so that its level lines are evenly far apart on the mean."""
+"""Rescaling of a field so that its level lines are evenly spaced on average."""
 
 import numpy as np
 
@@ -11,11 +11,11 @@ _BINS = 40
 
 
 def evened(surface: Surface, field: FloatArray) -> FloatArray:
-    """Map values of a field in [0, 1] so that between any two levels the mean distance is alike.
+    """Rescale a field in [0, 1] so that the mean distance between any two levels is the same.
 
-    The mean distance of two levels is the area between them over the mean length of the levels
+    The mean distance between two levels is the area between them over the mean length of the levels
     there, which is the integral of the gradient's size over that area (coarea formula). Values
-    below 0 are stretched as the lowest ones are.
+    below 0 are stretched like the lowest ones.
 
     Parameters
     ----------

@@ -1,8 +1,8 @@
-"""Curves that join the holes of a layer, well inside it: where the paper cuts the layer.
+"""Curves that join the holes of a layer, well inside it, along which the paper cuts the layer.
 
-Fang et al. 2024, section 2.4, steps 2 to 6, joins the middles of the holes' Voronoi cells by
-shortest paths along edges. Here the length weighs more near the outer border, three holes meet
-where the way to all of them is shortest, and the curves cross triangles instead of following edges.
+Fang et al. 2024, section 2.4, steps 2 to 6, join the middles of the holes' Voronoi cells by
+shortest paths along edges. Here lengths near the outer border cost more, three holes meet where the
+way to all of them is shortest, and curves cross triangles instead of following edges.
 """
 
 from collections.abc import Sequence
@@ -21,18 +21,18 @@ from ccfem.winding.triangle_mesh import EdgePath, TriangleMesh, insert
 __all__ = ["border_tree", "join"]
 
 _PER_EDGE = 3
-"""Points of an edge at which a curve may cross it."""
+"""Number of points on an edge at which a curve may cross it."""
 _KEEP = 0.12
-"""Least distance of a crossing from the ends of its edge, in the edge: no thinner triangles."""
+"""Least distance of a crossing from the ends of its edge, in edges, to avoid thin triangles."""
 _DEAR = 1000.0
 """Factor on the cost of an edge that touches the outer border."""
 _SAMPLE = 0.5
-"""Distance, mm, of the samples of the border that distances from it are taken to."""
+"""Distance, mm, between samples of the border to which distances are measured."""
 
 
 @dataclass(frozen=True)
 class _Cost:
-    """Cost of a mm of way: ``1 + repulsion / d^2`` at the distance d from the outer border."""
+    """Cost of a way per mm: ``1 + repulsion / d^2`` at the distance d from the outer border."""
 
     tree: cKDTree | None
     repulsion: float
@@ -56,14 +56,14 @@ def join(
     loops : sequence of int arrays
         Points of the border of each hole.
     outer : sequence of int arrays
-        All other loops of its border; curves keep off them.
+        All other loops of its border; curves keep away from them.
     repulsion : float, mm^2
-        How much.
+        Strength of that.
 
     Returns
     -------
     mesh : TriangleMesh
-        With the curves as edges; the points given keep their numbers.
+        With the curves as edges; the given points keep their numbers.
     curves : list of int arrays
         Points of each curve, from end to end.
 
@@ -111,7 +111,7 @@ def join(
 
 
 def border_tree(points: FloatArray, outer: Sequence[IntArray]) -> cKDTree | None:
-    """Tree of samples of the outer border; none where there is no such border."""
+    """Tree of samples of the outer border; None if there is no such border."""
     samples = []
     for loop in outer:
         a, b = points[loop], points[np.roll(loop, -1)]
@@ -123,7 +123,7 @@ def border_tree(points: FloatArray, outer: Sequence[IntArray]) -> cKDTree | None
 
 
 def _edge_graph(mesh: TriangleMesh, cost: _Cost, closed: BoolArray) -> sp.csr_array:
-    """Ways along the edges; dear ones, where a neck has no others, touch the outer border."""
+    """Ways along edges; costly ones, for necks without others, touch the outer border."""
     t, n = mesh.triangles, len(mesh.points)
     edges = np.sort(np.concatenate([t[:, [0, 1]], t[:, [1, 2]], t[:, [2, 0]]]), axis=1)
     edges = np.stack(np.divmod(np.unique(edges[:, 0] * n + edges[:, 1]), n), axis=1)
@@ -143,7 +143,7 @@ def _ways(graph: sp.csr_array, sources: Sequence[IntArray]) -> tuple[FloatArray,
 
 
 def _follow(before: IntArray, end: int) -> list[int]:
-    """Points of the way to an end, from there back to the source."""
+    """Points of the way to an end, from the end back to the source."""
     way = [end]
     while before[way[-1]] >= 0:
         way.append(int(before[way[-1]]))
@@ -157,7 +157,7 @@ def _refined(
     loop: IntArray,
     cost: _Cost,
 ) -> EdgePath:
-    """Shortest curve across the triangles about a way along edges, from the loop to the tree."""
+    """Shortest curve across the triangles round a way along edges, from the loop to the tree."""
     near = np.zeros(len(mesh.points), dtype=bool)
     near[way] = True
     for _ in range(2):

@@ -10,8 +10,8 @@ from ccfem.layers.layer import Layer
 __all__ = ["joint_loops"]
 
 _SHARE = 0.4
-"""Share of a loop's length that lies on the patch. Half of a hole may carry the load; a hole that
-the layer leaves lies on its outer border and takes a small share of that."""
+"""Share of a loop's length that lies on the patch. Half of a hole may carry the load. If a layer
+leaves a hole through its outer border, the hole takes only a small share of that."""
 
 
 def joint_loops(layer: Layer, names: Iterable[str]) -> dict[str, IntArray]:
@@ -26,8 +26,8 @@ def joint_loops(layer: Layer, names: Iterable[str]) -> dict[str, IntArray]:
     Returns
     -------
     dict of str to (k,) int arrays
-        Points of each loop by the patch that it lies on. A patch that two loops lie on, as where
-        a layer meets a hole twice, gives one entry more: its name with a prime.
+        Points of each loop by the patch that it lies on. If two loops lie on one patch, as where a
+        layer meets a hole twice, there is a second entry: the name with a prime.
     """
     found: dict[str, IntArray] = {}
     taken: set[int] = set()

@@ -1,7 +1,7 @@
 """The field of the paper: Fang et al. 2024, eq. 5 and 6.
 
-The printed equations are incomplete: the gradient on triangles with a side on the cut or a hole is
-taken to point away from it, and the field to be soft zero there, since it has no other level.
+The printed equations are incomplete. Here the gradient on triangles with a side on the cut or on a
+hole points away from it, and the field is softly zero there: its level is otherwise undefined.
 """
 
 from dataclasses import dataclass
@@ -27,13 +27,13 @@ class PaperWeights:
     Attributes
     ----------
     stress : float, default 1
-        Level lines along the stress.
+        Of level lines along the stress.
     curves : float, default 1
-        Gradients of size 1 away from the cut and the holes.
+        Of gradients of size 1 away from the cut and the holes.
     compatible : float, default 0.1
-        Gradients alike in neighbouring triangles.
+        Of equal gradients in neighbouring triangles.
     zero : float, default 1
-        Zero on the cut and the holes, by square mm round their points.
+        Of zero on the cut and the holes, by square mm round their points.
     """
 
     stress: float = 1.0

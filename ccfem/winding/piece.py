@@ -1,4 +1,4 @@
-"""A piece of a layer that holds joints, cut open along the curves that join them."""
+"""A piece of a layer with joints, cut open along the curves that join them."""
 
 from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
@@ -54,12 +54,12 @@ class Piece:
         Parameters
         ----------
         lift : float
-            The holes are so far below 0, and the curves near them too.
+            How far below 0 the holes are, and the curves near them.
         rise : float
-            Curves are below 0 by this, times how much further they are from the outer border than
-            the holes are: strands there run on at the distance that they have round the holes.
+            How far below 0 the curves are, per relative excess of their distance from the outer
+            border over that of the holes: strands there keep their distance round the holes.
         reach : float, mm
-            From the holes along the curves.
+            Distance from the holes along the curves over which `lift` acts.
         """
         rim = np.unique(np.concatenate(self.loops))
         if not self.curves:
@@ -81,7 +81,7 @@ class Piece:
 
 
 def pieces_with_joints(layer: Layer, names: Sequence[str]) -> Iterator[Piece]:
-    """Yield each connected piece of a layer that has a border round a joint, and another one.
+    """Yield each connected piece of a layer with a border round a joint and another border.
 
     Parameters
     ----------

@@ -16,8 +16,8 @@ _SWEEPS = 20
 def straighten(points: FloatArray, path: EdgePath, keep: float, sweeps: int = _SWEEPS) -> EdgePath:
     """Move the crossings of a curve along their edges so that it gets shorter.
 
-    Each crossing in turn goes to where the straight line between its neighbours crosses its edge,
-    with the two triangles laid flat; after s sweeps bends are spread over about sqrt(s) crossings.
+    Each crossing in turn moves to where the straight line between its neighbours crosses its edge,
+    with both triangles laid flat. After s sweeps bends are spread over about sqrt(s) crossings.
 
     Parameters
     ----------
@@ -38,7 +38,7 @@ def _sweep(points, start, end, edges, share, keep, sweeps):  # type: ignore[no-u
     for sweep in range(sweeps):
         for step in range(count):
             k = step if sweep % 2 == 0 else count - 1 - step
-            # Where each neighbour stands along the edge, and how far off it.
+            # Position of each neighbour along the edge, and its distance from the edge.
             square, s, t = 0.0, 0.0, 0.0
             for i in range(points.shape[1]):
                 a = points[edges[k, 0], i]
@@ -60,13 +60,13 @@ def _sweep(points, start, end, edges, share, keep, sweeps):  # type: ignore[no-u
 
 @njit(cache=True, nogil=True)
 def _before(points, start, edges, share, k, i):  # type: ignore[no-untyped-def]
-    """Coordinate i of what comes before crossing k: the crossing before it, or the start."""
+    """Coordinate i of the point before crossing k: the previous crossing, or the start."""
     return points[start, i] if k == 0 else _crossing(points, edges, share, k - 1, i)
 
 
 @njit(cache=True, nogil=True)
 def _behind(points, end, edges, share, k, i):  # type: ignore[no-untyped-def]
-    """Coordinate i of what follows crossing k: the next crossing, or the end."""
+    """Coordinate i of the point after crossing k: the next crossing, or the end."""
     return points[end, i] if k == len(share) - 1 else _crossing(points, edges, share, k + 1, i)
 
 

@@ -37,7 +37,7 @@ class EdgePath:
     edges : (k, 2) int array
         Edges crossed, in order.
     share : (k,) array in (0, 1)
-        Where: the share of the second end.
+        Position of the crossing: the share of the second end.
     """
 
     start: int
@@ -59,7 +59,7 @@ def insert(mesh: TriangleMesh, path: EdgePath) -> tuple[TriangleMesh, IntArray]:
     ----------
     mesh : TriangleMesh
     path : EdgePath
-        Two edges in a row belong to one triangle, and no triangle is crossed twice.
+        Consecutive edges belong to one triangle, and no triangle is crossed twice.
 
     Returns
     -------
@@ -100,7 +100,7 @@ def insert(mesh: TriangleMesh, path: EdgePath) -> tuple[TriangleMesh, IntArray]:
 
 
 def _split(corners: list[int], cuts: list[int | None]) -> list[list[int]]:
-    """Triangles of one whose side opposite to corner i is cut at a point, or not."""
+    """Split a triangle whose side opposite to corner i is cut at a point, or not cut."""
     number = sum(cut is not None for cut in cuts)
     if number == 1:
         i = next(k for k in range(3) if cuts[k] is not None)

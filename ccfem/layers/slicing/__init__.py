@@ -16,7 +16,7 @@ __all__ = ["as_slicer", "create", "from_text", "named", "slice", "split"]
 
 
 def named() -> Mapping[str, type[Slicer]]:
-    """Every slicer by name: the modules of this package, and entry points ``ccfem.slicers``."""
+    """Every slicer by name: modules of this package and entry points ``ccfem.slicers``."""
     return plugins.found(__name__, "ccfem.slicers")
 
 
@@ -26,21 +26,22 @@ def create(name: str, parameters: Mapping[str, Any] | None = None) -> Slicer:
     Raises
     ------
     InputError
-        For an unknown slicer or parameter, the known ones listed; for a value of a wrong type.
+        For an unknown slicer or parameter (the message lists the known ones), and for a value of
+        the wrong type.
     """
     return plugins.create("slicer", named(), name, parameters)
 
 
 def from_text(text: str) -> Slicer:
-    """Make a slicer of a text, ``method:name=value,name=value``.
+    """Make a slicer from a text, ``method:name=value,name=value``.
 
-    A value without a name is that of the parameter that the slicer names `shorthand`:
+    A value without a name belongs to the parameter that the slicer names in `shorthand`:
     ``planar:z`` is ``planar:axis=z``.
 
     Raises
     ------
     InputError
-        As of `create`.
+        As in `create`.
     """
     method, _, rest = (part.strip() for part in text.partition(":"))
     parameters = {}
@@ -69,13 +70,13 @@ def split(text: str) -> tuple[str, ...]:
 
 
 def as_slicer(layers: "int | Sequence[float] | str | Slicer") -> Slicer:
-    """Make a slicer of what short forms say.
+    """Make a slicer from one of the short forms.
 
     Parameters
     ----------
     layers : int, sequence of float, str or Slicer
-        A number of flat layers, their heights in mm, the name of a slicer with its parameters as
-        in `from_text`, or a slicer itself.
+        A number of flat layers, their heights in mm, the name of a slicer with parameters as in
+        `from_text`, or a slicer itself.
     """
     if isinstance(layers, str):
         return from_text(layers)

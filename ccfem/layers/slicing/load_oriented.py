@@ -2,8 +2,8 @@
 
 H. Kipping, T. Schueppstuhl, Load-oriented nonplanar additive manufacturing method for optimized
 continuous carbon fiber parts, Materials 16 (2023) 998. The defaults differ from the paper where it
-leaves layers flat, upside down, or to chance; ``quantile=1, gap=0, blend=0, even=False`` is the
-paper's.
+leaves layers flat, upside down, or undetermined. ``quantile=1, gap=0, blend=0, even=False`` gives
+the paper's method.
 """
 
 from dataclasses import dataclass
@@ -32,7 +32,7 @@ _SHORTEST = 0.15
 
 @dataclass(frozen=True)
 class LoadOrientedSlicing:
-    """Curved layers, and what they come from.
+    """Curved layers, and the data they were made from.
 
     Attributes
     ----------
@@ -41,14 +41,14 @@ class LoadOrientedSlicing:
     normals : NormalField
     field : HeightField
     step : float
-        Of the field's value from layer to layer.
+        Difference of the field between layers.
     inverted : float
-        Share of the volume where the layers lie upside down.
+        Share of the volume in which the layers lie upside down.
     across, across_build, across_best : Across
-        Stress across these layers, across flat ones along the build direction, and across those
-        flat ones across which the least tension acts.
+        Stress across these layers, across flat layers normal to the build direction, and across
+        those flat layers on which the least tension acts.
     best : (3,) array
-        Normal of the last.
+        Normal of the last ones.
     """
 
     layers: tuple[Layer, ...]
@@ -65,7 +65,7 @@ class LoadOrientedSlicing:
 
 @dataclass(frozen=True)
 class LoadOriented:
-    """Layers square to the least principal stress where the largest is high.
+    """Layers normal to the least principal stress where the largest is high.
 
     Attributes
     ----------
@@ -73,29 +73,30 @@ class LoadOriented:
         Mean thickness of the layers.
     thinnest, thickest : float, mm, default 0.2 and 0.5
         Where layers would be thinner, every second one is left out; where they would be thicker,
-        one is put in between. The second at least twice the first.
+        one is inserted in between. The second value is at least twice the first.
     share : float, default 0.16
         Layers follow the stress where its largest principal value is above this share of the peak.
     quantile : float, default 0.995
-        The rest of the volume exceeds the peak; the paper takes the largest of all, 1.
+        Quantile, over the volume, of that stress which counts as the peak; the paper takes the
+        maximum, 1.
     gap : float, default 0.1
-        ... and where the other two principal stresses differ by this share of the largest; the
-        paper asks for none, 0.
+        Layers follow the stress only where the other two principal stresses also differ by this
+        share of the largest; the paper requires no difference, 0.
     alignment : float, default 0.75
-        Cosine of the angle up to which neighbours belong to one region.
+        Least cosine of the angle between neighbours of one region.
     regions : int, default 10
-        So many regions are followed, the largest.
+        Number of regions that are followed, largest first.
     smoothing : int, default 200
         Passes that smooth the directions in a region.
     even : bool, default True
-        Whether the field is changed, as little as that takes, where layers would leave the range
-        of thickness; the paper only puts layers in and leaves layers out.
+        Whether the field is changed as little as necessary where layers would leave the range of
+        thickness. The paper only inserts layers and leaves layers out.
     blend : float, optional
-        How much of the mean direction is added to all: layers become flatter. By default as little
-        as leaves no layer upside down, and with `even` nearly none outside the range of thickness;
-        the paper has none, 0.
+        How much of the mean direction is added to all directions, which flattens the layers. By
+        default as little as leaves no layer upside down and, with `even`, almost none outside the
+        range of thickness; the paper adds none, 0.
     shortest_edge : float, mm, optional
-        Of the triangles of the layers, by default 0.15 mean edges of the mesh.
+        Shortest edge of the layers' triangles, by default 0.15 mean edges of the mesh.
     least_area : float, mm^2, default 3.3
         Smaller pieces of layers are left out.
     """
@@ -137,7 +138,7 @@ class LoadOriented:
 
     @property
     def _lengths(self) -> tuple[float, float] | None:
-        """Range of the gradient's length with which layers are neither too thick nor too thin."""
+        """Range of the gradient's size for which layers are neither too thick nor too thin."""
         if not self.even:
             return None
         return self.thickness / self.thickest, self.thickness / self.thinnest
@@ -153,13 +154,13 @@ class LoadOriented:
         return found.layers
 
     def slice(self, stress: PartStress, build: Vector = (0.0, 0.0, 1.0)) -> LoadOrientedSlicing:
-        """Cut a part into curved layers, and keep what they come from.
+        """Cut a part into curved layers, and return the data they were made from too.
 
         Parameters
         ----------
         stress : PartStress
         build : tuple of 3 floats, default z
-            The layers are counted along it.
+            Layers are counted along this direction.
 
         Raises
         ------

@@ -1,9 +1,9 @@
-"""Curved layers that follow the stress and are square to the bolts: Fang et al. 2024.
+"""Curved layers that follow the stress and are normal to the bolts: Fang et al. 2024.
 
 G. Fang, T. Zhang, Y. Huang, Z. Zhang, K. Masania, C. C. L. Wang, Exceptional mechanical performance
 by spatial printing with continuous fiber: Curved slicing, toolpath generation and physical
-verification, arXiv:2311.17265. ``form="literal"`` is the paper's term for
-the joints; the default makes layers like those that the authors published.
+verification, arXiv:2311.17265. ``form="literal"`` is the term of the paper for the joints. The
+default makes layers like those that the authors published.
 """
 
 from collections.abc import Sequence
@@ -30,19 +30,19 @@ from ccfem.principal_lines.trace import mean_edge
 __all__ = ["Spatial", "SpatialSlicing"]
 
 _THICKNESS = 0.5
-"""Nominal thickness where nothing else is asked for: the published layers are 0.53 mm apart."""
+"""Default nominal thickness, mm: the published layers are 0.53 mm apart."""
 _SMOOTH_OVER = 1.0 / 30.0
-"""Length over which the field is smooth, in the diagonal of the part."""
+"""Length over which the field is smoothed, as a share of the part's diagonal."""
 _SHORTEST = 0.3
 """Shortest edge of the layers' triangles, in mean edges of the mesh."""
 _FLAT_SHARE = 0.95
 _MOST_FOLDED = 0.02
-"""Share of the area between cells above which the layers count as inverted."""
+"""Share of the area between cells above which the layers count as folded."""
 
 
 @dataclass(frozen=True)
 class SpatialSlicing:
-    """Curved layers, and what they come from.
+    """Curved layers, and the data they were made from.
 
     Attributes
     ----------
@@ -53,9 +53,9 @@ class SpatialSlicing:
     joints : tuple of Joint
     quality : FieldQuality
     step : float
-        Of the field's value from layer to layer.
+        Difference of the field between layers.
     bubbles, specks : int
-        Closed pieces, and pieces that are too small, left out.
+        Numbers of pieces left out because they are closed, or too small.
     """
 
     layers: tuple[Layer, ...]
@@ -70,44 +70,44 @@ class SpatialSlicing:
 
 @dataclass(frozen=True)
 class Spatial:
-    """Layers along the strongest stress where it carries the load, square to the bolt holes.
+    """Layers along the strongest stress where it carries the load, and normal to the bolt holes.
 
     Attributes
     ----------
     joints : tuple of str, default ()
-        Patches where bolts sit; by default all that are held or loaded. A part of the wall of a
-        hole stands for all of it.
+        Patches where bolts sit; by default all that are held or loaded. A patch on part of the wall
+        of a hole represents the whole hole.
     thickness : float, mm, optional
         Mean thickness of the layers, by default 0.5.
     count : int, optional
         Number of layers instead.
     stress_weight : float, default 1
-        Of layers along the stress.
+        Weight of layers along the stress.
     smoothness : float, default 0.01
-        Of gradients alike in neighbouring cells.
+        Weight of equal gradients in neighbouring cells.
     joint_weight : float, default 1
-        Of layers square to the axes of the joints. Less follows the stress more closely.
+        Weight of layers normal to the axes of the joints; smaller values follow the stress better.
     length : float, mm, optional
-        Over which the field is smooth; by default a thirtieth of the part's diagonal.
+        Length over which the field is smoothed; by default a thirtieth of the part's diagonal.
     form : {"axis", "ring", "literal"}
-        Term of the joints: square to their axes; one value in each slab; one value (the paper).
+        Term of the joints: normal to their axes; one value in each slab; one value (the paper).
     rings : int, default 4
-        How many edges round its wall a joint reaches.
+        Extent of a joint, in edges round the wall of its hole.
     directions : table of patch to three numbers
-        Which way the layers are stacked in a joint, instead of the axis of its hole.
+        Stacking direction of the layers in a joint, instead of the axis of its hole.
     signs : list of 1 and -1, optional
         Sense in which the layers are stacked along the axis of each joint; by default those of
         the lowest energy.
     lines : {"joining", "touching", "all"}
-        Stress lines that count: those that join a held joint with a loaded one (any two where the
-        stress does not say which is which), that reach a joint, or all.
+        Stress lines that count: those that join a held joint with a loaded one (or any two joints,
+        if the stress does not tell which are held or loaded), those that reach a joint, or all.
     shortest_edge : float, mm, optional
-        Of the triangles of the layers, by default 0.3 mean edges of the mesh.
+        Shortest edge of the layers' triangles, by default 0.3 mean edges of the mesh.
     least_area : float, mm^2, default 5
         Smaller pieces of layers are left out.
     flat_within : float, degrees, default 1
-        A field whose gradient is within this of one direction in 95 % of the part gives flat
-        layers.
+        If the gradient of the field is within this angle of one direction in 95 % of the part, the
+        layers are flat.
     """
 
     joints: tuple[str, ...] = ()
@@ -148,13 +148,13 @@ class Spatial:
         return self.slice(stress, build).layers
 
     def slice(self, stress: PartStress, build: Vector = (0.0, 0.0, 1.0)) -> SpatialSlicing:
-        """Cut a part into curved layers, and keep what they come from.
+        """Cut a part into curved layers, and return the data they were made from too.
 
         Parameters
         ----------
         stress : PartStress
         build : tuple of 3 floats, default z
-            The layers are counted along it.
+            Layers are counted along this direction.
 
         Raises
         ------
@@ -221,9 +221,9 @@ class Spatial:
 def _flat(
     guidance: GuidanceField, joints: Sequence[Joint], build: FloatArray, within: float
 ) -> FloatArray | None:
-    """Direction of a field that has one throughout, to so many degrees in 95 % of the part.
+    """Direction of a field whose gradient has the same one, within an angle, in 95 % of the part.
 
-    Of a joint's or the build direction where it is one of them to the same angle.
+    If it is within that angle of the build direction or of a joint's direction, return that one.
     """
     volume, limit = guidance.mesh.volumes, np.cos(np.radians(within))
     mean = volume @ guidance.gradient

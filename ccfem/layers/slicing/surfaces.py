@@ -1,4 +1,4 @@
-"""Layers that another program made, one surface a file."""
+"""Layers made by another program, one surface a file."""
 
 from dataclasses import dataclass
 from pathlib import Path
@@ -19,15 +19,15 @@ __all__ = ["Surfaces"]
 
 @dataclass(frozen=True)
 class Surfaces:
-    """Curved layers read from the OBJ files of a folder, in the order of the numbers they end in.
+    """Curved layers read from the OBJ files in a folder, ordered by the numbers in their names.
 
     Attributes
     ----------
     folder : str
     thickness : float, mm, default 0.5
-        Of the layers: files of surfaces do not say.
+        Thickness of the layers, which files of surfaces do not state.
     tolerance : float, mm, default 1
-        Points may be so far outside the part.
+        Largest distance by which points may lie outside the part.
     """
 
     folder: str = "."
