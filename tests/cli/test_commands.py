@@ -321,7 +321,7 @@ def test_slicers_are_listed_and_explained(ccfem, monkeypatch, folder):
     assert "planar  Flat layers across the build direction" in out
     code, out, _ = ccfem("slicers", "planar")
     assert code == 0
-    assert "Height of a slab; the last one may stand out at the top." in out
+    assert "Height of a slab. As many slabs as fit are stacked from the bottom up." in out
     refused(ccfem, folder, "no slicer named 'planr'; there are: .*'planar'", "slicers", "planr")
 
 

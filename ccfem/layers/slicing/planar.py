@@ -45,8 +45,8 @@ class Planar:
     count : int, optional
         Number of layers, at the middle of equal slabs.
     thickness : float, mm, optional
-        Height of a slab. There are as many as fit, from the bottom up; what is left at the top,
-        less than one, belongs to the last layer, gets no fibre of its own and is printed in matrix.
+        Height of a slab. As many slabs as fit are stacked from the bottom up. The rest at the top,
+        less than one slab, belongs to the last layer and is printed in matrix, without fibre.
     heights : tuple of float, mm, optional
         Heights ``points @ direction`` of the layers themselves.
     axis : {"build", "x", "y", "z"}
