@@ -72,7 +72,7 @@ def test_every_value_is_drawn_in_the_plane(values):
 
 
 def test_what_is_wrong_is_said_with_its_cure(values):
-    assert "shorten the edges" in values["stress"]._repr_html_()
+    assert "smaller cells" in values["stress"]._repr_html_()
     assert "no fibre" in ccfem.toolpaths.Toolpaths.empty()._repr_html_()
     with pytest.raises(InputError, match="plan some"):
         ccfem.toolpaths.Toolpaths.empty().plot()

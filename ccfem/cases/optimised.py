@@ -253,12 +253,12 @@ def _found(
     if not design.converged:
         remarks.append(
             f"not converged after {design.iterations} iterations (last change "
-            f"{design.change[-1]:.2g}): --iterations for more"
+            f"{design.change[-1]:.2g}): raise --iterations"
         )
     if abs(share - wanted) > _AS_WANTED * wanted:
         remarks.append(
-            f"the part fills {share:.3f} of the volume, not {wanted:.3f}: hairs and pieces that "
-            "carry nothing are left out; a larger --radius makes fewer of them"
+            f"the part fills {share:.3f} of the volume, not {wanted:.3f}: thin strips and pieces "
+            "that carry no load were removed; a larger --radius leaves fewer of them"
         )
     new = replace(
         case,

@@ -55,7 +55,7 @@ def fibre_of(
     regions = list(() if base is None else base.regions)
     if "regions" in table:
         if folder is None:
-            found.lines.append("fibre.regions stand in a part file: write [[fibre.regions]] there")
+            found.lines.append("fibre.regions belong in a part file: write [[fibre.regions]] there")
         elif not isinstance(table["regions"], list):
             found.lines.append("fibre.regions must be a list of tables: write [[fibre.regions]]")
         else:

@@ -105,7 +105,7 @@ def _cases_of(table: Mapping[str, Any], cases: Mapping[str, Any], where: str) ->
     if not isinstance(names, list) or not names or not all(isinstance(n, str) for n in names):
         raise InputError(
             f"{where}.case must be the name of a load case, or a list of names; got "
-            f"{shown(given)}: correct it, or leave it out where the support holds in all"
+            f"{shown(given)}: correct it, or leave it out for a support in all load cases"
         )
     for name in names:
         if name not in cases:

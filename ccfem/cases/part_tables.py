@@ -87,8 +87,9 @@ def about_material(material: Material) -> tuple[str, ...]:
     for modulus in (float(moduli.min()), float(moduli.max())):
         if not _SOFTEST <= modulus <= _STIFFEST:
             return (
-                f"material '{material.name}' has a modulus of {modulus:.4g} MPa, where what is "
-                f"printed has {_SOFTEST:g} to {_STIFFEST:g} MPa: give it in MPa (1 GPa = 1000 MPa)",
+                f"material '{material.name}' has a modulus of {modulus:.4g} MPa; printed "
+                f"materials have {_SOFTEST:g} to {_STIFFEST:g} MPa: give it in MPa (1 GPa = 1000 "
+                "MPa)",
             )
     return ()
 

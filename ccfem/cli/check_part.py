@@ -59,5 +59,5 @@ def check_part(
     save(part_picture(checked), picture)
     with whole_file(page) as temporary:
         temporary.write_text(part_page(checked), encoding="utf-8")
-    print(f"{picture}, and {page} to turn it")
+    print(f"{picture}, and {page} with a rotatable view")
     return 2 if checked.mistakes else 0

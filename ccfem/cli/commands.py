@@ -124,10 +124,11 @@ def faces(
         ),
     ],
     angle: Annotated[
-        float, typer.Option(metavar="DEGREES", help="Angle from which an edge separates faces.")
+        float,
+        typer.Option(metavar="DEGREES", help="Angle at an edge from which it separates two faces."),
     ] = 30.0,
     scale: Annotated[
-        float, typer.Option(metavar="S", help="Factor that makes a file's coordinates mm.")
+        float, typer.Option(metavar="S", help="Factor that converts a file's coordinates to mm.")
     ] = 1.0,
     out: Annotated[
         Path,
@@ -155,7 +156,8 @@ def check(
             "--out",
             metavar="PICTURE",
             parser=path_of,
-            help="Picture (.png, .pdf, .svg), beside it a page that turns; default NAME-check.png.",
+            help="Picture (.png, .pdf, .svg), with a rotatable view beside it; default "
+            "NAME-check.png.",
         ),
     ] = None,
 ) -> None:
@@ -205,7 +207,7 @@ def compare(
         str | None,
         typer.Option(
             metavar="mesh|tool",
-            help="What their coordinates are in; default mesh for CSV, the printer's tool for "
+            help="Frame of their coordinates; default mesh for CSV, the printer's tool for "
             "waypoints.",
         ),
     ] = None,

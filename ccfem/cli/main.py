@@ -38,7 +38,9 @@ def main() -> None:
         code = 141
     except OSError as error:
         where = f" {error.filename}" if error.filename else ""
-        code = _complain(f"cannot go on{where}: {error.strerror or error}: see to it and repeat")
+        code = _complain(
+            f"cannot continue{where}: {error.strerror or error}: correct this and repeat"
+        )
     sys.exit(code if isinstance(code, int) else 0)
 
 

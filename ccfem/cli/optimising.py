@@ -38,7 +38,9 @@ def optimise(
     set_case: SetCase = None,
     element_size: Annotated[
         float | None,
-        typer.Option(metavar="MM", help="Cells of a plate; default 4000 squares make it."),
+        typer.Option(
+            metavar="MM", help="Element size of a plate; by default it has 4000 square cells."
+        ),
     ] = None,
     radius: Annotated[
         float | None,
@@ -69,24 +71,24 @@ def optimise(
         str | None,
         typer.Option(
             metavar="A,B,..",
-            help="Patches beside which the part stays solid; default loaded ones and holes that "
-            "hold it; '' for none.",
+            help="Patches around which the part stays solid; default loaded patches and supported "
+            "holes; '' for none.",
         ),
     ] = None,
     solid: Annotated[
         list[str] | None,
         typer.Option(
             metavar="X,Y,R",
-            help="A disc that stays solid, or X,Y,X,Y a rectangle, X,Y,Z,X,Y,Z a box; repeatable.",
+            help="Disc to keep solid, or X,Y,X,Y a rectangle, X,Y,Z,X,Y,Z a box; repeatable.",
         ),
     ] = None,
     void: Annotated[
         list[str] | None,
-        typer.Option(metavar="X,Y,R", help="Likewise what stays empty; repeatable."),
+        typer.Option(metavar="X,Y,R", help="The same, to keep empty; repeatable."),
     ] = None,
     iterations: Annotated[int, typer.Option(metavar="N", help="Iterations at most.")] = 200,
     in_space: Annotated[
-        bool, typer.Option("--in-space", help="Design a flat part in space, too (simp).")
+        bool, typer.Option("--in-space", help="Optimise a flat part in 3D too (simp).")
     ] = False,
     out: Annotated[
         Path | None,

@@ -30,7 +30,7 @@ def _new(
 
     written = new_part(body, out, force)
     if "\nscale = " in written.read_text(encoding="utf-8"):
-        print(f"{written}: the lengths of {body} look like metres: it says scale = 1000")
+        print(f"{written}: the lengths of {body} look like metres, so scale = 1000 is set")
     print(f"{written}: change what is marked, then: ccfem check {written}")
 
 
@@ -82,7 +82,7 @@ def _mesh(
         ),
     ],
     scale: Annotated[
-        float, typer.Option(metavar="S", help="Factor that makes a file's coordinates mm.")
+        float, typer.Option(metavar="S", help="Factor that converts a file's coordinates to mm.")
     ] = 1.0,
     mesher: Annotated[
         str, typer.Option(metavar="auto|gmsh|ftetwild", help="What meshes a surface.")

@@ -77,9 +77,8 @@ def _refuse_body(name: str) -> None:
     body = Path(name)
     if is_surface(body) or is_cad(body) or body.suffix.lower() in _MESHES:
         raise InputError(
-            f"{name} is a body, without material, loads and supports; these stand in a part file, "
-            f"a text (TOML) that names the body: 'ccfem new {shlex.quote(name)}' writes one to "
-            "fill in"
+            f"{name} is a body without material, loads and supports; a part file (TOML) adds "
+            f"these: 'ccfem new {shlex.quote(name)}' writes one to fill in"
         )
 
 
@@ -210,7 +209,7 @@ def run(
 
     imported = time.perf_counter()
     if drawings and options.get("slicings") is not None:
-        raise InputError("--drawings are of one slicing; got --slicings: drop one")
+        raise InputError("--drawings works with one slicing only; got --slicings: drop one")
     case = load(name, set_case, refine, machine, fibre)
     seconds = {"start": imported - _STARTED, "mesh": time.perf_counter() - imported}
     if calibration is not None:
@@ -261,7 +260,9 @@ def _given(
     """Paths of other programs, by the names of their files."""
     if not files:
         if frame is not None:
-            raise InputError("--paths-frame says what the files of --paths are in; got no --paths")
+            raise InputError(
+                "--paths-frame gives the frame of the --paths files; got no --paths: name them"
+            )
         return {}
     from ccfem.export.path_table import read_paths
     from ccfem.layers.plane import plane_frame

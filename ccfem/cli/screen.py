@@ -130,10 +130,10 @@ def _amount(member: typing.Any, parameter: str) -> str:
         return ""
     for name, most in amount.beyond:
         if name == parameter:
-            return f"follows where {amount.parameter} lays too little: {most:g} most"
+            return f"changes next, up to {most:g}, where {amount.parameter} alone lays too little"
     if parameter != amount.parameter:
         return ""
-    return f"sets the amount of fibre: {amount.most:g} most, {amount.least:g} least"
+    return f"sets the amount of fibre: {amount.most:g} lays the most, {amount.least:g} the least"
 
 
 def _default(field: "dataclasses.Field[typing.Any]") -> str:

@@ -118,7 +118,7 @@ def _over_bare(stiffness: float, stress: "StressField | WeightedCases") -> float
     if not stiffness / one > 1.0:
         raise InputError(
             f"--stiffness {stiffness:g}{_UNIT} is no more than the {one:.4g} {_UNIT} of the "
-            "part without fibre: it needs none, or ask for more"
+            "part without fibre, which needs no fibre: ask for more"
         )
     return stiffness / one
 

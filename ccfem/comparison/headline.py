@@ -101,17 +101,17 @@ TEST_COLUMNS = (
     Column(
         "interlayer_load",
         "N",
-        "Load at which printed layers come apart: the stress tensor averaged over a 2 mm ball, its "
-        "traction on the layer against tensile and shear strength of the bond (quadratic "
-        "criterion), from 3 mm on from loads and supports.",
+        "Load at which printed layers come apart: the stress tensor averaged over a 2 mm ball, "
+        "its traction on the layer against tensile and shear strength of the bond (quadratic "
+        "criterion), at least 3 mm from loads and supports.",
         "> 0, infinite where nothing opens; missing where the bond's strength is unknown; of use "
         "for comparing layers of one part, not as a load",
     ),
     Column(
         "interlayer_load_near",
         "N",
-        "As interlayer_load, from 1.5 mm on from loads and supports.",
-        "<= interlayer_load; how much of it is the zone's",
+        "As interlayer_load, at least 1.5 mm from loads and supports.",
+        "<= interlayer_load; the difference shows the effect of that distance",
     ),
     Column(
         "interlayer_load_everywhere",
@@ -122,7 +122,7 @@ TEST_COLUMNS = (
     Column(
         "interlayer_index",
         "1",
-        "f of that criterion under the load of the test, at its peak.",
+        "Largest value of that criterion under the load of the test.",
         ">= 0, 1 at failure, lower is better; missing as interlayer_load",
     ),
     *(

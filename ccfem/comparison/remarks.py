@@ -96,8 +96,8 @@ def _about_orders(tested: Sequence[Run]) -> list[str]:
 def _about_links(total: Mapping[str, float]) -> list[str]:
     """Say how much link fibre has no part to hold it, from a millimetre on."""
     places = {
-        "link_outside": "lie outside the part, to be cut off",
-        "link_over_void": "hang over voids, where nothing holds the fibre",
+        "link_outside": "lie outside the part and must be cut off",
+        "link_over_void": "lie over voids, where nothing supports the fibre",
     }
     return [
         f"{total[name]:.0f} mm of links {where}"
@@ -158,10 +158,14 @@ def open_remarks(runs: Sequence[Run], layers: Sequence[Layer], width: float) -> 
             f"{place.area:.1f} mm2 at ({place.x:.1f}, {place.y:.1f})"
             for place in left.places[:_PLACES]
         )
-        wide = f", {left.wide:.1%} where one would fit, the largest {largest} mm" if largest else ""
+        wide = (
+            f", {left.wide:.1%} gaps wide enough for one, the largest {largest} mm"
+            if largest
+            else ""
+        )
         found.append(
-            f"{run.name}: layer {layer.index} is open in {left.narrow:.1%} between strands that "
-            f"fan out and along the border, too narrow for one more{wide}"
+            f"{run.name}: {left.narrow:.1%} of layer {layer.index} is gaps too narrow for another "
+            f"strand (between diverging strands, along the border){wide}"
         )
     return found
 

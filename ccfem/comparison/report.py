@@ -125,7 +125,7 @@ def _facts(comparison: Comparison | SlicingComparison, record: Mapping[str, Any]
     several = comparison.cases if isinstance(comparison, Comparison) else None
     return [
         f"load case “{about['load_case']}”{_load_text(record)}"
-        + ("" if several is None else f", and {len(several) - 1} more at once"),
+        + ("" if several is None else f", together with {len(several) - 1} more"),
         f"{about['cells']:,} tetrahedra of order {about['order']}",
         *stacks,
         amount,
@@ -148,7 +148,11 @@ def _about_curve(comparison: Comparison | SlicingComparison) -> str:
     if isinstance(comparison, SlicingComparison) or comparison.curve is None:
         return ""
     common = ", ".join(f"{length:.0f}" for length in comparison.curve.common)
-    return f"All reach {common} mm a layer." if common else "There is no length that all reach."
+    return (
+        f"All strategies reach {common} mm a layer."
+        if common
+        else "No length is within reach of all strategies."
+    )
 
 
 def _parameters(

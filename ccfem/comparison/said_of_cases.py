@@ -32,7 +32,11 @@ def cases_verdict(runs: Sequence[Run], wanted: Wanted, bound: CasesBound | None)
     if len(order) < 2:
         return ""
     first, found = order[0], [order_of(order[0], other) for other in order[1:]]
-    of = "of what any paths could make of that case alone" if bound is not None else "the stiffness"
+    of = (
+        "of the upper bound for that case alone"
+        if bound is not None
+        else "the unreinforced stiffness"
+    )
     reached = f"{merit(first):.0%} {of}" if bound is not None else f"{merit(first):.2f} times {of}"
     if all(each == FIRST for each in found):
         return (

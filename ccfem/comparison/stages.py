@@ -217,7 +217,7 @@ def to_length(
         if run.name == setter:
             given = isinstance(run.strategy, GivenPaths)
             how = "given" if given else "has the shortest natural length"
-            return replace(run, note=f"{how}: sets the length")
+            return replace(run, note=f"{how}, so all are compared at this length")
         start = Planned(run.strategy, run.toolpaths, run.length_per_layer)
         return planned(run, part, length, tell, start if len(run.toolpaths) else None)
 
@@ -248,9 +248,9 @@ def _setter(own: dict[str, Run], part: Part, tell: Tell) -> str | None:
 
 def _no_fibre(machine: Machine) -> str:
     return (
-        "laid no fibre: the sections, or what of them is under tension, are too small "
-        f"for the shortest strand (machine.minimum_length = {machine.minimum_length:g} mm): are "
-        "all lengths in mm?"
+        "laid no fibre: the layers, or their areas in tension, are too small for the shortest "
+        f"strand (machine.minimum_length = {machine.minimum_length:g} mm): check that all lengths "
+        "are in mm"
     )
 
 

@@ -104,8 +104,8 @@ def _under_other(runs: Sequence[Run]) -> str:
     if not all(run.tested is not None and run.tested.alternative is not None for run in runs):
         return ""
     return (
-        f"; under the alternative supports {_ratios(runs, 'tension_alternative')}, and "
-        f"{_ratios(runs, 'bonded_alternative')}"
+        f"; under the alternative supports {_ratios(runs, 'tension_alternative')} (tension only), "
+        f"{_ratios(runs, 'bonded_alternative')} (bonded)"
     )
 
 

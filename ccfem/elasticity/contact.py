@@ -105,8 +105,8 @@ def find_contact(
         held = following
         start = held.restrict(displacement)
     raise SolveError(
-        f"contact did not settle in {_ROUNDS} rounds: the part hardly rests on what presses; hold "
-        "it by one more support, or take a finer mesh"
+        f"contact did not converge in {_ROUNDS} iterations; the part barely touches its pressing "
+        "supports: add a support, or use a finer mesh"
     )
 
 

@@ -16,7 +16,7 @@ def patch_facets(mesh: CellMesh | LoadedBody, name: str) -> IntArray:
     """Facets of a patch, which must not be empty."""
     facets = mesh.patch(name)
     if not len(facets):
-        raise InputError(f"patch '{name}' is empty: no boundary facet meets its rule")
+        raise InputError(f"patch '{name}' is empty: no boundary facet matches its rule")
     return facets
 
 

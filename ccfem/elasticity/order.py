@@ -44,9 +44,9 @@ def about_error(error: float, problem: Problem) -> str:
     """
     if not error > LARGEST_ERROR:
         return ""
-    cure = "shorten the edges of the cells"
+    cure = "use smaller cells"
     if problem.mesh.order == 1:
-        cure = "take quadratic cells (order = 2), or shorten the edges"
+        cure = "use quadratic cells (order = 2), or smaller cells"
     return (
         f"the cells leave an estimated error of {error:.0%} in energy norm, about {error**2:.0%} "
         f"of the displacement: {cure}"

@@ -79,7 +79,7 @@ def solve(
     if len({len(field.mesh.points) for field in fields.values()}) > 1:
         for one in sets:
             if fields[next(iter(one.loads))].mesh.order == 1:
-                why = "other supports call for them"
+                why = "load cases with other supports need them"
                 fields |= _solved_as_it_is(on_quadratic(one), backend, tolerance, why)
     return {case: fields[case] for case in problem.cases}
 

@@ -155,7 +155,7 @@ class _Collected:
             if (np.abs(self.value[before, k] - value[k]) > 1e-12).any():
                 raise InputError(
                     f"supports contradict each other: nodes of {what} are held in {component} at "
-                    f"{value[k]} mm and at another value"
+                    f"{value[k]} mm and at another value: give one value"
                 )
             self.free[nodes, k] = False
             self.value[nodes, k] = value[k]

@@ -64,8 +64,7 @@ COLUMNS = (
         "efficiency",
         "1",
         "Sum of t.S.t over the sum of S1+, along the fibre with unit tangent t (see angle_mean): "
-        "the part of the tension met that runs along the fibre; fibre in compression takes from "
-        "it.",
+        "the part of the tension met that runs along the fibre; fibre in compression reduces it.",
         f"at most 1, which is best; negative where compression prevails; {_NO_TENSION}",
     ),
     Column(

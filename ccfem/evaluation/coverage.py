@@ -28,8 +28,8 @@ COLUMNS = (
         "overfill",
         "1",
         "Length of the fibre, without links outside the section or over a void, times the fibre "
-        "width, over the area of the section: what coverage would be, did no strands overlap or "
-        "lie over the border.",
+        "width, over the area of the section: the coverage if no strands overlapped or lay over "
+        "the border.",
         ">= 0; NaN for an empty section",
     ),
     Column(

@@ -41,11 +41,11 @@ COLUMNS = (
         "print_time",
         "s",
         "Length of each step of the paths over its speed (by the machine's speed table for fibre, "
-        "else the speed of its kind), plus the straight way from the end of each path to the start "
-        "of the next one of its layer over the travel speed. Slow starts, corners and ends of "
-        "strands, fibre fed before them, cuts, lifts, acceleration, changes of tools with their "
-        "heat, and what is not among the paths given (such as matrix) cost nothing: the head of a "
-        "G-code file (--gcode) says the time of the whole print.",
+        "else the speed of its kind), plus the straight way from the end of each path to the "
+        "start of the next one of its layer over the travel speed. Slow starts, corners and ends "
+        "of strands, fibre fed before them, cuts, lifts, acceleration, tool changes with their "
+        "heating, and paths not given (such as matrix) are not counted: the head of a G-code file "
+        "(--gcode) states the time of the whole print.",
         ">= 0",
     ),
     Column(

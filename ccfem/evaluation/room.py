@@ -27,8 +27,8 @@ COLUMNS = (
         "on_fibre",
         "1",
         "Share of the fibre that lies on other fibre of its layer and about its direction, within "
-        "30 degrees: where m such bands overlap, (m - 1)/m of them. In the virtual test it lends "
-        f"nothing ({_BANDS}).",
+        "30 degrees: where m such bands overlap, (m - 1)/m of them. It adds no stiffness in the "
+        f"virtual test ({_BANDS}).",
         f"0 to 1, 0 is best; {_NONE}",
     ),
     Column(

@@ -254,7 +254,8 @@ def _factorised(matrix: sp.csr_array) -> Any:
         factor = splu(inner, permc_spec="MMD_AT_PLUS_A", diag_pivot_thresh=0.0, options=options)
     except RuntimeError as error:
         raise SolveError(
-            f"guidance field: {error}; is the part of one piece, and is the smoothness above 0?"
+            f"guidance field: {error}: check that the part is in one piece and the smoothness "
+            "above 0"
         ) from error
 
     def solve(rhs: FloatArray) -> FloatArray:

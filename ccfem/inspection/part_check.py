@@ -191,7 +191,7 @@ def _facts(case: Case) -> tuple[str, ...]:
     size = " x ".join(f"{side:.4g}" for side in np.ptp(mesh.bounds, axis=0))
     pieces = len(np.unique(connected(mesh.neighbours, len(mesh.cells))))
     kind = "linear" if mesh.order == 1 else "quadratic"
-    costs = " or, if their error calls for it, ".join(
+    costs = " or, if their error is too large, ".join(
         cost.about for cost in solve_costs(case.problem)
     )
     told = tuple(line for line in case.findings if _only_told(line))
@@ -225,8 +225,7 @@ def _about_fibre(case: Case, layers: Sequence[Layer]) -> tuple[str, ...]:
     area = np.mean([layer.areas.sum() for layer in layers])
     return (
         f"fibre on {len(layers)} layer{'s' * (len(layers) > 1)} ({shortened}), {area:.4g} mm^2 "
-        "each in the mean: "
-        f"{case.fibre.about()}",
+        f"each on average: {case.fibre.about()}",
     )
 
 
@@ -263,19 +262,19 @@ def _warnings(case: Case, rows: Sequence[LoadRow]) -> list[str]:
     for row in rows:
         if row.held < _ALL and row.held > _SOME:
             lines.append(
-                f"load case '{row.case}': {row.held:.0%} of {row.what} acts on held nodes and does "
-                "nothing: keep the patches of loads and supports apart"
+                f"load case '{row.case}': {row.held:.0%} of {row.what} acts on held nodes and has "
+                "no effect: keep the patches of loads and supports apart"
             )
         if row.size == 0.0:
             lines.append(
-                f"load case '{row.case}': {row.what} has no resultant: its parts cancel; check "
-                "that the patch faces one way"
+                f"load case '{row.case}': {row.what} has no resultant because its parts cancel: "
+                "check that the patch faces one way"
             )
     for each in support_sets(problem):
         lines += [line for line in _shared(each) if line not in lines]
     unused = sorted(set(problem.mesh.patches) - set(problem.held_or_loaded))
     if unused and len(unused) <= 6:
-        lines.append(f"patches without load and support: {', '.join(unused)}")
+        lines.append(f"patches without load or support: {', '.join(unused)}")
     return lines + _no_room(case)
 
 
@@ -287,7 +286,7 @@ def _no_room(case: Case) -> list[str]:
     if width > side:
         return [
             f"machine.fibre_width = {width:g} mm is wider than the part, {side:.4g} mm: no fibre "
-            "fits; are all lengths in mm?"
+            "fits: check that all lengths are in mm"
         ]
     most = side * longest / width
     if least > most:
@@ -309,7 +308,7 @@ def _shared(problem: Problem) -> list[str]:
             if both.any():
                 lines.append(
                     f"patches '{one}' (loaded) and '{other}' (held) share {int(both.sum())} of "
-                    f"{len(both)} facets: choose them apart"
+                    f"{len(both)} facets: choose patches that do not overlap"
                 )
     return lines
 

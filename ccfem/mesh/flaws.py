@@ -63,8 +63,8 @@ def _curved(points: FloatArray, cells: IntArray, edges: IntArray) -> str:
     if not count:
         return ""
     return (
-        f"{count} sides of quadratic cells are curved, by up to {off:.3g} mm on a side of "
-        f"{length:.3g} mm, and ccfem takes straight ones: straighten them with "
-        "ccfem.mesh.check_mesh, which says how far it moved the nodes, and mesh finer where that "
-        "is too far"
+        f"{count} edges of quadratic cells are curved, by up to {off:.3g} mm on an edge of "
+        f"{length:.3g} mm, but ccfem needs straight ones: straighten them with "
+        "ccfem.mesh.check_mesh, which reports how far it moved the nodes; use a finer mesh if "
+        "that is too far"
     )

@@ -20,7 +20,7 @@ def in_metres(points: FloatArray) -> str:
     Examples
     --------
     >>> in_metres([[0.0, 0.0, 0.0], [0.03, 0.04, 0.0]])
-    'the body measures 0.05 mm across: looks like metres: scale = 1000 (or --scale 1000)'
+    'the body is only 0.05 mm across: if it is in metres, set scale = 1000 (or --scale 1000)'
     >>> in_metres([[0.0, 0.0, 0.0], [30.0, 40.0, 0.0]])
     ''
     """
@@ -28,6 +28,6 @@ def in_metres(points: FloatArray) -> str:
     if across >= _SMALL:
         return ""
     return (
-        f"the body measures {across:.3g} mm across: looks like metres: scale = 1000 "
-        "(or --scale 1000)"
+        f"the body is only {across:.3g} mm across: if it is in metres, "
+        "set scale = 1000 (or --scale 1000)"
     )

@@ -76,8 +76,8 @@ def _about_cylinder(name: str, rule: Cylinder, parts: list[tuple[Face, float, fl
     for face, share, covered in parts:
         if face.kind != "cylinder":
             lines.append(
-                f"patch '{name}': {share:.0%} of what its cylinder takes is no round wall but a "
-                f"{face.about}: lessen the radius or the tolerance, or choose by rule 'face'"
+                f"patch '{name}': {share:.0%} of what its cylinder selects is not a round wall "
+                f"but a {face.about}: reduce the radius or the tolerance, or use rule 'face'"
             )
         elif rule.half is None and covered < _ALL:
             lines.append(

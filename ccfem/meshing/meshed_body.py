@@ -63,7 +63,10 @@ def mesh_body(
         mesh, fit, who = fill(surface, edge_length, mesher)
         about = fit.about(who)
         if who != "Gmsh":  # it takes its random numbers from the hardware
-            about += "; fTetWild makes another mesh each time: this one is kept on this machine"
+            about += (
+                "; fTetWild gives a different mesh each time, so this one is stored on this "
+                "machine for reuse"
+            )
         return with_faces_of(surface, mesh), (about,)
 
     asked: dict[str, object] = {

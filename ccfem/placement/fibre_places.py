@@ -183,8 +183,8 @@ class FibrePlaces:
         if layer.flat is None:
             if self.regions:
                 raise InputError(
-                    f"fibre.regions are of flat layers; layer {layer.index} is curved: choose "
-                    "method = 'planar' in [slicing], or leave the regions out"
+                    f"fibre.regions work on flat layers only; layer {layer.index} is curved: "
+                    "choose method = 'planar' in [slicing], or leave the regions out"
                 )
             return layer
         region = self._region(layer, mesh)
@@ -238,8 +238,8 @@ def _height(layer: Layer, mesh: TetMesh) -> float:
     """Height of a flat layer over the part's lowest point."""
     if layer.flat is None:
         raise InputError(
-            f"fibre.from and fibre.to are of flat layers; layer {layer.index} is curved: choose by "
-            "fibre.layers"
+            f"fibre.from and fibre.to work on flat layers only; layer {layer.index} is curved: "
+            "choose by fibre.layers"
         )
     height, low, _ = _levels(layer, mesh)
     return height - low

@@ -200,5 +200,5 @@ def _wrong(value: Any) -> Sequence[str]:
     if isinstance(value, TetMesh):
         return [line for line in [about_slivers(value)] if line]
     if isinstance(value, Toolpaths) and not len(value.of_kind(FIBRE)):
-        return ["no fibre: the sections, or what of them is under tension, may be too small"]
+        return ["no fibre: the layers, or their areas in tension, may be too small"]
     return ()

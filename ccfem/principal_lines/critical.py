@@ -79,7 +79,7 @@ def critical_region(
     if keep not in get_args(Keep):
         raise InputError(f"lines to keep must be one of {', '.join(get_args(Keep))}; got {keep!r}")
     if len(joints) > _MOST_JOINTS:
-        raise InputError(f"at most {_MOST_JOINTS} joints can be told apart; got {len(joints)}")
+        raise InputError(f"at most {_MOST_JOINTS} joints are possible; got {len(joints)}")
     touching = np.zeros(len(mesh.cells), dtype=np.int64)
     for k, nodes in enumerate(joints):
         on_wall = np.zeros(len(mesh.points), dtype=bool)

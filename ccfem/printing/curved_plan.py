@@ -178,8 +178,8 @@ def _not_full(filled: Sequence[FilledLayer], mesh: TetMesh) -> list[str]:
     if missing < _MISSING * whole:
         return []
     return [
-        f"{missing:.0f} mm^3 of the part, {missing / whole:.1%}, stay empty: there its layers are "
-        "too narrow for lines of matrix"
+        f"{missing:.0f} mm^3 of the part, {missing / whole:.1%}, stay empty, because its layers "
+        "are too narrow there for lines of matrix"
     ]
 
 
@@ -187,13 +187,13 @@ def _said(level: float, ordered: float, after: float, place: FloatArray | None) 
     """Say where the head touches what is printed, and what was done about it."""
     if not level > 0.0 and not after > 0.0:
         return []
-    done = f"layer by layer along {level:.0f} mm, in the order chosen along {ordered:.0f} mm"
+    done = f"{level:.0f} mm layer by layer, {ordered:.0f} mm in the order chosen"
     if place is None:
-        return [f"the head would touch what is printed {done}, leaning nowhere"]
+        return [f"the head would touch printed material along {done}, and nowhere when leaning"]
     x, y, z = place.tolist()
     return [
-        f"the head touches what is printed along {after:.0f} mm, first at X {x:.1f} Y {y:.1f} Z "
-        f"{z:.1f} (upright or along the normal {done}): choose other layers, a smaller "
+        f"the head touches printed material along {after:.0f} mm, first at X {x:.1f} Y {y:.1f} Z "
+        f"{z:.1f} (without leaning {done}): choose other layers, a smaller "
         "machine.kinematics.tilt_limit, or watch it there"
     ]
 

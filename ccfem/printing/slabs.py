@@ -116,6 +116,6 @@ def check_cover(slabs: Sequence[Slab], machine: Machine) -> list[str]:
             )
         if len(those) == 1:
             found.append(
-                f"one layer of matrix {side} fibre layer, {height:.3g} mm; two hold better"
+                f"only one layer of matrix, {height:.3g} mm, {side} fibre layer: two hold it better"
             )
     return found

@@ -154,9 +154,9 @@ class Winding:
         most = max((len(piece.loops) for piece in pieces), default=0)
         if not most:
             raise InputError(
-                "winding needs joints: patches that lie round a hole of a layer; none of "
-                f"{', '.join(names) or 'no patch'} does: name others (joints), or choose another "
-                "strategy or slicing"
+                "winding needs joints, patches around a hole of a layer; none of "
+                f"{', '.join(names) or 'no patch'} is one: name others (joints), or choose "
+                "another strategy or slicing"
             )
         least = most if self.joined is None else self.joined
         if self.weight == "lines":

@@ -164,7 +164,7 @@ class _Teller:
         self._first, self._failed = done, 0
         self._start = time.monotonic()
         if done:
-            progress(f"{done} of {total} runs were there", done / total)
+            progress(f"{done} of {total} runs were already done", done / total)
 
     def __call__(self, job: Job, outcome: dict[str, Any]) -> None:
         self._done += 1

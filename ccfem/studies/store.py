@@ -96,8 +96,8 @@ def opened(folder: Path, force: bool = False) -> Iterator[Store]:
         store.sweep()
     except OSError as error:
         raise InputError(
-            f"cannot go on in {folder}: {error.strerror or error}: what is done is kept; see to it "
-            "and repeat"
+            f"cannot continue in {folder}: {error.strerror or error}: finished runs are kept; "
+            "correct this and repeat"
         ) from error
     finally:
         os.close(lock)

@@ -75,8 +75,8 @@ class StudyResult:
         failed = sum(bool(self.outcome(job)["failure"]) for job in self.jobs)
         parts = len({job.part for job in self.jobs})
         return (
-            f"{len(self.jobs)} runs on {parts} part{'s' if parts > 1 else ''}, "
-            f"{self.computed} made now, {failed} failed"
+            f"{len(self.jobs)} runs on {parts} part{'s' if parts > 1 else ''}, {self.computed} "
+            f"computed now, {failed} failed"
         )
 
     def outcome(self, job: Job) -> Mapping[str, Any]:
@@ -98,7 +98,7 @@ class StudyResult:
             for reason, names in reasons.items()
         ]
         if self.repeated:
-            found.append(f"{self.repeated} runs were named more than once: each is made once")
+            found.append(f"{self.repeated} runs were listed more than once: each is computed once")
         return tuple(found)
 
     @cached_property

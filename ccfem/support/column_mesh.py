@@ -119,7 +119,7 @@ def column_mesh(
     area, lean, hanging = hanging_facets(mesh, frame, bed, angle, reach, _STEEPEST)
     if not hanging.any():
         raise InputError(
-            f"nothing of the part hangs over by more than {angle:g} degrees: it needs no support"
+            f"no surface of the part overhangs by more than {angle:g} degrees: it needs no support"
         )
     facets = mesh.boundary[hanging]
     top, facets = np.unique(facets, return_inverse=True)

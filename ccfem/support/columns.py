@@ -125,8 +125,8 @@ def _crossings(
     total = count.prod(axis=1)
     if total.sum() > _MOST:
         raise InputError(
-            f"columns {pitch:g} mm apart would be {float(total.sum()):.1g} on this part: give a "
-            "larger pitch"
+            f"a pitch of {pitch:g} mm would make {float(total.sum()):.1g} columns on this part: "
+            "give a larger pitch"
         )
     facet = np.repeat(np.arange(len(corners)), total)
     number = np.arange(len(facet)) - np.repeat(np.cumsum(total) - total, total)

@@ -127,7 +127,7 @@ def support_layers(
         first = layers[0].flat
         if not flat or first is None:
             raise InputError(
-                "support of curved layers needs the field that they are levels of: call "
+                "support below curved layers needs the field they were cut from: call "
                 "slice_with_support with their slicer"
             )
         field = mesh.points @ first.frame[2]
@@ -145,8 +145,8 @@ def support_layers(
             break
     else:
         raise InputError(
-            f"layers of the support lie upside down in {100.0 * found.inverted:.2g} % of it: raise "
-            f"lift above {height:.3g} mm, in which the lowest layers become flat"
+            f"support layers lie upside down in {100.0 * found.inverted:.2g} % of the support: "
+            f"raise lift, over which the lowest layers flatten, above {height:.3g} mm"
         )
     thinnest, thickest = (share * nominal for share in _RANGE)
     cut = layers_within(

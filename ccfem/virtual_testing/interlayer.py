@@ -97,7 +97,7 @@ def interlayer(
     if tensile is None:
         raise InputError(
             f"material '{material.name}' has no strength between layers: give interlayer_tensile, "
-            "that of a bar printed upright, MPa"
+            "MPa, measured on a bar printed upright"
         )
     check_number("radius of the ball", radius, above=0.0, unit="mm")
     mesh = stress.mesh
@@ -157,6 +157,6 @@ def _about_ball(mesh: TetMesh, radius: float) -> str:
     if radius >= edge:
         return ""
     return (
-        f"the stress between layers is averaged over {radius:g} mm, less than the mean edge of the "
-        f"cells of {edge:.2g} mm, so its peak hangs on the mesh: take finer cells"
+        f"the stress between layers is averaged over {radius:g} mm, less than the mean edge of "
+        f"the cells of {edge:.2g} mm, so its peak depends on the mesh: use smaller cells"
     )

@@ -168,8 +168,8 @@ def _check_case(system: System, case: str) -> None:
         )
     if any(isinstance(load, Temperature) for load in system.problem.loads_of(case)):
         raise InputError(
-            f"load case '{case}' heats the part; a virtual test needs forces or moving "
-            "supports: leave the heat out"
+            f"load case '{case}' heats the part; a virtual test needs forces or moving supports: "
+            "remove the temperature change"
         )
     held = system.held_in(case)
     if not held.value.any() and not np.any(held.restrict(system.forces_in(case))):

@@ -8,13 +8,13 @@ __all__ = ["FIRST", "HONEST_PROMISE", "RESOLUTION", "SAME", "SECOND", "UNDECIDED
 FIRST, SECOND, SAME, UNDECIDED = "first", "second", "no difference", "undecided"
 
 HONEST_PROMISE = (
-    "Virtual test: the order of two designs holds and the ratio of their stiffnesses is right to "
-    "about 10 %, or the verdict is 'undecided'; reinforced over unreinforced stiffness is right to "
-    "25 %, to 10 % after calibration with one reinforced print; first-failure load to 30 % after "
-    "calibration, while the size of its gain is not reliable. Measured on three published parts "
-    "with one specimen each: an indication, not a validation. Linear elastic, fibres as bars. "
-    "Delamination: the order of slicings of one part only, and where fixed and pressing supports "
-    "agree on it; a published load of 0.87 kN was not reproduced."
+    "Virtual test: it ranks two designs correctly and gives the ratio of their stiffnesses to "
+    "about 10 %, or says 'undecided'; the ratio to the unreinforced stiffness is accurate to 25 "
+    "%, or 10 % after calibration with one reinforced print; first-failure load to 30 % after "
+    "calibration, but the size of its gain is not reliable. Based on three published parts with "
+    "one specimen each: an indication, not a validation. Linear elastic, fibres as bars. "
+    "Delamination: use it only to rank slicings of one part, where fixed and pressing supports "
+    "give the same order; a published load of 0.87 kN was not reproduced."
 )
 """What may be expected of the numbers; to be shown wherever they are."""
 

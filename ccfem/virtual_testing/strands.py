@@ -116,8 +116,8 @@ def cut_strands(
     own = np.where(toolpaths.link[first_point], 0.0, length)
     if not count and not own.any():
         raise InputError(
-            f"the virtual test needs fibre inside the mesh; got {length.sum():.4g} mm of links "
-            "outside it: lay strands, or mark as links only what joins them"
+            f"the virtual test needs fibre inside the mesh; got only {length.sum():.4g} mm of "
+            "links outside it: lay strands, or mark as links only fibre that joins them"
         )
     inside = float(((end - begin) * own[segment] * share).sum())
     outside = max(float(own.sum()) - inside, 0.0)

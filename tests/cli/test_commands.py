@@ -330,7 +330,7 @@ def test_a_parameter_is_explained_in_the_words_of_its_class(ccfem, monkeypatch, 
     _, out, _ = ccfem("strategies", "contour_zigzag")
     assert "Direction of the lines on layer 0 to the first axis of the layer." in out
     assert "float, degrees" in out
-    assert "It sets the amount of fibre: 1 most, 20 least." in out
+    assert "It sets the amount of fibre: 1 lays the most, 20 the least." in out
     refused(ccfem, folder, "did you mean 'zigzag'", "strategies", "zigzga")
 
 

@@ -334,7 +334,7 @@ def test_links_outside_the_part_are_reported_and_carry_nothing():
     assert total["outside_length"] == 0.0
     inside = run.tested.bracket.tension.strands.total
     assert inside == pytest.approx(total["fibre_length"] - total["link_outside"], rel=1e-4)
-    assert "joined: 80 mm of links lie outside the part, to be cut off" in result.remarks
+    assert "joined: 80 mm of links lie outside the part and must be cut off" in result.remarks
     assert not any("voids" in line for line in result.remarks)
 
 

@@ -48,7 +48,7 @@ def compared(case):
 
 
 def test_every_run_lays_the_same_length_in_all(compared):
-    (setter,) = (run for run in compared.runs if "sets the length" in run.note)
+    (setter,) = (run for run in compared.runs if "compared at this length" in run.note)
     assert compared.fibre == pytest.approx(setter.toolpaths.lengths.sum(), rel=1e-9)
     assert [len(each.layers) for each in compared.slicings.values()] == [4, 3, 3]
     assert len(compared.runs) == 6

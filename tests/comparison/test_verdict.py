@@ -214,8 +214,8 @@ def test_an_order_that_other_supports_turn_round_is_undecided(compared, own, oth
     ends = {
         "makes": "or under the alternative supports).",
         "No": "under both models of the supports.",
-        "Undecided": f"; under the alternative supports {other[0]:.2f} and {other[1]:.2f}, and "
-        f"{other[0]:.2f} and {other[1]:.2f}.",
+        "Undecided": f"; under the alternative supports {other[0]:.2f} and {other[1]:.2f} (tension "
+        f"only), {other[0]:.2f} and {other[1]:.2f} (bonded).",
     }
     assert made.verdict.endswith(ends[said.split()[0]])
     undecided = any("undecided against" in line for line in made.remarks)

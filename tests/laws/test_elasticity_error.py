@@ -244,7 +244,7 @@ def test_linear_cells_in_bending_are_a_finding_with_its_cure():
     tip = -field.displacement[field.mesh.points[:, 0] > 100.0 - 1e-6, 2].mean()
     assert tip < 0.3 * sag_of_a_beam((100.0, 20.0, 1.0))
     (found,) = field.findings
-    assert found.endswith("take quadratic cells (order = 2), or shorten the edges")
+    assert found.endswith("use quadratic cells (order = 2), or smaller cells")
     assert field.record.error == field.error.relative > LARGEST_ERROR
 
 

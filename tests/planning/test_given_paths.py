@@ -28,7 +28,7 @@ def test_paths_read_back_have_the_numbers_of_the_strategy(bar, planned):
     # no layers were asked for: they are those of the paths
     assert [layer.plane.height for layer in judged.layers] == pytest.approx([1.0, 2.0, 4.0])
     mine, again = judged.runs
-    assert mine.note == "given: sets the length"
+    assert mine.note == "given, so all are compared at this length"
     assert mine.length_per_layer == pytest.approx(judged.fibre_per_layer)
     assert again.length_per_layer == pytest.approx(mine.length_per_layer, rel=0.02)
     for name, value in run.evaluation.total.items():

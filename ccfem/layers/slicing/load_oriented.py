@@ -127,8 +127,9 @@ class LoadOriented:
         check_fields(self, "blend", at_least=0.0)
         if not self.thickest >= 2.0 * self.thinnest:
             raise InputError(
-                "load_oriented.thickest must be at least twice thinnest, since layers are put in "
-                f"one between two; got {self.thinnest:g} and {self.thickest:g} mm: widen the range"
+                "load_oriented.thickest must be at least twice thinnest, since extra layers are "
+                f"inserted between two; got {self.thinnest:g} and {self.thickest:g} mm: widen the "
+                "range"
             )
         if not self.thinnest <= self.thickness <= self.thickest:
             raise InputError(
@@ -149,7 +150,7 @@ class LoadOriented:
         if found.inverted > 0.0:
             raise InputError(
                 f"layers lie upside down in {100.0 * found.inverted:.2g} % of the part: raise "
-                "load_oriented.blend, or leave it out for the least that is enough"
+                "load_oriented.blend, or leave it out to use the smallest value that is enough"
             )
         return found.layers
 

@@ -42,7 +42,7 @@ class Surfaces:
         files = sorted(Path(self.folder).glob("*.obj"), key=_number)
         if not files:
             raise InputError(
-                f"no .obj file in the folder '{self.folder}': give that of the layers "
+                f"no .obj file in the folder '{self.folder}': give the folder of the layers "
                 "(surfaces:folder=...)"
             )
         return tuple(
