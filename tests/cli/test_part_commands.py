@@ -83,7 +83,7 @@ def test_cite_prints_bibtex(ccfem, tmp_path):
 def test_a_body_in_metres_is_seen_to_be_one(ccfem, tmp_path):
     write_mesh(box_mesh((0.06, 0.024, 0.004), (6, 3, 2)), tmp_path / "lever.npz")
     said = " ".join(ccfem("faces", "lever.npz")[1].split())
-    assert "0.0647 mm across: looks like metres: scale = 1000 (or --scale 1000)" in said
+    assert "only 0.0647 mm across: if it is in metres, set scale = 1000 (or --scale 1000)" in said
     assert "looks like" not in ccfem("faces", "lever.npz", "--scale", "1000")[1]
     code, out, _ = ccfem("new", "lever.npz")
     assert (code, "look like metres" in out) == (0, True)
@@ -99,7 +99,7 @@ def test_a_surface_in_metres_is_meshed_with_a_hint(ccfem, tmp_path):
     used, facets = np.unique(box.boundary, return_inverse=True)
     surface = pyvista.PolyData.from_regular_faces(box.points[used], facets.reshape(-1, 3))
     surface.save(tmp_path / "lever.stl")
-    hint = "0.0647 mm across: looks like metres: scale = 1000 (or --scale 1000)"
+    hint = "only 0.0647 mm across: if it is in metres, set scale = 1000 (or --scale 1000)"
     code, out, err = ccfem("mesh", "lever.stl", "--size", "6", "-o", "lever.npz")
     assert (code, out, err.count("\n"), hint in err) == (2, "", 1, True)
     assert not (tmp_path / "lever.npz").exists()
