@@ -91,8 +91,8 @@ def test_at_most_twelve_loose_modules():
     assert len(loose) <= 12, loose
 
 
-def test_no_file_above_four_hundred_lines():
-    long = {name for name, path in modules().items() if len(path.read_text().splitlines()) > 400}
+def test_no_file_above_seven_hundred_lines():
+    long = {name for name, path in modules().items() if len(path.read_text().splitlines()) > 700}
     assert not long
 
 
