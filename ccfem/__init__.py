@@ -28,9 +28,9 @@ from ccfem import display
 if TYPE_CHECKING:
     from ccfem.cases.case import Case
     from ccfem.cases.reading import read
-    from ccfem.comparison.compare import compare
+    from ccfem.comparison.engine import compare
+    from ccfem.comparison.files import save
     from ccfem.comparison.result import Comparison
-    from ccfem.comparison.saving import save
     from ccfem.elasticity import Problem, solve
     from ccfem.evaluation import evaluate
     from ccfem.inspection.body_faces import faces

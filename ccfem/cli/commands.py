@@ -42,7 +42,16 @@ from ccfem.cli.options import (
 )
 from ccfem.cli.papers_again import reproduce
 from ccfem.cli.part_commands import add_part_commands
-from ccfem.cli.run import foreign_stress, layers_of, load, options_of, run, slicings_of
+from ccfem.cli.run import (
+    Output,
+    calibrated,
+    foreign_stress,
+    layers_of,
+    load,
+    run,
+    slicings_of,
+    with_given_paths,
+)
 from ccfem.cli.study_file import study
 from ccfem.cli.supporting import support
 
@@ -235,33 +244,33 @@ def compare(
     force: Force = False,
 ) -> None:
     """Plan a part by several strategies and show which is best, in numbers and a report."""
-    from ccfem.comparison.compare import STRATEGIES
 
-    names = STRATEGIES if strategies is None else names_of(strategies)
-    parameters = parameters_by_strategy(set_ or ())
-    chosen = layers_of(layers, heights, slicing)
-    options = options_of(chosen, fibre_per_layer, virtual_test, load_case, backend)
-    options |= {"natural": natural, "curve": curve, "fibre": fibre}
-    options["slicings"] = None if slicings is None else slicings_of(slicings)
-    options["stress"] = foreign_stress(stress, stress_unit)
-    files = names_of(paths) if paths is not None else ()
-    run(
-        case,
-        set_case,
-        names,
-        parameters,
-        options,
-        calibration,
-        out,
-        paths=files,
-        frame=paths_frame,
-        force=force,
-        refine=refine,
-        pictures=pictures,
-        drawings=drawings_of(drawings),
-        machine=machine_choice(machine, set_machine),
-        fibre=fibre_choice(set_fibre),
-    )
+    def ask() -> Any:
+        from ccfem.comparison.request import STRATEGIES, Request, named_strategies
+
+        printer, placed = machine_choice(machine, set_machine), fibre_choice(set_fibre)
+        part = load(case, set_case, refine, printer, placed)
+        part, strand = calibrated(part, virtual_test, calibration)
+        names = STRATEGIES if strategies is None else names_of(strategies)
+        files = () if paths is None else names_of(paths)
+        parameters = parameters_by_strategy(set_ or ())
+        chosen = named_strategies(part, names, parameters) if names or not files else {}
+        return Request.of(
+            part,
+            with_given_paths(part, chosen, files, paths_frame),
+            layers_of(layers, heights, slicing),
+            None if slicings is None else slicings_of(slicings),
+            fibre_per_layer,
+            fibre,
+            natural,
+            load_case=load_case,
+            strand=strand,
+            stress=foreign_stress(stress, stress_unit, refine),
+            backend=backend,
+            curve=curve,
+        )
+
+    run(case, ask, Output(out, force, pictures, drawings_of(drawings)))
 
 
 @app.command()
@@ -301,31 +310,30 @@ def plan(
     force: Force = False,
 ) -> None:
     """Plan a part by one strategy, by default with its natural amount of fibre."""
-    parameters = parameters_by_strategy(set_ or (), strategy)
-    chosen = layers_of(layers, heights, slicing)
-    options = options_of(chosen, fibre_per_layer, virtual_test, load_case, backend)
-    options["natural"] = fibre_per_layer is None
-    options["print_plans"], options["support"] = gcode, support
-    if stiffness is not None:
-        options["stiffness"] = stiffness
-    options["stress"] = foreign_stress(stress, stress_unit)
-    alone, suffix = (strategy,), f"-{strategy}"
-    run(
-        case,
-        set_case,
-        alone,
-        parameters,
-        options,
-        calibration,
-        out,
-        suffix,
-        force=force,
-        refine=refine,
-        pictures=pictures,
-        drawings=drawings_of(drawings),
-        machine=machine_choice(machine, set_machine),
-        fibre=fibre_choice(set_fibre),
-    )
+
+    def ask() -> Any:
+        from ccfem.comparison.request import Request, named_strategies
+
+        printer, placed = machine_choice(machine, set_machine), fibre_choice(set_fibre)
+        part = load(case, set_case, refine, printer, placed)
+        part, strand = calibrated(part, virtual_test, calibration)
+        parameters = parameters_by_strategy(set_ or (), strategy)
+        return Request.of(
+            part,
+            named_strategies(part, (strategy,), parameters),
+            layers_of(layers, heights, slicing),
+            fibre_per_layer=fibre_per_layer,
+            natural=fibre_per_layer is None and stiffness is None,
+            stiffness=stiffness,
+            load_case=load_case,
+            strand=strand,
+            stress=foreign_stress(stress, stress_unit, refine),
+            backend=backend,
+            print_plans=gcode,
+            support=support,
+        )
+
+    run(case, ask, Output(out, force, pictures, drawings_of(drawings), f"-{strategy}"))
 
 
 @app.command()
@@ -367,9 +375,13 @@ def calibrate(
     from ccfem.cli.fitting import fit_material
 
     parameters = parameters_by_strategy(set_ or (), strategy) if strategy is not None else {}
-    options = options_of(layers, fibre_per_layer, False, load_case, "auto")
-    options["natural"] = fibre_per_layer is None
-
+    options = {
+        "layers": layers,
+        "fibre_per_layer": fibre_per_layer,
+        "natural": fibre_per_layer is None,
+        "strand": None,
+        "load_case": load_case,
+    }
     chosen, placed = machine_choice(machine, set_machine), fibre_choice(set_fibre)
 
     def read() -> Any:

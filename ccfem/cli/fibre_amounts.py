@@ -56,12 +56,9 @@ def front(
     force: Force = False,
 ) -> None:
     """Show how stiff and strong a part gets with how much fibre, beside what no paths exceed."""
-    from ccfem.cases.load_cases import asks_for_all, weighted_cases
-    from ccfem.checks import check_known
     from ccfem.cli.run import load
-    from ccfem.comparison.compare import create_all
-    from ccfem.comparison.fibre_front import counts_to_try, fibre_front
-    from ccfem.elasticity.solve import solve
+    from ccfem.comparison.fibre_front import front_of
+    from ccfem.comparison.request import Request, named_strategies
     from ccfem.errors import InputError
     from ccfem.io.result_folder import whole_folder
     from ccfem.progress import progress_bar
@@ -73,31 +70,14 @@ def front(
     strengths = () if strength is None else numbers_of(strength)
     if strength is not None and not strengths:
         raise InputError(f"--strength expects numbers from 0 to 1 as 0,0.25,0.5; got '{strength}'")
-    chosen_machine, fibre = machine_choice(machine, set_machine), fibre_choice(set_fibre)
-    part = load(case, set_case, machine=chosen_machine, fibre=fibre)
-    chosen = create_all(part, (strategy,), parameters)[strategy]
-    names = part.problem.cases
-    for_all = asks_for_all(part, load_case)
-    if load_case is not None and not for_all:
-        check_known("load case", load_case, names)
+    printer, placed = machine_choice(machine, set_machine), fibre_choice(set_fibre)
+    part = load(case, set_case, machine=printer, fibre=placed)
+    chosen = named_strategies(part, (strategy,), parameters)
+    request = Request(part, chosen, load_case=load_case, backend=backend)
     where = out if out is not None else Path("results") / f"{part.name}-front"
     with whole_folder(where, force) as folder, progress_bar(lines=True) as progress:
-        progress(f"solving {part.name}", 0.0)
-        fields = solve(part.problem, backend=backend)
-        cases = weighted_cases(part, fields) if for_all else None
-        stress = fields[load_case or names[0]] if cases is None else cases.heaviest
-        several = counts_to_try(part, stress) if counts is None else [int(each) for each in counts]
-        found = fibre_front(
-            part,
-            stress if cases is None else cases,
-            strategy,
-            chosen,
-            several,
-            points,
-            backend=backend,
-            strengths=strengths,
-            progress=progress,
-        )
+        numbers = None if counts is None else [int(count) for count in counts]
+        found = front_of(request, numbers, points, strengths, progress)
         found.to_frame().to_csv(folder / "front.csv", index=False)
         found.plot().savefig(folder / "front.png")
         if len(strengths) > 1:

@@ -5,7 +5,8 @@ from pathlib import Path
 from typing import Any
 
 from ccfem.cases.case import Case
-from ccfem.comparison.compare import compare, create_all
+from ccfem.comparison.engine import compare
+from ccfem.comparison.request import named_strategies
 from ccfem.errors import InputError
 from ccfem.io.whole import check_writable
 from ccfem.virtual_testing.calibration import calibrate
@@ -35,7 +36,7 @@ def fit_material(
         That planned the reinforced part.
     parameters : mapping of strategy name to parameters
     options : mapping
-        From `ccfem.cli.run.options_of`, and ``natural``.
+        Keyword arguments of `ccfem.compare`.
     out : Path
     """
     curves = [each.resolve() for each in (unreinforced, reinforced) if each is not None]
@@ -48,7 +49,7 @@ def fit_material(
         raise InputError("--reinforced and --strategy belong together; got only one of them")
     case, paths = read(), None
     if strategy is not None:
-        chosen = create_all(case, (strategy,), parameters)
+        chosen = named_strategies(case, (strategy,), parameters)
         (planned,) = compare(case, chosen, **options).runs
         if not len(planned.toolpaths):
             raise InputError(f"{strategy} could not plan the part: {planned.failure}")

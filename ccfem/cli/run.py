@@ -6,12 +6,11 @@ Everything heavy is imported where it is needed, so that ``ccfem --help`` answer
 import shlex
 import sys
 import time
-from collections.abc import Callable, Mapping, Sequence
-from dataclasses import replace
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
-from ccfem.checks import member_name
 from ccfem.cli.arguments import numbers_of
 from ccfem.errors import InputError
 from ccfem.io.toml import assignment
@@ -19,18 +18,22 @@ from ccfem.progress import Progress, progress_bar
 
 if TYPE_CHECKING:
     from ccfem.cases.case import Case
+    from ccfem.comparison.request import Request
     from ccfem.comparison.result import Comparison
-    from ccfem.comparison.slicings import SlicingComparison
     from ccfem.machine.machine import Machine
     from ccfem.placement.fibre_places import FibrePlaces
+    from ccfem.planning.strategy import Strategy
+    from ccfem.virtual_testing.strand import Strand
 
 __all__ = [
+    "Output",
+    "calibrated",
     "foreign_stress",
     "layers_of",
     "load",
-    "options_of",
     "run",
     "slicings_of",
+    "with_given_paths",
 ]
 
 _STARTED = time.perf_counter()
@@ -115,138 +118,80 @@ def slicings_of(text: str) -> tuple[str, ...]:
     return split(text)
 
 
-def foreign_stress(path: Path | None, unit: str | None) -> Any:
+def foreign_stress(path: Path | None, unit: str | None, refine: bool) -> Any:
     """Stress of another program to plan on; None for the part's own."""
-    from ccfem.comparison.compare import ForeignStress
+    from ccfem.comparison.request import ForeignStress
 
     if path is None:
         if unit is not None:
             raise InputError("--stress-unit belongs to --stress; got no file: name it")
         return None
+    if refine:
+        raise InputError("--refine changes the mesh that the file of --stress is on: drop one")
     return ForeignStress(path, unit)
 
 
-def options_of(
-    layers: Any,
-    fibre_per_layer: float | None,
-    virtual_test: bool,
-    load_case: str | None,
-    backend: str,
-) -> dict[str, Any]:
-    """Keyword arguments of `ccfem.comparison.compare.compare`."""
-    from ccfem.comparison.compare import DEFAULT_STRAND
+@dataclass(frozen=True)
+class Output:
+    """Where the results of a command go, and what is drawn of them.
 
-    return {
-        "layers": layers,
-        "fibre_per_layer": fibre_per_layer,
-        "strand": DEFAULT_STRAND if virtual_test else None,
-        "load_case": load_case,
-        "backend": backend,
-    }
+    Attributes
+    ----------
+    out : Path, optional
+        Folder; default ``results/`` and the name of the case with `suffix`.
+    force : bool
+        Replace files in the folder that ccfem did not write, too.
+    pictures : bool
+        Also draw PNG files of what the report shows.
+    drawings : tuple of {"svg", "dxf"}
+        Also draw every flat layer of every strategy to scale.
+    suffix : str
+    """
+
+    out: Path | None = None
+    force: bool = False
+    pictures: bool = False
+    drawings: tuple[str, ...] = ()
+    suffix: str = ""
+
+    def folder(self, case: "Case") -> Path:
+        """Folder for the results of a case."""
+        return self.out or Path("results") / f"{case.name}{self.suffix}"
 
 
-def run(
-    name: str,
-    set_case: Sequence[str] | None,
-    strategies: Sequence[str],
-    parameters: Mapping[str, Mapping[str, Any]],
-    options: Mapping[str, Any],
-    calibration: Path | None,
-    out: Path | None,
-    suffix: str = "",
-    paths: Sequence[str] = (),
-    frame: str | None = None,
-    force: bool = False,
-    refine: bool = False,
-    pictures: bool = False,
-    drawings: Sequence[str] = (),
-    machine: "Callable[[Machine], Machine] | None" = None,
-    fibre: "Callable[[FibrePlaces | None], FibrePlaces] | None" = None,
-) -> None:
-    """Compare strategies, write the results and print the table; a failure leaves nothing behind.
+def run(name: str, ask: "Callable[[], Request]", output: Output) -> None:
+    """Carry out what is asked of a part, write the results and print the table.
+
+    A failure leaves nothing behind.
 
     Parameters
     ----------
     name : str
         Of a case, or of a part file.
-    set_case : sequence of str, optional
-        Parameters of the case, as ``NAME=VALUE``.
-    strategies : sequence of str
-    parameters : mapping of strategy name to parameters
-    options : mapping
-        From `options_of`, and others that `compare` knows; with ``stiffness``, a text, the one
-        strategy lays the least fibre that reaches it.
-    calibration : Path, optional
-        Material that goes before the part's own.
-    out : Path, optional
-        Folder; default ``results/`` and the name of the case with `suffix`.
-    suffix : str
-    paths : sequence of str
-        Files with paths of other programs, to be judged beside the strategies.
-    frame : {"mesh", "tool"}, optional
-        What the coordinates of these files are in.
-    force : bool
-        Replace files in the folder that ccfem did not write, too.
-    refine : bool
-        Refine the cells by their estimated error first.
-    pictures : bool
-        Also draw PNG files of what the report shows.
-    drawings : sequence of {"svg", "dxf"}
-        Also draw every flat layer of every strategy to scale.
-    machine : callable, optional
-        What it makes of the part's machine (`ccfem.cli.machines.machine_choice`).
-    fibre : callable, optional
-        What it makes of the layers that get fibre (`ccfem.cli.fibre_choice.fibre_choice`).
+    ask : callable
+        Reads the part, and returns what is asked of it.
+    output : Output
     """
-    if refine and options.get("stress") is not None:
-        raise InputError("--refine changes the mesh that the file of --stress is on: drop one")
-    from ccfem.cli.screen import print_comparison, print_slicings
-    from ccfem.comparison.compare import compare, create_all
+    from ccfem.cli.screen import print_comparison
+    from ccfem.comparison.engine import answer
     from ccfem.comparison.files import write_drawings, write_results
-    from ccfem.comparison.slicings import SlicingComparison
-    from ccfem.comparison.slicings_files import write_slicings
     from ccfem.io.result_folder import whole_folder
 
     imported = time.perf_counter()
-    if drawings and options.get("slicings") is not None:
+    request = ask()
+    if output.drawings and request.named:
         raise InputError("--drawings works with one slicing only; got --slicings: drop one")
-    case = load(name, set_case, refine, machine, fibre)
     seconds = {"start": imported - _STARTED, "mesh": time.perf_counter() - imported}
-    if calibration is not None:
-        case, options = _calibrated(case, options, calibration)
-    chosen = create_all(case, strategies, parameters) if strategies or not paths else {}
-    chosen |= _given(case, paths, frame, chosen)
-    if options.get("stiffness") is not None:
-        from ccfem.cli.wanted_stiffness import least_fibre_options, planned_for
-
-        first = next(iter(chosen))
-        chosen[first] = planned_for(case, chosen[first], options)
-        options = least_fibre_options(case, chosen[first], options)
-    where = out if out is not None else Path("results") / f"{case.name}{suffix}"
-    part_file = _text_of(name)
-    slicer = member_name(_slicer_of(case, options.get("layers")))
-    with whole_folder(where, force) as folder, progress_bar(lines=True) as progress:
-        comparison = compare(case, chosen, progress=_part(progress, 0.0, _SOLVED), **options)
+    where = output.folder(request.case)
+    with whole_folder(where, output.force) as folder, progress_bar(lines=True) as progress:
+        comparison = answer(request, _part(progress, 0.0, _SOLVED))
         _check(comparison)
+        if output.drawings:
+            write_drawings(comparison, folder, output.drawings)
         command, rest = shlex.join(["ccfem", *sys.argv[1:]]), _part(progress, _SOLVED, 1.0)
-        if isinstance(comparison, SlicingComparison):
-            write_slicings(comparison, folder, command, seconds, rest, pictures, part_file)
-        else:
-            if drawings:
-                write_drawings(comparison, folder, drawings)
-            write_results(comparison, folder, command, seconds, rest, pictures, part_file, slicer)
-    spent = time.perf_counter() - _STARTED
-    if isinstance(comparison, SlicingComparison):
-        print_slicings(comparison, where, spent)
-    else:
-        print_comparison(comparison, where, spent)
-
-
-def _slicer_of(case: "Case", layers: Any) -> Any:
-    """Return what cuts the layers: the part's own slicer, or the one that was asked for."""
-    from ccfem.layers.slicing import as_slicer
-
-    return case.slicing if layers is None else as_slicer(layers)
+        text = _text_of(name)
+        write_results(comparison, folder, command, seconds, rest, output.pictures, text)
+    print_comparison(comparison, where, time.perf_counter() - _STARTED)
 
 
 def _text_of(name: str) -> str:
@@ -254,46 +199,59 @@ def _text_of(name: str) -> str:
     return Path(name).read_text(encoding="utf-8") if name.endswith(".toml") else ""
 
 
-def _given(
-    case: "Case", files: Sequence[str], frame: str | None, taken: Mapping[str, Any]
-) -> dict[str, Any]:
-    """Paths of other programs, by the names of their files."""
+def with_given_paths(
+    case: "Case", strategies: "dict[str, Strategy]", files: Sequence[str], frame: str | None
+) -> "dict[str, Strategy]":
+    """Strategies, and paths of other programs by the names of their files.
+
+    Parameters
+    ----------
+    case : Case
+    strategies : dict of name to Strategy
+    files : sequence of str
+    frame : {"mesh", "tool"}, optional
+        What the coordinates of the files are in.
+    """
     if not files:
         if frame is not None:
             raise InputError(
                 "--paths-frame gives the frame of the --paths files; got no --paths: name them"
             )
-        return {}
+        return strategies
     from ccfem.export.path_table import read_paths
     from ccfem.layers.plane import plane_frame
     from ccfem.planning.given_paths import GivenPaths
 
-    found: dict[str, Any] = {}
+    named = dict(strategies)
     for file in files:
         name = Path(file).stem
-        if name in taken or name in found:
+        if name in named:
             raise InputError(f"'{name}' is the name of two runs: rename the file {file}")
         toolpaths = read_paths(file, plane_frame(case.build), frame)
         if not len(toolpaths):
             raise InputError(f"{file} holds no paths: check its name")
-        found[name] = GivenPaths(toolpaths, file)
-    return found
+        named[name] = GivenPaths(toolpaths, file)
+    return named
 
 
-def _calibrated(
-    case: "Case", options: Mapping[str, Any], calibration: Path
-) -> tuple["Case", dict[str, Any]]:
-    """Case and options with the matrix and the strand of a calibration."""
+def calibrated(
+    case: "Case", virtual_test: bool, calibration: Path | None
+) -> "tuple[Case, Strand | None]":
+    """Case and strand of the virtual test, with the matrix and the strand of a calibration."""
+    from ccfem.comparison.request import DEFAULT_STRAND
+
+    strand = DEFAULT_STRAND if virtual_test else None
+    if calibration is None:
+        return case, strand
     from ccfem.virtual_testing.calibration import read_calibration
 
-    fitted, strand = read_calibration(calibration), options["strand"]
+    fitted = read_calibration(calibration)
     if strand is not None:
         strand = fitted.strand(strand)
-    case = replace(case, problem=replace(case.problem, material=fitted.material))
-    return case, {**options, "strand": strand}
+    return replace(case, problem=replace(case.problem, material=fitted.material)), strand
 
 
-def _check(comparison: "Comparison | SlicingComparison") -> None:
+def _check(comparison: "Comparison") -> None:
     """Refuse a comparison in which nothing was planned, or what was cannot be printed as asked."""
     if not comparison.succeeded:
         reasons = "; ".join(f"{run.name}: {run.failure}" for run in comparison.runs)

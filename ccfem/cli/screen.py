@@ -27,7 +27,6 @@ from ccfem.comparison.ranking import best_values
 from ccfem.comparison.result import Comparison
 from ccfem.comparison.runs import Run
 from ccfem.comparison.said_of_cases import cases_rows
-from ccfem.comparison.slicings import SlicingComparison
 from ccfem.elasticity.stress_field import StressField, about_cells
 from ccfem.tensor import von_mises
 from ccfem.virtual_testing.stiffer import HONEST_PROMISE
@@ -37,7 +36,6 @@ __all__ = [
     "print_comparison",
     "print_member",
     "print_members",
-    "print_slicings",
     "print_solution",
 ]
 
@@ -155,13 +153,18 @@ def _first_line(what: object) -> str:
 
 
 def print_comparison(comparison: Comparison, where: Path, seconds: float) -> None:
-    """Print the headline table, the best of each row in bold, and where the results are."""
+    """Print the headline table, the best of each index in bold, and where the results are."""
     console = Console(highlight=False, emoji=False)
     runs = [run for run in comparison.ranking if run.evaluation is not None]
     if not console.is_terminal and "COLUMNS" not in os.environ:
-        console.width = max(console.width, _TITLES + _NUMBERS * len(runs))
+        least = 160 if comparison.over_slicings else _TITLES + _NUMBERS * len(runs)
+        console.width = max(console.width, least)
     console.print(comparison.case.title, style="bold", markup=False)
-    console.print(_headline_table(runs, best_values(comparison.runs, comparison.fibre_per_layer)))
+    best = best_values(comparison.runs, comparison.wanted)
+    if comparison.over_slicings:
+        _print_over_slicings(console, comparison.ranking, best)
+    else:
+        console.print(_headline_table(runs, best))
     _print_load_cases(console, runs)
     for line in (*comparison.case.findings, *comparison.stress.findings):
         console.print(f"mesh: {line}", style="dim", markup=False)
@@ -189,16 +192,10 @@ def _print_load_cases(console: Console, runs: Sequence[Run]) -> None:
     console.print(table)
 
 
-def print_slicings(comparison: SlicingComparison, where: Path, seconds: float) -> None:
-    """Print the table over slicings and strategies, the best of each column in bold."""
-    console = Console(highlight=False, emoji=False)
-    if not console.is_terminal and "COLUMNS" not in os.environ:
-        console.width = max(console.width, 160)
-    console.print(comparison.case.title, style="bold", markup=False)
-    runs = comparison.ranking
-    best = best_values(runs, comparison.wanted)
+def _print_over_slicings(console: Console, runs: Sequence[Run], best: Mapping[str, float]) -> None:
+    """Print the table over slicings: as many columns as the screen is wide."""
     values = {run.name: headline_values(run) for run in runs}
-    known = {column for found in values.values() for column in found}
+    known = {column for row in values.values() for column in row}
     heads = [head for head in HEADLINE_OF_SLICINGS if head.column in known]
     shown = list(heads)
     table = _slicings_table(runs, shown, values, best)
@@ -209,13 +206,6 @@ def print_slicings(comparison: SlicingComparison, where: Path, seconds: float) -
     if len(shown) < len(heads):
         left = ", ".join(head.title for head in heads[len(shown) :])
         console.print(f"in the report: {left}", style="dim", markup=False)
-    for line in comparison.remarks:
-        console.print(line, style="dim", markup=False)
-    if comparison.verdict:
-        console.print(comparison.verdict, style="bold", markup=False)
-    if any(run.tested is not None for run in runs):
-        console.print(HONEST_PROMISE, style="dim", markup=False)
-    console.print(f"{where / 'report.html'}  ({seconds:.1f} s)", markup=False, soft_wrap=True)
 
 
 def _is_cut(console: Console, table: Table) -> bool:

@@ -1,17 +1,20 @@
 """Comparison of strategies on one part: runs, ranking, pictures, report and files."""
 
 from ccfem.comparison.citations import bibtex, cited
-from ccfem.comparison.compare import compare
+from ccfem.comparison.engine import answer, compare
 from ccfem.comparison.fibre_front import fibre_front
+from ccfem.comparison.files import save
 from ccfem.comparison.front_points import FibreFront
+from ccfem.comparison.request import Request
 from ccfem.comparison.result import Comparison
 from ccfem.comparison.runs import Run
-from ccfem.comparison.saving import save
 
 __all__ = [
     "Comparison",
     "FibreFront",
+    "Request",
     "Run",
+    "answer",
     "bibtex",
     "cited",
     "compare",

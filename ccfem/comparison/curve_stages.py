@@ -9,8 +9,8 @@ import numpy as np
 
 from ccfem.comparison.curve import Curve
 from ccfem.comparison.runs import Run
-from ccfem.comparison.stages import Part, Tell, attempted, evaluated, with_plan
-from ccfem.planning.equal_fibre import Planned, extremes, plan_to_lengths
+from ccfem.comparison.stages import Part, Tell, attempted, evaluated, planned_to_lengths
+from ccfem.planning.equal_fibre import Planned, extremes
 from ccfem.planning.given_paths import GivenPaths
 from ccfem.planning.strategy import LengthStrategy
 
@@ -137,15 +137,4 @@ def _planned(reach: _Reach, asked: Sequence[float], part: Part) -> list[Run]:
     bare = replace(reach.run, evaluation=None, tested=None, print_plan=None, why_not="", note="")
     if isinstance(reach.run.strategy, GivenPaths):
         return [bare for _ in asked]
-    found: list[Planned] = []
-
-    def work() -> Run:
-        found.extend(
-            plan_to_lengths(
-                reach.run.strategy, part.layers, part.stress, part.machine, asked, reach.known
-            )
-        )
-        return bare
-
-    done = attempted(bare, work)
-    return [with_plan(done, one) for one in found] if found else [done for _ in asked]
+    return planned_to_lengths(bare, part, asked, reach.known)

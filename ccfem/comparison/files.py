@@ -1,6 +1,7 @@
 """Results on disk: tables, record, paths and pictures."""
 
 import json
+import os
 import time
 from collections.abc import Mapping, Sequence
 from pathlib import Path
@@ -10,7 +11,9 @@ import numpy as np
 
 from ccfem.comparison.record import record, results_rows, write_table
 from ccfem.comparison.result import Comparison
+from ccfem.comparison.runs import Run
 from ccfem.comparison.shown import file_stem
+from ccfem.io.result_folder import whole_folder
 from ccfem.printing.print_plan import PrintPlan
 from ccfem.progress import Progress, silent
 from ccfem.toolpaths import Toolpaths
@@ -18,7 +21,40 @@ from ccfem.toolpaths import Toolpaths
 if TYPE_CHECKING:
     from ccfem.comparison.pictures import Pictures
 
-__all__ = ["write_drawings", "write_results"]
+__all__ = ["save", "write_drawings", "write_results"]
+
+
+def save(
+    comparison: Comparison,
+    folder: str | os.PathLike[str],
+    force: bool = False,
+    progress: Progress = silent,
+) -> Path:
+    """Write the report, tables and paths of a comparison: all files or none.
+
+    Parameters
+    ----------
+    comparison : Comparison
+    folder : path
+        In an existing folder only files that ccfem wrote, and nobody has changed, are replaced.
+    force : bool, default False
+        Also replace files of the same names that others wrote or changed.
+    progress : callable, optional
+
+    Returns
+    -------
+    Path
+        Of the report, ``report.html``.
+
+    Raises
+    ------
+    InputError
+        When the folder cannot be written to, or holds files that would be overwritten.
+    """
+    folder, command = Path(folder), "ccfem.save(comparison) in Python"
+    with whole_folder(folder, force) as temporary:
+        write_results(comparison, temporary, command, {}, progress)
+    return folder / "report.html"
 
 
 def write_results(
@@ -29,7 +65,6 @@ def write_results(
     progress: Progress = silent,
     pictures: bool = False,
     part_file: str = "",
-    slicer: str = "",
 ) -> None:
     """Write ``results.csv``, ``results.json``, ``report.html`` and paths; pictures where wanted.
 
@@ -37,7 +72,8 @@ def write_results(
     fill the layers. Runs with a print plan get ``STRATEGY.gcode`` too, ``STRATEGY_cell.csv`` with
     the same moves for a cell of robots, and ``STRATEGY_trim.csv`` where strands leave the part. In
     ``paths.vtp`` the cell array "strategy" numbers the strategies that did not fail, in the order
-    of ``results.json``.
+    of ``results.json``. Over slicings the name of the slicing stands before that of the strategy:
+    ``SLICING_STRATEGY_waypoints.csv``. Characters that do not suit a file are dashes.
 
     Parameters
     ----------
@@ -52,11 +88,10 @@ def write_results(
     pictures : bool, default False
         Also draw what the report shows as PNG files: every layer of every strategy, forces,
         tension, all side by side, the part and the curve; and ``part.html``, which turns the part.
-        Where layers are curved, also ``STRATEGY_space.png`` and ``STRATEGY_space.html``.
+        Where layers are curved, also ``STRATEGY_space.png`` and ``STRATEGY_space.html``. Over
+        slicings ``SLICING_overview.png`` and the views in space of every run.
     part_file : str
         Text of the part file, for the report.
-    slicer : str
-        Name of what cut the layers, for the citations.
     """
     from ccfem.comparison.report import report_html
 
@@ -73,7 +108,7 @@ def write_results(
     _write_paths(comparison, folder)
     spent["files"] = time.perf_counter() - start
     progress("writing the report", 0.8)
-    about = {**record(comparison, command, spent), "slicer": slicer}
+    about = record(comparison, command, spent)
     page = report_html(comparison, about, part_file)
     (folder / "report.html").write_text(page, encoding="utf-8")
     about["seconds"]["report"] = time.perf_counter() - start - spent["files"]
@@ -108,11 +143,18 @@ def write_drawings(comparison: Comparison, folder: Path, formats: Sequence[str])
 
 def _draw(comparison: Comparison, folder: Path, progress: Progress) -> None:
     """Draw and write all pictures."""
-    from ccfem.comparison.pictures import draw_pictures
+    from ccfem.comparison.pictures import draw_pictures, overview_picture
+    from ccfem.plot.canvas import png
 
-    _write_pictures(draw_pictures(comparison, progress), folder)
-    if any(layer.flat is None for layer in comparison.layers):
-        _write_in_space(comparison, folder)
+    if not comparison.over_slicings:
+        _write_pictures(draw_pictures(comparison, progress), folder)
+    for k, (name, alone) in enumerate(comparison.slicings.items()):
+        progress(f"drawing {name}", k / len(comparison.slicings))
+        if comparison.over_slicings and alone.succeeded:
+            picture = folder / f"{file_stem(name)}_overview.png"
+            picture.write_bytes(png(overview_picture(alone)))
+        if comparison.over_slicings or any(layer.flat is None for layer in alone.layers):
+            _write_in_space(alone, folder, name)
 
 
 def _write_pictures(pictures: "Pictures", folder: Path) -> None:
@@ -129,18 +171,24 @@ def _write_pictures(pictures: "Pictures", folder: Path) -> None:
         (folder / "curve.png").write_bytes(pictures.curve)
 
 
-def _write_in_space(comparison: Comparison, folder: Path) -> None:
+def _write_in_space(comparison: Comparison, folder: Path, slicing: str) -> None:
     """Write a picture of the strands of every strategy in space, and a page on which they turn."""
     from ccfem.plot.canvas import png
     from ccfem.plot.stack_page import space_picture, turning_page
 
     layers, build = comparison.layers, comparison.case.build
     for run in comparison.succeeded:
-        title = f"{comparison.case.name}, {run.name}"
+        stem = f"{_stem(slicing, run)}_space"
+        title = f"{comparison.case.name}, {comparison.request.on_slicing(run.name, slicing)}"
         picture = space_picture(layers, run.toolpaths, title, build)
-        (folder / f"{file_stem(run.name)}_space.png").write_bytes(png(picture))
+        (folder / f"{stem}.png").write_bytes(png(picture))
         page = turning_page(layers, run.toolpaths, title, build)
-        (folder / f"{file_stem(run.name)}_space.html").write_text(page, encoding="utf-8")
+        (folder / f"{stem}.html").write_text(page, encoding="utf-8")
+
+
+def _stem(slicing: str, run: Run) -> str:
+    """Name of the files of a run."""
+    return file_stem(*filter(None, (slicing, run.strategy_name)))
 
 
 def _write_matrix(comparison: Comparison, folder: Path) -> None:
@@ -177,17 +225,18 @@ def _write_paths(comparison: Comparison, folder: Path) -> None:
     from ccfem.export.vtk import write_paths
     from ccfem.export.waypoints import write_waypoints
 
-    runs = comparison.succeeded
+    runs, machine = comparison.succeeded, comparison.case.machine
     for run in runs:
-        layers, paths = comparison.layers, run.toolpaths
-        if all(layer.flat is not None for layer in layers):
-            write_waypoints(folder / f"{file_stem(run.name)}_waypoints.txt", paths, layers)
+        layers, stem = comparison.stacks[run.slicing], _stem(run.slicing, run)
+        flat = all(layer.flat is not None for layer in layers)
+        if flat and not comparison.over_slicings:
+            write_waypoints(folder / f"{stem}_waypoints.txt", run.toolpaths, layers)
         else:
-            file = folder / f"{file_stem(run.name)}_waypoints.csv"
-            write_robot_waypoints(file, paths, layers, comparison.case.machine)
+            write_robot_waypoints(folder / f"{stem}_waypoints.csv", run.toolpaths, layers, machine)
+        if not flat and not comparison.over_slicings:
             _write_matrix(comparison, folder)
         if run.print_plan is not None:
-            _write_print(folder, file_stem(run.name), run.print_plan, comparison)
+            _write_print(folder, stem, run.print_plan, comparison)
     every = Toolpaths.concatenate(run.toolpaths for run in runs)
     number = np.repeat(np.arange(float(len(runs))), [len(run.toolpaths) for run in runs])
     write_paths(every, folder / "paths.vtp", path_data={"strategy": number})

@@ -5,7 +5,8 @@ from collections.abc import Sequence
 import numpy as np
 
 from ccfem.comparison.headline import HEADLINE, headline_values
-from ccfem.comparison.runs import InAll, Run, Wanted
+from ccfem.comparison.request import InAll, Wanted
+from ccfem.comparison.runs import Run
 from ccfem.planning.equal_fibre import TOLERANCE
 from ccfem.virtual_testing.stiffer import FIRST, RESOLUTION, SAME, UNDECIDED, stiffer
 

@@ -16,13 +16,14 @@ from ccfem.comparison.headline import TEST_COLUMNS, headline_values
 from ccfem.comparison.result import Comparison
 from ccfem.comparison.runs import Run
 from ccfem.elasticity.stress_field import StressField
+from ccfem.fibre_aware.upper_bound import UpperBound
 
 if TYPE_CHECKING:
     import pandas as pd
 
 __all__ = ["record", "results_frame", "results_rows", "write_table"]
 
-_FIRST = ("strategy", "layer", "failure")
+_FIRST = ("slicing", "strategy", "layer", "failure")
 
 _PACKAGES = ("numpy", "scipy", "numba", "pyamg", "shapely", "pypardiso")
 
@@ -36,9 +37,10 @@ def results_rows(comparison: Comparison) -> list[dict[str, Any]]:
     """
     rows: list[dict[str, Any]] = []
     for run in comparison.runs:
-        own = {"strategy": run.name}
+        own = {"slicing": run.slicing} if comparison.over_slicings else {}
+        own |= {"strategy": run.strategy_name}
         if run.evaluation is None:
-            rows.append({"strategy": run.name, "layer": "total", "failure": run.failure})
+            rows.append({**own, "layer": "total", "failure": run.failure})
             continue
         values = run.evaluation.values
         for k, layer in enumerate((*run.evaluation.layers, "total")):
@@ -55,7 +57,8 @@ def results_rows(comparison: Comparison) -> list[dict[str, Any]]:
 
 def _columns(rows: Sequence[Mapping[str, Any]]) -> list[str]:
     """Columns of rows: who, where and why not first, then in the order in which they occur."""
-    return list(dict.fromkeys([*_FIRST, *(name for row in rows for name in row)]))
+    names = [name for row in rows for name in row]
+    return list(dict.fromkeys([*(n for n in _FIRST if n in names or n != "slicing"), *names]))
 
 
 def results_frame(comparison: Comparison) -> "pd.DataFrame":
@@ -66,12 +69,12 @@ def results_frame(comparison: Comparison) -> "pd.DataFrame":
     return pd.DataFrame(rows, columns=_columns(rows))
 
 
-def write_table(rows: Sequence[Mapping[str, Any]], file: Path, first: Sequence[str] = ()) -> None:
-    """Write rows as CSV, with some columns first; what is missing or not a number is empty.
+def write_table(rows: Sequence[Mapping[str, Any]], file: Path) -> None:
+    """Write rows as CSV; what is missing or not a number is empty.
 
     Pandas, which takes a second to be imported, is not needed for this.
     """
-    columns = list(dict.fromkeys([*first, *_columns(rows)]))
+    columns = _columns(rows)
     with file.open("w", encoding="utf-8", newline="") as stream:
         writer = csv.writer(stream, lineterminator="\n")
         writer.writerow(columns)
@@ -103,50 +106,81 @@ def record(comparison: Comparison, command: str, seconds: Mapping[str, float]) -
     """
     case, stress = comparison.case, comparison.stress
     mesh = stress.mesh
-    return _plain(
-        {
-            "ccfem": version("ccfem"),
-            "command": command,
-            "made": datetime.now(UTC).isoformat(timespec="seconds"),
-            "versions": _versions(),
-            "case": {
-                "name": case.name,
-                "title": case.title,
-                "source": case.source,
-                "findings": (*case.findings, *stress.findings),
-                "load_case": stress.case,
-                "load": _load(stress),
-                "material": case.problem.material.name,
-                "build": case.build,
-                "layers": len(comparison.layers),
-                "heights": [
-                    None if layer.flat is None else layer.flat.height for layer in comparison.layers
-                ],
-                "nodes": len(mesh.points),
-                "cells": len(mesh.cells),
-                "order": mesh.order,
-            },
-            "machine": dataclasses.asdict(case.machine),
-            "solver": vars(stress.record),
-            "planned_on_given_stress": comparison.given is not None,
-            "strain_energy": stress.strain_energy,
-            "fibre_per_layer": comparison.fibre_per_layer,
-            "upper_bound": None if comparison.bound is None else comparison.bound.ratio,
-            "upper_bound_gap": None if comparison.bound is None else comparison.bound.gap,
-            "load_cases": None if comparison.cases is None else _load_cases(comparison),
-            "curve": None
-            if comparison.curve is None
-            else comparison.curve.frame.to_dict(orient="records"),
-            "seconds": {**seconds, **comparison.seconds},
-            "strategies": [_run_record(run) for run in comparison.runs],
-        }
-    )
+    about = {
+        "ccfem": version("ccfem"),
+        "command": command,
+        "made": datetime.now(UTC).isoformat(timespec="seconds"),
+        "versions": _versions(),
+        "case": {
+            "name": case.name,
+            "title": case.title,
+            "source": case.source,
+            "findings": (*case.findings, *stress.findings),
+            "load_case": stress.case,
+            "load": _load(stress),
+            "material": case.problem.material.name,
+            "build": case.build,
+            "nodes": len(mesh.points),
+            "cells": len(mesh.cells),
+            "order": mesh.order,
+        },
+        "machine": dataclasses.asdict(case.machine),
+        "solver": vars(stress.record),
+        "planned_on_given_stress": comparison.given is not None,
+        "strain_energy": stress.strain_energy,
+        "seconds": {**seconds, **comparison.seconds},
+    }
+    if comparison.over_slicings:
+        return _plain(about | _of_slicings(comparison))
+    about["case"] |= _of_layers(comparison)
+    return _plain(about | _of_strategies(comparison) | _of_bound(comparison))
+
+
+def _of_layers(comparison: Comparison) -> dict[str, Any]:
+    layers = comparison.layers
+    heights = [None if layer.flat is None else layer.flat.height for layer in layers]
+    return {"layers": len(layers), "heights": heights}
+
+
+def _of_strategies(comparison: Comparison) -> dict[str, Any]:
+    """Say what cut the layers, how much fibre lies on them, and what each strategy did."""
+    slicer = comparison.request.slicings[""].slicer or comparison.case.slicing
+    return {
+        "slicer": member_name(slicer),
+        "fibre_per_layer": comparison.fibre_per_layer,
+        "strategies": [_run_record(run) for run in comparison.runs],
+    }
+
+
+def _of_bound(comparison: Comparison) -> dict[str, Any]:
+    """Say what no paths exceed, and what was compared at several lengths."""
+    alone = comparison.bound if isinstance(comparison.bound, UpperBound) else None
+    curve = comparison.curve
+    return {
+        "upper_bound": None if alone is None else alone.ratio,
+        "upper_bound_gap": None if alone is None else alone.gap,
+        "load_cases": _load_cases(comparison) if comparison.several_cases else None,
+        "curve": None if curve is None else curve.frame.to_dict(orient="records"),
+    }
+
+
+def _of_slicings(comparison: Comparison) -> dict[str, Any]:
+    """Say what was done on each slicing."""
+    return {
+        "fibre": comparison.fibre,
+        "verdict": comparison.verdict,
+        "remarks": comparison.remarks,
+        "refused": dict(comparison.refused),
+        "slicings": {
+            name: _of_layers(alone) | _of_strategies(alone)
+            for name, alone in comparison.slicings.items()
+        },
+    }
 
 
 def _load_cases(comparison: Comparison) -> dict[str, Any]:
     """Say what each load case counts, and what no paths exceed."""
-    cases, bound = comparison.cases, comparison.cases_bound
-    assert cases is not None
+    cases, bound = comparison.cases, comparison.bound
     weights = dict(zip(cases.names, cases.weights.tolist(), strict=True))
     return {"weights": weights, "bound": None if bound is None else vars(bound)}
 

@@ -5,7 +5,8 @@ from collections.abc import Mapping, Sequence
 import numpy as np
 
 from ccfem.comparison.ranking import off_length, order_of, ranking, stiffness_ratio
-from ccfem.comparison.runs import Run, Wanted
+from ccfem.comparison.request import Wanted
+from ccfem.comparison.runs import Run
 from ccfem.evaluation.evaluation import Evaluation
 from ccfem.evaluation.open_places import open_places
 from ccfem.evaluation.plane_paths import plane_paths

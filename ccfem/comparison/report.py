@@ -1,7 +1,7 @@
 """The report of a comparison: one HTML file that holds everything and draws itself."""
 
 import dataclasses
-from collections.abc import Mapping, Sequence
+from collections.abc import Mapping
 from typing import Any
 
 from ccfem.comparison.charts import curve_charts, fronts, spreads
@@ -18,8 +18,6 @@ from ccfem.comparison.report_tables import (
     stage_seconds,
 )
 from ccfem.comparison.result import Comparison
-from ccfem.comparison.runs import Wanted
-from ccfem.comparison.slicings import SlicingComparison
 from ccfem.elasticity.stress_field import about_cells
 from ccfem.evaluation import COLUMNS
 from ccfem.inspection import check
@@ -31,7 +29,7 @@ __all__ = ["report_html"]
 
 
 def report_html(
-    comparison: Comparison | SlicingComparison,
+    comparison: Comparison,
     record: Mapping[str, Any],
     part_file: str = "",
 ) -> str:
@@ -39,7 +37,7 @@ def report_html(
 
     Parameters
     ----------
-    comparison : Comparison or SlicingComparison
+    comparison : Comparison
     record : mapping
         What ``results.json`` holds.
     part_file : str
@@ -49,21 +47,15 @@ def report_html(
     -------
     str
     """
-    several = isinstance(comparison, SlicingComparison)
-    stacks: Mapping[str, Comparison]
-    wanted: Wanted
-    if isinstance(comparison, SlicingComparison):
-        stacks, wanted, curve = comparison.slicings, comparison.wanted, None
-    else:
-        stacks, wanted, curve = {"": comparison}, comparison.fibre_per_layer, comparison.curve
-    strategies = palette(run.name for one in stacks.values() for run in one.runs)
+    several, curve = comparison.over_slicings, comparison.curve
+    strategies = palette(run.strategy_name for run in comparison.runs)
     colours = palette(run.name for run in comparison.runs) if several else strategies
     ranked = [run for run in comparison.ranking if run.evaluation is not None]
     checked = check(comparison.case)
     radius = comparison.case.machine.minimum_radius
     data = {
         "part": part_view(checked, comparison.stress),
-        "layers": layer_views(stacks, strategies),
+        "layers": layer_views(comparison.slicings, strategies),
         "charts": {
             "curve": curve_charts(curve, colours),
             "fronts": fronts(ranked, colours),
@@ -79,9 +71,9 @@ def report_html(
         "load_text": _load_text(record),
         "patches": checked.patches,
         "loads": checked.loads,
-        "verdicts": _verdicts(comparison),
+        "verdicts": comparison.verdicts,
         "headline": headline_table(
-            comparison, wanted, HEADLINE_OF_SLICINGS if several else HEADLINE
+            comparison, comparison.wanted, HEADLINE_OF_SLICINGS if several else HEADLINE
         ),
         "colours": colours,
         "remarks": comparison.remarks,
@@ -109,11 +101,11 @@ def report_html(
     return filled_page(context, data)
 
 
-def _facts(comparison: Comparison | SlicingComparison, record: Mapping[str, Any]) -> list[str]:
+def _facts(comparison: Comparison, record: Mapping[str, Any]) -> list[str]:
     """Say in few words what was compared."""
     about = record["case"]
-    if isinstance(comparison, SlicingComparison):
-        stacks = [f"{name}: {len(one.layers)} layers" for name, one in comparison.slicings.items()]
+    if comparison.over_slicings:
+        stacks = [f"{name}: {len(layers)} layers" for name, layers in comparison.stacks.items()]
         amount = "each run lays its own amount of fibre"
         if comparison.fibre is not None:
             amount = f"{1e-3 * comparison.fibre:.2f} m of fibre in all"
@@ -122,10 +114,10 @@ def _facts(comparison: Comparison | SlicingComparison, record: Mapping[str, Any]
         amount = "each strategy lays its own amount of fibre"
         if comparison.fibre_per_layer is not None:
             amount = f"{comparison.fibre_per_layer:.0f} mm of fibre per layer"
-    several = comparison.cases if isinstance(comparison, Comparison) else None
+    others = len(comparison.cases) - 1
     return [
         f"load case “{about['load_case']}”{_load_text(record)}"
-        + ("" if several is None else f", together with {len(several) - 1} more"),
+        + (f", together with {others} more" if others else ""),
         f"{about['cells']:,} tetrahedra of order {about['order']}",
         *stacks,
         amount,
@@ -138,14 +130,8 @@ def _load_text(record: Mapping[str, Any]) -> str:
     return "" if load is None else f", in all ({', '.join(f'{x:.4g}' for x in load)}) N"
 
 
-def _verdicts(comparison: Comparison | SlicingComparison) -> Sequence[str]:
-    if isinstance(comparison, SlicingComparison):
-        return [comparison.verdict] if comparison.verdict else []
-    return comparison.verdicts
-
-
-def _about_curve(comparison: Comparison | SlicingComparison) -> str:
-    if isinstance(comparison, SlicingComparison) or comparison.curve is None:
+def _about_curve(comparison: Comparison) -> str:
+    if comparison.curve is None:
         return ""
     common = ", ".join(f"{length:.0f}" for length in comparison.curve.common)
     return (
@@ -156,7 +142,7 @@ def _about_curve(comparison: Comparison | SlicingComparison) -> str:
 
 
 def _parameters(
-    comparison: Comparison | SlicingComparison,
+    comparison: Comparison,
 ) -> list[tuple[str, list[tuple[str, str, bool]]]]:
     """Return what every strategy was set to, and which parameter sets its amount of fibre."""
     return [
@@ -171,7 +157,7 @@ def _parameters(
     ]
 
 
-def _machine(comparison: Comparison | SlicingComparison) -> list[tuple[str, str]]:
+def _machine(comparison: Comparison) -> list[tuple[str, str]]:
     values = vars(comparison.case.machine).items()
     return [(k, _short(v)) for k, v in values if v is not None and k != "gcode"]
 
@@ -185,9 +171,7 @@ def _short(value: Any) -> str:
     return str(value)
 
 
-def _computation(
-    comparison: Comparison | SlicingComparison, record: Mapping[str, Any]
-) -> list[str]:
+def _computation(comparison: Comparison, record: Mapping[str, Any]) -> list[str]:
     """Say what was computed how."""
     solver = record["solver"]
     return [

@@ -15,10 +15,10 @@ from ccfem.comparison.headline import (
     headline_values,
 )
 from ccfem.comparison.ranking import best_values, stiffness_ratios
+from ccfem.comparison.request import Wanted
 from ccfem.comparison.result import Comparison
-from ccfem.comparison.runs import Run, Wanted
+from ccfem.comparison.runs import Run
 from ccfem.comparison.said_of_cases import cases_rows
-from ccfem.comparison.slicings import SlicingComparison
 from ccfem.evaluation import COLUMNS
 
 __all__ = [
@@ -32,9 +32,6 @@ __all__ = [
     "load_cases_table",
     "stage_seconds",
 ]
-
-Shown = Comparison | SlicingComparison
-"""What is shown: runs with their order."""
 
 _OWN = {
     "printable": "Whether the paths keep all limits of the machine, and why not.",
@@ -86,7 +83,7 @@ def _numbered(value: float) -> Cell:
 
 
 def headline_table(
-    comparison: Shown, wanted: Wanted, columns: Sequence[Headline] = HEADLINE
+    comparison: Comparison, wanted: Wanted, columns: Sequence[Headline] = HEADLINE
 ) -> Table:
     """Table of the indices that matter first, the best run first."""
     best, runs = best_values(comparison.runs, wanted), comparison.ranking
@@ -119,7 +116,7 @@ def _headline_cell(
     return Cell(text, extra, float(value), is_best)
 
 
-def against_each_other(comparison: Shown) -> Table | None:
+def against_each_other(comparison: Comparison) -> Table | None:
     """Table of stiffness of each strategy over that of each other."""
     runs = [run for run in comparison.ranking if run.tested is not None]
     if len(runs) < 2:
@@ -135,16 +132,16 @@ def against_each_other(comparison: Shown) -> Table | None:
     return Table(tuple(Head(f"over {run.name}") for run in runs), tuple(rows))
 
 
-def load_cases_table(comparison: Shown) -> Table | None:
+def load_cases_table(comparison: Comparison) -> Table | None:
     """Table of every load case; None where paths are planned for one."""
-    if isinstance(comparison, SlicingComparison) or comparison.cases is None:
+    if not comparison.several_cases:
         return None
     heads, rows = cases_rows(comparison.ranking)
     cells = tuple((name, tuple(map(Cell, texts)), "") for name, texts in rows)
     return Table(tuple(map(Head, heads)), cells) if rows else None
 
 
-def all_indices(comparison: Shown) -> Table:
+def all_indices(comparison: Comparison) -> Table:
     """Table of every index of every run."""
     runs = [run for run in comparison.ranking if run.evaluation is not None]
     values = [headline_values(run) for run in runs]
@@ -176,7 +173,7 @@ def curve_table(curve: Curve | None) -> Table | None:
     return Table(tuple(map(Head, titles)), tuple(rows))
 
 
-def stage_seconds(comparison: Shown) -> Table:
+def stage_seconds(comparison: Comparison) -> Table:
     """Table of the seconds that each stage took for each run."""
     stages = list(dict.fromkeys(stage for run in comparison.runs for stage in run.seconds))
     rows: list[tuple[str, tuple[Cell, ...], str]] = []

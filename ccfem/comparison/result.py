@@ -1,7 +1,8 @@
-"""The result of a comparison: what each strategy did on the same part."""
+"""The result of a request: one table of runs, and what is said and drawn of it."""
 
 from collections.abc import Mapping
-from dataclasses import dataclass
+from dataclasses import dataclass, field, replace
+from functools import cached_property
 from pathlib import Path
 from typing import TYPE_CHECKING
 
@@ -9,17 +10,20 @@ from ccfem.arrays import freeze
 from ccfem.cases.case import Case
 from ccfem.checks import check_known
 from ccfem.comparison.curve import Curve
+from ccfem.comparison.headline import Headline
 from ccfem.comparison.ranking import ranking
 from ccfem.comparison.remarks import open_remarks, remarks
+from ccfem.comparison.request import InAll, Request, Wanted
 from ccfem.comparison.runs import Run
 from ccfem.comparison.said_of_cases import cases_remarks, cases_verdict
-from ccfem.comparison.summary import summary_html, summary_text
+from ccfem.comparison.summary import SUMMARY, SUMMARY_OF_SLICINGS, summary_html, summary_text
 from ccfem.comparison.table import frame
 from ccfem.comparison.verdict import verdict
 from ccfem.comparison.views import front_picture, layer_view, shown_layer, told
 from ccfem.elasticity.part_stress import GivenStress, PartStress
 from ccfem.elasticity.stress_field import StressField
 from ccfem.elasticity.weighted_cases import WeightedCases
+from ccfem.errors import InputError
 from ccfem.fibre_aware.cases_bound import CasesBound
 from ccfem.fibre_aware.upper_bound import UpperBound
 from ccfem.layers import Layer
@@ -30,78 +34,175 @@ if TYPE_CHECKING:
     import pandas as pd
     from matplotlib.figure import Figure
 
-__all__ = ["Comparison"]
+__all__ = ["Bound", "Comparison"]
+
+Bound = UpperBound | CasesBound
+"""What no paths can exceed, under one load case or several."""
 
 
 @dataclass(frozen=True)
 class Comparison:
-    """Runs of several strategies on the same part.
+    """Runs of strategies on one part, cut into layers in one way or several.
 
     Attributes
     ----------
-    case : Case
-    stress : StressField
-        Of the load case that the paths are planned and evaluated for.
-    layers : tuple of Layer
+    request : Request
+        What was asked for.
+    cases : WeightedCases
+        The load cases that paths are planned for, solved: one, or several.
+    stacks : mapping of slicing to tuple of Layer
+        In the order they were asked for; the name of a single one that was not named is empty.
     runs : tuple of Run
         In the order they were asked for, failed ones included.
-    fibre_per_layer : float, mm, or None
-        Length that every strategy was held to; None if each laid its own.
+    wanted : float, mm, InAll or None
+        Length per layer, or in all, that every run was held to; None if each laid its own.
     seconds : mapping of stage to float
-        Solve and slice; the stages of each strategy are in its run.
+        Of the stages that are done once; the others are in the runs.
+    refused : mapping of slicing to str
+        Slicings that could not cut the part, and why.
     given : GivenStress, optional
         Stress of another program, if paths are planned and evaluated on that.
-    bound : UpperBound or None
-        Stiffness that no paths can exceed at the largest length of any run; None without virtual
-        tests.
-    cases : WeightedCases, optional
-        If paths are planned for several load cases. `stress` is then that of the case of largest
-        weight, the first of several.
-    cases_bound : CasesBound, optional
-        What no paths can exceed in all load cases together.
+    bounds : mapping of float to UpperBound or CasesBound
+        Stiffness that no paths can exceed, by the length of fibre in all, mm: the largest of the
+        runs, and others where several lengths are asked for. Empty without virtual tests.
     curve : Curve, optional
         The strategies at several lengths of fibre, if that was asked for, or if a strategy cannot
         lay the length of the others.
     """
 
-    case: Case
-    stress: StressField
-    layers: tuple[Layer, ...]
+    request: Request
+    cases: WeightedCases
+    stacks: Mapping[str, tuple[Layer, ...]]
     runs: tuple[Run, ...]
-    fibre_per_layer: float | None
+    wanted: Wanted
     seconds: Mapping[str, float]
-    bound: UpperBound | None = None
+    refused: Mapping[str, str]
     given: GivenStress | None = None
+    bounds: Mapping[float, Bound] = field(default_factory=dict)
     curve: Curve | None = None
-    cases: WeightedCases | None = None
-    cases_bound: CasesBound | None = None
+
+    def __post_init__(self) -> None:
+        freeze(self, stacks=dict, runs=tuple, seconds=dict, refused=dict, bounds=dict)
+
+    def __repr__(self) -> str:
+        failed = len(self.runs) - len(self.succeeded)
+        if self.over_slicings:
+            count = len(self.request.strategies)
+            about = (
+                f"on {len(self.stacks)} slicings of {self.case.name!r}: {', '.join(self.stacks)}"
+            )
+        else:
+            count = len(self.runs)
+            about = f"on {self.case.name!r}: {len(self.layers)} layers"
+        cells = f", {len(self.stress.mesh.cells)} cells"
+        return f"Comparison of {count} strategies {about}{cells}" + (
+            f", {failed} failed" if failed else ""
+        )
+
+    def __str__(self) -> str:
+        return summary_text(self.ranking, " ".join(self.verdicts), self._columns)
+
+    def _repr_html_(self) -> str:
+        page = summary_html(self.ranking, " ".join(self.verdicts), self._columns)
+        page += told(self.remarks)
+        return page + image(self.plot()) if self.succeeded else page
+
+    @property
+    def _columns(self) -> tuple[Headline, ...]:
+        return SUMMARY_OF_SLICINGS if self.over_slicings else SUMMARY
+
+    @property
+    def case(self) -> Case:
+        """The part."""
+        return self.request.case
+
+    @property
+    def stress(self) -> StressField:
+        """Solution of the load case that paths are planned and evaluated for, or the heaviest."""
+        return self.cases.heaviest
 
     @property
     def planned_on(self) -> PartStress:
         """Stress that the paths are planned and evaluated on."""
         return self.stress if self.given is None else self.given
 
-    def __post_init__(self) -> None:
-        freeze(self, seconds=dict)
+    @property
+    def bound(self) -> Bound | None:
+        """What no paths of the largest length can exceed; None without a bound."""
+        return self.bounds[max(self.bounds)] if self.bounds else None
 
-    def __repr__(self) -> str:
-        failed = len(self.runs) - len(self.succeeded)
-        return (
-            f"Comparison of {len(self.runs)} strategies on {self.case.name!r}: "
-            f"{len(self.layers)} layers, {len(self.stress.mesh.cells)} cells"
-            + (f", {failed} failed" if failed else "")
-        )
+    @property
+    def several_cases(self) -> bool:
+        """Whether paths are planned for more than one load case."""
+        return len(self.cases) > 1
 
-    def __str__(self) -> str:
-        return summary_text(self.ranking, " ".join(self.verdicts))
+    @property
+    def over_slicings(self) -> bool:
+        """Whether slicings are compared with each other."""
+        return self.request.named
 
-    def _repr_html_(self) -> str:
-        page = summary_html(self.ranking, " ".join(self.verdicts)) + told(self.remarks)
-        return page + image(self.plot()) if self.succeeded else page
+    @property
+    def layers(self) -> tuple[Layer, ...]:
+        """Layers of the part.
+
+        Raises
+        ------
+        InputError
+            Where several slicings are compared.
+        """
+        if len(self.stacks) > 1:
+            raise InputError(
+                f"a comparison over slicings has layers for each: {', '.join(self.stacks)}; take "
+                ".slicings[NAME].layers"
+            )
+        return next(iter(self.stacks.values()))
+
+    @property
+    def fibre_per_layer(self) -> float | None:
+        """Length per layer that every run was held to, mm; None where there is none for all."""
+        return None if isinstance(self.wanted, InAll) else self.wanted
+
+    @property
+    def fibre(self) -> float | None:
+        """Length in all layers that every run was held to, mm; None where there is none for all."""
+        if isinstance(self.wanted, InAll):
+            return self.wanted.length
+        return None if self.wanted is None else self.wanted * len(self.layers)
+
+    @cached_property
+    def slicings(self) -> Mapping[str, "Comparison"]:
+        """Comparison of the strategies on each slicing alone, by its name."""
+        if not self.over_slicings:
+            return {"": self}
+        parts = {}
+        for name, layers in self.stacks.items():
+            request = replace(self.request, slicings={"": self.request.slicings[name]})
+            runs = [
+                replace(run, name=run.strategy_name, slicing="")
+                for run in self.runs
+                if run.slicing == name
+            ]
+            wanted = None if self.fibre is None else self.fibre / len(layers)
+            parts[name] = replace(
+                self,
+                request=request,
+                stacks={"": layers},
+                runs=tuple(runs),
+                wanted=wanted,
+                refused={},
+                seconds={},
+                bounds={},
+            )
+        return parts
 
     def plot(self) -> "Figure":
-        """Draw the paths of all strategies on the middle one of the layers with fibre."""
-        return self.plot_layer(shown_layer(self.succeeded, self.layers))
+        """Draw the paths of all strategies on the middle one of the layers with fibre.
+
+        Of several slicings that of the best run is drawn.
+        """
+        best = next(iter(self.ranking)).slicing if self.over_slicings else ""
+        shown = self.slicings[best]
+        return shown.plot_layer(shown_layer(shown.succeeded, shown.layers))
 
     def plot_layer(self, index: int) -> "Figure":
         """Draw the paths of all strategies on one layer, on the tension there.
@@ -114,29 +215,33 @@ class Comparison:
         machine = self.case.machine
         return layer_view(self.succeeded, self.layers, self.planned_on, machine, index)
 
-    def pareto(self, over: str = "fibre_length") -> "Figure":
+    def pareto(self, over: str | None = None) -> "Figure":
         """Draw stiffness over another index, and the front of the printable runs.
 
         Parameters
         ----------
         over : {"fibre_length", "print_time_nearest", "first_failure_load"}
+            By default the length of fibre; over slicings, where all lay the same, the load at first
+            failure.
         """
-        return front_picture(self.succeeded, over)
+        default = "first_failure_load" if self.over_slicings else "fibre_length"
+        return front_picture(self.succeeded, over or default)
 
-    def show(self, strategy: str | None = None, picture: str | Path | None = None) -> View | None:
-        """Show the paths of one strategy in the part, in a window, a notebook, or as a picture.
+    def show(self, run: str | None = None, picture: str | Path | None = None) -> View | None:
+        """Show the paths of one run in the part, in a window, a notebook, or as a picture.
 
         Parameters
         ----------
-        strategy : str, optional
-            By default the best one.
+        run : str, optional
+            Such as ``"zigzag"``, or ``"zigzag on planar:z"``; by default the best one.
         picture : path, optional
             Write the view to a file (.png) instead.
         """
-        runs = {run.name: run for run in self.ranking if len(run.toolpaths)}
-        name = next(iter(runs), "") if strategy is None else strategy
-        check_known("strategy with paths", name, runs)
-        return show((runs[name].toolpaths, *self.layers[:1]), picture)
+        runs = {each.name: each for each in self.ranking if len(each.toolpaths)}
+        name = next(iter(runs), "") if run is None else run
+        check_known("run with paths" if self.over_slicings else "strategy with paths", name, runs)
+        layers = self.stacks[runs[name].slicing]
+        return show((runs[name].toolpaths, *layers[:1]), picture)
 
     @property
     def succeeded(self) -> tuple[Run, ...]:
@@ -146,14 +251,15 @@ class Comparison:
     @property
     def ranking(self) -> tuple[Run, ...]:
         """Runs from the best to the worst, failed ones last."""
-        return ranking(self.runs, self.fibre_per_layer)
+        return ranking(self.runs, self.wanted)
 
     @property
     def verdict(self) -> str:
-        """One sentence on which strategy is best; empty where there is none to compare."""
-        if self.cases is not None:
-            return cases_verdict(self.runs, self.fibre_per_layer, self.cases_bound)
-        return verdict(self.runs, self.fibre_per_layer)
+        """One sentence on which run is best; empty where there is none to compare."""
+        if self.several_cases:
+            bound = self.bound if isinstance(self.bound, CasesBound) else None
+            return cases_verdict(self.runs, self.wanted, bound)
+        return verdict(self.runs, self.wanted)
 
     @property
     def verdicts(self) -> tuple[str, ...]:
@@ -164,19 +270,39 @@ class Comparison:
     @property
     def remarks(self) -> list[str]:
         """Remarks to be shown with the numbers, one line each."""
-        found = remarks(self.runs, self.fibre_per_layer, self.bound)
-        found += open_remarks(self.succeeded, self.layers, self.case.machine.fibre_width)
+        lines = [f"{name}: cannot cut the part: {why}" for name, why in self.refused.items()]
         if self.case.fibre is not None:
-            found.insert(0, f"fibre on {len(self.layers)} layers: {self.case.fibre.about()}")
-        if self.cases is not None:
-            about, case = (self.runs, self.fibre_per_layer, self.cases), self.stress.case
+            where = "fibre" if self.over_slicings else f"fibre on {len(self.layers)} layers"
+            lines.append(f"{where}: {self.case.fibre.about()}")
+        if self.over_slicings:
+            thick = (f"{name} {self._count(name)}" for name in self.stacks)
+            lines.append(f"layers: {', '.join(thick)}")
+        alone = self.bound if isinstance(self.bound, UpperBound) else None
+        lines += remarks(self.runs, self.wanted, alone)
+        if not self.over_slicings:
+            lines += open_remarks(self.succeeded, self.layers, self.case.machine.fibre_width)
+        if self.several_cases:
+            together = self.bound if isinstance(self.bound, CasesBound) else None
             others = bool(self.case.alternative_supports)
-            found += cases_remarks(*about, case, self.cases_bound, others)
+            lines += cases_remarks(self.runs, self.wanted, self.cases, together, others)
         if self.given is not None:
-            found.append("paths are planned and evaluated on the stress of another program")
-        return found
+            lines.append("paths are planned and evaluated on the stress of another program")
+        return lines
+
+    def _count(self, slicing: str) -> str:
+        """Say how many layers a slicing has, and how many of them hold fibre of any run."""
+        runs = (run for run in self.succeeded if run.slicing == slicing)
+        laid = {int(k) for run in runs for k in run.toolpaths.layer.tolist()}
+        return f"{len(self.stacks[slicing])} ({len(laid)} with fibre)"
 
     @property
     def frame(self) -> "pd.DataFrame":
-        """One row a strategy in order of rank: rank, printable, why_not and every index."""
-        return frame(self.ranking)
+        """One row a run in order of rank: rank, strategy, printable, why_not and every index.
+
+        Over several slicings a column slicing stands before the strategy.
+        """
+        table = frame(self.ranking)
+        if self.over_slicings:
+            table["strategy"] = [run.strategy_name for run in self.ranking]
+            table.insert(1, "slicing", [run.slicing for run in self.ranking])
+        return table

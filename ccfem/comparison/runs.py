@@ -15,23 +15,7 @@ from ccfem.toolpaths import Toolpaths
 from ccfem.virtual_testing.strength import FirstFailure
 from ccfem.virtual_testing.virtual_test import Bracket
 
-__all__ = ["InAll", "Run", "Tested", "Wanted"]
-
-
-@dataclass(frozen=True)
-class InAll:
-    """Total length of fibre in the part, for runs with different layers.
-
-    Attributes
-    ----------
-    length : float, mm
-    """
-
-    length: float
-
-
-Wanted = float | InAll | None
-"""Length of fibre that runs are held to: mm per layer, in total, or None if each lays its own."""
+__all__ = ["Run", "Tested"]
 
 
 @dataclass(frozen=True)
@@ -74,6 +58,7 @@ class Run:
     Attributes
     ----------
     name : str
+        Of the strategy, and of the slicing where several are compared: "zigzag on planar:z".
     strategy : Strategy
         With the parameters that it ran with.
     toolpaths : Toolpaths
@@ -87,6 +72,9 @@ class Run:
     printed_volume : float
         Volume of matrix and fibre of the print plan over that of the part; NaN without a plan.
     length_per_layer : float, mm
+    asked : float, mm, optional
+        Length per layer that the strategy was asked for: asked again, it lays the same. None where
+        it was asked for none, or for the one of the whole comparison.
     sampled : float, mm, optional
         The same on a few layers, if no others were planned.
     note : str
@@ -100,6 +88,8 @@ class Run:
         part or on nothing; empty if they can be.
     unprinted : str
         Why the part cannot be printed as planned although a print was asked for; else empty.
+    slicing : str
+        Name of the slicing; empty where slicings are not compared.
     seconds : mapping of stage to float
     """
 
@@ -111,12 +101,14 @@ class Run:
     print_plan: PrintPlan | None = None
     printed_volume: float = float("nan")
     length_per_layer: float = 0.0
+    asked: float | None = None
     sampled: float | None = None
     note: str = ""
     failure: str = ""
     untested: str = ""
     why_not: str = ""
     unprinted: str = ""
+    slicing: str = ""
     seconds: Mapping[str, float] = field(default_factory=dict)
 
     def __post_init__(self) -> None:
@@ -138,6 +130,11 @@ class Run:
     def plot(self, layer: int | None = None) -> Any:
         """Draw the paths of one layer, by default of the one with most fibre."""
         return self.toolpaths.plot(layer=layer)
+
+    @property
+    def strategy_name(self) -> str:
+        """Name of the strategy alone."""
+        return self.name.removesuffix(f" on {self.slicing}") if self.slicing else self.name
 
     @property
     def length(self) -> float:

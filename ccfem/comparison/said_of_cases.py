@@ -5,7 +5,8 @@ from collections.abc import Sequence
 import numpy as np
 
 from ccfem.comparison.ranking import merit, off_length, order_of, ranking
-from ccfem.comparison.runs import Run, Wanted
+from ccfem.comparison.request import Wanted
+from ccfem.comparison.runs import Run
 from ccfem.elasticity.weighted_cases import WeightedCases
 from ccfem.fibre_aware.cases_bound import LEAST, CasesBound
 from ccfem.fibre_aware.upper_bound import LOOSE
@@ -60,7 +61,6 @@ def cases_remarks(
     runs: Sequence[Run],
     wanted: Wanted,
     cases: WeightedCases,
-    reference: str,
     bound: CasesBound | None,
     others: bool = False,
 ) -> list[str]:
@@ -71,8 +71,6 @@ def cases_remarks(
     runs : sequence of Run
     wanted : float, mm, InAll or None
     cases : WeightedCases
-    reference : str
-        Name of the case that the other tables show.
     bound : CasesBound, optional
     others : bool
         Whether the part has alternative supports.
@@ -80,7 +78,7 @@ def cases_remarks(
     said = ", ".join(f"{n} {w:.2g}" for n, w in zip(cases.names, cases.weights, strict=True))
     found = [
         f"planned for {len(cases)} load cases, by weight: {said}; stiffness, first failure and "
-        f"indices of stress in the first table are those of '{reference}'"
+        f"indices of stress in the first table are those of '{cases.heaviest.case}'"
     ]
     if others:
         found.append("alternative supports are not tested with several load cases")

@@ -15,7 +15,7 @@ from ccfem.elasticity.weighted_cases import WeightedCases
 from ccfem.errors import InputError, SolveError
 from ccfem.evaluation import evaluate
 from ccfem.evaluation.printable import why_not
-from ccfem.fibre_aware.plan_cases import plan_cases
+from ccfem.fibre_aware.plan_cases import plan_cases, plan_cases_to_lengths
 from ccfem.layers import Layer
 from ccfem.machine.machine import Machine
 from ccfem.planning.equal_fibre import (
@@ -23,6 +23,7 @@ from ccfem.planning.equal_fibre import (
     Planned,
     length_per_layer,
     plan_to_length,
+    plan_to_lengths,
     sampled_length,
 )
 from ccfem.planning.given_paths import GivenPaths
@@ -51,6 +52,7 @@ __all__ = [
     "levelled",
     "natural",
     "planned",
+    "planned_to_lengths",
     "timed",
     "to_length",
     "with_plan",
@@ -80,18 +82,33 @@ def counted(progress: Progress, first: float, steps: int) -> Tell:
 
 @dataclass(frozen=True)
 class Part:
-    """Data shared by all runs: stress, layers, their support, machine and strand.
+    """A part cut into layers, with all that its runs share.
 
-    With `cases`, paths are planned for and tested under all of them; the stress is that of one.
+    Attributes
+    ----------
+    stress : PartStress
+        That paths are planned and evaluated on; of several load cases that of the heaviest.
+    layers : tuple of Layer
+    machine : Machine
+    cases : WeightedCases
+        The load cases that paths are planned for and tested under: one, or several.
+    strand : Strand, optional
+    build : tuple of 3 floats, optional
+    support : SupportLayers, optional
     """
 
     stress: PartStress
     layers: tuple[Layer, ...]
     machine: Machine
+    cases: WeightedCases
     strand: Strand | None = None
     build: tuple[float, float, float] | None = None
-    cases: WeightedCases | None = None
     support: SupportLayers | None = None
+
+    @property
+    def several_cases(self) -> bool:
+        """Whether paths are planned for more than one load case."""
+        return len(self.cases) > 1
 
 
 def planned(
@@ -108,7 +125,7 @@ def planned(
             paths = run.strategy.toolpaths
             laid = length_per_layer(paths, layers)
             found = Planned(run.strategy, paths, laid, _as_given(laid, wanted))
-        elif part.cases is not None:
+        elif part.several_cases:
             found = plan_cases(run.strategy, layers, part.cases, machine, wanted, part.strand)
         elif wanted is None:
             paths = plan(run.strategy, layers, stress, machine)
@@ -137,6 +154,42 @@ def with_plan(run: Run, found: Planned) -> Run:
 def attempted(run: Run, work: Callable[[], Run]) -> Run:
     """Run returned by `work`; if it fails, `run` with the reason."""
     return _stage(run, "plan", work)
+
+
+def planned_to_lengths(
+    run: Run, part: Part, lengths: Sequence[float], known: Sequence[Planned] = ()
+) -> list[Run]:
+    """Plan a strategy to several lengths per layer, mm; a failure is in all of the runs.
+
+    Parameters
+    ----------
+    run : Run
+        Unplanned.
+    part : Part
+    lengths : sequence of float, mm
+    known : sequence of Planned
+        Plans that exist already, as of `plan_to_lengths`; not used with several load cases.
+    """
+    plans: list[Planned] = []
+    layers, machine = part.layers, part.machine
+
+    def work() -> Run:
+        if part.several_cases:
+            about = (run.strategy, layers, part.cases, machine, lengths, part.strand)
+            plans.extend(plan_cases_to_lengths(*about))
+        else:
+            plans.extend(
+                plan_to_lengths(run.strategy, layers, part.stress, machine, lengths, known)
+            )
+        return run
+
+    done = attempted(run, work)
+    if done.failure:
+        return [replace(done, asked=length) for length in lengths]
+    return [
+        replace(with_plan(done, plan), asked=length)
+        for plan, length in zip(plans, lengths, strict=True)
+    ]
 
 
 def _as_given(laid: float, wanted: float | None) -> str:
@@ -349,7 +402,7 @@ def _tested(run: Run, tests: Tests, part: Part, tell: Tell, span: Sequence[float
         strands = cut_strands(run.toolpaths, mesh, machine=part.machine)
         found = [_test(strands, *model, tests.strand, part, span) for model in tests.models]
         tested = replace(found[0], alternative=[*found[1:], None][0])
-        if part.cases is not None:
+        if part.several_cases:
             every = in_all_cases(strands, part.cases, tests.strand, part.layers)
             tested = replace(tested, cases=every)
         return replace(run, tested=tested)

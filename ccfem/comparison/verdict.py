@@ -6,7 +6,8 @@ import numpy as np
 
 from ccfem.comparison.headline import headline_values
 from ccfem.comparison.ranking import off_length, order_of, ranking, stiffness_ratio
-from ccfem.comparison.runs import InAll, Run, Wanted
+from ccfem.comparison.request import InAll, Wanted
+from ccfem.comparison.runs import Run
 from ccfem.virtual_testing.stiffer import RESOLUTION, SAME, UNDECIDED
 
 __all__ = ["verdict"]

@@ -10,7 +10,7 @@ from typing import Any
 from ccfem.arrays import freeze
 from ccfem.cases.case import check_name
 from ccfem.checks import check_number
-from ccfem.comparison.compare import DEFAULT_STRAND
+from ccfem.comparison.request import DEFAULT_STRAND
 from ccfem.errors import InputError
 from ccfem.io.toml import from_table
 from ccfem.io.whole import existing_file

@@ -7,16 +7,16 @@ from importlib.metadata import version
 from threading import Lock
 from typing import Any
 
-from ccfem.cases.case import Case
-from ccfem.comparison.compare import otherwise_held
+from ccfem.comparison.engine import Solved, answer, otherwise_held
 from ccfem.comparison.headline import headline_values
-from ccfem.comparison.judging import Solved, judged
+from ccfem.comparison.request import Natural, PerLayer, Request, Slicing
 from ccfem.comparison.runs import Run
-from ccfem.comparison.stages import Tests, planned, timed
+from ccfem.comparison.stages import Part as CutPart
+from ccfem.comparison.stages import Tests, timed
 from ccfem.elasticity.solve import solve
 from ccfem.elasticity.stress_field import StressField
+from ccfem.elasticity.weighted_cases import WeightedCases
 from ccfem.errors import InputError, SolveError
-from ccfem.layers import Layer
 from ccfem.layers.slicer import Slicer
 from ccfem.planning.strategy import Strategy
 from ccfem.studies.fingerprint import fingerprint
@@ -82,27 +82,29 @@ class _Bench:
 
     stress: _Stress
     solved: dict[str, Solved] = field(default_factory=dict)
-    stacks: dict[str, tuple[Layer, ...]] = field(default_factory=dict)
+    parts: dict[str, CutPart] = field(default_factory=dict)
     seconds: dict[str, float] = field(default_factory=dict)
 
     def solved_for(self, load_case: str) -> Solved:
         """Stress of a load case with what virtual tests stand on."""
         if load_case not in self.solved:
-            stress, strand, tests = self.stress.fields[load_case], self.stress.strand, None
+            field, strand, tests = self.stress.fields[load_case], self.stress.strand, None
             if strand is not None:
                 other = self.stress.alternative.get(load_case)
                 with timed(self.seconds, "specimens"):
-                    tests = Tests.of(stress, other, strand, self.stress.backend)
-            self.solved[load_case] = Solved(self.stress.part.case, stress, None, tests)
+                    tests = Tests.of(field, other, strand, self.stress.backend)
+            cases = WeightedCases.of({load_case: field})
+            self.solved[load_case] = Solved(self.stress.part.case, cases, None, tests)
         return self.solved[load_case]
 
-    def layers_of(self, solved: Solved, load_case: str, slicer: Slicer) -> tuple[Layer, ...]:
-        """Layers that a slicer cuts."""
-        key, case = fingerprint(load_case, slicer), solved.case
-        if key not in self.stacks:
+    def cut(self, load_case: str, slicer: Slicer) -> CutPart:
+        """Part cut into layers by a slicer."""
+        key = fingerprint(load_case, slicer)
+        if key not in self.parts:
+            basis = self.solved_for(load_case)
             with timed(self.seconds, "slice"):
-                self.stacks[key] = case.fibre_layers(solved.planned_on, slicer)
-        return self.stacks[key]
+                self.parts[key] = basis.cut(slicer)
+        return self.parts[key]
 
 
 _BENCHES: dict[str, _Bench] = {}
@@ -151,24 +153,27 @@ def _run(
     wanted: float | None,
 ) -> dict[str, Any]:
     """Outcome of one run."""
-    run = Run("run", strategy, Toolpaths.empty(), None, failure=bench.stress.failure)
+    stress, case = bench.stress, bench.stress.part.case
     bench.seconds = {}
-    if not run.failure:
-        try:
-            solved = bench.solved_for(load_case)
-            layers = bench.layers_of(solved, load_case, slicer)
-            if not layers:
-                raise InputError("the slicing has no layer")
-        except InputError as error:
-            run = Run("run", strategy, Toolpaths.empty(), None, failure=str(error))
-        else:
-            part = solved.part(layers)
-            run = planned(run, part, wanted, _quiet)
-            judgement = judged(
-                solved, part, [run], [run], wanted, _quiet, curve=False, bounded=False
-            )
-            run = judgement.runs[0]
-    case: Case = bench.stress.part.case
+    try:
+        if stress.failure:
+            raise InputError(stress.failure)
+        part = bench.cut(load_case, slicer)
+        if not part.layers:
+            raise InputError("the slicing has no layer")
+        request = Request(
+            case,
+            {"run": strategy},
+            {"": Slicing(slicer)},
+            Natural() if wanted is None else PerLayer(wanted),
+            load_case,
+            stress.strand,
+            curve=False,
+            bound=False,
+        )
+        (run,) = answer(request, known=bench.solved_for(load_case), parts={"": part}).runs
+    except InputError as error:
+        run = Run("run", strategy, Toolpaths.empty(), None, failure=str(error))
     return {
         "ccfem": version("ccfem"),
         "failure": run.failure,
@@ -183,10 +188,6 @@ def _run(
         "title": case.title,
         "seconds": {**bench.seconds, **run.seconds},
     }
-
-
-def _quiet(what: str) -> None:
-    """Tell nobody."""
 
 
 def _number(value: float) -> float | str:

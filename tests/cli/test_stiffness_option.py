@@ -4,10 +4,9 @@ import pytest
 
 from ccfem.cases.case import Case
 from ccfem.cases.reading import read
-from ccfem.cli.run import options_of
-from ccfem.cli.wanted_stiffness import least_fibre_options, planned_for
-from ccfem.comparison.compare import compare, solve_and_slice
+from ccfem.comparison.engine import compare
 from ccfem.elasticity.problem import Force, Problem, Support
+from ccfem.elasticity.solve import solve
 from ccfem.layers.slicing.planar import Planar
 from ccfem.machine.machine import Machine
 from ccfem.materials import isotropic
@@ -20,35 +19,34 @@ from ccfem.virtual_testing.virtual_test import virtual_test
 QUICK = ["--set-case", "element_size=4.0", "--layers", "2", "--strategy", "zigzag"]
 
 
-def test_the_options_ask_for_the_fibre_that_reaches_a_stiffness_in_newtons_per_mm():
-    case, strategy = read("bar", element_size=4.0), create("zigzag", {})
-    stress, _, layers, _ = solve_and_slice(case, 2)
-    specimen = Specimen.of(stress)
-    bare = specimen.stiffness(stress.displacement, stress.strain_energy)
-    asked = {**options_of(2, None, True, None, "auto"), "stiffness": f"{1.15 * bare}N/mm"}
-    found = least_fibre_options(case, strategy, asked)
-    assert "stiffness" not in found
-    assert not found["natural"]
-    paths = plan_to_length(strategy, layers, stress, case.machine, found["fibre_per_layer"])
-    tested = virtual_test(paths.toolpaths, specimen, span=(), machine=case.machine)
+def test_the_plan_is_the_least_fibre_that_reaches_a_stiffness_in_newtons_per_mm():
+    case = read("bar", element_size=4.0)
+    specimen = Specimen.of(solve(case.problem)["pull"])
+    field = specimen.unreinforced
+    bare = specimen.stiffness(field.displacement, field.strain_energy)
+    planned = compare(case, ["zigzag"], layers=2, stiffness=f"{1.15 * bare}N/mm")
+    (run,) = planned.runs
+    tested = virtual_test(run.toolpaths, specimen, span=(), machine=case.machine)
     assert 1.15 * bare <= tested.stiffness <= 1.16 * bare
+    # Asked for that length, the strategy lays the same: the plan can be repeated.
+    strategy, stress = create("zigzag", {}), planned.stress
+    again = plan_to_length(strategy, planned.layers, stress, case.machine, planned.wanted)
+    assert again.toolpaths.lengths.sum() == pytest.approx(run.toolpaths.lengths.sum(), rel=1e-12)
 
 
-def test_the_number_of_layers_is_chosen_and_said(capsys):
+def test_the_number_of_layers_is_chosen_and_said():
     mesh, pull = box_mesh((60.0, 8.0, 2.0), (10, 3, 2)), (Force("x_max", (100.0, 0.0, 0.0)),)
     problem = Problem(mesh, isotropic(3500.0, 0.0), (Support("x_min"),), {"pull": pull}, order=1)
     case = Case("bar", "", problem, slicing=Planar(count=1), machine=Machine())
     strategy = create("zigzag", {"angle": 0.0, "turn": 0.0})
-    asked = {**options_of(None, None, True, None, "auto"), "stiffness": "2.5"}
-    found = least_fibre_options(case, strategy, asked)
-    assert found["layers"] in (None, 2)
-    count = found["layers"] or 1
-    said = capsys.readouterr().out
+    planned = compare(case, {"zigzag": strategy}, stiffness="2.5")
+    count = len(planned.layers)
+    assert count in (1, 2)
+    (said,) = (line for line in planned.remarks if "takes" in line)
+    assert said.startswith("zigzag: 2.5 times the stiffness without fibre takes")
     assert f" on {count} layers, " in said
-    assert said.startswith("2.5 times the stiffness without fibre takes")
-    stress, _, layers, _ = solve_and_slice(case, count)
-    paths = plan_to_length(strategy, layers, stress, case.machine, found["fibre_per_layer"])
-    assert virtual_test(paths.toolpaths, Specimen.of(stress), span=()).ratio >= 2.5
+    specimen = Specimen.of(planned.stress)
+    assert virtual_test(planned.runs[0].toolpaths, specimen, span=()).ratio >= 2.5
 
 
 @pytest.mark.parametrize(
@@ -59,7 +57,7 @@ def test_the_number_of_layers_is_chosen_and_said(capsys):
         (["--stiffness", "nan"], "must be a finite number"),
         (["--stiffness", "1e9N/mm"], "no paths on 2 layers exceed"),
         (["--stiffness", "9"], "9 times the stiffness without fibre was asked for"),
-        (["--stiffness", "1.2", "--fibre-per-layer", "500"], "drop --fibre-per-layer"),
+        (["--stiffness", "1.2", "--fibre-per-layer", "500"], "fibre_per_layer and stiffness: drop"),
         (["--stiffness", "1.2", "--no-virtual-test"], "drop --no-virtual-test"),
     ],
 )
@@ -70,24 +68,22 @@ def test_a_stiffness_that_makes_no_sense_is_answered_in_one_line(ccfem, words, a
     assert said.count("ccfem: error: ") == 1
 
 
-def test_with_all_load_cases_every_one_is_as_stiff_in_the_comparison_too(capsys):
+def test_with_all_load_cases_every_one_is_as_stiff():
     mesh = box_mesh((60.0, 24.0, 4.0), (15, 6, 2))
     loads = {"pull": (Force("x_max", (300.0, 0.0, 0.0)),), "side": (Force("x_max", (0, 40.0, 0)),)}
     problem = Problem(mesh, isotropic(3500.0, 0.3), (Support("x_min"),), loads, order=1)
     machine = Machine(minimum_length=15.0)
     case = Case("beam", "", problem, slicing=Planar(count=4), machine=machine)
-    asked = {**options_of(4, None, True, "all", "auto"), "stiffness": "1.5"}
-    strategy = planned_for(case, create("stream_function", {"evaluations": 6, "phases": 1}), asked)
-    assert strategy.objective == "least"
-    found = least_fibre_options(case, strategy, asked)
-    said = capsys.readouterr().out
-    assert said.startswith("1.5 times the stiffness without fibre in every load case takes")
-    run = compare(case, {"stream": strategy}, **found).runs[0]
+    strategy = create("stream_function", {"evaluations": 6, "phases": 1})
+    planned = compare(case, {"stream": strategy}, layers=4, load_case="all", stiffness="1.5")
+    (run,) = planned.runs
+    assert run.strategy.objective == "least"
+    said = " ".join(planned.remarks)
+    assert "stream: 1.5 times the stiffness without fibre in every load case takes" in said
     ratios = run.tested.cases.tension.ratios
     assert 1.5 - 1e-5 < ratios.min() < 1.51
     for name, ratio in zip(("pull", "side"), ratios, strict=True):
         assert f"{ratio:.4g} times in '{name}'" in said
-    assert planned_for(case, strategy, {**asked, "load_case": "side"}) is strategy
 
 
 PLATE = ["--set-case", "element_size=8", "--layers", "2", "--strategy", "zigzag"]

@@ -10,12 +10,13 @@ import pandas as pd
 import pytest
 
 from ccfem.cases.case import Case
-from ccfem.comparison.compare import compare, create_all
+from ccfem.comparison.engine import compare
 from ccfem.comparison.files import write_results
 from ccfem.comparison.headline import HEADLINE, headline_values
 from ccfem.comparison.pictures import caption
 from ccfem.comparison.ranking import best_values
 from ccfem.comparison.remarks import bound_remark
+from ccfem.comparison.request import named_strategies
 from ccfem.elasticity.problem import Force, Problem, Support
 from ccfem.elasticity.support_kinds import PressingSupport
 from ccfem.elasticity.system import System
@@ -301,7 +302,7 @@ def test_unequal_fibre_is_no_verdict():
     thin, dense = result.runs
     assert result.ranking == (dense, thin)
     assert "each with its own amount of fibre" in result.verdict
-    held = replace(result, fibre_per_layer=thin.length_per_layer)
+    held = replace(result, wanted=thin.length_per_layer)
     assert held.ranking == (thin, dense)
     assert held.verdict == ""  # one is left, and there is no other at that length
 
@@ -354,7 +355,7 @@ def test_strands_that_cross_by_intention_are_reported():
     result = compare(strip(), {"woven": Woven()}, natural=True)
     said = "woven: strands cross in the joints: 12 crossings on 2 of 4 layers, thicker there"
     assert f"{said}; the bound does not hold for strands laid over each other" in result.remarks
-    assert said in replace(result, bound=None).remarks
+    assert said in replace(result, bounds={}).remarks
 
 
 def test_the_bound_says_that_it_is_not_one_of_bonded_fibres(compared):
@@ -419,10 +420,10 @@ def test_bad_input(arguments, message):
 
 def test_parameters_of_the_case_come_before_defaults_and_after_given_ones():
     case = replace(strip(), parameters={"zigzag": {"angle": 10.0, "turn": 5.0}})
-    (zigzag,) = create_all(case, ["zigzag"], {"zigzag": {"turn": 7.0}}).values()
+    (zigzag,) = named_strategies(case, ["zigzag"], {"zigzag": {"turn": 7.0}}).values()
     assert (zigzag.angle, zigzag.turn) == (10.0, 7.0)
     with pytest.raises(InputError, match="'isocurve', which is not among"):
-        create_all(case, ["zigzag"], {"isocurve": {"cap": 80.0}})
+        named_strategies(case, ["zigzag"], {"isocurve": {"cap": 80.0}})
 
 
 def test_no_run_exceeds_the_bound(compared):
@@ -457,7 +458,7 @@ def test_tables_say_what_share_of_the_possible_gain_each_strategy_reaches(compar
 def test_strands_that_overlap_may_exceed_the_bound(compared):
     best = compared.ranking[0]
     ratio = 0.5 * (1.0 + best.tested.bracket.tension.ratio)
-    beaten = replace(compared, bound=replace(compared.bound, ratio=ratio))
+    beaten = replace(compared, bounds={1.0: replace(compared.bound, ratio=ratio)})
     said = beaten.remarks[-1]
     assert said.startswith(f"only where strands overlap, as those of {best.name} do, paths of ")
     assert f"more than {ratio:.2f} times as stiff" in said

@@ -10,7 +10,7 @@ import pytest
 import ccfem
 from ccfem.cases.case import Case
 from ccfem.comparison import pictures
-from ccfem.comparison.compare import compare
+from ccfem.comparison.engine import compare
 from ccfem.elasticity.problem import Force, Problem, Support
 from ccfem.evaluation import FibreSamples
 from ccfem.evaluation.matching import THRESHOLDS

@@ -7,9 +7,12 @@ import numpy as np
 import pytest
 
 from ccfem.cases.case import Case
-from ccfem.comparison.fibre_front import counts_to_try, fibre_front
+from ccfem.comparison.engine import Solved
+from ccfem.comparison.fibre_front import fibre_front
 from ccfem.comparison.front_points import FibreFront, FrontPoint
+from ccfem.comparison.plan_to_stiffness import counts_to_try
 from ccfem.elasticity import Force, Problem, Support, solve
+from ccfem.elasticity.weighted_cases import WeightedCases
 from ccfem.errors import InputError
 from ccfem.layers.slicing.planar import Planar
 from ccfem.machine import Machine
@@ -103,11 +106,11 @@ def test_table_and_picture_show_every_plan(front, tmp_path):
 
 def test_twice_as_many_layers_where_strands_have_room(bar):
     case, stress = bar
-    assert counts_to_try(case, stress) == (2, 4)
+    cases = WeightedCases.of({"pull": stress})
+    assert counts_to_try(Solved(case, cases).cut()) == (2, 4)
     thick = Machine(filament_area=1.2)  # 1.2 mm high: no room in layers of 1 mm
-    assert counts_to_try(
-        Case("bar", "", case.problem, slicing=Planar(count=2), machine=thick), stress
-    ) == (2,)
+    case = Case("bar", "", case.problem, slicing=Planar(count=2), machine=thick)
+    assert counts_to_try(Solved(case, cases).cut()) == (2,)
 
 
 def test_front_begins_with_the_part_without_fibre_and_bounds_lie_above_all_between(front):

@@ -5,7 +5,7 @@ import pytest
 
 from ccfem.cases.case import Case
 from ccfem.cases.load_cases import weighted_cases
-from ccfem.comparison.compare import compare
+from ccfem.comparison.engine import compare
 from ccfem.comparison.files import write_results
 from ccfem.elasticity.problem import Force, Problem, Support
 from ccfem.elasticity.solve import solve
@@ -45,7 +45,7 @@ def test_every_run_is_tested_under_every_case(compared):
             for name in ("pull", "side")
         ]
         np.testing.assert_allclose(found.tension.ratios, alone, rtol=1e-5)
-        bound = compared.cases_bound
+        bound = compared.bound
         assert (found.shares() < 1.0).all()
         assert bound.gap(found.tension.ratios) > 0.0
         assert found.merit() == pytest.approx((alone / bound.singles).min(), rel=1e-5)
@@ -68,7 +68,7 @@ def test_ranked_by_the_worst_case(compared):
 def test_results_hold_every_case(compared, tmp_path):
     write_results(compared, tmp_path)
     found = json.loads((tmp_path / "results.json").read_text(encoding="utf-8"))
-    assert found["load_cases"]["bound"]["least"] == compared.cases_bound.least
+    assert found["load_cases"]["bound"]["least"] == compared.bound.least
     run = compared.runs[0]
     values = found["strategies"][0]["load_cases"]
     assert values["stiffness_ratio_tension[side]"] == pytest.approx(

@@ -9,7 +9,7 @@ import numpy as np
 import pytest
 
 from ccfem.cases.case import Case
-from ccfem.comparison.compare import compare
+from ccfem.comparison.engine import compare
 from ccfem.comparison.files import write_results
 from ccfem.elasticity.problem import Force, Problem, Support
 from ccfem.layers.slicing import Planar

@@ -10,11 +10,11 @@ import pandas as pd
 import pytest
 
 from ccfem.cases.case import Case
-from ccfem.cli.screen import print_slicings
-from ccfem.comparison.compare import compare
+from ccfem.cli.screen import print_comparison
+from ccfem.comparison.engine import compare
+from ccfem.comparison.files import write_results
 from ccfem.comparison.ranking import best_values, off_length
-from ccfem.comparison.runs import InAll
-from ccfem.comparison.slicings_files import write_slicings
+from ccfem.comparison.request import InAll
 from ccfem.elasticity.problem import Force, Problem, Support
 from ccfem.errors import InputError
 from ccfem.layers.slicing import Planar, Spatial, as_slicer, from_text, split
@@ -110,10 +110,8 @@ def test_verdict_speaks_of_strategy_and_slicing(compared):
 
 def test_a_run_that_cannot_be_printed_stands_below_all_that_can(compared):
     best = compared.ranking[0].name
-    strategy, name = best.split(" on ")
-    one = compared.slicings[name]
-    runs = [replace(run, why_not="too sharp") if run.name == strategy else run for run in one.runs]
-    worse = replace(compared, slicings={**compared.slicings, name: replace(one, runs=tuple(runs))})
+    runs = [replace(run, why_not="too sharp") if run.name == best else run for run in compared.runs]
+    worse = replace(compared, runs=tuple(runs))
     broken = [run.name for run in worse.ranking if not run.printable]
     assert best in broken
     assert [run.name for run in worse.ranking][-len(broken) :] == broken
@@ -133,12 +131,10 @@ def test_fronts_and_views_name_strategy_and_slicing(compared, tmp_path):
 
 
 def test_files_hold_every_run_and_one_report(compared, tmp_path):
-    few = {
-        name: replace(compared.slicings[name], runs=compared.slicings[name].runs[:1])
-        for name in ("z", "x")
-    }
-    compared = replace(compared, slicings=few)
-    write_slicings(compared, tmp_path, "ccfem compare strip", pictures=True)
+    few = [run for run in compared.runs if run.name in ("zigzag on z", "zigzag on x")]
+    stacks = {name: compared.stacks[name] for name in ("z", "x")}
+    compared = replace(compared, runs=tuple(few), stacks=stacks)
+    write_results(compared, tmp_path, "ccfem compare strip", pictures=True)
     table = pd.read_csv(tmp_path / "results.csv")
     total = table[table["layer"] == "total"]
     assert list(zip(total["slicing"], total["strategy"], strict=True)) == [
@@ -164,7 +160,7 @@ def test_files_hold_every_run_and_one_report(compared, tmp_path):
 def test_screen_shows_every_run_its_figures_and_the_verdict(compared, width, capsys, monkeypatch):
     """On a narrow screen columns are left to the report, and no number is cut in two."""
     monkeypatch.setenv("COLUMNS", width)
-    print_slicings(compared, Path("somewhere"), 1.0)
+    print_comparison(compared, Path("somewhere"), 1.0)
     said = capsys.readouterr().out
     for run in compared.runs:
         assert run.name in said

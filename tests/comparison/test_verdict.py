@@ -124,7 +124,7 @@ def test_verdicts_of_made_up_tables_are_true(compared):
         changed = [
             with_stiffness(run, t, b) for run, t, b in zip(runs, tension, bonded, strict=True)
         ]
-        made = replace(compared, runs=tuple(changed), fibre_per_layer=None)
+        made = replace(compared, runs=tuple(changed), wanted=None)
         kind = check(made)
         kinds.add(kind)
         marked = best_values(made.runs, made.fibre_per_layer)
@@ -176,7 +176,7 @@ def test_no_verdict_is_a_number_that_there_is_none_of(compared):
             values["efficiency"][:] = float("nan")
             evaluation = replace(run.evaluation, values=values)
             runs.append(replace(run, tested=None, evaluation=evaluation, why_not=""))
-    made = replace(compared, runs=tuple(runs), bound=None, fibre_per_layer=None)
+    made = replace(compared, runs=tuple(runs), bounds={}, wanted=None)
     assert made.verdict == "No verdict: there is no virtual test, and no fibre lies in tension."
     assert "nan" not in str(made)
 
@@ -204,7 +204,7 @@ def test_an_order_that_other_supports_turn_round_is_undecided(compared, own, oth
         with_alternative(with_stiffness(run, k, k), again, again)
         for run, k, again in zip((first, second), own, other, strict=True)
     )
-    made = replace(compared, runs=(first, second), fibre_per_layer=None, bound=None)
+    made = replace(compared, runs=(first, second), wanted=None, bounds={})
     table = made.frame.set_index("strategy")
     for name, k, again in zip((first.name, second.name), own, other, strict=True):
         assert table.loc[name, "stiffness_ratio_tension"] == pytest.approx(k)

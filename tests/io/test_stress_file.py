@@ -11,7 +11,7 @@ import pyvista
 
 from ccfem.cases.case import Case
 from ccfem.comparison import compare
-from ccfem.comparison.compare import ForeignStress
+from ccfem.comparison.request import ForeignStress
 from ccfem.elasticity import Force, Problem, Support, solve
 from ccfem.elasticity.loads import nodal_forces
 from ccfem.errors import InputError

@@ -9,7 +9,7 @@ import shapely
 from ccfem.cases.case import Case
 from ccfem.cases.part_file import read_part
 from ccfem.cases.part_writing import part_text
-from ccfem.comparison.compare import compare
+from ccfem.comparison.engine import compare
 from ccfem.elasticity import Force, Problem, Support, solve
 from ccfem.errors import InputError
 from ccfem.inspection import check

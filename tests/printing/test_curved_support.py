@@ -4,12 +4,12 @@ from types import SimpleNamespace
 
 import numpy as np
 import pytest
+from ccfem.comparison.judging import Solved
 from scipy.spatial import cKDTree
 from scipy.spatial.transform import Rotation
 
 from ccfem.cases.case import Case
-from ccfem.comparison.compare import compare
-from ccfem.comparison.judging import Solved
+from ccfem.comparison.engine import compare
 from ccfem.elasticity import Problem
 from ccfem.errors import InputError
 from ccfem.export.gcode import gcode

@@ -3,7 +3,7 @@
 from collections.abc import Mapping
 from pathlib import Path
 
-from ccfem.comparison.slicings import SlicingComparison
+from ccfem.comparison.result import Comparison
 from ccfem.papers.fang_2024.measures import Strands
 from ccfem.papers.fang_2024.planar_against_curved import failure_loads
 from ccfem.papers.fang_2024.t_bracket import PAPER_SECONDS
@@ -18,7 +18,7 @@ def quantities(
     field: Mapping[str, float],
     strands: Mapping[str, Strands],
     seconds: Mapping[str, float],
-    tests: Mapping[str, SlicingComparison],
+    tests: Mapping[str, Comparison],
 ) -> dict[str, float]:
     """Every quantity that `expected.toml` may name; orders that hold are 1, others 0."""
     found = {**field, **{f"seconds, {name}": value for name, value in seconds.items()}}
@@ -33,7 +33,7 @@ def quantities(
     return found
 
 
-def _loads(load: str, compared: SlicingComparison) -> dict[str, float]:
+def _loads(load: str, compared: Comparison) -> dict[str, float]:
     """Orders of slicings under one load, with fixed and with pressing supports."""
     found: dict[str, float] = {}
     for held, end in (("fixed", ""), ("pressing", "_alternative")):

@@ -11,9 +11,9 @@ import sys
 from pathlib import Path
 
 from ccfem.cases.t_bracket import t_bracket
-from ccfem.comparison.compare import compare
-from ccfem.comparison.slicings import SlicingComparison
-from ccfem.comparison.slicings_files import write_slicings
+from ccfem.comparison.engine import compare
+from ccfem.comparison.files import write_results
+from ccfem.comparison.result import Comparison
 from ccfem.layers.slicer import Slicer
 from ccfem.layers.slicing.planar import Planar
 from ccfem.layers.slicing.spatial import Spatial
@@ -49,7 +49,7 @@ COLUMNS = (
 )
 
 
-def against(load_case: str) -> SlicingComparison:
+def against(load_case: str) -> Comparison:
     """Compare under one load, and print the table."""
     case = t_bracket(order=1, bolts=True)
     found = compare(case, ["winding", "concentric"], slicings=SLICINGS, load_case=load_case)
@@ -69,7 +69,7 @@ def against(load_case: str) -> SlicingComparison:
     return found
 
 
-def failure_loads(found: SlicingComparison, column: str) -> dict[str, float]:
+def failure_loads(found: Comparison, column: str) -> dict[str, float]:
     """Failure load, N, of the paper's rows, by slicing."""
     rows = {(row["slicing"], row["strategy"]): row for row in found.frame.to_dict("records")}
     return {slicing: float(rows[slicing, each][column]) for slicing, each in ROWS.items()}
@@ -81,4 +81,4 @@ if __name__ == "__main__":
         if len(sys.argv) > 1:
             where = Path(sys.argv[1]) / load
             where.mkdir(parents=True, exist_ok=True)
-            write_slicings(result, where)
+            write_results(result, where)

@@ -11,7 +11,7 @@ from typing import NamedTuple
 import numpy as np
 
 from ccfem.arrays import FloatArray
-from ccfem.comparison.slicings import SlicingComparison
+from ccfem.comparison.result import Comparison
 from ccfem.elasticity.stress_field import StressField
 from ccfem.layers.layer import Layer
 from ccfem.papers.fang_2024.planar_against_curved import ROWS
@@ -55,12 +55,12 @@ class Opening(NamedTuple):
         return float(self.load[(height > low) & (height <= high)].min())
 
 
-def openings(found: SlicingComparison, pressing: bool = False) -> dict[str, Opening]:
+def openings(found: Comparison, pressing: bool = False) -> dict[str, Opening]:
     """Find the loads for the paper's slicings with its strategies on them.
 
     Parameters
     ----------
-    found : SlicingComparison
+    found : Comparison
         With virtual tests.
     pressing : bool
         Under bolts that only press, not fixed walls.

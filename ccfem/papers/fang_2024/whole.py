@@ -4,8 +4,8 @@ import json
 from collections.abc import Sequence
 from pathlib import Path
 
-from ccfem.comparison.slicings import SlicingComparison
-from ccfem.comparison.slicings_files import write_slicings
+from ccfem.comparison.files import write_results
+from ccfem.comparison.result import Comparison
 from ccfem.export.robot_waypoints import write_robot_waypoints
 from ccfem.machine import Machine
 from ccfem.papers.fang_2024.authors import authors_mesh, authors_stress, finer_mesh
@@ -56,7 +56,7 @@ def write_all(folder: Path, loads: Sequence[str] = ("pull", "side")) -> None:
     for load in loads:
         tests[load] = against(load)
         (folder / load).mkdir(exist_ok=True)
-        write_slicings(tests[load], folder / load)
+        write_results(tests[load], folder / load)
     found = quantities(field, strands, chain.seconds, tests)
     found["170 k cells: seconds"] = finer["all, clock"]
     if "pull" in tests:
@@ -67,7 +67,7 @@ def write_all(folder: Path, loads: Sequence[str] = ("pull", "side")) -> None:
     print(f"\n{claims}")
 
 
-def _failures_explained(pulled: SlicingComparison, folder: Path) -> dict[str, float]:
+def _failures_explained(pulled: Comparison, folder: Path) -> dict[str, float]:
     """Print and draw where layers open under the pull; what bond the paper's loads would need."""
     where = {"walls fixed": openings(pulled), "bolts press": openings(pulled, pressing=True)}
     tensile = pulled.case.problem.material.interlayer_tensile

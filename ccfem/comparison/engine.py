@@ -1,0 +1,576 @@
+"""The engine of every comparison: solve, slice, plan each run, judge it, and put it in one table.
+
+`answer` carries out a `Request` from top to bottom. A comparison of strategies, one over slicings,
+a plan to a stiffness, a run of a study and a front of fibre are all requests; none has an engine of
+its own.
+"""
+
+import itertools
+import os
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, replace
+from typing import Any
+
+import numpy as np
+
+from ccfem.cases.case import Case
+from ccfem.cases.load_cases import weighted_cases
+from ccfem.comparison.curve import Curve
+from ccfem.comparison.curve_stages import along_curve
+from ccfem.comparison.plan_to_stiffness import plan_to_stiffness
+from ccfem.comparison.ranking import off_length
+from ccfem.comparison.request import (
+    DEFAULT_STRAND,
+    STRATEGIES,
+    ForeignStress,
+    InAll,
+    PerLayer,
+    Request,
+    Shortest,
+    Spread,
+    Stiffness,
+    Wanted,
+    check_propped,
+)
+from ccfem.comparison.result import Bound, Comparison
+from ccfem.comparison.runs import Run
+from ccfem.comparison.stages import (
+    Part,
+    Tell,
+    Tests,
+    all_tested,
+    counted,
+    evaluated,
+    natural,
+    planned,
+    planned_to_lengths,
+    timed,
+    to_length,
+    with_print,
+)
+from ccfem.elasticity.part_stress import GivenStress, PartStress
+from ccfem.elasticity.solve import solve
+from ccfem.elasticity.stress_field import StressField
+from ccfem.elasticity.support_kinds import PressingSupport
+from ccfem.elasticity.weighted_cases import WeightedCases
+from ccfem.errors import InputError
+from ccfem.fibre_aware.cases_bound import cases_bound
+from ccfem.fibre_aware.upper_bound import UpperBound, upper_bound
+from ccfem.io.stress_file import read_stress
+from ccfem.layers.slicer import Slicer
+from ccfem.layers.slicing.planar import Planar
+from ccfem.planning.given_paths import GivenPaths
+from ccfem.planning.strategy import Strategy
+from ccfem.planning.whole_part import full_length
+from ccfem.progress import Progress, silent
+from ccfem.support import SupportLayers, slice_with_support
+from ccfem.toolpaths import Toolpaths
+from ccfem.virtual_testing.several_cases import specimens
+from ccfem.virtual_testing.strand import RHO_SPAN, Strand
+
+__all__ = ["Solved", "answer", "compare", "otherwise_held", "solved"]
+
+_ALIKE = 0.005
+"""Share by which two lengths differ at least to be two plans."""
+
+_LEAST = 1.0 / 16.0
+"""Least of several lengths over the largest: twice as much fibre says the same at every length."""
+
+_SAME_BOUND, _SAME_CASES_BOUND = 1.002, 1.01
+"""Largest length over the shortest for which one bound is taken, that of the largest; a bound of
+several load cases takes several times as long as one of one."""
+
+
+@dataclass(frozen=True)
+class Solved:
+    """A case with its stress: what all slicings share.
+
+    Attributes
+    ----------
+    case : Case
+    cases : WeightedCases
+        The load cases that paths are planned for: one, or several with their weights.
+    given : GivenStress, optional
+        Stress of another program to plan and evaluate on.
+    tests : Tests, optional
+        None if nothing is tested.
+    """
+
+    case: Case
+    cases: WeightedCases
+    given: GivenStress | None = None
+    tests: Tests | None = None
+
+    @property
+    def field(self) -> StressField:
+        """Solution of the load case that counts most."""
+        return self.cases.heaviest
+
+    @property
+    def planned_on(self) -> PartStress:
+        """Stress that paths are planned and evaluated on."""
+        return self.field if self.given is None else self.given
+
+    def cut(self, slicer: Slicer | None = None, support: bool = False) -> Part:
+        """Cut the part into the layers that get fibre, with support below them if wanted.
+
+        Raises
+        ------
+        InputError
+            Where the part cannot be cut, or support is wanted below flat layers, or below curved
+            ones of a slicer that does not say the field of its layers (`slice`).
+        """
+        case, stress = self.case, self.planned_on
+        chosen = case.slicing if slicer is None else slicer
+        check_propped(chosen, support)
+        below: SupportLayers | None = None
+        if support and hasattr(chosen, "slice"):
+            layers, below = slice_with_support(chosen, stress, case.build, case.machine)
+            if case.fibre is not None:
+                layers = case.fibre.on(layers, stress.mesh, case.machine)
+        else:
+            layers = case.fibre_layers(stress, chosen)
+        if support and all(layer.flat is not None for layer in layers):
+            check_propped(Planar(), support)
+        if support and below is None:
+            raise InputError(
+                "support continues the field whose levels the layers are, and these layers were "
+                "given without one: leave out support, or choose --slicing load_oriented or spatial"
+            )
+        strand = None if self.tests is None else self.tests.strand
+        return Part(stress, tuple(layers), case.machine, self.cases, strand, case.build, below)
+
+
+def solved(request: Request, seconds: dict[str, float] | None = None) -> Solved:
+    """Solve what is asked for, and prepare what virtual tests need.
+
+    Parameters
+    ----------
+    request : Request
+    seconds : dict of stage to float, optional
+        Gets the time of each stage.
+
+    Raises
+    ------
+    InputError
+        For a problem that cannot be solved, and stress on another mesh.
+    SolveError
+        When the solve misses its tolerance.
+    """
+    seconds = {} if seconds is None else seconds
+    case, strand, backend = request.case, request.strand, request.backend
+    with timed(seconds, "solve"):
+        fields = solve(case.problem, backend=backend)
+        if request.all_cases:
+            cases = weighted_cases(case, fields)
+        else:
+            name = request.load_case or case.problem.cases[0]
+            cases = WeightedCases.of({name: fields[name]})
+    given, foreign, field = None, request.stress, cases.heaviest
+    if foreign is not None:
+        read = read_stress(foreign.path, field.mesh, foreign.unit, foreign.array,
+                           field.held_or_loaded)  # fmt: skip
+        given = replace(read, material=field.material)
+    if strand is None:
+        return Solved(case, cases, given)
+    alternative = None
+    if case.alternative_supports and len(cases) == 1:
+        with timed(seconds, "solve, alternative supports"):
+            alternative = otherwise_held(case, field, backend)
+    with timed(seconds, "specimens"):
+        if len(cases) > 1:
+            specimens(cases, backend)  # one factorisation for all
+        tests = Tests.of(field, alternative, strand, backend)
+    return Solved(case, cases, given, tests)
+
+
+def otherwise_held(case: Case, field: StressField, backend: str) -> StressField:
+    """Solution of the same load case under the alternative supports."""
+    loads = {field.case: field.problem.loads[field.case]}
+    supports = case.alternative_supports
+    try:
+        problem = replace(field.problem, supports=supports, loads=loads, combinations={})
+        return solve(problem, backend)[field.case]
+    except InputError as error:
+        raise InputError(f"alternative supports: {error}") from None
+
+
+def answer(
+    request: Request,
+    progress: Progress = silent,
+    known: Solved | None = None,
+    parts: Mapping[str, Part] | None = None,
+) -> Comparison:
+    """Carry out a request.
+
+    Parameters
+    ----------
+    request : Request
+    progress : callable, optional
+        Receives what is being done, and the share of the work that is done.
+    known : Solved, optional
+        The case with its stress, if it is solved already.
+    parts : mapping of slicing to Part, optional
+        The part with its layers, if it is cut already.
+
+    Raises
+    ------
+    InputError
+        When the part cannot be solved or sliced, or nothing can reach the stiffness asked for. A
+        strategy that fails stays in the table, with the reason.
+    SolveError
+        When the solve misses its tolerance.
+    """
+    seconds: dict[str, float] = {}
+    progress(f"solving {request.case.name}", 0.0)
+    basis = solved(request, seconds) if known is None else known
+    refused: dict[str, str] = {}
+    if parts is None:
+        with timed(seconds, "slice"):
+            parts, refused = _cut(request, basis)
+    steps = (5 if request.print_plans else 4) * len(request.strategies) * len(parts) + 1
+    tell = counted(progress, 0.1, steps)
+    if isinstance(request.amount, Stiffness):
+        part, run, wanted = plan_to_stiffness(request, parts[""], basis.cut, tell)
+        parts, runs = {"": part}, [run]
+    else:
+        runs, wanted = _planned(request, parts, tell)
+    runs = [evaluated(run, parts[run.slicing], tell) for run in runs]
+    if request.print_plans:
+        runs = [with_print(run, parts[run.slicing], tell) for run in runs]
+    if basis.tests is not None:
+        span = () if isinstance(request.amount, Spread) else RHO_SPAN
+        runs = [all_tested([run], basis.tests, parts[run.slicing], tell, span)[0] for run in runs]
+    curve = _curve(request, basis, parts, runs, wanted, tell, seconds)
+    bounds = _bounds(request, basis, parts, runs, wanted, tell, seconds)
+    runs = [_bounded(run, bounds, wanted) for run in runs]
+    stacks = {name: part.layers for name, part in parts.items()}
+    shared = (request, basis.cases, stacks)
+    return Comparison(*shared, tuple(runs), wanted, seconds, refused, basis.given, bounds, curve)
+
+
+def _cut(request: Request, basis: Solved) -> tuple[dict[str, Part], dict[str, str]]:
+    """Part cut in each way, and why it cannot be cut in others.
+
+    The only way to cut a part is not optional: its error is raised.
+    """
+    if not request.named:
+        return {"": basis.cut(request.slicings[""].slicer, request.support)}, {}
+    own = _own_thickness(request, basis)
+    parts: dict[str, Part] = {}
+    refused: dict[str, str] = {}
+    for name, slicing in request.slicings.items():
+        slicer: Any = slicing.slicer
+        if slicing.as_thick:
+            slicer = replace(slicer, count=None, thickness=own)
+        try:
+            part = basis.cut(slicer)
+        except InputError as error:
+            refused[name] = str(error)
+            continue
+        if part.layers:
+            parts[name] = part
+        else:
+            refused[name] = "it has no layer"
+    if not parts:
+        reasons = "; ".join(f"{name}: {why}" for name, why in refused.items())
+        raise InputError(f"no slicing could cut '{request.case.name}': {reasons}")
+    return parts, refused
+
+
+def _own_thickness(request: Request, basis: Solved) -> float:
+    """Mean thickness of the layers of the part's own slicing, mm; NaN where nobody asks for it."""
+    if not any(slicing.as_thick for slicing in request.slicings.values()):
+        return float("nan")
+    case = request.case
+    layers = case.slicing(basis.planned_on, case.build, case.machine)
+    return float(np.mean([layer.thickness for layer in layers]))
+
+
+def _planned(request: Request, parts: Mapping[str, Part], tell: Tell) -> tuple[list[Run], Wanted]:
+    """Plan every strategy on every slicing; with the runs the length that all are held to."""
+    unplanned = {name: _unplanned(request, name, part) for name, part in parts.items()}
+    amount = request.amount
+    if isinstance(amount, Spread):
+        return _spread(unplanned, parts, amount.points, tell), None
+    if not isinstance(amount, Shortest):
+        wanted = _per_layer(amount, parts)
+        runs = [
+            planned(run, part, wanted[name], tell)
+            for name, part in parts.items()
+            for run in unplanned[name]
+        ]
+        if isinstance(amount, InAll) and request.named:
+            return runs, amount
+        return runs, wanted[""] if not request.named else None
+    alone = {name: natural(unplanned[name], part, tell) for name, part in parts.items()}
+    lengths = {
+        name: runs[setter].length_per_layer * len(parts[name].layers)
+        for name, (runs, setter) in alone.items()
+        if setter is not None
+    }
+    if not lengths:
+        return [run for runs, _ in alone.values() for run in runs.values()], None
+    first = min(lengths, key=lengths.__getitem__)
+    setting, least = alone[first][0], lengths[first]
+    runs = []
+    for name, (own, setter) in alone.items():
+        length = least / len(parts[name].layers)
+        if name == first and setter is not None:
+            length = setting[setter].length_per_layer
+            held: Wanted = length
+        runs += to_length(own, setter if name == first else None, length, parts[name], tell)
+    return runs, InAll(least) if request.named else held
+
+
+def _spread(
+    unplanned: Mapping[str, Sequence[Run]], parts: Mapping[str, Part], points: int, tell: Tell
+) -> list[Run]:
+    """Plan every strategy on every slicing to several lengths, the largest filling most layers.
+
+    Fewer layers reach less at their most: a plan that lays its most is one run, however much more
+    was asked for.
+    """
+    most = max(len(part.layers) * full_length(part.layers, part.machine) for part in parts.values())
+    lengths = np.geomspace(_LEAST * most, most, points)
+    runs: list[Run] = []
+    for name, part in parts.items():
+        for run in unplanned[name]:
+            tell(f"planning {run.name}")
+            longer: list[Run] = []
+            for planned_run in planned_to_lengths(run, part, (lengths / len(part.layers)).tolist()):
+                laid = longer[-1].length_per_layer if longer else -1.0
+                if planned_run.length_per_layer > (1.0 + _ALIKE) * laid:
+                    longer.append(planned_run)
+            runs += longer
+    return runs
+
+
+def _unplanned(request: Request, slicing: str, part: Part) -> list[Run]:
+    """Make the runs of all strategies on one slicing, before anything is planned."""
+    return [
+        Run(
+            request.on_slicing(name, slicing),
+            strategy.on(part.layers) if isinstance(strategy, GivenPaths) else strategy,
+            Toolpaths.empty(),
+            None,
+            slicing=slicing,
+        )
+        for name, strategy in request.strategies.items()
+    ]
+
+
+def _per_layer(amount: Any, parts: Mapping[str, Part]) -> dict[str, float | None]:
+    """Length per layer, mm, that is asked for on each slicing; None for the natural amount."""
+    if isinstance(amount, InAll):
+        return {name: amount.length / max(len(part.layers), 1) for name, part in parts.items()}
+    length = amount.length if isinstance(amount, PerLayer) else None
+    return dict.fromkeys(parts, length)
+
+
+def _curve(
+    request: Request,
+    basis: Solved,
+    parts: Mapping[str, Part],
+    runs: Sequence[Run],
+    wanted: Wanted,
+    tell: Tell,
+    seconds: dict[str, float],
+) -> Curve | None:
+    """Compare at several lengths where that is asked for, or where one length suits not all."""
+    tests = basis.tests
+    if request.named or tests is None or request.curve is False or len(basis.cases) > 1:
+        return None
+    if request.curve is None and not _misses(runs, wanted):
+        return None
+    part, held = parts[""], wanted if isinstance(wanted, float) else None
+    with timed(seconds, "curve"):
+        unchanged = [
+            replace(run, strategy=before.strategy)
+            for run, before in zip(runs, _unplanned(request, "", part), strict=True)
+        ]
+        return along_curve(
+            unchanged, part, held, lambda some: all_tested(some, tests, part, tell, ()), tell
+        )
+
+
+def _misses(runs: Sequence[Run], wanted: Wanted) -> bool:
+    """Whether a strategy lays a length other than the wanted one, since it cannot lay that."""
+    return any(
+        off_length(run, wanted) and not isinstance(run.strategy, GivenPaths)
+        for run in runs
+        if run.evaluation is not None
+    )
+
+
+def _bounds(
+    request: Request,
+    basis: Solved,
+    parts: Mapping[str, Part],
+    runs: Sequence[Run],
+    wanted: Wanted,
+    tell: Tell,
+    seconds: dict[str, float],
+) -> dict[float, Bound]:
+    """Bound what any paths can reach, by the length of fibre in all, mm.
+
+    None if no run of the wanted length was tested, for curved layers, for supports that hold in
+    one sense only, and where slicings are compared. Slicings that differ in the number of flat
+    layers alone, as those of several lengths do, are bounded on the most layers.
+    """
+    equal = [run for run in runs if run.tested is not None and not off_length(run, wanted)]
+    supports = [support for field in basis.cases.fields for support in field.problem.supports]
+    pressing = any(isinstance(support, PressingSupport) for support in supports)
+    several_lengths = isinstance(request.amount, Spread)
+    if request.named and not several_lengths:
+        return {}
+    part = max(parts.values(), key=lambda part: len(part.layers))
+    curved = any(layer.flat is None for layer in part.layers)
+    if not request.bound or basis.tests is None or not equal or pressing or curved:
+        return {}
+    several, strand = len(basis.cases) > 1, basis.tests.strand
+    laid = [float(run.toolpaths.lengths.sum()) for run in equal]
+    lengths = [max(laid)]
+    if several_lengths:
+        lengths = _lengths_to_bound(laid, _SAME_CASES_BOUND if several else _SAME_BOUND)
+    bounds: dict[float, Bound] = {}
+    with timed(seconds, "bound"):
+        for length in lengths:
+            of = " in all load cases" if several else ""
+            tell(f"bounding what any paths of {1e-3 * length:.3g} m could reach{of}")
+            about = (part.layers, length, part.machine, strand)
+            bounds[length] = (
+                cases_bound(basis.cases, *about) if several else upper_bound(basis.field, *about)
+            )
+    return bounds
+
+
+def _lengths_to_bound(laid: Sequence[float], alike: float) -> list[float]:
+    """Lengths to be bounded, mm: of every run, and between them for the curve.
+
+    Lengths within the factor `alike` share a bound, that of the largest.
+    """
+    taken: list[float] = []
+    for length in sorted(laid, reverse=True):
+        if not taken or alike * length < taken[-1]:
+            taken.append(length)
+    between = [0.5 * (longer + shorter) for longer, shorter in itertools.pairwise([*taken, 0.0])]
+    return sorted([*taken, *between])
+
+
+def _bounded(run: Run, bounds: Mapping[float, Bound], wanted: Wanted) -> Run:
+    """Run with the most that paths of its length can reach."""
+    length = float(run.toolpaths.lengths.sum())
+    enough = [longer for longer in bounds if longer >= length]
+    if not enough or run.tested is None or off_length(run, wanted):
+        return run
+    bound = bounds[min(enough)]
+    if isinstance(bound, UpperBound):
+        return replace(run, tested=replace(run.tested, most=bound.ratio))
+    if run.tested.cases is None:
+        return run
+    return replace(run, tested=replace(run.tested, cases=replace(run.tested.cases, bound=bound)))
+
+
+def compare(
+    case: Case | str | os.PathLike[str],
+    strategies: Mapping[str, Strategy] | Sequence[str | Strategy] = STRATEGIES,
+    layers: int | Sequence[float] | str | Slicer | None = None,
+    fibre_per_layer: float | None = None,
+    natural: bool = False,
+    strand: Strand | None = DEFAULT_STRAND,
+    load_case: str | None = None,
+    backend: str = "auto",
+    print_plans: bool = False,
+    support: bool = False,
+    stress: ForeignStress | None = None,
+    curve: bool | None = None,
+    progress: Progress = silent,
+    slicings: Mapping[str, Slicer] | Sequence[str | Slicer] | None = None,
+    fibre: float | None = None,
+    stiffness: str | None = None,
+) -> Comparison:
+    """Solve a case once, and plan and evaluate each strategy on it.
+
+    Strategies are compared at equal length of fibre, since more fibre wins almost any comparison.
+    If no length is given, it is the shortest natural length of any strategy. All others are thinned
+    to it, each by its own parameter (`LayerStrategy.amount`). Paths of another program
+    (`GivenPaths`) are never changed: the shortest of their lengths then applies to all, and their
+    heights are those of the layers if no others are given. A strategy that fails stays in the
+    result, with the reason. If a strategy cannot lay the length, stiffness is also compared along a
+    curve over the length of fibre.
+
+    With `slicings` the part is cut in several ways, and each strategy is planned on each of them.
+    All lay the same total length of fibre, whatever the number of layers.
+
+    Parameters
+    ----------
+    case : Case, str or path
+        A case, the name of one, or a part file.
+    strategies : sequence of str or Strategy, or mapping of name to Strategy
+        Strategies given by name take the parameters of the case.
+    layers : int, sequence of float, str or Slicer, optional
+        Instead of the case's own slicing: a number of flat layers, their heights along the build
+        direction in mm, the name of a slicer, or a slicer.
+    fibre_per_layer : float, mm, optional
+        Length that every strategy is held to, as a mean over the layers.
+    natural : bool, default False
+        Let every strategy lay its own amount instead.
+    strand : Strand or None
+        Stiffness and strength of a strand in the virtual test; None leaves the test out.
+    load_case : str, optional
+        Load case to plan, evaluate and test for; by default the first one. "all" plans for all of
+        them at once, weighted by `Case.weights`, tests under all and ranks by the worst.
+    backend : str, default "auto"
+        As in `solve`.
+    print_plans : bool, default False
+        Also plan the print of the whole part, matrix and fibre, for every strategy.
+    support : bool, default False
+        Also print support below a part of curved layers (`ccfem.support`).
+    stress : ForeignStress, optional
+        Stress file of another program, on the same mesh, to plan and evaluate on. Virtual tests and
+        the bound still solve the part themselves.
+    curve : bool, optional
+        Test every strategy at three to five lengths of fibre (`Comparison.curve`). By default only
+        if a strategy cannot change its amount of fibre to the wanted length. Never over several
+        slicings.
+    progress : callable, optional
+        Receives what is being done, and the share of the work that is done.
+    slicings : sequence of str or Slicer, or mapping of name to Slicer, optional
+        Ways to cut the part, instead of `layers`, such as ``["planar:z", "planar:x", "spatial"]``.
+    fibre : float, mm, optional
+        Total length that every strategy is held to in all layers, instead of `fibre_per_layer`.
+    stiffness : str, optional
+        Lay the least fibre that makes the part so stiff, by one strategy: a ratio to the part
+        without fibre as ``"2.5"``, or ``"1200N/mm"``.
+
+    Returns
+    -------
+    Comparison
+
+    Raises
+    ------
+    InputError
+        When the case, the name of a strategy or its parameters are invalid, for what does not go
+        together, or when a print is asked for that the machine cannot do.
+    SolveError
+        When the solve misses its tolerance.
+    """
+    request = Request.of(
+        case,
+        strategies,
+        layers,
+        slicings,
+        fibre_per_layer,
+        fibre,
+        natural,
+        stiffness,
+        load_case=load_case,
+        strand=strand,
+        stress=stress,
+        backend=backend,
+        curve=curve,
+        print_plans=print_plans,
+        support=support,
+    )
+    return answer(request, progress)

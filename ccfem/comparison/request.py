@@ -1,0 +1,483 @@
+"""What is asked of a part, in one value.
+
+The command line, Python and studies only make a `Request`; what excludes what stands here and
+nowhere else. `ccfem.comparison.engine.answer` carries it out.
+"""
+
+import os
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, field
+from itertools import count
+from typing import Any
+
+from ccfem.arrays import freeze
+from ccfem.cases.case import Case
+from ccfem.cases.load_cases import asks_for_all
+from ccfem.cases.reading import read
+from ccfem.checks import check_known, check_number, member_name
+from ccfem.errors import InputError, known_names
+from ccfem.layers.plane import plane_frame
+from ccfem.layers.slicer import Slicer
+from ccfem.layers.slicing import as_slicer, from_text
+from ccfem.layers.slicing.planar import Planar
+from ccfem.planning.equal_fibre import check_wanted
+from ccfem.planning.given_paths import GivenPaths
+from ccfem.planning.strategy import Strategy
+from ccfem.printing.print_plan import check_machine
+from ccfem.strategies import create
+from ccfem.virtual_testing.strand import Strand
+
+__all__ = [
+    "DEFAULT_STRAND",
+    "SHORTEST",
+    "STRATEGIES",
+    "Amount",
+    "ForeignStress",
+    "InAll",
+    "Natural",
+    "PerLayer",
+    "Request",
+    "Shortest",
+    "Slicing",
+    "Spread",
+    "Stiffness",
+    "Wanted",
+    "check_propped",
+    "named_slicings",
+    "named_strategies",
+]
+
+STRATEGIES = ("isocurve", "concentric", "zigzag", "contour_zigzag")
+"""The strategies that are compared when none are named."""
+
+DEFAULT_STRAND = Strand()
+"""Stiffness and strength of a strand where nothing else is known."""
+
+_UNIT = "N/mm"
+
+_COUNTED_BY = ("count", "thickness", "heights")
+"""Parameters of flat layers that say how many there are."""
+
+_FLAT = (
+    "support is printed below curved layers alone; these are flat: leave out support, or choose "
+    "curved layers (--slicing load_oriented or spatial)"
+)
+
+
+@dataclass(frozen=True)
+class ForeignStress:
+    """Stress of another program in a file: see `ccfem.io.read_stress`.
+
+    Attributes
+    ----------
+    path : path
+    unit : str, optional
+        Unit of the stress, if the file does not state it.
+    array : str, default "stress"
+        Name of the array in a ``.vtu`` file.
+    """
+
+    path: str | os.PathLike[str]
+    unit: str | None = None
+    array: str = "stress"
+
+
+@dataclass(frozen=True)
+class Natural:
+    """The amount of fibre that each strategy lays with its own parameters."""
+
+
+@dataclass(frozen=True)
+class Shortest:
+    """The shortest natural length of any strategy, for all: a comparison at equal fibre."""
+
+
+@dataclass(frozen=True)
+class PerLayer:
+    """A length of fibre per layer, mm, as a mean over the layers."""
+
+    length: float
+
+    def __post_init__(self) -> None:
+        check_wanted(self.length)
+
+
+@dataclass(frozen=True)
+class InAll:
+    """A length of fibre in all layers together, mm."""
+
+    length: float
+
+    def __post_init__(self) -> None:
+        check_number("fibre in all", self.length, above=0.0, unit="mm")
+
+
+@dataclass(frozen=True)
+class Stiffness:
+    """The least fibre that makes the part as stiff as this.
+
+    Attributes
+    ----------
+    value : float
+        Stiffness over that of the part without fibre, or N/mm.
+    absolute : bool, default False
+        Whether it is N/mm.
+    """
+
+    value: float
+    absolute: bool = False
+
+    @classmethod
+    def parsed(cls, text: str) -> "Stiffness":
+        """Read a ratio as ``2.5``, or ``1200N/mm``.
+
+        Raises
+        ------
+        InputError
+            For any other text.
+        """
+        stripped = text.strip()
+        try:
+            return cls(float(stripped.removesuffix(_UNIT)), stripped.endswith(_UNIT))
+        except ValueError:
+            raise InputError(
+                f"--stiffness expects a ratio as 2.5, or N/mm as 1200N/mm; got '{text}'"
+            ) from None
+
+
+@dataclass(frozen=True)
+class Spread:
+    """Several lengths of fibre by one factor, from a sixteenth of what fills the most layers up.
+
+    Attributes
+    ----------
+    points : int, default 5
+        Lengths, at least 2.
+    """
+
+    points: int = 5
+
+    def __post_init__(self) -> None:
+        check_number("points", self.points, at_least=2)
+
+
+Amount = Natural | Shortest | PerLayer | InAll | Stiffness | Spread
+"""How much fibre is asked for."""
+
+SHORTEST = Shortest()
+
+Wanted = float | InAll | None
+"""Length of fibre that runs are held to: mm per layer, in total, or None if each lays its own."""
+
+
+@dataclass(frozen=True)
+class Slicing:
+    """A way to cut the part.
+
+    Attributes
+    ----------
+    slicer : Slicer or None
+        None for the part's own.
+    as_thick : bool, default False
+        Whether flat layers are as thick as those of the part's own slicing are in the mean: one
+        printer lays them all.
+    """
+
+    slicer: Slicer | None = None
+    as_thick: bool = False
+
+
+@dataclass(frozen=True)
+class Request:
+    """A part, and what is asked of it.
+
+    Every strategy is planned on every slicing to the amount of fibre, for the load cases, and
+    judged. One slicing without a name stands for the part alone; slicings with names are compared
+    with each other, at the same length of fibre in all.
+
+    Attributes
+    ----------
+    case : Case
+    strategies : mapping of name to Strategy
+        At least one.
+    slicings : mapping of name to Slicing
+        At least one; by default the part's own, without a name.
+    amount : Natural, Shortest, PerLayer, InAll, Stiffness or Spread, default Shortest
+    load_case : str, optional
+        Load case to plan, evaluate and test for; by default the first. "all" plans for all of them
+        at once, weighted by `Case.weights`, tests under all, and ranks by the worst.
+    strand : Strand or None
+        Stiffness and strength of a strand in the virtual test; None leaves the test out.
+    stress : ForeignStress, optional
+        Stress of another program, on the same mesh, to plan and evaluate on.
+    backend : str, default "auto"
+        As in `ccfem.solve`.
+    curve : bool, optional
+        Test every strategy at three to five lengths of fibre. By default only if a strategy cannot
+        change its amount of fibre to the wanted length.
+    bound : bool, default True
+        Whether to compute what no paths can exceed.
+    print_plans : bool, default False
+        Also plan the print of the whole part, matrix and fibre, for every run.
+    support : bool, default False
+        Also print support below a part of curved layers.
+
+    Raises
+    ------
+    InputError
+        For what does not go together, before anything is solved.
+    """
+
+    case: Case
+    strategies: Mapping[str, Strategy]
+    slicings: Mapping[str, Slicing] = field(default_factory=lambda: {"": Slicing()})
+    amount: Amount = SHORTEST
+    load_case: str | None = None
+    strand: Strand | None = DEFAULT_STRAND
+    stress: ForeignStress | None = None
+    backend: str = "auto"
+    curve: bool | None = None
+    bound: bool = True
+    print_plans: bool = False
+    support: bool = False
+
+    def __post_init__(self) -> None:
+        freeze(self, strategies=dict, slicings=dict)
+        if not self.strategies:
+            raise InputError("name at least one strategy to compare; got none")
+        self._check_load_case()
+        if self.curve and self.strand is None:
+            raise InputError("the curve is one of stiffness: leave the virtual test in, or it out")
+        if self.named:
+            self._check_named()
+        if isinstance(self.amount, Stiffness):
+            self._check_stiffness()
+        if self.print_plans:
+            check_machine(self.case.machine)
+        elif self.support:
+            raise InputError("support is laid in a print: plan that too (print_plans, --gcode)")
+        for slicing in self.slicings.values():
+            check_propped(slicing.slicer or self.case.slicing, self.support)
+
+    def _check_load_case(self) -> None:
+        known = self.case.problem.cases
+        if not known:
+            raise InputError(f"case '{self.case.name}' has no load case; give it at least one load")
+        if not self.all_cases:
+            if self.load_case is not None:
+                check_known("load case", self.load_case, known)
+            return
+        if self.strand is None:
+            raise InputError(
+                "plans for all load cases are cut and ranked by virtual tests: leave these in, or "
+                "name one load case"
+            )
+        refused = {
+            "stress of another program": self.stress is not None,
+            "a curve": bool(self.curve),
+            "several slicings": self.named and not isinstance(self.amount, Spread),
+        }
+        for what, asked in refused.items():
+            if asked:
+                raise InputError(
+                    f"all load cases are planned for at once; got {what} too: drop one"
+                )
+
+    def _check_named(self) -> None:
+        given = any(isinstance(strategy, GivenPaths) for strategy in self.strategies.values())
+        if isinstance(self.amount, PerLayer | Stiffness) or given or self.curve:
+            raise InputError(
+                "over several slicings there are no layers, fibre_per_layer, stiffness, given "
+                "paths or curve: drop them, and give fibre, the length in all"
+            )
+        if self.print_plans:
+            raise InputError("prints are planned on one slicing: drop print_plans or slicings")
+
+    def _check_stiffness(self) -> None:
+        if len(self.strategies) > 1:
+            raise InputError("the fibre for a stiffness is that of one strategy: name one")
+        if self.strand is None:
+            raise InputError("--stiffness is that of the virtual test: drop --no-virtual-test")
+        if self.stress is not None:
+            raise InputError("--stiffness solves the part itself: drop --stress")
+
+    @classmethod
+    def of(
+        cls,
+        case: Case | str | os.PathLike[str],
+        strategies: Mapping[str, Strategy] | Sequence[str | Strategy] = STRATEGIES,
+        layers: int | Sequence[float] | str | Slicer | None = None,
+        slicings: Mapping[str, Slicer] | Sequence[str | Slicer] | None = None,
+        fibre_per_layer: float | None = None,
+        fibre: float | None = None,
+        natural: bool = False,
+        stiffness: str | None = None,
+        **more: Any,
+    ) -> "Request":
+        """Make a request from short forms: names, numbers and texts.
+
+        Parameters
+        ----------
+        case : Case, str or path
+            A case, the name of one, or a part file.
+        strategies : sequence of str or Strategy, or mapping of name to Strategy
+            Strategies given by name take the parameters of the case.
+        layers : int, sequence of float, str or Slicer, optional
+            Instead of the case's own slicing: a number of flat layers, their heights along the
+            build direction in mm, the name of a slicer, or a slicer. Given paths bring the heights
+            of their layers.
+        slicings : sequence of str or Slicer, or mapping of name to Slicer, optional
+            Ways to cut the part that are compared, instead of `layers`.
+        fibre_per_layer, fibre : float, mm, optional
+            Length of fibre per layer, or in all.
+        natural : bool, default False
+        stiffness : str, optional
+            As in `Stiffness.parsed`.
+        **more
+            As the attributes of the class.
+
+        Raises
+        ------
+        InputError
+            As the class, and for short forms that mean nothing.
+        """
+        case = read(case)
+        if not isinstance(strategies, Mapping):
+            strategies = named_strategies(case, strategies)
+        amount = _amount(fibre_per_layer, fibre, natural, stiffness)
+        if slicings is not None:
+            if layers is not None:
+                raise InputError(
+                    "over several slicings there are no layers: drop layers or slicings"
+                )
+            return cls(case, strategies, named_slicings(slicings), amount, **more)
+        given = [each for each in strategies.values() if isinstance(each, GivenPaths)]
+        if given and layers is None:
+            layers = tuple(given[0].heights(plane_frame(case.build)[2]).tolist())
+        slicing = Slicing(None if layers is None else as_slicer(layers))
+        return cls(case, strategies, {"": slicing}, amount, **more)
+
+    @property
+    def named(self) -> bool:
+        """Whether slicings are compared with each other."""
+        return list(self.slicings) != [""]
+
+    @property
+    def all_cases(self) -> bool:
+        """Whether all load cases are planned for at once."""
+        return asks_for_all(self.case, self.load_case)
+
+    def on_slicing(self, strategy: str, slicing: str) -> str:
+        """Name of the run of a strategy on a slicing."""
+        return f"{strategy} on {slicing}" if slicing else strategy
+
+
+def check_propped(slicer: Slicer, support: bool) -> None:
+    """Raise where support is wanted below layers that are flat, before anything is solved."""
+    if support and isinstance(slicer, Planar):
+        raise InputError(_FLAT)
+
+
+def _amount(
+    fibre_per_layer: float | None, fibre: float | None, natural: bool, stiffness: str | None
+) -> Amount:
+    """Amount of fibre from the one of four options that is given."""
+    given = {
+        "fibre_per_layer": fibre_per_layer is not None,
+        "fibre": fibre is not None,
+        "natural": natural,
+        "stiffness": stiffness is not None,
+    }
+    names = [name for name, is_given in given.items() if is_given]
+    if len(names) > 1:
+        raise InputError(
+            "give one amount of fibre: a length per layer, one in all, the natural amount or a "
+            f"stiffness, not both {names[0]} and {names[1]}: drop one"
+        )
+    if fibre_per_layer is not None:
+        return PerLayer(fibre_per_layer)
+    if fibre is not None:
+        return InAll(fibre)
+    if stiffness is not None:
+        return Stiffness.parsed(stiffness)
+    return Natural() if natural else SHORTEST
+
+
+def named_strategies(
+    case: Case,
+    strategies: Sequence[str | Strategy] = STRATEGIES,
+    parameters: Mapping[str, Mapping[str, Any]] | None = None,
+) -> dict[str, Strategy]:
+    """Make strategies by name, with the parameters of the case, which those given override.
+
+    Parameters
+    ----------
+    case : Case
+    strategies : sequence of str or Strategy
+        A strategy object keeps its parameters and gets the name of its module; a second one of the
+        same name gets a number.
+    parameters : mapping of strategy name to parameters, optional
+
+    Raises
+    ------
+    InputError
+        For an unknown strategy or parameter, or one named twice.
+    """
+    overrides = dict(parameters or {})
+    names = [strategy for strategy in strategies if isinstance(strategy, str)]
+    if not strategies:
+        raise InputError("name at least one strategy to compare; got none")
+    repeated = {name for name in names if names.count(name) > 1}
+    if repeated:
+        raise InputError(f"name each strategy once; got '{min(repeated)}' more than once")
+    for name in overrides:
+        if name not in names:
+            raise InputError(
+                f"parameters are given for '{name}', which is not among the strategies: "
+                f"{known_names(name, names)}"
+            )
+    made: dict[str, Strategy] = {}
+    for strategy in strategies:
+        if isinstance(strategy, str):
+            own = {**case.parameters.get(strategy, {}), **overrides.get(strategy, {})}
+            made[strategy] = create(strategy, own)
+        else:
+            made[_free_name(member_name(strategy), {*made, *names})] = strategy
+    return made
+
+
+def named_slicings(slicings: Mapping[str, Slicer] | Sequence[str | Slicer]) -> dict[str, Slicing]:
+    """Slicings by name: as they were written, or the name of their module.
+
+    Flat layers named by a text that says nothing of their number are as thick as the layers of the
+    part's own slicing are in the mean.
+
+    Raises
+    ------
+    InputError
+        For an unknown slicer or parameter, none at all, or one named twice.
+    """
+    if isinstance(slicings, str) or not slicings:
+        raise InputError(
+            f"slicings must be a list of at least one, as ['planar:z', 'spatial']; got {slicings!r}"
+        )
+    if isinstance(slicings, Mapping):
+        return {name: Slicing(slicer) for name, slicer in slicings.items()}
+    made: dict[str, Slicing] = {}
+    for given in slicings:
+        if isinstance(given, str):
+            name, slicer = given.strip(), from_text(given)
+            if name in made:
+                raise InputError(f"name each slicing once; got '{name}' more than once")
+            counted = any(f"{parameter}=" in name for parameter in _COUNTED_BY)
+            made[name] = Slicing(slicer, isinstance(slicer, Planar) and not counted)
+        else:
+            made[_free_name(member_name(given), set(made))] = Slicing(given)
+    return made
+
+
+def _free_name(name: str, taken: set[str]) -> str:
+    """Name, with a number behind it where it is taken."""
+    if name not in taken:
+        return name
+    return next(free for free in (f"{name}_{k}" for k in count(2)) if free not in taken)
