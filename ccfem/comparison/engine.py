@@ -231,8 +231,8 @@ def answer(
     steps = (5 if request.print_plans else 4) * len(request.strategies) * len(parts) + 1
     tell = counted(progress, 0.1, steps)
     if isinstance(request.amount, Stiffness):
-        part, run, wanted = plan_to_stiffness(request, parts[""], basis.cut, tell)
-        parts, runs = {"": part}, [run]
+        part, run, held = plan_to_stiffness(request, parts[""], basis.cut, tell)
+        parts, runs, wanted = {"": part}, [run], held
     else:
         runs, wanted = _planned(request, parts, tell)
     runs = [evaluated(run, parts[run.slicing], tell) for run in runs]

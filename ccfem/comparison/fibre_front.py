@@ -81,8 +81,10 @@ def fibre_front(
         on any number of layers.
     """
     strand = Strand() if strand is None else strand
-    one_case = isinstance(stress, StressField)
-    cases = WeightedCases.of({stress.case: stress}) if one_case else stress
+    if isinstance(stress, StressField):
+        cases = WeightedCases.of({stress.case: stress})
+    else:
+        cases = stress
     if len(cases) > 1:
         specimens(cases, backend)  # one factorisation for all
     known = Solved(case, cases, None, Tests.of(cases.heaviest, None, strand, backend))

@@ -106,7 +106,7 @@ def record(comparison: Comparison, command: str, seconds: Mapping[str, float]) -
     """
     case, stress = comparison.case, comparison.stress
     mesh = stress.mesh
-    about = {
+    about: dict[str, Any] = {
         "ccfem": version("ccfem"),
         "command": command,
         "made": datetime.now(UTC).isoformat(timespec="seconds"),
