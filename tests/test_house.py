@@ -170,3 +170,26 @@ def test_equal_values_keep_their_order_on_every_processor():
                 and "reverse_cuthill_mckee" in [alias.name for alias in node.names]
             ]
     assert not found
+
+
+CLOCKS = {
+    "ccfem.cli.run",
+    "ccfem.comparison.files",
+    "ccfem.comparison.stages",
+    "ccfem.elasticity.solve",
+    "ccfem.progress",
+    "ccfem.studies.processes",
+    "ccfem.studies.running",
+    "ccfem.virtual_testing.virtual_test",
+}
+"""Modules that read a clock: to record the seconds of a stage, or to say how long it will take."""
+
+
+def test_no_result_depends_on_the_clock():
+    readers = set()
+    for name, path in modules().items():
+        for node in ast.walk(ast.parse(path.read_text(encoding="utf-8"))):
+            named = [alias.name for alias in node.names] if isinstance(node, ast.Import) else []
+            if "time" in named or (isinstance(node, ast.ImportFrom) and node.module == "time"):
+                readers.add(name)
+    assert {name for name in readers if room(name) != "papers"} <= CLOCKS

@@ -4,7 +4,6 @@ Every order is evaluated with its best terminals, found by dynamic programming a
 part that an exchange changes is recomputed. See `ordering` for what a cluster is.
 """
 
-import time
 from typing import NamedTuple
 
 import numpy as np
@@ -19,8 +18,9 @@ _BLOCK = 3
 """Maximum number of clusters that Or-opt moves at once."""
 _MANY = 50
 """Number of clusters above which fewer rounds are made."""
-_TIME_LIMIT = 30.0
-"""Time, s, after which no further round starts; about a hundred clusters need less."""
+_MOST_WORK = 5e7
+"""Rounds times the cube of the number of clusters, about what a round costs: no more rounds are
+made. Up to about a hundred clusters need less."""
 
 
 class Clusters(NamedTuple):
@@ -58,19 +58,15 @@ def strands(links: FloatArray, first: int = -1, last: int = -1) -> Clusters:
 def improved_order(order: IntArray, clusters: Clusters, rounds: int) -> IntArray:
     """Terminals (p, 2) entered and left, in an order no worse than the given one (p,).
 
-    Each round perturbs the best order and makes exchanges until none helps. Unless the time limit
-    is reached, the same input gives the same order.
+    Each round perturbs the best order and makes exchanges until none helps. The number of rounds
+    follows from that of the clusters: the same input gives the same order on every machine.
     """
     best, count = order.copy(), len(order)
     least = _exchange(best, clusters)
-    # The time counts from here: compiling may have taken some before.
-    begun = time.monotonic()
     random = np.random.default_rng(0)
     fixed, free = int(clusters.first >= 0), count - int(clusters.last >= 0)
-    # A round costs about the cube of the count.
-    for _ in range(round(rounds * min(1.0, (_MANY / count) ** 2))):
-        if time.monotonic() - begun > _TIME_LIMIT:
-            break
+    wanted = round(rounds * min(1.0, (_MANY / count) ** 2))
+    for _ in range(min(wanted, max(1, round(_MOST_WORK / count**3)))):
         # Swap two neighbouring stretches: exchanges of single stretches do not undo that.
         i, j, k = np.sort(random.integers(fixed, free + 1, 3))
         trial = np.concatenate([best[:i], best[j:k], best[i:j], best[k:]])
