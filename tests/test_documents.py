@@ -3,17 +3,20 @@
 import dataclasses
 import hashlib
 import json
+import operator
 import os
 import re
 import shutil
 import subprocess
 import sys
 import textwrap
+import typing
 from pathlib import Path
 
 import pytest
 
 from ccfem.cases.part_file import read_part
+from ccfem.comparison import engine, request
 from ccfem.errors import InputError
 from ccfem.io import read_mesh
 from ccfem.strategies import named
@@ -45,6 +48,24 @@ def test_python_of_the_readme_runs(capsys, monkeypatch, tmp_path):
     assert "efficiency" in said
     assert "isocurve makes the stiffest part" in said
     assert set(read_mesh(tmp_path / "cantilever.vtu").patches) == set(space["part"].mesh.patches)
+
+
+def test_the_flow_is_drawn_as_it_is(capsys):
+    """Every word of the drawing is a name of the engine, and its code runs."""
+    page = (ROOT / "docs/concepts/flow.md").read_text()
+    first, second = blocks(page, "python")
+    space: dict = {}
+    exec(compile(second, "flow.md", "exec"), space)
+    assert len(space["comparison"].runs) == 1
+    for name in ("solved", "Solved.cut", "Request", "Comparison", "planned", "evaluated"):
+        assert name in page
+        assert operator.attrgetter(name)(engine)
+    for name in ("with_print", "all_tested", "upper_bound"):
+        assert name in page
+        assert callable(getattr(engine, name))
+    drawn = set(re.findall(r"`(\w+)`", page.partition("| `amount` |")[2].partition("|")[0]))
+    known = {kind.__name__ for kind in typing.get_args(request.Amount)}
+    assert drawn == known
 
 
 def test_part_file_of_the_readme_lacks_nothing_but_its_mesh(tmp_path):

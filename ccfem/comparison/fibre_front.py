@@ -81,10 +81,7 @@ def fibre_front(
         on any number of layers.
     """
     strand = Strand() if strand is None else strand
-    if isinstance(stress, StressField):
-        cases = WeightedCases.of({stress.case: stress})
-    else:
-        cases = stress
+    cases = WeightedCases.of({stress.case: stress}) if isinstance(stress, StressField) else stress
     if len(cases) > 1:
         specimens(cases, backend)  # one factorisation for all
     known = Solved(case, cases, None, Tests.of(cases.heaviest, None, strand, backend))
