@@ -62,7 +62,7 @@ def front(
     from ccfem.comparison.compare import create_all
     from ccfem.comparison.fibre_front import counts_to_try, fibre_front
     from ccfem.elasticity.solve import solve
-    from ccfem.errors import InputError
+    from ccfem.errors import InputError, spared
     from ccfem.io.result_folder import whole_folder
     from ccfem.progress import progress_bar
 
@@ -99,14 +99,16 @@ def front(
             progress=progress,
         )
         found.to_frame().to_csv(folder / "front.csv", index=False)
-        found.plot().savefig(folder / "front.png")
+        with spared("front.png", []):
+            found.plot().savefig(folder / "front.png")
         if len(strengths) > 1:
-            found.plot_trade().savefig(folder / "trade.png")
+            with spared("trade.png", []):
+                found.plot_trade().savefig(folder / "trade.png")
         command = shlex.join(["ccfem", *sys.argv[1:]])
         (folder / "command.txt").write_text(command + "\n", encoding="utf-8")
     _say(found)
-    trade = "trade.png, " if len(strengths) > 1 else ""
-    print(f"\n{where}: front.png, {trade}front.csv")
+    drawn = [f"{name}, " for name in ("front.png", "trade.png") if (where / name).exists()]
+    print(f"\n{where}: {''.join(drawn)}front.csv")
 
 
 def _say(found: "FibreFront") -> None:

@@ -202,7 +202,7 @@ def run(
         raise InputError("--refine changes the mesh that the file of --stress is on: drop one")
     from ccfem.cli.screen import print_comparison, print_slicings
     from ccfem.comparison.compare import compare, create_all
-    from ccfem.comparison.files import write_drawings, write_results
+    from ccfem.comparison.files import write_results
     from ccfem.comparison.slicings import SlicingComparison
     from ccfem.comparison.slicings_files import write_slicings
     from ccfem.io.result_folder import whole_folder
@@ -232,9 +232,8 @@ def run(
         if isinstance(comparison, SlicingComparison):
             write_slicings(comparison, folder, command, seconds, rest, pictures, part_file)
         else:
-            if drawings:
-                write_drawings(comparison, folder, drawings)
-            write_results(comparison, folder, command, seconds, rest, pictures, part_file, slicer)
+            about = (command, seconds, rest, pictures, part_file, slicer, drawings)
+            write_results(comparison, folder, *about)
     spent = time.perf_counter() - _STARTED
     if isinstance(comparison, SlicingComparison):
         print_slicings(comparison, where, spent)

@@ -4,21 +4,22 @@ import json
 import time
 from collections.abc import Mapping, Sequence
 from pathlib import Path
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
 from ccfem.comparison.record import record, results_rows, write_table
 from ccfem.comparison.result import Comparison
 from ccfem.comparison.shown import file_stem
+from ccfem.errors import spared
 from ccfem.printing.print_plan import PrintPlan
 from ccfem.progress import Progress, silent
 from ccfem.toolpaths import Toolpaths
 
 if TYPE_CHECKING:
-    from ccfem.comparison.pictures import Pictures
+    from ccfem.comparison.slicings import SlicingComparison
 
-__all__ = ["write_drawings", "write_results"]
+__all__ = ["write_report", "write_results"]
 
 
 def write_results(
@@ -30,6 +31,7 @@ def write_results(
     pictures: bool = False,
     part_file: str = "",
     slicer: str = "",
+    drawings: Sequence[str] = (),
 ) -> None:
     """Write ``results.csv``, ``results.json``, ``report.html`` and paths; pictures where wanted.
 
@@ -37,7 +39,8 @@ def write_results(
     fill the layers. Runs with a print plan get ``STRATEGY.gcode`` too, ``STRATEGY_cell.csv`` with
     the same moves for a cell of robots, and ``STRATEGY_trim.csv`` where strands leave the part. In
     ``paths.vtp`` the cell array "strategy" numbers the strategies that did not fail, in the order
-    of ``results.json``.
+    of ``results.json``. Numbers and paths come first: a picture or a view of the report that fails
+    is left out with a warning, which ``results.json`` keeps under "left_out".
 
     Parameters
     ----------
@@ -57,66 +60,75 @@ def write_results(
         Text of the part file, for the report.
     slicer : str
         Name of what cut the layers, for the citations.
+    drawings : sequence of {"svg", "dxf"}
+        Also draw every flat layer of every run to scale: ``STRATEGY_layer_NN.svg``, ``.dxf``.
     """
-    from ccfem.comparison.report import report_html
-
     start = time.perf_counter()
-    spent = dict(seconds or {})
-    if pictures:
-        _draw(comparison, folder, lambda what, share: progress(what, 0.6 * share))
-        spent["pictures"] = time.perf_counter() - start
-    progress("writing results", 0.6)
-    start = time.perf_counter()
+    spent, left_out = dict(seconds or {}), list[str]()
+    progress("writing results", 0.0)
     write_table(results_rows(comparison), folder / "results.csv")
     if comparison.curve is not None:
         comparison.curve.frame.to_csv(folder / "curve.csv", index=False)
     _write_paths(comparison, folder)
     spent["files"] = time.perf_counter() - start
+    start = time.perf_counter()
+    for suffix in drawings:
+        with spared(f"drawings ({suffix})", left_out):
+            _write_drawings(comparison, folder, suffix)
+    if pictures:
+        with spared("pictures", left_out):
+            _draw(comparison, folder, lambda what, share: progress(what, 0.2 + 0.6 * share))
+        if any(layer.flat is None for layer in comparison.layers):
+            with spared("pictures in space", left_out):
+                _write_in_space(comparison, folder)
+        spent["pictures"] = time.perf_counter() - start
     progress("writing the report", 0.8)
-    about = {**record(comparison, command, spent), "slicer": slicer}
-    page = report_html(comparison, about, part_file)
-    (folder / "report.html").write_text(page, encoding="utf-8")
-    about["seconds"]["report"] = time.perf_counter() - start - spent["files"]
+    about = {**record(comparison, command, spent), "slicer": slicer, "left_out": left_out}
+    write_report(comparison, about, folder, part_file)
+
+
+def write_report(
+    comparison: "Comparison | SlicingComparison", about: dict[str, Any], folder: Path, part: str
+) -> None:
+    """Write ``report.html``, and ``results.json`` whatever becomes of the report.
+
+    Parameters
+    ----------
+    comparison : Comparison or SlicingComparison
+    about : dict
+        The record, with "left_out": what failed so far.
+    folder : Path
+    part : str
+        Text of the part file, if there is one.
+    """
+    from ccfem.comparison.report import report_html
+
+    start = time.perf_counter()
+    with spared("report.html", about["left_out"]):
+        page = report_html(comparison, about, part)
+        (folder / "report.html").write_text(page, encoding="utf-8")
+    about["seconds"]["report"] = time.perf_counter() - start
     about["files"] = sorted({path.name for path in folder.iterdir()} | {"results.json"})
     text = json.dumps(about, indent=1, ensure_ascii=False, allow_nan=False)
     (folder / "results.json").write_text(text + "\n", encoding="utf-8")
 
 
-def write_drawings(comparison: Comparison, folder: Path, formats: Sequence[str]) -> None:
-    """Draw every flat layer of every run to scale: ``STRATEGY_layer_NN.svg`` and ``.dxf``.
-
-    Parameters
-    ----------
-    comparison : Comparison
-    folder : Path
-    formats : sequence of {"svg", "dxf"}
-
-    Raises
-    ------
-    InputError
-        Where layers are curved.
-    """
+def _write_drawings(comparison: Comparison, folder: Path, suffix: str) -> None:
+    """Draw every layer of every run to scale; raise `InputError` where layers are curved."""
     from ccfem.export.layer_drawings import draw_layer
 
     width = comparison.case.machine.fibre_width
     for run in comparison.succeeded:
         for layer in comparison.layers:
-            for suffix in formats:
-                file = folder / f"{file_stem(run.name)}_layer_{layer.index:02d}.{suffix}"
-                draw_layer(run.toolpaths, layer, width, file)
+            file = folder / f"{file_stem(run.name)}_layer_{layer.index:02d}.{suffix}"
+            draw_layer(run.toolpaths, layer, width, file)
 
 
 def _draw(comparison: Comparison, folder: Path, progress: Progress) -> None:
-    """Draw and write all pictures."""
+    """Draw and write the pictures that are files of their own."""
     from ccfem.comparison.pictures import draw_pictures
 
-    _write_pictures(draw_pictures(comparison, progress), folder)
-    if any(layer.flat is None for layer in comparison.layers):
-        _write_in_space(comparison, folder)
-
-
-def _write_pictures(pictures: "Pictures", folder: Path) -> None:
-    """Write the pictures that are files of their own."""
+    pictures = draw_pictures(comparison, progress)
     for (name, index), image in pictures.paths.items():
         (folder / f"{file_stem(name)}_layer_{index:02d}.png").write_bytes(image)
     for name, image in pictures.forces.items():

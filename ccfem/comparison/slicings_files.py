@@ -3,17 +3,18 @@
 Everything heavy (matplotlib, pyvista) is imported where it is needed.
 """
 
-import json
 import time
 from collections.abc import Mapping
 from pathlib import Path
 from typing import Any
 
+from ccfem.comparison.files import write_report
 from ccfem.comparison.record import record, results_rows, write_table
 from ccfem.comparison.result import Comparison
 from ccfem.comparison.runs import Run
 from ccfem.comparison.shown import file_stem
 from ccfem.comparison.slicings import SlicingComparison
+from ccfem.errors import spared
 from ccfem.progress import Progress, silent
 
 __all__ = ["write_slicings"]
@@ -50,17 +51,9 @@ def write_slicings(
     part_file : str
         Text of the part file, for the report.
     """
-    from ccfem.comparison.report import report_html
-
     start = time.perf_counter()
-    spent = dict(seconds or {})
-    if pictures:
-        for k, (name, one) in enumerate(comparison.slicings.items()):
-            progress(f"drawing {name}", 0.6 * k / len(comparison.slicings))
-            _pictures(name, one, folder)
-        spent["pictures"] = time.perf_counter() - start
-    progress("writing results", 0.6)
-    start = time.perf_counter()
+    spent, left_out = dict(seconds or {}), list[str]()
+    progress("writing results", 0.0)
     for name, one in comparison.slicings.items():
         for run in one.succeeded:
             _write_waypoints(name, one, run, folder)
@@ -71,14 +64,16 @@ def write_slicings(
     ]
     write_table(rows, folder / "results.csv", first=("slicing",))
     spent["files"] = time.perf_counter() - start
+    start = time.perf_counter()
+    if pictures:
+        for k, (name, one) in enumerate(comparison.slicings.items()):
+            progress(f"drawing {name}", 0.2 + 0.6 * k / len(comparison.slicings))
+            with spared(f"pictures of {name}", left_out):
+                _pictures(name, one, folder)
+        spent["pictures"] = time.perf_counter() - start
     progress("writing the report", 0.8)
-    about = _record(comparison, command, spent)
-    page = report_html(comparison, about, part_file)
-    (folder / "report.html").write_text(page, encoding="utf-8")
-    about["seconds"]["report"] = time.perf_counter() - start - spent["files"]
-    about["files"] = sorted({path.name for path in folder.iterdir()} | {"results.json"})
-    text = json.dumps(about, indent=1, ensure_ascii=False, allow_nan=False)
-    (folder / "results.json").write_text(text + "\n", encoding="utf-8")
+    about = {**_record(comparison, command, spent), "left_out": left_out}
+    write_report(comparison, about, folder, part_file)
 
 
 def _pictures(name: str, comparison: Comparison, folder: Path) -> None:
