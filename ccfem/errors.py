@@ -1,11 +1,12 @@
-"""The two errors that ccfem raises, and how several mistakes become one of them."""
+"""The two errors that ccfem raises, how several mistakes become one, and what goes on without."""
 
 import difflib
 import reprlib
+import warnings
 from collections.abc import Iterable, Iterator
 from contextlib import contextmanager
 
-__all__ = ["InputError", "Mistakes", "SolveError", "known_names", "shown"]
+__all__ = ["InputError", "Mistakes", "SolveError", "known_names", "shown", "spared"]
 
 
 class InputError(ValueError):
@@ -59,6 +60,29 @@ class Mistakes:
 
 class SolveError(RuntimeError):
     """A solve that missed its tolerance; the message names the backend and the residual."""
+
+
+@contextmanager
+def spared(what: str, left_out: list[str]) -> Iterator[None]:
+    """Go on without a picture or a view that fails in the block: the numbers behind it stand.
+
+    What is left out, and why, is added to `left_out` as one line, and is a warning. A file that
+    cannot be written is an error as elsewhere.
+
+    Parameters
+    ----------
+    what : str
+        What the block draws.
+    left_out : list of str
+    """
+    try:
+        yield
+    except OSError:
+        raise
+    except Exception as error:
+        kind = "" if isinstance(error, InputError) else f"{type(error).__name__}: "
+        left_out.append(f"{what} left out: {kind}{' '.join(str(error).split())}")
+        warnings.warn(left_out[-1], UserWarning, stacklevel=3)
 
 
 def known_names(wanted: str, known: Iterable[str]) -> str:

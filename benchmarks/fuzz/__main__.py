@@ -33,8 +33,11 @@ def read(path: Path) -> None:
         read_mesh(path, check=False)
 
 
-def verdict(path: Path, see: Callable[[Path], None] = read) -> str:
-    """Read a file in a process of its own: "read", "refused", or what is wrong."""
+def verdict(path: Path, see: Callable[[Path], object] = read, limit: float = SECONDS) -> str:
+    """Read a file in a process of its own: "read", "refused", or what is wrong.
+
+    More than `limit` seconds are wrong; after twice as many the process is ended.
+    """
     with tempfile.TemporaryFile() as said:
         child = os.fork()
         if child == 0:
@@ -62,7 +65,7 @@ def verdict(path: Path, see: Callable[[Path], None] = read) -> str:
             seconds = time.perf_counter() - start
             if ended:
                 break
-            if seconds > 2.0 * SECONDS:
+            if seconds > 2.0 * limit:
                 os.killpg(child, signal.SIGKILL)
             time.sleep(0.002 if seconds < 1.0 else 0.05)
         said.seek(0)
@@ -70,7 +73,7 @@ def verdict(path: Path, see: Callable[[Path], None] = read) -> str:
     code = os.waitstatus_to_exitcode(status)
     if used.ru_maxrss * 1024 > MEMORY:
         return f"{used.ru_maxrss / 1e6:.1f} GB"
-    if seconds > SECONDS:
+    if seconds > limit:
         return f"{seconds:.0f} s"
     if code not in (0, 2):
         return f"code {code}: {text.splitlines()[-1] if text else ''}"

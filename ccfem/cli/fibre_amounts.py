@@ -59,7 +59,7 @@ def front(
     from ccfem.cli.run import load
     from ccfem.comparison.fibre_front import front_of
     from ccfem.comparison.request import Request, named_strategies
-    from ccfem.errors import InputError
+    from ccfem.errors import InputError, spared
     from ccfem.io.result_folder import whole_folder
     from ccfem.progress import progress_bar
 
@@ -79,9 +79,11 @@ def front(
         numbers = None if counts is None else [int(count) for count in counts]
         found = front_of(request, numbers, points, strengths, progress)
         found.to_frame().to_csv(folder / "front.csv", index=False)
-        found.plot().savefig(folder / "front.png")
+        with spared("front.png", []):
+            found.plot().savefig(folder / "front.png")
         if len(strengths) > 1:
-            found.plot_trade().savefig(folder / "trade.png")
+            with spared("trade.png", []):
+                found.plot_trade().savefig(folder / "trade.png")
         command = shlex.join(["ccfem", *sys.argv[1:]])
         (folder / "command.txt").write_text(command + "\n", encoding="utf-8")
     _say(found)

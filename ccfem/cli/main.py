@@ -23,6 +23,7 @@ def main() -> None:
     for stream in (sys.stdout, sys.stderr):
         if isinstance(stream, io.TextIOWrapper):  # a title outside ASCII on an ASCII terminal
             stream.reconfigure(errors="replace")
+    warnings.formatwarning = _line
     # A title in letters that the font of pictures lacks is drawn as boxes; no more to say.
     warnings.filterwarnings("ignore", message="Glyph .* missing from")
     try:
@@ -42,6 +43,11 @@ def main() -> None:
             f"cannot continue{where}: {error.strerror or error}: correct this and repeat"
         )
     sys.exit(code if isinstance(code, int) else 0)
+
+
+def _line(message: Warning | str, *where: Any, **more: Any) -> str:
+    """Warning as a line of its own: where in the code it arose says nothing to the user."""
+    return f"ccfem: warning: {' '.join(str(message).split())}\n"
 
 
 def _complain(message: str) -> int:

@@ -174,7 +174,7 @@ def run(name: str, ask: "Callable[[], Request]", output: Output) -> None:
     """
     from ccfem.cli.screen import print_comparison
     from ccfem.comparison.engine import answer
-    from ccfem.comparison.files import write_drawings, write_results
+    from ccfem.comparison.files import write_results
     from ccfem.io.result_folder import whole_folder
 
     imported = time.perf_counter()
@@ -186,11 +186,9 @@ def run(name: str, ask: "Callable[[], Request]", output: Output) -> None:
     with whole_folder(where, output.force) as folder, progress_bar(lines=True) as progress:
         comparison = answer(request, _part(progress, 0.0, _SOLVED))
         _check(comparison)
-        if output.drawings:
-            write_drawings(comparison, folder, output.drawings)
         command, rest = shlex.join(["ccfem", *sys.argv[1:]]), _part(progress, _SOLVED, 1.0)
-        text = _text_of(name)
-        write_results(comparison, folder, command, seconds, rest, output.pictures, text)
+        about = (command, seconds, rest, output.pictures, _text_of(name), output.drawings)
+        write_results(comparison, folder, *about)
     print_comparison(comparison, where, time.perf_counter() - _STARTED)
 
 

@@ -175,7 +175,14 @@ def print_comparison(comparison: Comparison, where: Path, seconds: float) -> Non
         console.print(said, style="bold", markup=False)
     if any(run.tested is not None for run in runs):
         console.print(HONEST_PROMISE, style="dim", markup=False)
-    console.print(f"{where / 'report.html'}  ({seconds:.1f} s)", markup=False, soft_wrap=True)
+    _print_where(console, where, seconds)
+
+
+def _print_where(console: Console, where: Path, seconds: float) -> None:
+    """Print where the report is, or the folder of the results where there is none."""
+    report = where / "report.html"
+    shown = report if report.exists() else where
+    console.print(f"{shown}  ({seconds:.1f} s)", markup=False, soft_wrap=True)
 
 
 def _print_load_cases(console: Console, runs: Sequence[Run]) -> None:

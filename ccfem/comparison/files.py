@@ -5,7 +5,7 @@ import os
 import time
 from collections.abc import Mapping, Sequence
 from pathlib import Path
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
@@ -13,6 +13,7 @@ from ccfem.comparison.record import record, results_rows, write_table
 from ccfem.comparison.result import Comparison
 from ccfem.comparison.runs import Run
 from ccfem.comparison.shown import file_stem
+from ccfem.errors import spared
 from ccfem.io.result_folder import whole_folder
 from ccfem.printing.print_plan import PrintPlan
 from ccfem.progress import Progress, silent
@@ -21,7 +22,7 @@ from ccfem.toolpaths import Toolpaths
 if TYPE_CHECKING:
     from ccfem.comparison.pictures import Pictures
 
-__all__ = ["save", "write_drawings", "write_results"]
+__all__ = ["save", "write_results"]
 
 
 def save(
@@ -65,6 +66,7 @@ def write_results(
     progress: Progress = silent,
     pictures: bool = False,
     part_file: str = "",
+    drawings: Sequence[str] = (),
 ) -> None:
     """Write ``results.csv``, ``results.json``, ``report.html`` and paths; pictures where wanted.
 
@@ -73,7 +75,9 @@ def write_results(
     the same moves for a cell of robots, and ``STRATEGY_trim.csv`` where strands leave the part. In
     ``paths.vtp`` the cell array "strategy" numbers the strategies that did not fail, in the order
     of ``results.json``. Over slicings the name of the slicing stands before that of the strategy:
-    ``SLICING_STRATEGY_waypoints.csv``. Characters that do not suit a file are dashes.
+    ``SLICING_STRATEGY_waypoints.csv``. Characters that do not suit a file are dashes. Numbers and
+    paths come first: a picture or a view of the report that fails is left out with a warning, which
+    ``results.json`` keeps under "left_out".
 
     Parameters
     ----------
@@ -92,69 +96,73 @@ def write_results(
         slicings ``SLICING_overview.png`` and the views in space of every run.
     part_file : str
         Text of the part file, for the report.
+    drawings : sequence of {"svg", "dxf"}
+        Also draw every flat layer of every run to scale: ``STRATEGY_layer_NN.svg``, ``.dxf``.
     """
-    from ccfem.comparison.report import report_html
-
     start = time.perf_counter()
-    spent = dict(seconds or {})
-    if pictures:
-        _draw(comparison, folder, lambda what, share: progress(what, 0.6 * share))
-        spent["pictures"] = time.perf_counter() - start
-    progress("writing results", 0.6)
-    start = time.perf_counter()
+    spent, left_out = dict(seconds or {}), list[str]()
+    progress("writing results", 0.0)
     write_table(results_rows(comparison), folder / "results.csv")
     if comparison.curve is not None:
         comparison.curve.frame.to_csv(folder / "curve.csv", index=False)
     _write_paths(comparison, folder)
     spent["files"] = time.perf_counter() - start
+    start = time.perf_counter()
+    for suffix in drawings:
+        with spared(f"drawings ({suffix})", left_out):
+            _write_drawings(comparison, folder, suffix)
+    if pictures:
+        _draw(comparison, folder, lambda what, share: progress(what, 0.2 + 0.6 * share), left_out)
+        spent["pictures"] = time.perf_counter() - start
     progress("writing the report", 0.8)
-    about = record(comparison, command, spent)
-    page = report_html(comparison, about, part_file)
-    (folder / "report.html").write_text(page, encoding="utf-8")
-    about["seconds"]["report"] = time.perf_counter() - start - spent["files"]
+    about = {**record(comparison, command, spent), "left_out": left_out}
+    _write_report(comparison, about, folder, part_file)
+
+
+def _write_report(
+    comparison: Comparison, about: dict[str, Any], folder: Path, part_file: str
+) -> None:
+    """Write ``report.html``, and ``results.json`` whatever becomes of the report."""
+    from ccfem.comparison.report import report_html
+
+    start = time.perf_counter()
+    with spared("report.html", about["left_out"]):
+        page = report_html(comparison, about, part_file)
+        (folder / "report.html").write_text(page, encoding="utf-8")
+    about["seconds"]["report"] = time.perf_counter() - start
     about["files"] = sorted({path.name for path in folder.iterdir()} | {"results.json"})
     text = json.dumps(about, indent=1, ensure_ascii=False, allow_nan=False)
     (folder / "results.json").write_text(text + "\n", encoding="utf-8")
 
 
-def write_drawings(comparison: Comparison, folder: Path, formats: Sequence[str]) -> None:
-    """Draw every flat layer of every run to scale: ``STRATEGY_layer_NN.svg`` and ``.dxf``.
-
-    Parameters
-    ----------
-    comparison : Comparison
-    folder : Path
-    formats : sequence of {"svg", "dxf"}
-
-    Raises
-    ------
-    InputError
-        Where layers are curved.
-    """
+def _write_drawings(comparison: Comparison, folder: Path, suffix: str) -> None:
+    """Draw every layer of every run to scale; raise `InputError` where layers are curved."""
     from ccfem.export.layer_drawings import draw_layer
 
     width = comparison.case.machine.fibre_width
     for run in comparison.succeeded:
         for layer in comparison.layers:
-            for suffix in formats:
-                file = folder / f"{file_stem(run.name)}_layer_{layer.index:02d}.{suffix}"
-                draw_layer(run.toolpaths, layer, width, file)
+            file = folder / f"{file_stem(run.name)}_layer_{layer.index:02d}.{suffix}"
+            draw_layer(run.toolpaths, layer, width, file)
 
 
-def _draw(comparison: Comparison, folder: Path, progress: Progress) -> None:
-    """Draw and write all pictures."""
+def _draw(comparison: Comparison, folder: Path, progress: Progress, left_out: list[str]) -> None:
+    """Draw and write the pictures that are files of their own."""
     from ccfem.comparison.pictures import draw_pictures, overview_picture
     from ccfem.plot.canvas import png
 
     if not comparison.over_slicings:
-        _write_pictures(draw_pictures(comparison, progress), folder)
+        with spared("pictures", left_out):
+            _write_pictures(draw_pictures(comparison, progress), folder)
     for k, (name, alone) in enumerate(comparison.slicings.items()):
         progress(f"drawing {name}", k / len(comparison.slicings))
-        if comparison.over_slicings and alone.succeeded:
-            picture = folder / f"{file_stem(name)}_overview.png"
-            picture.write_bytes(png(overview_picture(alone)))
-        if comparison.over_slicings or any(layer.flat is None for layer in alone.layers):
-            _write_in_space(alone, folder, name)
+        curved = any(layer.flat is None for layer in alone.layers)
+        with spared(f"pictures of {name}" if name else "pictures in space", left_out):
+            if comparison.over_slicings and alone.succeeded:
+                picture = folder / f"{file_stem(name)}_overview.png"
+                picture.write_bytes(png(overview_picture(alone)))
+            if comparison.over_slicings or curved:
+                _write_in_space(alone, folder, name)
 
 
 def _write_pictures(pictures: "Pictures", folder: Path) -> None:

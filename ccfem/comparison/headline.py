@@ -63,7 +63,7 @@ TEST_COLUMNS = (
         "1",
         "(stiffness_ratio_tension - 1) over the same of the bound that no paths of the compared "
         "length exceed, strands beside each other carrying tension only; empty at another length.",
-        "at most 1, but where strands cross; higher is better",
+        "at most 1, but where strands cross: see the remarks; higher is better",
     ),
     Column(
         "gain_per_metre",

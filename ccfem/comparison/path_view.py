@@ -132,16 +132,7 @@ def in_layer(points: FloatArray, layer: Layer) -> FloatArray:
     """Points (n, 3) of a layer in its plane, or in the chart of a curved one: (n, 2), mm."""
     if layer.flat is not None:
         return layer.plane.project(points)
-    count = len(points)
-    lines = Toolpaths(
-        points,
-        np.zeros((count, 3)),
-        np.array([0, count]),
-        np.array([layer.index]),
-        np.array([FIBRE]),
-        np.array([False]),
-    )
-    return chart_of(layer).flattened(lines).points[:, :2] if count else np.zeros((0, 2))
+    return chart_of(layer).images(points)[:, :2]
 
 
 def angle_on_layer(plane: FloatArray, stress: LayerStress) -> FloatArray:

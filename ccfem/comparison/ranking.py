@@ -8,10 +8,11 @@ from ccfem.comparison.headline import HEADLINE, headline_values
 from ccfem.comparison.request import InAll, Wanted
 from ccfem.comparison.runs import Run
 from ccfem.planning.equal_fibre import TOLERANCE
-from ccfem.virtual_testing.stiffer import FIRST, RESOLUTION, SAME, UNDECIDED, stiffer
+from ccfem.virtual_testing.stiffer import FIRST, RESOLUTION, SAME, SECOND, UNDECIDED
 
 __all__ = [
     "best_values",
+    "is_tested",
     "merit",
     "off_length",
     "order_of",
@@ -22,6 +23,11 @@ __all__ = [
 
 _SAME = TOLERANCE * (1.0 + 1e-9)
 """Share of the wanted length by which a run may differ and still count as equal."""
+
+_MODES = ("tension", "bonded")
+
+_DIGITS = 2
+"""Decimals with which tables show a ratio of stiffnesses."""
 
 _STIFFNESSES = (
     "stiffness",
@@ -65,9 +71,9 @@ def best_values(runs: Sequence[Run], wanted: Wanted) -> dict[str, float]:
     """Best value of each headline column, if a run is really better than another.
 
     Runs that cannot be printed, lay another length than the wanted one, or leave layers empty have
-    no best value. A stiffness is best only if its run is stiffer than every other by more than the
-    resolution of the test, whatever fibres in compression do. A load at first failure is best if it
-    is the largest by more than that.
+    no best value. Stiffnesses are best of the run that is stiffer than every other (`order_of`), if
+    there is one. A load at first failure is best if it is the largest by more than the resolution
+    of the test.
     """
     equal = [
         run
@@ -82,9 +88,11 @@ def best_values(runs: Sequence[Run], wanted: Wanted) -> dict[str, float]:
         known = sorted(value for value in values if np.isfinite(value))
         if not head.better or len(known) < 2 or known[0] == known[-1]:
             continue
-        if head.column in _STIFFNESSES and not stiffest:
-            continue
         found = known[-1] if head.better == "high" else known[0]
+        if head.column in _STIFFNESSES:
+            if not stiffest:
+                continue
+            found = headline_values(order[0])[head.column]
         if head.column == "first_failure_load" and not _strongest(equal, found):
             continue
         best[head.column] = found
@@ -121,8 +129,12 @@ def stiffness_ratio(run: Run, mode: str = "tension") -> float:
 
 
 def merit(run: Run, mode: str = "tension") -> float:
-    """Return the value that ranks runs: the ratio, or `TestedCases.merit` of several load cases."""
-    if run.tested is not None and run.tested.cases is not None:
+    """Return the value that ranks runs: the ratio, or `TestedCases.merit` of several load cases.
+
+    Modes are "tension", "bonded" and, under alternative supports, "tension_alternative" and
+    "bonded_alternative", which several load cases do not have.
+    """
+    if mode in _MODES and run.tested is not None and run.tested.cases is not None:
         return run.tested.cases.merit(mode)
     return stiffness_ratio(run, mode)
 
@@ -135,35 +147,32 @@ def stiffness_ratios(one: Run, other: Run) -> tuple[float, float]:
     )
 
 
-def order_of(better: Run, other: Run) -> str:
-    """Say whether a run is stiffer than one ranked below it.
+def is_tested(run: Run) -> bool:
+    """Whether a run has a stiffness, with fibres in tension only and with bonded fibres."""
+    return run.tested is not None and all(np.isfinite(merit(run, m)) for m in _MODES)
+
+
+def order_of(one: Run, other: Run) -> str:
+    """Say which of two runs is stiffer, as far as their table shows it.
 
     Returns
     -------
     str
-        FIRST, SAME or UNDECIDED of `ccfem.virtual_testing.stiffer`. It is also undecided if only
-        bonded fibres, or only the alternative supports, tell the runs apart, or tell the opposite.
-        SAME if one run is untested.
+        FIRST or SECOND if one is stiffer than the other by more than `RESOLUTION`, fibres carrying
+        tension only, and the table shows none of its stiffnesses, bonded or under alternative
+        supports, below that of the other. SAME if no stiffness differs by more than `RESOLUTION`.
+        Else UNDECIDED, and wherever a stiffness is missing.
     """
-    if better.tested is None or other.tested is None:
+    modes = _MODES
+    if all(run.tested is not None and run.tested.alternative is not None for run in (one, other)):
+        modes = (*_MODES, *(f"{mode}_alternative" for mode in _MODES))
+    first, second = (np.array([merit(run, mode) for mode in modes]) for run in (one, other))
+    if not np.isfinite([first, second]).all():
+        return UNDECIDED
+    if np.maximum(first / second, second / first).max() <= 1.0 + RESOLUTION:
         return SAME
-    if better.tested.cases is not None and other.tested.cases is not None:
-        return _order_in_cases(better, other)
-    found = stiffer(better.tested.bracket, other.tested.bracket)
-    again = (better.tested.alternative, other.tested.alternative)
-    if again[0] is not None and again[1] is not None:
-        second = stiffer(again[0].bracket, again[1].bracket)
-        if second not in (found, SAME):
-            found = second if found == SAME else UNDECIDED
-    if found == FIRST and stiffness_ratios(better, other)[0] <= 1.0 + RESOLUTION:
-        return UNDECIDED
-    return found if found in (FIRST, SAME) else UNDECIDED
-
-
-def _order_in_cases(better: Run, other: Run) -> str:
-    """Order by the worst of several load cases, as `order_of`."""
-    gains = [merit(better, mode) / merit(other, mode) - 1.0 for mode in ("tension", "bonded")]
-    ahead, behind = gains[0] > RESOLUTION, min(gains) < -RESOLUTION
-    if behind or (max(gains) > RESOLUTION and not ahead):
-        return UNDECIDED
-    return FIRST if ahead else SAME
+    for found, high, low in ((FIRST, first, second), (SECOND, second, first)):
+        shown = high.round(_DIGITS) >= low.round(_DIGITS)
+        if high[0] > (1.0 + RESOLUTION) * low[0] and shown.all():
+            return found
+    return UNDECIDED

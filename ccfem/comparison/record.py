@@ -23,7 +23,7 @@ if TYPE_CHECKING:
 
 __all__ = ["record", "results_frame", "results_rows", "write_table"]
 
-_FIRST = ("slicing", "strategy", "layer", "failure")
+_FIRST = ("slicing", "strategy", "layer", "failure", "printable", "why_not")
 
 _PACKAGES = ("numpy", "scipy", "numba", "pyamg", "shapely", "pypardiso")
 
@@ -31,16 +31,17 @@ _PACKAGES = ("numpy", "scipy", "numba", "pyamg", "shapely", "pypardiso")
 def results_rows(comparison: Comparison) -> list[dict[str, Any]]:
     """Every index of every run: one row per layer, and one in total.
 
-    Columns are strategy, layer ("total" or its index), failure, the evaluator's columns, and those
-    of the virtual test, which are of the whole part and stand in the total rows only. A failed
-    strategy has its total row, with the reason and no numbers. A row holds what it has a value for.
+    Columns are slicing where several are compared, strategy, layer ("total" or its index), failure,
+    printable, why_not (what keeps the paths from being printed), the evaluator's columns, and those
+    of the virtual test. Printable, why_not and the virtual test are of the whole part, and stand in
+    the total rows only. A failed strategy has its total row, with the reason and no numbers. A row holds what it has a value for.
     """
     rows: list[dict[str, Any]] = []
     for run in comparison.runs:
         own = {"slicing": run.slicing} if comparison.over_slicings else {}
         own |= {"strategy": run.strategy_name}
         if run.evaluation is None:
-            rows.append({**own, "layer": "total", "failure": run.failure})
+            rows.append({**own, "layer": "total", "failure": run.failure, "printable": False})
             continue
         values = run.evaluation.values
         for k, layer in enumerate((*run.evaluation.layers, "total")):
@@ -49,7 +50,7 @@ def results_rows(comparison: Comparison) -> list[dict[str, Any]]:
         extra = headline_values(run)
         tested = (column.name for column in TEST_COLUMNS)
         rows[-1] |= {name: extra[name] for name in tested if name in extra}
-        rows[-1]["fails_in"] = run.fails_in
+        rows[-1] |= {"printable": run.printable, "why_not": run.why_not, "fails_in": run.fails_in}
         if run.tested is not None and run.tested.cases is not None:
             rows[-1] |= run.tested.cases.values()
     return rows

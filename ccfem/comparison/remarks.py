@@ -4,7 +4,7 @@ from collections.abc import Mapping, Sequence
 
 import numpy as np
 
-from ccfem.comparison.ranking import off_length, order_of, ranking, stiffness_ratio
+from ccfem.comparison.ranking import is_tested, off_length, order_of, ranking, stiffness_ratio
 from ccfem.comparison.request import Wanted
 from ccfem.comparison.runs import Run
 from ccfem.evaluation.evaluation import Evaluation
@@ -14,7 +14,7 @@ from ccfem.fibre_aware.upper_bound import LOOSE, UpperBound
 from ccfem.layers.layer import Layer
 from ccfem.virtual_testing.stiffer import RESOLUTION, SAME, UNDECIDED
 
-__all__ = ["bound_remark", "open_remarks", "remarks"]
+__all__ = ["bound_remark", "open_remarks", "remarks", "why_above"]
 
 _FULL = 0.93
 """Coverage of a layer above which it counts as filled."""
@@ -40,7 +40,7 @@ def remarks(runs: Sequence[Run], wanted: Wanted, bound: UpperBound | None = None
         for line in _about(run, wanted, bound is not None):
             lines.setdefault(line, []).append(run.name)
     found = [f"{', '.join(names)}: {line}" for line, names in lines.items()]
-    tested = [run for run in order if run.tested is not None and not off_length(run, wanted)]
+    tested = [run for run in order if is_tested(run) and not off_length(run, wanted)]
     found += _about_orders(tested)
     return [*found, bound_remark(tested, bound)] if bound is not None and tested else found
 
@@ -58,10 +58,10 @@ def _about(run: Run, wanted: Wanted, bounded: bool) -> list[str]:
         lines.append(run.tested.failure.note)
     if run.evaluation is not None:
         lines += _about_links(run.evaluation.total)
-        if getattr(run.strategy, "crosses", False):
-            lines += _about_crossings(run.evaluation, bounded)
-            if wanted is None:
-                lines += _about_open(run.evaluation)
+        meant = getattr(run.strategy, "crosses", False)
+        lines += _about_crossings(run.evaluation, meant, bounded)
+        if meant and wanted is None:
+            lines += _about_open(run.evaluation)
     if run.why_not:
         lines.append(f"not printable as planned: {run.why_not}")
     if run.print_plan is not None:
@@ -107,13 +107,14 @@ def _about_links(total: Mapping[str, float]) -> list[str]:
     ]
 
 
-def _about_crossings(evaluation: Evaluation, bounded: bool) -> list[str]:
-    """Say how often strands that cross on purpose lie over each other, and the consequences."""
+def _about_crossings(evaluation: Evaluation, meant: bool, bounded: bool) -> list[str]:
+    """Say how often strands lie over each other, on purpose or not, and the consequences."""
     crossings = evaluation.values["crossings"] + evaluation.values["self_crossings"]
     if not crossings[-1]:
         return []
+    number = f"{crossings[-1]:.0f} crossing{'s' if crossings[-1] > 1 else ''}"
     line = (
-        f"strands cross in the joints: {crossings[-1]:.0f} crossings on "
+        f"strands cross{'' if meant else ', which the strategy does not intend'}: {number} on "
         f"{np.count_nonzero(crossings[:-1])} of {len(evaluation.layers)} layers, thicker there"
     )
     bound = "; the bound does not hold for strands laid over each other"
@@ -180,10 +181,10 @@ def _filling(run: Run) -> bool:
 
 
 def bound_remark(tested: Sequence[Run], bound: UpperBound) -> str:
-    """Say how far the best run is from what any paths could reach.
+    """Say how far the best run is from what any paths could reach, and which runs lie above that.
 
     The bound holds for strands that lie beside each other and carry tension only. Strands that
-    overlap may exceed it, and so may bonded ones.
+    cross may exceed it, and so may bonded ones.
 
     Parameters
     ----------
@@ -194,15 +195,39 @@ def bound_remark(tested: Sequence[Run], bound: UpperBound) -> str:
     best = tested[0]
     length, name = max(run.length_per_layer for run in tested), best.name
     layers = 0 if best.evaluation is None else len(best.evaluation.layers)
-    share = bound.share(stiffness_ratio(best))
     bonded = max(stiffness_ratio(run, "bonded") for run in tested)
     free = "; bonded fibres are not bounded" if bonded > bound.ratio else ""
     loose = f"; it may be loose by {bound.gap:.1%}" if bound.gap > LOOSE else ""
     most = (
-        f"paths of {length:.0f} mm a layer in {layers} layers can make the part "
+        f"no paths of {length:.0f} mm a layer in {layers} layers can make the part "
         f"more than {bound.ratio:.2f} times as stiff (fibres carrying tension only"
         f"{free}{loose})"
     )
-    if share > 1.0:
-        return f"only where strands overlap, as those of {name} do, {most}"
-    return f"no {most}: {name} reaches {share:.0%} of that gain"
+    shares = {run.name: (run, bound.share(stiffness_ratio(run))) for run in tested}
+    above = [
+        f"{run.name} reaches {stiffness_ratio(run):.2f} times: {why_above(run, 1.0 - 1.0 / share)}"
+        for run, share in shares.values()
+        if share > 1.0
+    ]
+    if shares[name][1] <= 1.0:
+        above.insert(0, f"{name} reaches {shares[name][1]:.0%} of that gain")
+        return f"{most}: {'; but '.join(above)}"
+    return f"by the bound, {most}; {'; '.join(above)}"
+
+
+def why_above(run: Run, share: float) -> str:
+    """Say why a run lies above a bound: strands that cross, if that is enough of its fibre.
+
+    Fibre on other fibre of its direction, and outside the part, carries nothing in the test.
+
+    Parameters
+    ----------
+    run : Run
+    share : float
+        Of its gain that lies above the bound.
+    """
+    across = 0.0 if run.evaluation is None else run.evaluation.total["across_fibre"]
+    if across >= share:
+        return f"{across:.1%} of its fibre lies across other fibre, which the bound leaves out"
+    some = f"only {across:.1%} of its fibre lies" if across >= 0.0005 else "none of its fibre lies"
+    return f"{some} across other fibre, so the cause is not known: trust neither number"

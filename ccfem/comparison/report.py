@@ -19,6 +19,7 @@ from ccfem.comparison.report_tables import (
 )
 from ccfem.comparison.result import Comparison
 from ccfem.elasticity.stress_field import about_cells
+from ccfem.errors import spared
 from ccfem.evaluation import COLUMNS
 from ccfem.inspection import check
 from ccfem.plot.colours import palette
@@ -39,7 +40,7 @@ def report_html(
     ----------
     comparison : Comparison
     record : mapping
-        What ``results.json`` holds.
+        What ``results.json`` holds; a view that fails is added to its "left_out".
     part_file : str
         Text of the part file, where there is one.
 
@@ -53,15 +54,19 @@ def report_html(
     ranked = [run for run in comparison.ranking if run.evaluation is not None]
     checked = check(comparison.case)
     radius = comparison.case.machine.minimum_radius
-    data = {
-        "part": part_view(checked, comparison.stress),
-        "layers": layer_views(comparison.slicings, strategies),
-        "charts": {
-            "curve": curve_charts(curve, colours),
-            "fronts": fronts(ranked, colours),
-            "spreads": list(spreads(ranked, colours, radius)) if ranked else [],
-        },
-    }
+    left_out: list[str] = record["left_out"]
+    charts: dict[str, Any] = {"curve": [], "fronts": [], "spreads": []}
+    data: dict[str, Any] = {"part": None, "layers": {"stacks": []}, "charts": charts}
+    with spared("view of the part", left_out):
+        data["part"] = part_view(checked, comparison.stress)
+    with spared("view of layers and paths", left_out):
+        data["layers"] = layer_views(comparison.slicings, strategies)
+    with spared("curve", left_out):
+        charts["curve"] = curve_charts(curve, colours)
+    with spared("fronts", left_out):
+        charts["fronts"] = fronts(ranked, colours)
+    with spared("spreads", left_out):
+        charts["spreads"] = list(spreads(ranked, colours, radius)) if ranked else []
     keys = cited(methods_of(record))
     context = {
         "title": comparison.case.title,
@@ -76,6 +81,7 @@ def report_html(
             comparison, comparison.wanted, HEADLINE_OF_SLICINGS if several else HEADLINE
         ),
         "colours": colours,
+        "left_out": left_out,
         "remarks": comparison.remarks,
         "promise": HONEST_PROMISE if any(run.tested is not None for run in ranked) else "",
         "has_curve": curve is not None,

@@ -4,13 +4,15 @@ from collections.abc import Sequence
 
 import numpy as np
 
-from ccfem.comparison.ranking import merit, off_length, order_of, ranking
+from ccfem.comparison.ranking import is_tested, merit, off_length, order_of, ranking
+from ccfem.comparison.remarks import why_above
 from ccfem.comparison.request import Wanted
 from ccfem.comparison.runs import Run
+from ccfem.comparison.verdict import all_same, comparable, left_out
 from ccfem.elasticity.weighted_cases import WeightedCases
 from ccfem.fibre_aware.cases_bound import LEAST, CasesBound
 from ccfem.fibre_aware.upper_bound import LOOSE
-from ccfem.virtual_testing.stiffer import FIRST, RESOLUTION, SAME
+from ccfem.virtual_testing.stiffer import FIRST, RESOLUTION
 
 __all__ = ["cases_remarks", "cases_rows", "cases_verdict"]
 
@@ -25,11 +27,7 @@ def cases_verdict(runs: Sequence[Run], wanted: Wanted, bound: CasesBound | None)
         Length of fibre that all were held to.
     bound : CasesBound, optional
     """
-    order = [
-        run
-        for run in ranking(runs, wanted)
-        if run.printable and not off_length(run, wanted) and np.isfinite(merit(run))
-    ]
+    order = [run for run in comparable(runs, wanted) if is_tested(run)]
     if len(order) < 2:
         return ""
     first, found = order[0], [order_of(order[0], other) for other in order[1:]]
@@ -39,22 +37,25 @@ def cases_verdict(runs: Sequence[Run], wanted: Wanted, bound: CasesBound | None)
         else "the unreinforced stiffness"
     )
     reached = f"{merit(first):.0%} {of}" if bound is not None else f"{merit(first):.2f} times {of}"
+    group = [first, *(run for run, each in zip(order[1:], found, strict=True) if each != FIRST)]
+    names = f"{first.name} and {', '.join(run.name for run in group[1:])}"
     if all(each == FIRST for each in found):
-        return (
+        said = (
             f"{first.name} serves all load cases best: the worst of them reaches {reached}, "
             f"{merit(first) / merit(order[1]):.2f} times {order[1].name} (predicted, fibres "
             "carrying tension only; no other is better with bonded fibres)."
         )
-    like = [run.name for run, each in zip(order[1:], found, strict=True) if each != FIRST]
-    if all(each in (FIRST, SAME) for each in found):
-        return (
-            f"No difference between {first.name} and {', '.join(like)} over all load cases: less "
-            f"than {RESOLUTION:.0%}, the resolution of the test."
+    elif all_same(group):
+        said = (
+            f"No difference between {names} over all load cases: less than {RESOLUTION:.0%}, the "
+            "resolution of the test."
         )
-    return (
-        f"Undecided between {first.name} and {', '.join(like)} over all load cases: tension-only "
-        "and bonded fibres do not agree on an order."
-    )
+    else:
+        said = (
+            f"Undecided between {names} over all load cases: tension-only and bonded fibres do "
+            "not agree on an order."
+        )
+    return said + left_out(runs, wanted, first)
 
 
 def cases_remarks(
@@ -89,20 +90,21 @@ def cases_remarks(
         if getattr(run.strategy, "objective", None) == LEAST
     ]
     tested = [
-        run
-        for run in ranking(runs, wanted)
-        if run.tested is not None and not off_length(run, wanted)
+        run for run in ranking(runs, wanted) if is_tested(run) and not off_length(run, wanted)
     ]
     if bound is None or not tested or tested[0].tested is None or tested[0].tested.cases is None:
         return found
     ratios = tested[0].tested.cases.tension.ratios
     gap = bound.duality_gap
     loose = f"; the bound may be loose by {gap:.1%}" if gap > LOOSE else ""
+    away = bound.gap(ratios)
+    where = f"{away:.1%} from" if away >= 0.0 else f"{-away:.1%} above"
+    why = "" if away >= 0.0 else f": {why_above(tested[0], -away)}"
     return [
         *found,
         f"no paths of this length bring the worst case above {1.0 / bound.least:.0%} of what is "
         f"possible for it alone: {tested[0].name} reaches {bound.shares(ratios).min():.0%}, "
-        f"{bound.gap(ratios):.1%} from that bound (fibres carrying tension only{loose})",
+        f"{where} that bound (fibres carrying tension only{loose}){why}",
     ]
 
 

@@ -1,25 +1,35 @@
 """The verdict of a comparison: one sentence on which strategy is best, and in what respect."""
 
 from collections.abc import Sequence
+from itertools import combinations
 
 import numpy as np
 
 from ccfem.comparison.headline import headline_values
-from ccfem.comparison.ranking import off_length, order_of, ranking, stiffness_ratio
+from ccfem.comparison.ranking import (
+    is_tested,
+    merit,
+    off_length,
+    order_of,
+    ranking,
+    stiffness_ratio,
+)
 from ccfem.comparison.request import InAll, Wanted
 from ccfem.comparison.runs import Run
-from ccfem.virtual_testing.stiffer import RESOLUTION, SAME, UNDECIDED
+from ccfem.virtual_testing.stiffer import FIRST, RESOLUTION, SAME
 
-__all__ = ["verdict"]
+__all__ = ["all_same", "comparable", "left_out", "verdict"]
 
 
 def verdict(runs: Sequence[Run], wanted: Wanted) -> str:
     """Say in one sentence which strategy is best, in what respect, and at how much fibre.
 
-    Only runs count that can be printed and have the wanted length. "No difference" is stated if the
-    best differ by less than the resolution of the test. "Undecided" is stated if tension-only and
-    bonded fibres, or the supports of the part and its alternative ones, disagree on the order of
-    the best and any other.
+    Only runs count that can be printed and have the wanted length. One is the stiffest if it is
+    stiffer than every other of them by more than the resolution of the test, fibres carrying
+    tension only, and none is stiffer with bonded fibres or under the alternative supports, as the
+    table shows them (`order_of`). "No difference" is stated if all stiffnesses of the best agree
+    within the resolution; else the best are "undecided". Runs that do not count are named, with
+    those that are stiffer than the best.
 
     Parameters
     ----------
@@ -32,62 +42,98 @@ def verdict(runs: Sequence[Run], wanted: Wanted) -> str:
     str
         Empty if fewer than two runs are left.
     """
-    order = [run for run in ranking(runs, wanted) if run.evaluation is not None]
-    kept = [run for run in order if run.printable and not off_length(run, wanted)]
+    kept = comparable(runs, wanted)
     if len(kept) < 2:
         return ""
-    said = _of_printable(kept, wanted)
-    off = [
-        f"{run.name} (lays {_laid(run, wanted)})"
-        for run in order
-        if run.printable and off_length(run, wanted)
-    ]
-    if said and off:
-        said += f" Not at that length: {', '.join(off)}."
-    left = [run.name for run in order if not run.printable]
-    return f"{said} Not printable as planned: {', '.join(left)}." if said and left else said
+    tested = [run for run in kept if is_tested(run)]
+    if len(tested) < 2:
+        return _by_efficiency(kept, wanted) + left_out(runs, wanted)
+    return _by_stiffness(tested, wanted) + left_out(runs, wanted, tested[0])
 
 
-def _of_printable(order: Sequence[Run], wanted: Wanted) -> str:
+def comparable(runs: Sequence[Run], wanted: Wanted) -> list[Run]:
+    """Select the runs that can be printed and have the wanted length, the best first."""
+    return [run for run in ranking(runs, wanted) if run.printable and not off_length(run, wanted)]
+
+
+def left_out(runs: Sequence[Run], wanted: Wanted, best: Run | None = None) -> str:
+    """Name the runs that a verdict does not count, and which of them are stiffer than the best.
+
+    Parameters
+    ----------
+    runs : sequence of Run
+    wanted : float, mm, InAll or None
+    best : Run, optional
+        Best of the runs that count; without it no run is called stiffer or untested.
+    """
+    order = [run for run in ranking(runs, wanted) if run.evaluation is not None]
+    said = {
+        "Not tested": [run.name for run in comparable(runs, wanted) if best and not is_tested(run)],
+        "Not at that length": [
+            f"{run.name} (lays {_laid(run, wanted)}{', stiffer' if _stiffer(run, best) else ''})"
+            for run in order
+            if run.printable and off_length(run, wanted)
+        ],
+        "Not printable as planned": [
+            f"{run.name}{' (stiffer)' if _stiffer(run, best) else ''}"
+            for run in order
+            if not run.printable
+        ],
+    }
+    return "".join(f" {what}: {', '.join(names)}." for what, names in said.items() if names)
+
+
+def _stiffer(run: Run, best: Run | None) -> bool:
+    """Whether a run that does not count is stiffer than the best, in tension only."""
+    if best is None or run.tested is None or best.tested is None:
+        return False
+    cases = [each.tested.cases for each in (run, best) if each.tested is not None]
+    if len({each is None or each.bound is None for each in cases}) > 1:
+        return False  # a share of the bound, which another length has none of, against a ratio
+    return merit(run) > merit(best)
+
+
+def _by_stiffness(order: Sequence[Run], wanted: Wanted) -> str:
     first, second = order[0], order[1]
-    if first.tested is None or second.tested is None:
-        return _by_efficiency(first, second, wanted)
-    tested = [run for run in order[1:] if run.tested is not None]
-    unclear = [run for run in tested if order_of(first, run) == UNDECIDED]
-    same = [run for run in tested if order_of(first, run) == SAME]
-    both = first.tested.alternative is not None
-    if unclear:
-        group = [first, *(run for run in tested if run in unclear or run in same)]
+    found = [order_of(first, run) for run in order[1:]]
+    both = all(run.tested is not None and run.tested.alternative is not None for run in order)
+    if all(each == FIRST for each in found):
+        gain = stiffness_ratio(first) / stiffness_ratio(second)
         return (
-            f"Undecided between {_names(group)}, {_amount(wanted)}: "
-            f"{_ratios(group)} times the unreinforced stiffness where fibres carry tension only, "
-            f"{_ratios(group, 'bonded')} where they are bonded{_under_other(group)}."
+            f"{first.name} makes the stiffest part, {_amount(wanted)}: "
+            f"{stiffness_ratio(first):.2f} times the unreinforced one, and {gain:.2f} times "
+            f"{second.name} (predicted, fibres carrying tension only; no other is stiffer with "
+            f"bonded fibres{', or under the alternative supports' if both else ''})."
         )
-    if same:
-        group = [first, *same]
+    group = [first, *(run for run, each in zip(order[1:], found, strict=True) if each != FIRST)]
+    if all_same(group):
         return (
             f"No difference between {_names(group)}, {_amount(wanted)}: "
             f"{_ratios(group)} times the unreinforced stiffness, within {RESOLUTION:.0%}, the "
             f"resolution of the test{', under both models of the supports' if both else ''}."
         )
-    gain = stiffness_ratio(first) / stiffness_ratio(second)
     return (
-        f"{first.name} makes the stiffest part, {_amount(wanted)}: "
-        f"{stiffness_ratio(first):.2f} times the unreinforced one, and {gain:.2f} times "
-        f"{second.name} (predicted, fibres carrying tension only; no other is stiffer with bonded "
-        f"fibres{', or under the alternative supports' if both else ''})."
+        f"Undecided between {_names(group)}, {_amount(wanted)}: "
+        f"{_ratios(group)} times the unreinforced stiffness where fibres carry tension only, "
+        f"{_ratios(group, 'bonded')} where they are bonded{_under_other(group)}."
     )
 
 
-def _by_efficiency(first: Run, second: Run, wanted: Wanted) -> str:
-    best, following = (headline_values(run)["efficiency"] for run in (first, second))
-    if not np.isfinite(best):
-        return "No verdict: there is no virtual test, and no fibre lies in tension."
-    then = f", then {second.name} with {following:.3f}" if np.isfinite(following) else ""
-    return (
-        f"By efficiency alone (no virtual test): {first.name} with {best:.3f}{then}, "
-        f"{_amount(wanted)}."
-    )
+def all_same(runs: Sequence[Run]) -> bool:
+    """Whether no two of some runs differ."""
+    return all(order_of(*pair) == SAME for pair in combinations(runs, 2))
+
+
+def _by_efficiency(runs: Sequence[Run], wanted: Wanted) -> str:
+    known = {run.name: headline_values(run)["efficiency"] for run in runs}
+    order = sorted((name for name in known if np.isfinite(known[name])), key=lambda n: -known[n])
+    why = "fewer than two have a virtual test" if any(map(is_tested, runs)) else "no virtual test"
+    if not order:
+        said = why if any(map(is_tested, runs)) else "there is no virtual test"
+        return f"No verdict: {said}, and no fibre lies in tension."
+    then = f", then {order[1]} with {known[order[1]]:.3f}" if len(order) > 1 else ""
+    best = f"{order[0]} with {known[order[0]]:.3f}"
+    return f"By efficiency alone ({why}): {best}{then}, {_amount(wanted)}."
 
 
 def _names(runs: Sequence[Run]) -> str:

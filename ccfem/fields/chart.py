@@ -62,11 +62,17 @@ class Chart:
         at = min(int(np.searchsorted(below, 0.95 * below[-1])), len(order) - 1)
         return float(worst[order[at]] - 1.0)
 
+    def images(self, points: FloatArray) -> FloatArray:
+        """Images (n, 3) in the chart of points (n, 3) on the layer, mm."""
+        if not len(points):
+            return np.zeros((0, 3))
+        found = nearest_on_triangles(self.layer.points, self.layer.triangles, points)
+        corners = self.flat.points[self.layer.triangles[found.triangle]]
+        return np.asarray(np.einsum("qk,qkd->qd", found.weights, corners))
+
     def flattened(self, paths: Toolpaths) -> Toolpaths:
         """Images in the chart of paths on the layer."""
-        found = nearest_on_triangles(self.layer.points, self.layer.triangles, paths.points)
-        corners = self.flat.points[self.layer.triangles[found.triangle]]
-        points = np.einsum("qk,qkd->qd", found.weights, corners)
+        points = self.images(paths.points)
         normals = np.broadcast_to([0.0, 0.0, 1.0], points.shape)
         return replace(paths, points=points, normals=normals)
 

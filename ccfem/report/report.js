@@ -607,8 +607,10 @@ async function start() {
   const program = document.createElement("script");
   program.textContent = new TextDecoder().decode(await inflate("plotly"));
   document.head.append(program);
-  partScene(data.part);
-  if (!byId("layers").hidden) spaceScene(data.part, data.layers);
+  if (data.part) {
+    partScene(data.part);
+    if (!byId("layers").hidden) spaceScene(data.part, data.layers);
+  } else byId("part-view").hidden = true;
   charts(data.charts);
   document.body.dataset.ready = "yes";
 }

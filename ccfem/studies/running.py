@@ -11,6 +11,7 @@ from typing import Any
 from uuid import uuid4
 
 from ccfem.checks import check_number
+from ccfem.errors import spared
 from ccfem.io.whole import whole_file
 from ccfem.progress import Progress, silent
 from ccfem.studies.cluster import on_cluster
@@ -141,7 +142,8 @@ def write_tables(result: StudyResult) -> None:
                 plain[name] = frame[name].map(lambda v: v if v is None else str(v))
         with whole_file(folder / "results.parquet") as temporary:
             plain.to_parquet(temporary, index=False)
-    _write(folder / "study.html", study_page(result))
+    with spared("study.html", []):
+        _write(folder / "study.html", study_page(result))
 
 
 def _write(path: Path, text: str) -> None:

@@ -353,9 +353,18 @@ class Woven:
 
 def test_strands_that_cross_by_intention_are_reported():
     result = compare(strip(), {"woven": Woven()}, natural=True)
-    said = "woven: strands cross in the joints: 12 crossings on 2 of 4 layers, thicker there"
-    assert f"{said}; the bound does not hold for strands laid over each other" in result.remarks
-    assert said in replace(result, bounds={}).remarks
+    (run,) = result.runs
+    number = "12 crossings on 2 of 4 layers, thicker there"
+    no_bound = "the bound does not hold for strands laid over each other"
+    assert f"woven: strands cross: {number}; {no_bound}" in result.remarks
+    assert f"woven: strands cross: {number}" in replace(result, bounds={}).remarks
+    # The same paths of a strategy that means to lay its strands beside each other.
+    other = replace(result, runs=(replace(run, strategy=create("zigzag")),), bounds={})
+    assert f"woven: strands cross, which the strategy does not intend: {number}" in other.remarks
+    values = {name: column.copy() for name, column in run.evaluation.values.items()}
+    values["crossings"][:] = 0.0
+    none = replace(run, evaluation=replace(run.evaluation, values=values))
+    assert "cross" not in " ".join(replace(other, runs=(none,)).remarks)
 
 
 def test_the_bound_says_that_it_is_not_one_of_bonded_fibres(compared):
@@ -455,13 +464,39 @@ def test_tables_say_what_share_of_the_possible_gain_each_strategy_reaches(compar
         assert 0.0 < values["share_of_gain"] <= 1.0
 
 
-def test_strands_that_overlap_may_exceed_the_bound(compared):
-    best = compared.ranking[0]
+def with_across(run, share):
+    """A run of which this share of the fibre lies across other fibre."""
+    values = {name: column.copy() for name, column in run.evaluation.values.items()}
+    values["across_fibre"][-1] = share
+    return replace(run, evaluation=replace(run.evaluation, values=values))
+
+
+@pytest.mark.parametrize(
+    ("across", "cause"),
+    [
+        (0.6, "60.0% of its fibre lies across other fibre, which the bound leaves out"),
+        (0.2, "only 20.0% of its fibre lies across other fibre, so the cause is not known"),
+        (0.0, "none of its fibre lies across other fibre, so the cause is not known"),
+    ],
+)
+def test_above_the_bound_the_cause_is_said_that_the_indices_show(compared, across, cause):
+    """Half of the gain lies above the bound: crossing strands are the cause if they are as many."""
+    best, *others = (run for run in compared.ranking if run.tested is not None)
     ratio = 0.5 * (1.0 + best.tested.bracket.tension.ratio)
-    beaten = replace(compared, bounds={1.0: replace(compared.bound, ratio=ratio)})
-    said = beaten.remarks[-1]
-    assert said.startswith(f"only where strands overlap, as those of {best.name} do, paths of ")
+    bound = replace(compared.bound, ratio=ratio)
+    said = bound_remark([with_across(best, across)], bound)
+    assert said.startswith("by the bound, no paths of ")
     assert f"more than {ratio:.2f} times as stiff" in said
+    reached = f"{best.name} reaches {best.tested.bracket.tension.ratio:.2f} times: "
+    assert f"{reached}{cause}" in said
+    assert ("trust neither number" in said) == (across < 0.5)
+    # One that ranks below another, as what cannot be printed does, is named all the same.
+    bracket = best.tested.bracket
+    low = replace(bracket.tension, stiffness=bracket.tension.unreinforced_stiffness)
+    tested = replace(best.tested, bracket=replace(bracket, tension=low))
+    first = replace(others[0], tested=tested)
+    said = bound_remark([first, with_across(best, across)], bound)
+    assert f"{first.name} reaches 0% of that gain; but {reached}{cause}" in said
 
 
 def test_captions_of_pictures_count_paths(compared):

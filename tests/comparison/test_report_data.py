@@ -119,7 +119,9 @@ def test_a_curved_layer_is_drawn_as_rolled_off():
     bent = np.column_stack([radius * np.sin(angle), LAYER.points[:, 1], radius * np.cos(angle)])
     turn = np.linspace(-1.2, 1.2, 40)
     line = np.column_stack([radius * np.sin(turn), np.full(40, 30.0), radius * np.cos(turn)])
-    plane = in_layer(line, replace(LAYER, points=bent, flat=None))
+    curved = replace(LAYER, points=bent, flat=None)
+    assert in_layer(np.zeros((0, 3)), curved).shape == (0, 2)  # a layer without fibre
+    plane = in_layer(line, curved)
     steps = np.linalg.norm(np.diff(plane, axis=0), axis=1)
     assert steps.sum() == pytest.approx(2.4 * radius, rel=0.02)
     assert np.linalg.norm(plane[-1] - plane[0]) == pytest.approx(steps.sum(), rel=1e-3)

@@ -141,6 +141,9 @@ def test_files_hold_every_run_and_one_report(compared, tmp_path):
         ("z", "zigzag"),
         ("x", "zigzag"),
     ]
+    for name, row in zip(few, total.fillna("").to_dict("records"), strict=True):
+        (run,) = (run for run in few if run.slicing == name)
+        assert (row["printable"] in (True, "True"), row["why_not"]) == (run.printable, run.why_not)
     record = json.loads((tmp_path / "results.json").read_text(encoding="utf-8"))
     assert record["fibre"] == compared.fibre
     assert record["verdict"] == compared.verdict
@@ -157,9 +160,14 @@ def test_files_hold_every_run_and_one_report(compared, tmp_path):
 
 
 @pytest.mark.parametrize("width", ["200", "90"])
-def test_screen_shows_every_run_its_figures_and_the_verdict(compared, width, capsys, monkeypatch):
+def test_screen_shows_every_run_its_figures_and_the_verdict(
+    compared, width, capsys, monkeypatch, tmp_path
+):
     """On a narrow screen columns are left to the report, and no number is cut in two."""
     monkeypatch.setenv("COLUMNS", width)
+    monkeypatch.chdir(tmp_path)
+    Path("somewhere").mkdir()
+    Path("somewhere/report.html").touch()
     print_comparison(compared, Path("somewhere"), 1.0)
     said = capsys.readouterr().out
     for run in compared.runs:
