@@ -34,7 +34,8 @@ def results_rows(comparison: Comparison) -> list[dict[str, Any]]:
     Columns are slicing where several are compared, strategy, layer ("total" or its index), failure,
     printable, why_not (what keeps the paths from being printed), the evaluator's columns, and those
     of the virtual test. Printable, why_not and the virtual test are of the whole part, and stand in
-    the total rows only. A failed strategy has its total row, with the reason and no numbers. A row holds what it has a value for.
+    the total rows only. A failed strategy has its total row, with the reason and no numbers. A row
+    holds what it has a value for.
     """
     rows: list[dict[str, Any]] = []
     for run in comparison.runs:
