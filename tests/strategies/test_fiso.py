@@ -184,3 +184,19 @@ def test_a_bent_sheet_is_filled_as_the_flat_one():
 def test_a_way_in_leaves_no_room_for_ramps():
     with pytest.raises(InputError, match=r"set fiso.least_radius to 0, or fiso.entry to false"):
         create("fiso", {"entry": True, "least_radius": 2.0})
+
+
+@pytest.mark.parametrize("radius", [0.0, 3.85])
+def test_wide_turns_cost_the_middle_alone(radius):
+    """A rectangle of 50 x 20 mm holds area / width of strand, less what its corners lose.
+
+    A corner of radius r leaves (1 - pi/4) r^2 open in every contour; where contours are narrower
+    than 2 r the strand ends, so that a strip of 2 r x (50 - 20 + 2 r) stays without.
+    """
+    layer = Planar(count=1).cut(box_mesh((50.0, 20.0, 1.0), (100, 4, 1)))[0]
+    machine = Machine()
+    paths = create("fiso", {"least_radius": radius})(layer, None, machine)
+    middle = 2.0 * radius * (30.0 + 2.0 * radius)
+    corners = (4.0 - np.pi) * radius**2
+    least = (50.0 * 20.0 - middle - corners) / machine.fibre_width
+    assert 0.9 * least < paths.lengths.sum() < 50.0 * 20.0 / machine.fibre_width
