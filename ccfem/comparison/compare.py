@@ -49,7 +49,7 @@ __all__ = [
     "solve_and_slice",
 ]
 
-STRATEGIES = ("isocurve", "concentric", "zigzag", "contour_zigzag")
+STRATEGIES = ("stream_function", "isocurve", "contour_zigzag", "zigzag")
 """The strategies that are compared when none are named."""
 
 DEFAULT_STRAND = Strand()
