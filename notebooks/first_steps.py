@@ -71,7 +71,7 @@ assert evaluation.total["outside_length"] == 0.0
 # part is solved again with the fibres in it.
 
 # %%
-comparison = ccfem.compare(case, layers=3)
+comparison = ccfem.compare(case, ["isocurve", "concentric", "zigzag", "contour_zigzag"], layers=3)
 print(comparison)
 comparison.plot()  # the middle layer; comparison.pareto() draws stiffness over fibre
 

@@ -187,7 +187,7 @@ def compare(
         str | None,
         typer.Option(
             metavar="A,B,..",
-            help="Strategies; default isocurve, concentric, zigzag and contour_zigzag.",
+            help="Strategies; default stream_function, isocurve, contour_zigzag and zigzag.",
         ),
     ] = None,
     set_case: SetCase = None,

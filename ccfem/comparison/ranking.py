@@ -163,7 +163,7 @@ def order_of(one: Run, other: Run) -> str:
         supports, below that of the other. SAME if no stiffness differs by more than `RESOLUTION`.
         Else UNDECIDED, and wherever a stiffness is missing.
     """
-    modes = _MODES
+    modes: tuple[str, ...] = _MODES
     if all(run.tested is not None and run.tested.alternative is not None for run in (one, other)):
         modes = (*_MODES, *(f"{mode}_alternative" for mode in _MODES))
     first, second = (np.array([merit(run, mode) for mode in modes]) for run in (one, other))
@@ -172,7 +172,8 @@ def order_of(one: Run, other: Run) -> str:
     if np.maximum(first / second, second / first).max() <= 1.0 + RESOLUTION:
         return SAME
     for found, high, low in ((FIRST, first, second), (SECOND, second, first)):
-        shown = high.round(_DIGITS) >= low.round(_DIGITS)
-        if high[0] > (1.0 + RESOLUTION) * low[0] and shown.all():
+        pairs = zip(high.tolist(), low.tolist(), strict=True)
+        below = any(round(a, _DIGITS) < round(b, _DIGITS) for a, b in pairs)
+        if high[0] > (1.0 + RESOLUTION) * low[0] and not below:
             return found
     return UNDECIDED

@@ -47,7 +47,7 @@ __all__ = [
     "named_strategies",
 ]
 
-STRATEGIES = ("isocurve", "concentric", "zigzag", "contour_zigzag")
+STRATEGIES = ("stream_function", "isocurve", "contour_zigzag", "zigzag")
 """The strategies that are compared when none are named."""
 
 DEFAULT_STRAND = Strand()

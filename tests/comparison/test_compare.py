@@ -1,5 +1,6 @@
 """Comparison: equal fibre, nobody dropped, and the order by the virtual test."""
 
+import inspect
 import json
 import re
 from dataclasses import dataclass, replace
@@ -10,13 +11,14 @@ import pandas as pd
 import pytest
 
 from ccfem.cases.case import Case
+from ccfem.cli import commands
 from ccfem.comparison.engine import compare
 from ccfem.comparison.files import write_results
 from ccfem.comparison.headline import HEADLINE, headline_values
 from ccfem.comparison.pictures import caption
 from ccfem.comparison.ranking import best_values
 from ccfem.comparison.remarks import bound_remark
-from ccfem.comparison.request import named_strategies
+from ccfem.comparison.request import STRATEGIES, named_strategies
 from ccfem.elasticity.problem import Force, Problem, Support
 from ccfem.elasticity.support_kinds import PressingSupport
 from ccfem.elasticity.system import System
@@ -50,7 +52,7 @@ def strip(force=1000.0):
 
 @pytest.fixture(scope="module")
 def compared():
-    return compare(strip())
+    return compare(strip(), ["isocurve", "concentric", "zigzag", "contour_zigzag"])
 
 
 def test_strategies_lay_the_same_length(compared):
@@ -67,6 +69,17 @@ def test_strategies_lay_the_same_length(compared):
         assert run.length_per_layer <= compared.fibre_per_layer * (1.0 + 1e-9)
         assert run.length_per_layer >= 0.99 * compared.fibre_per_layer
         assert set(run.seconds) == {"plan", "evaluate", "virtual test"}
+
+
+def test_the_default_strategies_are_those_that_the_help_names():
+    """Among them what `plan` takes by default."""
+    options = {name: p.default for name, p in inspect.signature(commands.plan).parameters.items()}
+    assert options["strategy"] in STRATEGIES
+    hint = inspect.signature(commands.compare, eval_str=True).parameters["strategies"].annotation
+    (said,) = (each.help for each in hint.__metadata__)
+    first, last = STRATEGIES[:-1], STRATEGIES[-1]
+    assert said == f"Strategies; default {', '.join(first)} and {last}."
+    assert list(named_strategies(strip())) == list(STRATEGIES)
 
 
 def test_natural_amounts_are_those_of_the_strategies():

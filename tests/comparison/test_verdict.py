@@ -149,7 +149,8 @@ def check(comparison):
 def compared(request):
     size = {"bar": 4.0, "open_hole": 4.0, "loop": 6.0, "m_shape": 6.0}[request.param]
     case = ccfem.read(request.param, element_size=size)
-    return ccfem.compare(case, layers=2, curve=False)
+    strategies = ["isocurve", "concentric", "zigzag", "contour_zigzag"]
+    return ccfem.compare(case, strategies, layers=2, curve=False)
 
 
 def with_stiffness(run, tension, bonded):
