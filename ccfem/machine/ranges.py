@@ -185,7 +185,7 @@ def _within(value: float, allowed: Range) -> bool:
 
 
 def _cure(value: float, allowed: Range) -> str:
-    """What to write where the value lies in range in another unit; else no more than to correct."""
+    """Say what to write, where the value lies in range in another unit."""
     if allowed.unit == "degrees Celsius" and _within(value - 273.15, allowed):
         return f"{value:g} kelvin would be {value - 273.15:.4g} {allowed.unit}: write that"
     for unit, factor in _MEANT.get(allowed.unit, ()):

@@ -261,7 +261,7 @@ def without(start, stop=None):
         (PART + "[machine]\nwidth = 1.0", "machine has no key 'width'; it has: fibre_width"),
         (
             PART + "[machine]\nfibre_width = -1.0",
-            "machine.fibre_width must be from 0.05 to 50 mm; got -1",
+            "fibre_width must be from 0.05 to 50 mm; got -1",
         ),
         (PART + "[strategies.spiral]\na = 1", "no strategy named 'spiral'; there are: "),
         (PART + "[strategies.zigzag]\nspeed = 1", "strategy 'zigzag' has no parameter 'speed'"),
