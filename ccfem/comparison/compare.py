@@ -32,6 +32,7 @@ from ccfem.layers.slicer import Slicer
 from ccfem.layers.slicing import as_slicer
 from ccfem.planning.given_paths import GivenPaths
 from ccfem.planning.strategy import Strategy
+from ccfem.printing.line_counts import check_matrix_lines
 from ccfem.printing.print_plan import check_machine
 from ccfem.progress import Progress, silent
 from ccfem.strategies import create
@@ -298,6 +299,7 @@ def compare(
         raise InputError("the curve is one of stiffness: leave the virtual test in, or it out")
     if print_plans:
         check_machine(case.machine)
+        check_matrix_lines(case.problem.mesh, case.build, case.machine)
     elif support:
         raise InputError("support is laid in a print: plan that too (print_plans, --gcode)")
     if not isinstance(strategies, Mapping):

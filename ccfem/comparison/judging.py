@@ -29,6 +29,7 @@ from ccfem.layers import Layer
 from ccfem.layers.slicer import Slicer
 from ccfem.layers.slicing.planar import Planar
 from ccfem.planning.given_paths import GivenPaths
+from ccfem.printing.line_counts import check_strands
 from ccfem.support import SupportLayers, slice_with_support
 
 __all__ = ["Solved", "check_propped", "judged"]
@@ -81,7 +82,7 @@ class Solved:
         Raises
         ------
         InputError
-            Where the part cannot be cut, or support is wanted below flat layers, or below curved
+            Where the part cannot be cut or its layers would have too many strands, or support is wanted below flat layers, or below curved
             ones of a slicer that does not say the field of its layers (`slice`).
         """
         case, stress, below = self.case, self.planned_on, None
@@ -93,6 +94,7 @@ class Solved:
                 stack = case.fibre.on(stack, stress.mesh, case.machine)
         else:
             stack = case.fibre_layers(stress, chosen)
+        check_strands(stack, case.machine)
         if support and all(layer.flat is not None for layer in stack):
             raise InputError(_FLAT)
         if support and below is None:
