@@ -50,10 +50,8 @@ def tables() -> Iterator[tuple[str, dict[str, Any]]]:
         for name in ranges:
             for value in VALUES:
                 number: Any = int(value) if name.endswith("_loops") else value
-                entry = (
-                    [number] * LENGTHS[name] if kind != "machine" and name in LENGTHS else number
-                )
-                table: dict[str, Any] = {name: entry}
+                count = LENGTHS.get(name, 0) if kind != "machine" else 0
+                table: dict[str, Any] = {name: [number] * count if count else number}
                 for key in KEYS[kind]:
                     table = {key: table}
                 yield f"{kind}.{name} = {value:g}", table

@@ -25,6 +25,7 @@ if TYPE_CHECKING:
     from ccfem.placement.fibre_places import FibrePlaces
 
 __all__ = [
+    "complain",
     "foreign_stress",
     "layers_of",
     "load",
@@ -40,6 +41,13 @@ _MESHES = (".msh", ".vtu", ".inp", ".tet", ".npz")
 
 _SOLVED = 0.75
 """Share of the progress bar at which the comparison is made and the pictures begin."""
+
+
+def complain(*messages: str) -> int:
+    """Print mistakes on standard error, one line each; the exit code."""
+    for message in messages:
+        print("ccfem: error:", " ".join(message.split()), file=sys.stderr)
+    return 2
 
 
 def load(

@@ -7,13 +7,14 @@ print, test, bound.
 import os
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
+from inspect import signature
 from itertools import count
 from typing import Any, overload
 
 from ccfem.cases.case import Case
 from ccfem.cases.load_cases import asks_for_all, weighted_cases
 from ccfem.cases.reading import read
-from ccfem.checks import check_known, member_name
+from ccfem.checks import check_instance, check_known, member_name, refuse_keywords
 from ccfem.comparison.asked import check_all, check_amount
 from ccfem.comparison.judging import Solved, check_propped, judged
 from ccfem.comparison.over_slicings import named_slicers, over_slicings
@@ -24,7 +25,7 @@ from ccfem.comparison.stages import Tests, counted, levelled, planned, timed
 from ccfem.elasticity.part_stress import GivenStress
 from ccfem.elasticity.solve import solve
 from ccfem.elasticity.stress_field import StressField
-from ccfem.errors import InputError, known_names
+from ccfem.errors import InputError, known_names, shown
 from ccfem.io.stress_file import read_stress
 from ccfem.layers import Layer
 from ccfem.layers.plane import plane_frame
@@ -52,6 +53,14 @@ __all__ = [
 
 STRATEGIES = ("isocurve", "concentric", "zigzag", "contour_zigzag")
 """The strategies that are compared when none are named."""
+
+_REPLACED = {
+    "slicing": "layers, a slicer or its name",
+    "heights": "layers, a list of heights in mm",
+    "machine": "that of the case, dataclasses.replace(case, machine=...)",
+    "parameters": "strategies, made with their parameters",
+}
+"""What takes the place of keywords of the command line that `compare` does not have."""
 
 DEFAULT_STRAND = Strand()
 """Stiffness and strength of a strand where nothing else is known."""
@@ -95,10 +104,15 @@ def create_all(
     InputError
         For an unknown strategy or parameter, or one named twice.
     """
-    given = dict(parameters or {})
-    names = [one for one in strategies if isinstance(one, str)]
+    if isinstance(strategies, str | type) or not isinstance(strategies, Sequence):
+        raise InputError(
+            f"strategies must be a list, as ['isocurve', 'zigzag']; got {shown(strategies)}: "
+            "write it in [ ]"
+        )
     if not strategies:
         raise InputError("name at least one strategy to compare; got none")
+    given = dict(parameters or {})
+    names = [one for one in strategies if isinstance(one, str)]
     repeated = {name for name in names if names.count(name) > 1}
     if repeated:
         raise InputError(f"name each strategy once; got '{min(repeated)}' more than once")
@@ -113,6 +127,7 @@ def create_all(
         if isinstance(one, str):
             found[one] = create(one, {**case.parameters.get(one, {}), **given.get(one, {})})
             continue
+        check_instance("strategy", one)
         name = member_name(one)
         numbers = (f"{name}_{k}" for k in count(2))
         taken = {*found, *names}
@@ -227,6 +242,7 @@ def compare(
     progress: Progress = silent,
     slicings: Mapping[str, Slicer] | Sequence[str | Slicer] | None = None,
     fibre: float | None = None,
+    **unknown: Any,
 ) -> Comparison | SlicingComparison:
     """Solve a case once, and plan and evaluate each strategy on it.
 
@@ -278,6 +294,8 @@ def compare(
         Ways to cut the part, instead of `layers`, such as ``["planar:z", "planar:x", "spatial"]``.
     fibre : float, mm, optional
         Total length that every strategy is held to in all layers, instead of `fibre_per_layer`.
+    **unknown
+        Refused: a keyword that there is not.
 
     Returns
     -------
@@ -291,6 +309,7 @@ def compare(
     SolveError
         When the solve misses its tolerance.
     """
+    refuse_keywords("compare", unknown, list(signature(compare).parameters)[:-1], _REPLACED)
     case = read(case)
     if asks_for_all(case, load_case):
         check_all(strand, stress, curve, slicings)
@@ -304,6 +323,8 @@ def compare(
         raise InputError("support is laid in a print: plan that too (print_plans, --gcode)")
     if not isinstance(strategies, Mapping):
         strategies = create_all(case, strategies)
+    for one in strategies.values():
+        check_instance("strategy", one)
     foreign = [one for one in strategies.values() if isinstance(one, GivenPaths)]
     if slicings is not None:
         if layers is not None or fibre_per_layer is not None or foreign or curve:

@@ -82,8 +82,9 @@ class Solved:
         Raises
         ------
         InputError
-            Where the part cannot be cut or its layers would have too many strands, or support is wanted below flat layers, or below curved
-            ones of a slicer that does not say the field of its layers (`slice`).
+            Where the part cannot be cut or its layers would have too many strands, or support is
+            wanted below flat layers, or below curved ones of a slicer that does not say the field
+            of its layers (`slice`).
         """
         case, stress, below = self.case, self.planned_on, None
         chosen = case.slicing if slicer is None else slicer

@@ -8,7 +8,7 @@ from typing import NamedTuple
 import numpy as np
 
 from ccfem.cases.case import Case
-from ccfem.checks import member_name
+from ccfem.checks import check_instance, member_name
 from ccfem.comparison.judging import Solved, judged
 from ccfem.comparison.result import Comparison
 from ccfem.comparison.runs import Run
@@ -100,6 +100,8 @@ def named_slicers(
             f"slicings must be a list of at least one, as ['planar:z', 'spatial']; got {slicings!r}"
         )
     if isinstance(slicings, Mapping):
+        for slicer in slicings.values():
+            check_instance("slicer", slicer)
         return {name: Named(slicer) for name, slicer in slicings.items()}
     found: dict[str, Named] = {}
     for each in slicings:
@@ -110,6 +112,7 @@ def named_slicers(
             said = any(f"{own}=" in name for own in _OWN)
             found[name] = Named(slicer, isinstance(slicer, Planar) and not said)
         else:
+            check_instance("slicer", each)
             name = member_name(each)
             numbers = (f"{name}_{k}" for k in count(2))
             free = name if name not in found else next(n for n in numbers if n not in found)

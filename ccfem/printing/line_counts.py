@@ -66,7 +66,7 @@ def check_strands(layers: Sequence[Layer], machine: Machine) -> None:
     if strands > MOST_STRANDS:
         raise InputError(
             f"{len(layers):,} layers would have about {strands:,.0f} strands, "
-            f"{areas.sum() / machine.fibre_width / 1e6:,.0f} km, of {machine.fibre_width:g} mm width; at most "
-            f"{MOST_STRANDS:,.0f} strands are planned: raise fibre_width in [machine], or choose "
-            "fewer layers; are all lengths in mm?"
+            f"{areas.sum() / machine.fibre_width / 1e6:,.0f} km, of {machine.fibre_width:g} mm "
+            f"width; at most {MOST_STRANDS:,.0f} strands are planned: raise fibre_width in "
+            "[machine], or choose fewer layers; are all lengths in mm?"
         )
