@@ -2,20 +2,26 @@
 
 import math
 import re
-from collections.abc import Iterable
+from collections.abc import Iterable, Mapping
+from dataclasses import is_dataclass
 from numbers import Real
-from typing import Any, Literal, get_args, get_origin, get_type_hints
+from typing import Any, Literal, TypeVar, get_args, get_origin, get_type_hints
 
-from ccfem.errors import InputError, known_names
+from ccfem.errors import InputError, known_names, shown
 
 __all__ = [
     "FARTHEST",
+    "KnownNames",
     "check_choices",
     "check_fields",
+    "check_instance",
     "check_known",
     "check_number",
     "member_name",
+    "refuse_keywords",
 ]
+
+V = TypeVar("V")
 
 FARTHEST = 1e9
 """Largest coordinate that is taken for meant, mm: a thousand kilometres."""
@@ -127,6 +133,83 @@ def check_known(kind: str, name: str, known: Iterable[str], cure: str = "") -> N
     if name not in names:
         there = known_names(name, names) or "none"
         raise InputError(f"no {kind} named '{name}'; there are: {there}{cure and f' ({cure})'}")
+
+
+class KnownNames(dict[str, V]):
+    """Values by name: an unknown name raises `InputError` with the known ones.
+
+    Parameters
+    ----------
+    kind : str
+        What a name stands for in the message, as "load case".
+    values : mapping
+
+    Examples
+    --------
+    >>> KnownNames("load case", {"pull": 1, "twist": 2})["bend"]
+    Traceback (most recent call last):
+    ccfem.errors.InputError: no load case named 'bend'; there are: pull, twist
+    """
+
+    def __init__(self, kind: str, values: Mapping[str, V]) -> None:
+        super().__init__(values)
+        self.kind = kind
+
+    def __missing__(self, name: object) -> V:
+        raise InputError(
+            f"no {self.kind} named {name!r}; there are: {known_names(str(name), self) or 'none'}"
+        )
+
+    def __reduce__(self) -> tuple[Any, ...]:
+        return KnownNames, (self.kind, dict(self))
+
+
+def check_instance(kind: str, value: object) -> None:
+    """Refuse a class in place of an instance of it, and what cannot be called.
+
+    Parameters
+    ----------
+    kind : str
+        What is expected, as "strategy".
+    value : object
+
+    Raises
+    ------
+    InputError
+    """
+    if isinstance(value, type):
+        raise InputError(
+            f"a {kind} must be an instance; got the class {value.__name__}: write "
+            f"{value.__name__}()"
+        )
+    if not callable(value) and not is_dataclass(value):
+        raise InputError(
+            f"a {kind} must be a name or an object of a dataclass; got {shown(value)}: give one"
+        )
+
+
+def refuse_keywords(
+    function: str, unknown: Iterable[str], known: Iterable[str], replaced: Mapping[str, str]
+) -> None:
+    """Refuse keywords that a function does not have.
+
+    Parameters
+    ----------
+    function : str
+    unknown, known : iterable of str
+        What was given beyond its keywords, and these.
+    replaced : mapping of str to str
+        What takes the place of a keyword that might be expected.
+
+    Raises
+    ------
+    InputError
+    """
+    for name in unknown:
+        cure = f": give it as {replaced[name]}" if name in replaced else ""
+        raise InputError(
+            f"{function} has no keyword '{name}'; it has: {known_names(name, known)}{cure}"
+        )
 
 
 def member_name(value: object) -> str:

@@ -1,13 +1,22 @@
 """Checks of parameters: what passes, and what the one line says about what does not."""
 
+import pickle
 from dataclasses import dataclass
 from typing import Literal
 
 import numpy as np
 import pytest
 
-from ccfem.checks import check_choices, check_fields, check_known, check_number
+import ccfem
+from ccfem.checks import KnownNames, check_choices, check_fields, check_known, check_number
+from ccfem.elasticity import Force, Problem, Support
 from ccfem.errors import InputError
+from ccfem.layers.slicing.planar import Planar
+from ccfem.materials import isotropic
+from ccfem.mesh import box_mesh
+from ccfem.strategies import Zigzag
+
+PLA = isotropic(3500.0, 0.35)
 
 
 @dataclass(frozen=True)
@@ -75,3 +84,53 @@ def test_unknown_names_are_answered_by_the_known_ones():
         check_known("road", "c", ["a", "b"], "or walk")
     with pytest.raises(InputError, match=r"there are: none$"):
         check_known("road", "c", [])
+
+
+def box_problem():
+    loads = {"pull": (Force("x_max", (10.0, 0.0, 0.0)),)}
+    return Problem(box_mesh((20.0, 5.0, 5.0), (4, 1, 1)), PLA, (Support("x_min"),), loads)
+
+
+def test_an_unknown_load_case_names_those_there_are():
+    fields = ccfem.solve(box_problem())
+    assert list(fields) == ["pull"]
+    assert fields.get("bend") is None
+    for known in (fields, pickle.loads(pickle.dumps(KnownNames("load case", {"pull": 1})))):
+        with pytest.raises(InputError, match=r"^no load case named 'bend'; there are: pull$"):
+            known["bend"]
+
+
+@pytest.mark.parametrize(
+    ("given", "said"),
+    [
+        ({"layers": Planar}, "a slicer must be an instance; got the class Planar: write Planar()"),
+        ({"layers": 2.5}, "layers must be their number, their heights in mm, or a slicer"),
+        ({"layers": "planar:zz"}, "got 'zz'"),
+        ({"layers": "no"}, "no slicer named 'no'; there are: "),
+        ({"strategies": [Zigzag]}, "a strategy must be an instance; got the class Zigzag: write"),
+        ({"strategies": {"z": Zigzag}}, "a strategy must be an instance; got the class Zigzag"),
+        ({"strategies": Zigzag}, "strategies must be a list, as ['isocurve', 'zigzag']; got"),
+        ({"strategies": "zigzag"}, "got 'zigzag': write it in [ ]"),
+        ({"strategies": [3]}, "a strategy must be a name or an object of a dataclass; got 3"),
+        ({"slicings": {"flat": Planar}}, "a slicer must be an instance; got the class Planar"),
+        ({"slicings": [Planar]}, "a slicer must be an instance; got the class Planar"),
+        ({"slicing": Planar()}, "compare has no keyword 'slicing'; it has: case, strategies, la"),
+        ({"slicing": Planar()}, ": give it as layers, a slicer or its name"),
+        ({"strategy": "zigzag"}, "did you mean 'strategies'?"),
+    ],
+)
+def test_wrong_types_given_to_compare_are_one_line(given, said):
+    case = ccfem.Case("box", "Box", box_problem())
+    with pytest.raises(InputError) as caught:
+        ccfem.compare(case, **{"strategies": ["zigzag"], **given})
+    assert said in str(caught.value)
+    assert "\n" not in str(caught.value)
+
+
+def test_a_class_in_place_of_a_strategy_or_slicer_is_refused_by_every_function():
+    stress = ccfem.solve(box_problem())["pull"]
+    with pytest.raises(InputError, match="got the class Planar"):
+        ccfem.slice(stress, Planar)
+    layers = ccfem.slice(stress, 2)
+    with pytest.raises(InputError, match="got the class Zigzag"):
+        ccfem.plan(Zigzag, layers, stress, ccfem.Machine())

@@ -10,11 +10,13 @@ import shutil
 import subprocess
 import sys
 import textwrap
+import types
 import typing
 from pathlib import Path
 
 import pytest
 
+import ccfem
 from ccfem.cases.part_file import read_part
 from ccfem.comparison import engine, request
 from ccfem.errors import InputError
@@ -134,11 +136,27 @@ def copy(tmp_path):
 def test_adding_a_strategy_works_as_told(copy):
     """Do what CONTRIBUTING.md says, to the letter, in a copy of the project."""
     folder, run = copy
-    module, test, _ = blocks(CONTRIBUTING, "python")
+    module, test, *_ = blocks(CONTRIBUTING, "python")
     (folder / "ccfem/strategies/mean_tension.py").write_text(module)
     (folder / "tests/strategies/test_mean_tension.py").write_text(test)
     (command,) = re.findall(r"^ +(pytest -n 0 .*mean_tension)$", CONTRIBUTING, flags=re.M)
     assert re.search(r"\d+ passed", run(command))
+
+
+def test_a_slicer_of_a_notebook_works_as_printed(capsys):
+    """What the page defines is compared as it stands there, without a file in the package."""
+    module = types.ModuleType("notebook")
+    sys.modules["notebook"] = module
+    try:
+        for block in blocks(CONTRIBUTING, "python")[2:4]:
+            exec(compile(block, "CONTRIBUTING.md", "exec"), vars(module))
+    finally:
+        del sys.modules["notebook"]
+    heights = [layer.plane.height for layer in module.comparison.layers]
+    assert heights == pytest.approx([5.0 * (k / 6.0) ** 2 for k in (1, 3, 5)])
+    assert "[0.14, 1.25, 3.47]" in capsys.readouterr().out
+    with pytest.raises(InputError, match=r"got the class Graded: write Graded\(\)"):
+        ccfem.compare("bar", ["zigzag"], layers=module.Graded)
 
 
 def test_adding_a_slicer_works_as_told(copy):

@@ -3,7 +3,7 @@
 from collections.abc import Callable
 from pathlib import Path
 
-from ccfem.cli.run import load
+from ccfem.cli.run import complain, load
 from ccfem.errors import InputError
 from ccfem.inspection import check
 from ccfem.io.whole import check_writable, whole_file
@@ -49,15 +49,13 @@ def check_part(
     except InputError as error:
         if len(error.mistakes) < 2:
             raise
-        for line in error.mistakes:
-            print(f"mistake: {line}")
-        return 2
+        return complain(*error.mistakes)
     if picture is None:
         picture = check_picture(Path(f"{checked.case.name}-check.png"))
     page = check_writable(picture.with_suffix(".html"))
-    print(checked)
+    print(checked.known)
     save(part_picture(checked), picture)
     with whole_file(page) as temporary:
         temporary.write_text(part_page(checked), encoding="utf-8")
     print(f"{picture}, and {page} with a rotatable view")
-    return 2 if checked.mistakes else 0
+    return complain(*checked.mistakes) if checked.mistakes else 0

@@ -10,6 +10,7 @@ from typing import Any
 import typer
 
 from ccfem.cli.commands import app
+from ccfem.cli.run import complain
 from ccfem.errors import InputError, SolveError
 
 __all__ = ["main"]
@@ -29,9 +30,9 @@ def main() -> None:
     try:
         code = typer.main.get_command(app)(standalone_mode=False)
     except (InputError, SolveError) as error:
-        code = _complain(str(error))
+        code = complain(str(error))
     except usage_error as error:
-        code = _complain(error.format_message())
+        code = complain(error.format_message())
     except (typer.Abort, KeyboardInterrupt):
         code = 130
     except BrokenPipeError:  # as under `ccfem cases | head -1`: nobody reads on
@@ -39,7 +40,7 @@ def main() -> None:
         code = 141
     except OSError as error:
         where = f" {error.filename}" if error.filename else ""
-        code = _complain(
+        code = complain(
             f"cannot continue{where}: {error.strerror or error}: correct this and repeat"
         )
     sys.exit(code if isinstance(code, int) else 0)
@@ -48,8 +49,3 @@ def main() -> None:
 def _line(message: Warning | str, *where: Any, **more: Any) -> str:
     """Warning as a line of its own: where in the code it arose says nothing to the user."""
     return f"ccfem: warning: {' '.join(str(message).split())}\n"
-
-
-def _complain(message: str) -> int:
-    print("ccfem: error:", " ".join(message.split()), file=sys.stderr)
-    return 2

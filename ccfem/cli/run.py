@@ -28,6 +28,7 @@ if TYPE_CHECKING:
 __all__ = [
     "Output",
     "calibrated",
+    "complain",
     "foreign_stress",
     "layers_of",
     "load",
@@ -43,6 +44,13 @@ _MESHES = (".msh", ".vtu", ".inp", ".tet", ".npz")
 
 _SOLVED = 0.75
 """Share of the progress bar at which the comparison is made and the pictures begin."""
+
+
+def complain(*messages: str) -> int:
+    """Print mistakes on standard error, one line each; the exit code."""
+    for message in messages:
+        print("ccfem: error:", " ".join(message.split()), file=sys.stderr)
+    return 2
 
 
 def load(

@@ -2,10 +2,11 @@
 
 import dataclasses
 import inspect
+import io
 import os
 import re
 import typing
-from collections.abc import Mapping, Sequence
+from collections.abc import Callable, Iterable, Mapping, Sequence
 from pathlib import Path
 
 import numpy as np
@@ -39,6 +40,8 @@ __all__ = [
     "print_solution",
 ]
 
+Item = typing.TypeVar("Item")
+
 _TITLES, _NUMBERS = 30, 20
 """Characters that a table is given for its titles and for each strategy, where neither a terminal
 nor COLUMNS sets its width."""
@@ -67,6 +70,7 @@ def print_members(kind: str) -> None:
     for name, member in sorted(_members(kind).items()):
         console.print(f"[bold]{name}[/bold]  {_first_line(member)}")
         table = Table(box=None, show_header=False, padding=(0, 2, 0, 4))
+        table.add_column(no_wrap=True)
         hints = typing.get_type_hints(member)
         for field in dataclasses.fields(member):
             note = _amount(member, field.name) or _choices(hints[field.name])
@@ -89,17 +93,27 @@ def print_member(kind: str, name: str) -> None:
     console.print(f"[bold]{name}[/bold]")
     for paragraph in about(member):
         console.print(paragraph, markup=False)
-    table = Table(box=box.SIMPLE_HEAD, header_style="bold")
-    for column in ("parameter", "default", "type, unit", "meaning"):
-        table.add_column(column, overflow="fold")
     said = attributes(member)
+    rows = []
     for field in dataclasses.fields(member):
         what = said[field.name].kind if field.name in said else ""
         note = _amount(member, field.name)
         meaning = _meaning(member, field.name, by_class)
         text = f"{meaning} {note and f'It {note}.'}".strip()
-        table.add_row(*map(escape, (field.name, _default(field), what, text)))
-    console.print(table)
+        rows.append((field.name, _default(field), what, text))
+    heads = ("parameter", "default", "type, unit", "meaning")
+    table = Table(box=box.SIMPLE_HEAD, header_style="bold")
+    for k, head in enumerate(heads):
+        width = _longest_word([head, *(row[k] for row in rows)])
+        table.add_column(head, no_wrap=not k, min_width=width)
+    for row in rows:
+        table.add_row(*map(escape, row))
+    if not _is_cut(console, table):
+        console.print(table)
+        return
+    for name, default, what, text in rows:
+        console.print(f"\n[bold]{escape(name)}[/bold] = {escape(default)}  {escape(what)}")
+        console.print(text, markup=False)
 
 
 def _members(kind: str) -> Mapping[str, typing.Any]:
@@ -164,7 +178,7 @@ def print_comparison(comparison: Comparison, where: Path, seconds: float) -> Non
     if comparison.over_slicings:
         _print_over_slicings(console, comparison.ranking, best)
     else:
-        console.print(_headline_table(runs, best))
+        _print_in_columns(console, runs, lambda some: _headline_table(some, best))
     _print_load_cases(console, runs)
     for line in (*comparison.case.findings, *comparison.stress.findings):
         console.print(f"mesh: {line}", style="dim", markup=False)
@@ -188,15 +202,35 @@ def _print_where(console: Console, where: Path, seconds: float) -> None:
 def _print_load_cases(console: Console, runs: Sequence[Run]) -> None:
     """Print what every run does under every load case, where there are several."""
     heads, rows = cases_rows(runs)
-    if not rows:
-        return
-    table = Table(header_style="bold", box=box.SIMPLE_HEAD)
-    table.add_column("load cases")
-    for name, _ in rows:
-        table.add_column(escape(name), justify="right", overflow="fold")
-    for k, head in enumerate(heads):
-        table.add_row(escape(head), *(cells[k] for _, cells in rows))
-    console.print(table)
+
+    def table_of(some: Sequence[tuple[str, Sequence[str]]]) -> Table:
+        table = Table(header_style="bold", box=box.SIMPLE_HEAD)
+        table.add_column("load cases", min_width=_longest_word(["load cases", *heads]))
+        for name, _ in some:
+            table.add_column(escape(name), justify="right", no_wrap=True)
+        for k, head in enumerate(heads):
+            table.add_row(escape(head), *(cells[k] for _, cells in some))
+        return table
+
+    _print_in_columns(console, rows, table_of)
+
+
+def _print_in_columns(
+    console: Console, columns: Sequence[Item], table_of: Callable[[Sequence[Item]], Table]
+) -> None:
+    """Print a table with a column for each item; one below the other where they do not fit."""
+    left = list(columns)
+    while left:
+        count = len(left)
+        while count > 1 and _is_cut(console, table_of(left[:count])):
+            count -= 1
+        console.print(table_of(left[:count]))
+        left = left[count:]
+
+
+def _longest_word(texts: Iterable[str]) -> int:
+    """Width below which a column breaks its words."""
+    return max((len(word) for text in texts for word in text.split()), default=1)
 
 
 def _print_over_slicings(console: Console, runs: Sequence[Run], best: Mapping[str, float]) -> None:
@@ -216,10 +250,20 @@ def _print_over_slicings(console: Console, runs: Sequence[Run], best: Mapping[st
 
 
 def _is_cut(console: Console, table: Table) -> bool:
-    """Whether a screen is so narrow that words or numbers of a table are cut."""
+    """Whether a screen is so narrow that a word or a number of a table is broken or left out."""
+    wide, here = (
+        _printed(Console(width=width, color_system=None, file=io.StringIO(), emoji=False), table)
+        for width in (10000, console.width)
+    )
+    return not set(wide) <= set(here)
+
+
+def _printed(console: Console, table: Table) -> list[str]:
+    """Words of a table as they are printed; lines between them aside."""
     with console.capture() as capture:
         console.print(table)
-    return "\N{HORIZONTAL ELLIPSIS}" in capture.get()
+    rule = "\N{BOX DRAWINGS LIGHT HORIZONTAL}"
+    return [word for word in capture.get().split() if word.strip(rule)]
 
 
 def _slicings_table(
@@ -232,7 +276,8 @@ def _slicings_table(
     table = Table(header_style="bold", box=box.SIMPLE_HEAD)
     table.add_column("", no_wrap=True)
     for head in heads:
-        table.add_column(head.title, justify="right")
+        width = _longest_word([head.title])
+        table.add_column(head.title, justify="right", min_width=width)
     for run in runs:
         if run.evaluation is None:
             table.add_row(run.name, "failed")
@@ -279,13 +324,12 @@ def print_solution(field: StressField, findings: Sequence[str], where: Path) -> 
 def _headline_table(runs: Sequence[Run], best: Mapping[str, float]) -> Table:
     """One column a run, one row an index; indices that no run has are left out."""
     table = Table(header_style="bold", box=box.SIMPLE_HEAD)
-    table.add_column("")
-    for run in runs:
-        table.add_column(run.name, justify="right", overflow="fold")
     values = [headline_values(run) for run in runs]
-    for head in HEADLINE:
-        if not any(head.column in found for found in values):
-            continue
+    heads = [head for head in HEADLINE if any(head.column in found for found in values)]
+    table.add_column("", min_width=_longest_word(head.title for head in heads))
+    for run in runs:
+        table.add_column(run.name, justify="right", no_wrap=True)
+    for head in heads:
         cells = []
         for run, found in zip(runs, values, strict=True):
             text, extra = cell_text(run, head)

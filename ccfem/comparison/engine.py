@@ -9,12 +9,14 @@ import itertools
 import os
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
+from inspect import signature
 from typing import Any
 
 import numpy as np
 
 from ccfem.cases.case import Case
 from ccfem.cases.load_cases import weighted_cases
+from ccfem.checks import refuse_keywords
 from ccfem.comparison.curve import Curve
 from ccfem.comparison.curve_stages import along_curve
 from ccfem.comparison.plan_to_stiffness import plan_to_stiffness
@@ -62,6 +64,7 @@ from ccfem.layers.slicing.planar import Planar
 from ccfem.planning.given_paths import GivenPaths
 from ccfem.planning.strategy import Strategy
 from ccfem.planning.whole_part import full_length
+from ccfem.printing.line_counts import check_strands
 from ccfem.progress import Progress, silent
 from ccfem.support import SupportLayers, slice_with_support
 from ccfem.toolpaths import Toolpaths
@@ -69,6 +72,14 @@ from ccfem.virtual_testing.several_cases import specimens
 from ccfem.virtual_testing.strand import RHO_SPAN, Strand
 
 __all__ = ["Solved", "answer", "compare", "otherwise_held", "solved"]
+
+_REPLACED = {
+    "slicing": "layers, a slicer or its name",
+    "heights": "layers, a list of heights in mm",
+    "machine": "that of the case, dataclasses.replace(case, machine=...)",
+    "parameters": "strategies, made with their parameters",
+}
+"""What takes the place of keywords of the command line that `compare` does not have."""
 
 _ALIKE = 0.005
 """Share by which two lengths differ at least to be two plans."""
@@ -117,8 +128,9 @@ class Solved:
         Raises
         ------
         InputError
-            Where the part cannot be cut, or support is wanted below flat layers, or below curved
-            ones of a slicer that does not say the field of its layers (`slice`).
+            Where the part cannot be cut or its layers would have too many strands, or support is
+            wanted below flat layers, or below curved ones of a slicer that does not say the field
+            of its layers (`slice`).
         """
         case, stress = self.case, self.planned_on
         chosen = case.slicing if slicer is None else slicer
@@ -130,6 +142,7 @@ class Solved:
                 layers = case.fibre.on(layers, stress.mesh, case.machine)
         else:
             layers = case.fibre_layers(stress, chosen)
+        check_strands(layers, case.machine)
         if support and all(layer.flat is not None for layer in layers):
             check_propped(Planar(), support)
         if support and below is None:
@@ -489,6 +502,7 @@ def compare(
     slicings: Mapping[str, Slicer] | Sequence[str | Slicer] | None = None,
     fibre: float | None = None,
     stiffness: str | None = None,
+    **unknown: Any,
 ) -> Comparison:
     """Solve a case once, and plan and evaluate each strategy on it.
 
@@ -543,6 +557,8 @@ def compare(
     stiffness : str, optional
         Lay the least fibre that makes the part so stiff, by one strategy: a ratio to the part
         without fibre as ``"2.5"``, or ``"1200N/mm"``.
+    **unknown
+        Refused: a keyword that there is not.
 
     Returns
     -------
@@ -556,6 +572,7 @@ def compare(
     SolveError
         When the solve misses its tolerance.
     """
+    refuse_keywords("compare", unknown, list(signature(compare).parameters)[:-1], _REPLACED)
     request = Request.of(
         case,
         strategies,

@@ -14,8 +14,8 @@ from ccfem.arrays import freeze
 from ccfem.cases.case import Case
 from ccfem.cases.load_cases import asks_for_all
 from ccfem.cases.reading import read
-from ccfem.checks import check_known, check_number, member_name
-from ccfem.errors import InputError, known_names
+from ccfem.checks import check_instance, check_known, check_number, member_name
+from ccfem.errors import InputError, known_names, shown
 from ccfem.layers.plane import plane_frame
 from ccfem.layers.slicer import Slicer
 from ccfem.layers.slicing import as_slicer, from_text
@@ -23,6 +23,7 @@ from ccfem.layers.slicing.planar import Planar
 from ccfem.planning.equal_fibre import check_wanted
 from ccfem.planning.given_paths import GivenPaths
 from ccfem.planning.strategy import Strategy
+from ccfem.printing.line_counts import check_matrix_lines
 from ccfem.printing.print_plan import check_machine
 from ccfem.strategies import create
 from ccfem.virtual_testing.strand import Strand
@@ -245,6 +246,8 @@ class Request:
         freeze(self, strategies=dict, slicings=dict)
         if not self.strategies:
             raise InputError("name at least one strategy to compare; got none")
+        for strategy in self.strategies.values():
+            check_instance("strategy", strategy)
         self._check_load_case()
         if self.curve and self.strand is None:
             raise InputError("the curve is one of stiffness: leave the virtual test in, or it out")
@@ -254,6 +257,7 @@ class Request:
             self._check_stiffness()
         if self.print_plans:
             check_machine(self.case.machine)
+            check_matrix_lines(self.case.problem.mesh, self.case.build, self.case.machine)
         elif self.support:
             raise InputError("support is laid in a print: plan that too (print_plans, --gcode)")
         for slicing in self.slicings.values():
@@ -423,6 +427,11 @@ def named_strategies(
     InputError
         For an unknown strategy or parameter, or one named twice.
     """
+    if isinstance(strategies, str | type) or not isinstance(strategies, Sequence):
+        raise InputError(
+            f"strategies must be a list, as ['isocurve', 'zigzag']; got {shown(strategies)}: "
+            "write it in [ ]"
+        )
     overrides = dict(parameters or {})
     names = [strategy for strategy in strategies if isinstance(strategy, str)]
     if not strategies:
@@ -442,6 +451,7 @@ def named_strategies(
             own = {**case.parameters.get(strategy, {}), **overrides.get(strategy, {})}
             made[strategy] = create(strategy, own)
         else:
+            check_instance("strategy", strategy)
             made[_free_name(member_name(strategy), {*made, *names})] = strategy
     return made
 
@@ -462,6 +472,8 @@ def named_slicings(slicings: Mapping[str, Slicer] | Sequence[str | Slicer]) -> d
             f"slicings must be a list of at least one, as ['planar:z', 'spatial']; got {slicings!r}"
         )
     if isinstance(slicings, Mapping):
+        for slicer in slicings.values():
+            check_instance("slicer", slicer)
         return {name: Slicing(slicer) for name, slicer in slicings.items()}
     made: dict[str, Slicing] = {}
     for given in slicings:
@@ -472,6 +484,7 @@ def named_slicings(slicings: Mapping[str, Slicer] | Sequence[str | Slicer]) -> d
             counted = any(f"{parameter}=" in name for parameter in _COUNTED_BY)
             made[name] = Slicing(slicer, isinstance(slicer, Planar) and not counted)
         else:
+            check_instance("slicer", given)
             made[_free_name(member_name(given), set(made))] = Slicing(given)
     return made
 

@@ -10,6 +10,7 @@ import numpy as np
 import scipy.sparse as sp
 
 from ccfem.arrays import FloatArray
+from ccfem.checks import KnownNames
 from ccfem.elasticity.conditioning import about_conditioning
 from ccfem.elasticity.contact import EXPECTED, Contact, find_contact
 from ccfem.elasticity.held import Held
@@ -54,6 +55,7 @@ def solve(
     Returns
     -------
     dict of load case name to StressField
+        An unknown name raises `InputError` with the known ones.
         Combinations of load cases come last. With supports that only press they are solved as load
         cases of their own, since their contact differs. The time of the factorisation counts in the
         record of the first load case. If cases have supports of their own, the problem of each
@@ -81,7 +83,7 @@ def solve(
             if fields[next(iter(one.loads))].mesh.order == 1:
                 why = "load cases with other supports need them"
                 fields |= _solved_as_it_is(on_quadratic(one), backend, tolerance, why)
-    return {case: fields[case] for case in problem.cases}
+    return KnownNames("load case", {case: fields[case] for case in problem.cases})
 
 
 def _solved(problem: Problem, backend: str, tolerance: float) -> dict[str, StressField]:

@@ -63,15 +63,19 @@ class Check(Shown):
     mistakes: tuple[str, ...]
     fibre: tuple[Layer, ...] = ()
 
-    def __str__(self) -> str:
+    @property
+    def known(self) -> str:
+        """All but the mistakes, as text: size, patches, loads, warnings."""
         lines = [self.case.title, *(f"  {fact}" for fact in self.facts), ""]
         for frame in (self.to_frame(), self.load_frame()):
             lines += [] if frame.empty else [*frame.to_string(index=False).splitlines(), ""]
         lines += [f"warning: {line}" for line in self.warnings]
-        lines += [f"mistake: {line}" for line in self.mistakes]
         if not self.mistakes:
             lines.append("nothing keeps this part from being solved")
         return "\n".join(line.rstrip() for line in lines)
+
+    def __str__(self) -> str:
+        return "\n".join([self.known, *(f"mistake: {line}" for line in self.mistakes)])
 
     def __repr__(self) -> str:
         return (

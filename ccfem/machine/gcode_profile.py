@@ -5,8 +5,9 @@ from collections.abc import Mapping
 from dataclasses import dataclass, field
 from typing import Literal
 
-from ccfem.checks import check_choices, check_fields, check_number
+from ccfem.checks import check_choices
 from ccfem.errors import InputError
+from ccfem.machine.ranges import check_ranges
 
 __all__ = ["FeedAxes", "GcodeProfile"]
 
@@ -31,6 +32,8 @@ _FIELDS = {
 }
 """Kinds of lines, and the fields that each knows beside those that all know."""
 _FIELD = re.compile(r"\{(\w*)\}")
+_BRACES = re.compile(r"\{[^{}]*\}|[{}]")
+"""What stands in braces, and a brace without its other one."""
 
 
 @dataclass(frozen=True)
@@ -170,24 +173,18 @@ class GcodeProfile:
         for name in _FIELDS:
             for line in getattr(self, name):
                 self._check(name, line)
-        check_fields(self, "lift", "retract", at_least=0.0, unit="mm")
-        check_fields(self, "lift_speed", "retract_speed", "feed_speed", above=0.0, unit="mm/s")
-        check_fields(self, "longest_feed", above=0.0, unit="mm")
-        check_fields(self, "matrix_angle", "matrix_turn", unit="degrees")
-        for value in self.offset:
-            check_number("each number of gcode_profile.offset", value, unit="mm")
-        for size in self.bed:
-            check_number("each size of gcode_profile.bed", size, above=0.0, unit="mm")
+        check_ranges(self)
 
     @staticmethod
     def _check(name: str, line: str) -> None:
         if not line.isprintable():
             raise InputError(f"{name} must be a list of single lines; got {line!r}: split it")
         known = _ALWAYS + _FIELDS[name]
-        for word in _FIELD.findall(line):
-            if word not in known:
+        for text in _BRACES.findall(line):
+            if text[1:-1] not in known or len(text) < 2:
                 raise InputError(
-                    f"{name} has no field '{{{word}}}' to fill in; there are: {', '.join(known)}"
+                    f"gcode.{name} has no field {text!r} to fill in; there are: "
+                    f"{', '.join(f'{{{word}}}' for word in known)}: write one of them"
                 )
 
     @staticmethod

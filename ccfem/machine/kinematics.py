@@ -6,7 +6,8 @@ from typing import Literal
 import numpy as np
 
 from ccfem.arrays import FloatArray
-from ccfem.checks import check_choices, check_fields, check_number
+from ccfem.checks import check_choices
+from ccfem.machine.ranges import check_ranges
 
 __all__ = ["Kinematics", "axis_values", "head_pose"]
 
@@ -39,10 +40,7 @@ class Kinematics:
 
     def __post_init__(self) -> None:
         check_choices(self)
-        check_fields(self, "pivot", at_least=0.0, unit="mm")
-        check_fields(self, "tilt_limit", at_least=0.0, below=180.0, unit="degrees")
-        for value in self.centre:
-            check_number("each number of kinematics.centre", value, unit="mm")
+        check_ranges(self)
 
     @property
     def letters(self) -> tuple[str, ...]:

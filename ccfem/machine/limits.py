@@ -2,7 +2,7 @@
 
 from dataclasses import dataclass
 
-from ccfem.checks import check_fields
+from ccfem.machine.ranges import check_ranges
 
 __all__ = ["Limits"]
 
@@ -48,6 +48,4 @@ class Limits:
     fraction: float = 1.0
 
     def __post_init__(self) -> None:
-        shares = ("short", "tight", "on_fibre", "across_fibre", "outside", "links", "fraction")
-        check_fields(self, *shares, "outside_height", at_least=0.0)
-        check_fields(self, "free_span", at_least=0.0, unit="mm")
+        check_ranges(self)

@@ -1,23 +1,19 @@
 """The printer: what paths have to respect, and what they cost."""
 
-from dataclasses import dataclass, field, fields
+from dataclasses import dataclass, field
 
 from ccfem.arrays import in_brief
-from ccfem.checks import check_fields
 from ccfem.machine.gcode_profile import GcodeProfile
 from ccfem.machine.kinematics import Kinematics
 from ccfem.machine.limits import Limits
 from ccfem.machine.print_process import Process
+from ccfem.machine.ranges import check_ranges
 from ccfem.machine.speed_table import SpeedTable
 
 __all__ = ["Machine"]
 
 _CUTTER_DISTANCE = 42.0
 """Chen et al. 2021, section 5.2, mm."""
-
-
-_PARTS = ("speeds", "gcode", "limits", "process", "kinematics", "pressed")
-"""Fields that are not numbers."""
 
 
 @dataclass(frozen=True)
@@ -122,12 +118,7 @@ class Machine:
     __repr__ = in_brief
 
     def __post_init__(self) -> None:
-        check_fields(self, "fibre_width", "matrix_width", "matrix_diameter", above=0.0, unit="mm")
-        numbers = [one.name for one in fields(self) if one.name not in _PARTS]
-        check_fields(self, *numbers, at_least=0.0)
-        check_fields(self, "matrix_heating", "fibre_heating", above=0.0, unit="K/s")
-        check_fields(self, "coextrusion", at_most=1.0)
-        check_fields(self, "head_angle", below=90.0, unit="degrees")
+        check_ranges(self)
 
     @property
     def strand_height(self) -> float:

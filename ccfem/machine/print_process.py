@@ -1,14 +1,12 @@
 """How a machine prints: speeds of a strand, tools that wait, what is laid beside the part."""
 
-from dataclasses import dataclass, fields
+from dataclasses import dataclass
 from typing import Literal
 
-from ccfem.checks import check_choices, check_fields
+from ccfem.checks import check_choices
+from ccfem.machine.ranges import check_ranges
 
 __all__ = ["Process"]
-
-_WORDS = ("short", "turns", "stacks", "prime")
-_WHOLE = ("skirt_loops", "brim_loops")
 
 
 @dataclass(frozen=True)
@@ -116,10 +114,4 @@ class Process:
 
     def __post_init__(self) -> None:
         check_choices(self)
-        numbers = [one.name for one in fields(self) if one.name not in _WORDS]
-        check_fields(self, *numbers, at_least=0.0)
-        check_fields(self, "start_speed", "finish_speed", "speed_limit", above=0.0, unit="mm/s")
-        check_fields(self, "first_layer_speed", "feed_ratio", "prime_size", above=0.0)
-        check_fields(self, "acceleration", "junction", above=0.0)
-        check_fields(self, "matrix_fan", "fibre_fan", at_most=1.0)
-        check_fields(self, "corner_angle", at_most=180.0, unit="degrees")
+        check_ranges(self)

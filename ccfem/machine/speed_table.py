@@ -7,6 +7,7 @@ from numpy.typing import ArrayLike
 
 from ccfem.arrays import FloatArray, IntArray
 from ccfem.errors import InputError
+from ccfem.machine.ranges import check_ranges
 
 __all__ = ["SpeedTable"]
 
@@ -54,6 +55,7 @@ class SpeedTable:
                 raise InputError(
                     f"the speed table needs {size} {order} as {name}; got {list(given)}: correct it"
                 )
+        check_ranges(self)
 
     def at(self, curvature: ArrayLike, length: ArrayLike, angle: ArrayLike) -> FloatArray:
         """Speed, mm/s, of pieces of a path.

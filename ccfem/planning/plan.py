@@ -2,6 +2,7 @@
 
 from collections.abc import Sequence
 
+from ccfem.checks import check_instance
 from ccfem.elasticity.part_stress import PartStress
 from ccfem.errors import InputError
 from ccfem.fields.chart import chart_of, flat_view
@@ -44,6 +45,7 @@ def plan(
         When the strategy plans on flat layers only and a layer is curved, when layers are nearer
         than a strand is high; and whatever the strategy raises.
     """
+    check_instance("strategy", strategy)
     check_layers(strategy, layers, machine)
     in_plane = getattr(strategy, "in_plane", False)
     views: Sequence[Layer] = layers

@@ -7,6 +7,7 @@ import numpy as np
 import scipy.sparse as sp
 
 from ccfem.arrays import FloatArray
+from ccfem.checks import KnownNames
 from ccfem.elasticity.held import Held
 from ccfem.elasticity.loads import load_cases
 from ccfem.elasticity.solve import solve_system
@@ -175,4 +176,5 @@ def solve_plane(
     SolveError
         When a relative residual stays above the tolerance.
     """
-    return solve_system(partial(prepare, problem, elements), backend, tolerance)
+    fields = solve_system(partial(prepare, problem, elements), backend, tolerance)
+    return KnownNames("load case", fields)

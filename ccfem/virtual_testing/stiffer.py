@@ -11,8 +11,9 @@ HONEST_PROMISE = (
     "Virtual test: it ranks two designs correctly and gives the ratio of their stiffnesses to "
     "about 10 %, or says 'undecided'; the ratio to the unreinforced stiffness is accurate to 25 "
     "%, or 10 % after calibration with one reinforced print; first-failure load to 30 % after "
-    "calibration, but the size of its gain is not reliable. Based on three published parts with "
-    "one specimen each: an indication, not a validation. Linear elastic, fibres as bars. "
+    "calibration, but the size of its gain is not reliable. Based on one published part, printed "
+    "without fibre and with two plans, one specimen each: an indication, not a validation. Linear "
+    "elastic, fibres as bars. "
     "Delamination: use it only to rank slicings of one part, where fixed and pressing supports "
     "give the same order; a published load of 0.87 kN was not reproduced."
 )

@@ -259,7 +259,10 @@ def without(start, stop=None):
         (PART.replace("[10, 0, 0]", "[inf, 0, 0]"), r"loads.pull\[0\].vector must be"),
         (PART.replace('"end"', '"tip"'), "no patch named 'tip'; there are: end, foot"),
         (PART + "[machine]\nwidth = 1.0", "machine has no key 'width'; it has: fibre_width"),
-        (PART + "[machine]\nfibre_width = -1.0", "machine.fibre_width must be above 0 mm; got -1"),
+        (
+            PART + "[machine]\nfibre_width = -1.0",
+            "fibre_width must be from 0.05 to 50 mm; got -1",
+        ),
         (PART + "[strategies.spiral]\na = 1", "no strategy named 'spiral'; there are: "),
         (PART + "[strategies.zigzag]\nspeed = 1", "strategy 'zigzag' has no parameter 'speed'"),
         (PART + "[strategies]\nzigzag = 1", "strategies.zigzag must be a table"),

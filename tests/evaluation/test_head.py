@@ -151,5 +151,5 @@ def test_flat_layers_have_none_of_it():
 
 
 def test_head_that_is_no_cone_is_refused():
-    with pytest.raises(InputError, match="head_angle must be below 90"):
+    with pytest.raises(InputError, match="head_angle must be from 1 to 89 degrees; got 90"):
         Machine(head_angle=90.0)

@@ -38,15 +38,15 @@ PLAIN = Process(
     first_layer_height=0.0,
     first_layer_speed=1.0,
     warm_height=0.0,
-    acceleration=1e9,
+    acceleration=1e6,
 )
 MACHINE = Machine(
     speeds=SpeedTable(),
     matrix_height=0.7,
     fibre_height=0.1,
     filament_area=0.1,
-    matrix_heating=1e9,
-    fibre_heating=1e9,
+    matrix_heating=1e4,
+    fibre_heating=1e4,
     process=PLAIN,
 )
 TAIL = 42.0
@@ -441,12 +441,12 @@ def test_the_printer_s_own_commands(plate):
 @pytest.mark.parametrize(
     ("table", "message"),
     [
-        ({"cut": ["M280 P{pin}"]}, r"machine\.gcode: cut has no field '\{pin\}' to fill in"),
+        ({"cut": ["M280 P{pin}"]}, r"machine\.gcode: gcode\.cut has no field '\{pin\}' to fill in"),
         ({"start": ["G28\nM112"]}, r"machine\.gcode: start must be a list of single lines"),
         ({"tool": "T0"}, r"machine\.gcode\.tool must be a list, each item a string; got 'T0'"),
-        ({"bed": [200, 0, 50]}, r"machine\.gcode: .*bed must be above 0 mm; got 0"),
-        ({"lift": -1}, r"machine\.gcode: .*lift must be at least 0 mm; got .*: corr"),
-        ({"feed_speed": 0}, r"machine\.gcode: .*feed_speed must be above 0 mm/s"),
+        ({"bed": [200, 0, 50]}, r"machine\.gcode: .*bed must be from 10 to 100000 mm; got 0"),
+        ({"lift": -1}, r"machine\.gcode: .*lift must be 0 or from 0.01 to 1000 mm; got .*: corr"),
+        ({"feed_speed": 0}, r"machine\.gcode: .*feed_speed must be from 0.01 to 2000 mm/s"),
         ({"nozzle": 1}, r"machine\.gcode has no key 'nozzle'"),
     ],
 )

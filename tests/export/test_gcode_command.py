@@ -89,7 +89,7 @@ def test_no_file_without_the_option(ccfem):
         ("minimum_length = 20.0", "machine.minimum_length is 20 mm, but the cutter lies 42 mm"),
         ("fibre_speed = 0", "machine.fibre_speed must be above 0 to print"),
         ("[machine.gcode]\nbed = [50, 50, 50]", "the part needs 59.2 x 23.2 x 4 mm, but the print"),
-        ("[machine.gcode]\ncut = ['{pin}']", "machine.gcode: cut has no field '{pin}'"),
+        ("[machine.gcode]\ncut = ['{pin}']", "gcode.cut has no field '{pin}'"),
     ],
 )
 def test_what_cannot_be_printed_ends_in_one_line(ccfem, machine, message):

@@ -91,12 +91,16 @@ def test_the_later_one_wins(tmp_path):
         (None, ["lift=2"], "machine has no key 'lift'"),
         (None, ["process.start_sped=2"], "machine.process has no key .*did you mean 'start_speed'"),
         (None, ["process.short=melt"], "machine.process.short must be one of 'matrix', 'drop'"),
-        (None, ["process.start_speed=0"], "process.start_speed must be above 0 mm/s; got 0"),
+        (
+            None,
+            ["process.start_speed=0"],
+            "start_speed must be from 0.01 to 2000 mm/s; got 0",
+        ),
         (None, ["process=3"], "machine.process must be a table; got 3"),
         (None, ["gcode.axes.fibre=X"], "axes.fibre must be one capital letter .* got 'X'"),
         (None, ["gcode.axes.fibre=V"], "axes need two letters; both are 'V'"),
         (None, ["gcode.fan=['M106 S{temperature}']"], r"fan has no field '\{temperature\}'"),
-        (None, ["coextrusion=1.2"], "machine.coextrusion must be .*at most 1"),
+        (None, ["coextrusion=1.2"], "machine.coextrusion must be from 0 to 1; got 1.2"),
         (None, ["profile=prusa"], "machine.profile must be one of aura_like"),
     ],
 )

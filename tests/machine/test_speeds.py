@@ -234,11 +234,11 @@ def test_the_cutter_allows_the_shortest_strand():
         ({"speeds": {"speed": [1, 2]}}, r"machine\.speeds\.speed must be a list of 3, each a num"),
         ({"speeds": {"radius": 1}}, r"machine\.speeds has no key 'radius'; it has: speed, curv"),
         ({"speeds": {"speed": [3, 2, 1]}}, r"machine\.speeds: the speed table needs 3 rising"),
-        ({"cut_wait": -1.0}, r"machine\.cut_wait must be at least 0; got -1"),
-        ({"matrix_diameter": 0}, r"machine\.matrix_diameter must be above 0"),
+        ({"cut_wait": -1.0}, r"machine\.cut_wait must be from 0 to 600 s; got -1"),
+        ({"matrix_diameter": 0}, r"machine\.matrix_diameter must be from 0\.1 to 20 mm; got 0"),
         (
             {"gcode": {"lift": -1}},
-            r"machine\.gcode: gcode_profile\.lift must be at least 0 mm; got -1",
+            r"machine\.gcode: gcode_profile\.lift must be 0 or from 0\.01 to 1000 mm; got -1",
         ),
     ],
 )

@@ -8,7 +8,7 @@ from benchmarks.print_checks.estimators import estimate
 
 def test_pygcodedecode_finds_the_same_time(small_part):
     pytest.importorskip("pyGCodeDecode")
-    job = small_part("marlin_two_tools", {"matrix_heating": 1e9, "fibre_heating": 1e9})
+    job = small_part("marlin_two_tools", {"matrix_heating": 1e4, "fibre_heating": 1e4})
     found = estimate(job.text)
     assert found.said == ()
     assert float(job.done.head["TIME"]) == pytest.approx(found.seconds, rel=0.05)

@@ -52,7 +52,7 @@ def seconds(run, most, deviation):
 
 def test_the_time_is_that_of_another_estimator(small_part):
     # Tools that heat at once: the wait for them has a test of its own.
-    hot = {"matrix_heating": 1e9, "fibre_heating": 1e9, "process": {"acceleration": 20.0}}
+    hot = {"matrix_heating": 1e4, "fibre_heating": 1e4, "process": {"acceleration": 20.0}}
     job = small_part("marlin_two_tools", hot)
     process = job.machine.process
     found = seconds(job.done, process.acceleration, process.junction)

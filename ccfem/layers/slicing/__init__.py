@@ -4,8 +4,9 @@ from collections.abc import Mapping, Sequence
 from typing import Any
 
 from ccfem import plugins
+from ccfem.checks import check_instance
 from ccfem.elasticity.part_stress import PartStress
-from ccfem.errors import InputError
+from ccfem.errors import InputError, shown
 from ccfem.io.toml import assignment
 from ccfem.layers.layer import Layer
 from ccfem.layers.slicer import Slicer, Vector
@@ -77,12 +78,26 @@ def as_slicer(layers: "int | Sequence[float] | str | Slicer") -> Slicer:
     layers : int, sequence of float, str or Slicer
         A number of flat layers, their heights in mm, the name of a slicer with parameters as in
         `from_text`, or a slicer itself.
+
+    Raises
+    ------
+    InputError
+        For anything else, as the class of a slicer.
     """
     if isinstance(layers, str):
         return from_text(layers)
-    if isinstance(layers, Slicer):
+    if isinstance(layers, type) or callable(layers):
+        check_instance("slicer", layers)
         return layers
-    return Planar(count=layers) if isinstance(layers, int) else Planar(heights=tuple(layers))
+    if isinstance(layers, int):
+        return Planar(count=layers)
+    try:
+        return Planar(heights=tuple(layers))
+    except TypeError:
+        raise InputError(
+            "layers must be their number, their heights in mm, or a slicer or its name, as "
+            f"'planar:z'; got {shown(layers)}: give one of these"
+        ) from None
 
 
 def slice(

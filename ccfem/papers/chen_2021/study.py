@@ -1,9 +1,10 @@
 """What the figures and the claims of the paper are computed from.
 
 On the authors' Loop where ``CCFEM_CHEN2021`` names their folder, else on the case `loop`, which
-has its size and loads. The paper's Shell, Wrench and Piston are not published. Their places are
-taken by parts of ours that show the same thing: a bar with a hole (`open_hole`), and `lifting_eye`,
-whose section changes from layer to layer as the Piston's does.
+has its size and loads. The authors published their Shell, bar and Wrench too, which are not run
+here, and not their Piston. The places of these are taken by parts of ours that show the same thing:
+a bar with a hole (`open_hole`), and `lifting_eye`, whose section changes from layer to layer as the
+Piston's does.
 """
 
 import os
@@ -30,8 +31,13 @@ from ccfem.toolpaths import Toolpaths
 from ccfem.virtual_testing.specimen import Specimen
 from ccfem.virtual_testing.virtual_test import virtual_test
 
-__all__ = ["POWERS", "Model", "Study", "joined", "model", "run_study"]
+__all__ = ["PARTS_AT_HAND", "POWERS", "Model", "Study", "joined", "model", "run_study"]
 
+PARTS_AT_HAND = (
+    "The authors published their Loop, Shell, bar and Wrench, not the Piston. The Loop is run "
+    "here; `open_hole` and `lifting_eye` stand in for the others."
+)
+"""Which parts of the paper are published, and which are run."""
 POWERS = (0.0, 0.5, 1.0, 2.0)
 """p of Eq. 5 that figure 9 is drawn for."""
 PISTON_LAYERS = 66

@@ -5,7 +5,7 @@ from pathlib import Path
 
 from ccfem.papers.chen_2021.claims import quantities, verdicts
 from ccfem.papers.chen_2021.figures import draw_all
-from ccfem.papers.chen_2021.study import Study, run_study
+from ccfem.papers.chen_2021.study import PARTS_AT_HAND, Study, run_study
 from ccfem.papers.chen_2021.tables import length_table, time_table
 from ccfem.papers.verdicts import claim_table
 
@@ -23,8 +23,7 @@ def write(study: Study, folder: Path) -> str:
     parts = [
         "# Field-based toolpaths of Chen et al. (2021): ours beside theirs\n",
         "Written by `ccfem reproduce chen_2021`. The algorithm is the published one. "
-        f"Part: {study.loop.case.title}. The paper's Shell, Wrench and Piston are "
-        "not published; `open_hole` and `lifting_eye` stand in.\n",
+        f"Part: {study.loop.case.title}. {PARTS_AT_HAND}\n",
         f"## Claims\n\n{claims}",
         f"## Table 1: times\n\n{time_table(study)}",
         f"## Table 2: fibre and stiffness\n\n{length_table(study, found)}",

@@ -1,0 +1,72 @@
+"""About how many lines a print has, and the numbers beyond which it is not planned."""
+
+from collections.abc import Sequence
+
+import numpy as np
+
+from ccfem.arrays import FloatArray
+from ccfem.errors import InputError
+from ccfem.layers.layer import Layer
+from ccfem.machine.machine import Machine
+from ccfem.mesh.tet_mesh import TetMesh
+
+__all__ = ["MOST_LINES", "MOST_STRANDS", "check_matrix_lines", "check_strands"]
+
+MOST_LINES = 1e6
+"""Lines of matrix: some minutes, and about 3 GB."""
+MOST_STRANDS = 1e5
+"""Strands side by side, on all layers: some hours."""
+
+
+def check_matrix_lines(mesh: TetMesh, build: Sequence[float], machine: Machine) -> None:
+    """Refuse a print whose matrix would need more than a million lines.
+
+    Parameters
+    ----------
+    mesh : TetMesh
+        The part: its volume is filled with lines as long as its mean section is wide.
+    build : 3 floats
+        Build direction.
+    machine : Machine
+
+    Raises
+    ------
+    InputError
+        With the estimate, before anything is computed.
+    """
+    along = np.asarray(build, dtype=np.float64)
+    height = float(np.ptp(mesh.points @ (along / np.linalg.norm(along))))
+    layers = height / machine.matrix_height
+    section = float(mesh.volumes.sum()) / height
+    lines = layers * np.sqrt(section) / machine.matrix_width
+    if lines > MOST_LINES:
+        raise InputError(
+            f"the print would have about {layers:,.0f} layers of matrix and {lines:,.0f} lines, "
+            f"{lines * np.sqrt(section) / 1e6:,.0f} km, of {machine.matrix_height:g} x "
+            f"{machine.matrix_width:g} mm; at most {MOST_LINES:,.0f} lines are planned: raise "
+            "matrix_height or matrix_width in [machine]; are all lengths in mm?"
+        )
+
+
+def check_strands(layers: Sequence[Layer], machine: Machine) -> None:
+    """Refuse layers that hold more than a hundred thousand strands side by side.
+
+    Parameters
+    ----------
+    layers : sequence of Layer
+    machine : Machine
+
+    Raises
+    ------
+    InputError
+        With the estimate, before anything is planned.
+    """
+    areas: FloatArray = np.array([layer.areas.sum() for layer in layers])
+    strands = float(np.sqrt(areas).sum()) / machine.fibre_width
+    if strands > MOST_STRANDS:
+        raise InputError(
+            f"{len(layers):,} layers would have about {strands:,.0f} strands, "
+            f"{areas.sum() / machine.fibre_width / 1e6:,.0f} km, of {machine.fibre_width:g} mm "
+            f"width; at most {MOST_STRANDS:,.0f} strands are planned: raise fibre_width in "
+            "[machine], or choose fewer layers; are all lengths in mm?"
+        )
