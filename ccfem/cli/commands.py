@@ -20,6 +20,7 @@ from ccfem.cli.options import (
     Backend,
     Calibration,
     CasePath,
+    Details,
     Drawings,
     Fibre,
     FibreInAll,
@@ -240,6 +241,7 @@ def compare(
     stress_unit: StressUnit = None,
     pictures: Pictures = False,
     drawings: Drawings = None,
+    details: Details = False,
     out: Out = None,
     force: Force = False,
 ) -> None:
@@ -270,7 +272,7 @@ def compare(
             curve=curve,
         )
 
-    run(case, ask, Output(out, force, pictures, drawings_of(drawings)))
+    run(case, ask, Output(out, force, pictures, drawings_of(drawings), "", details))
 
 
 @app.command()
@@ -306,6 +308,7 @@ def plan(
     stress_unit: StressUnit = None,
     pictures: Pictures = False,
     drawings: Drawings = None,
+    details: Details = False,
     out: Out = None,
     force: Force = False,
 ) -> None:
@@ -333,7 +336,7 @@ def plan(
             support=support,
         )
 
-    run(case, ask, Output(out, force, pictures, drawings_of(drawings), f"-{strategy}"))
+    run(case, ask, Output(out, force, pictures, drawings_of(drawings), f"-{strategy}", details))
 
 
 @app.command()

@@ -11,6 +11,7 @@ __all__ = [
     "Backend",
     "Calibration",
     "CasePath",
+    "Details",
     "Drawings",
     "Fibre",
     "FibreInAll",
@@ -107,6 +108,10 @@ Drawings = Annotated[
         metavar="svg,dxf",
         help="Also draw every flat layer of every strategy to scale, in mm: border, fibre, links.",
     ),
+]
+Details = Annotated[
+    bool,
+    typer.Option("--details", help="Print every index and remark, as the report shows them."),
 ]
 PrintedSupport = Annotated[
     bool,

@@ -154,6 +154,8 @@ class Output:
     drawings : tuple of {"svg", "dxf"}
         Also draw every flat layer of every strategy to scale.
     suffix : str
+    details : bool
+        Print every index and remark.
     """
 
     out: Path | None = None
@@ -161,6 +163,7 @@ class Output:
     pictures: bool = False
     drawings: tuple[str, ...] = ()
     suffix: str = ""
+    details: bool = False
 
     def folder(self, case: "Case") -> Path:
         """Folder for the results of a case."""
@@ -197,7 +200,7 @@ def run(name: str, ask: "Callable[[], Request]", output: Output) -> None:
         command, rest = shlex.join(["ccfem", *sys.argv[1:]]), _part(progress, _SOLVED, 1.0)
         about = (command, seconds, rest, output.pictures, _text_of(name), output.drawings)
         write_results(comparison, folder, *about)
-    print_comparison(comparison, where, time.perf_counter() - _STARTED)
+    print_comparison(comparison, where, time.perf_counter() - _STARTED, output.details)
 
 
 def _text_of(name: str) -> str:

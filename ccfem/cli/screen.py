@@ -20,17 +20,19 @@ from ccfem.cli.docstring import about, attributes
 from ccfem.comparison.headline import (
     HEADLINE,
     HEADLINE_OF_SLICINGS,
+    SHORT,
     Headline,
     cell_text,
     headline_values,
 )
 from ccfem.comparison.ranking import best_values
+from ccfem.comparison.remarks import by_importance
 from ccfem.comparison.result import Comparison
 from ccfem.comparison.runs import Run
 from ccfem.comparison.said_of_cases import cases_rows
 from ccfem.elasticity.stress_field import StressField, about_cells
 from ccfem.tensor import von_mises
-from ccfem.virtual_testing.stiffer import HONEST_PROMISE
+from ccfem.virtual_testing.stiffer import HONEST_PROMISE, IN_SHORT
 
 __all__ = [
     "print_cases",
@@ -41,6 +43,9 @@ __all__ = [
 ]
 
 Item = typing.TypeVar("Item")
+
+_REMARKS = 3
+"""Number of remarks that are shown first."""
 
 _TITLES, _NUMBERS = 30, 20
 """Characters that a table is given for its titles and for each strategy, where neither a terminal
@@ -166,8 +171,21 @@ def _first_line(what: object) -> str:
     return (inspect.getdoc(what) or "").split("\n")[0]
 
 
-def print_comparison(comparison: Comparison, where: Path, seconds: float) -> None:
-    """Print the headline table, the best of each index in bold, and where the results are."""
+def print_comparison(
+    comparison: Comparison, where: Path, seconds: float, details: bool = False
+) -> None:
+    """Print the headline table, the best of each index in bold, and where the results are.
+
+    Parameters
+    ----------
+    comparison : Comparison
+    where : Path
+        Folder of the results.
+    seconds : float
+        That it took.
+    details : bool, default False
+        Print every index of the headline and every remark, not only the most important ones.
+    """
     console = Console(highlight=False, emoji=False)
     runs = [run for run in comparison.ranking if run.evaluation is not None]
     if not console.is_terminal and "COLUMNS" not in os.environ:
@@ -176,19 +194,24 @@ def print_comparison(comparison: Comparison, where: Path, seconds: float) -> Non
     console.print(comparison.case.title, style="bold", markup=False)
     best = best_values(comparison.runs, comparison.wanted)
     if comparison.over_slicings:
-        _print_over_slicings(console, comparison.ranking, best)
+        _print_over_slicings(console, comparison.ranking, best, details)
     else:
-        _print_in_columns(console, runs, lambda some: _headline_table(some, best))
+        _print_in_columns(console, runs, lambda some: _headline_table(some, best, details))
     _print_load_cases(console, runs)
-    for line in (*comparison.case.findings, *comparison.stress.findings):
-        console.print(f"mesh: {line}", style="dim", markup=False)
-    console.print(about_cells(comparison.stress), style="dim", markup=False)
-    for line in comparison.remarks:
+    findings = (*comparison.case.findings, *comparison.stress.findings)
+    lines = [*(f"mesh: {line}" for line in findings), *comparison.remarks]
+    shown = lines if details else by_importance(lines)[:_REMARKS]
+    if details:
+        console.print(about_cells(comparison.stress), style="dim", markup=False)
+    for line in shown:
         console.print(line, style="dim", markup=False)
-    for said in comparison.verdicts:
+    for said in comparison.verdicts if details else comparison.verdicts[:1]:
         console.print(said, style="bold", markup=False)
     if any(run.tested is not None for run in runs):
-        console.print(HONEST_PROMISE, style="dim", markup=False)
+        console.print(HONEST_PROMISE if details else IN_SHORT, style="dim", markup=False)
+    if len(shown) < len(lines):
+        more = f"{len(lines) - len(shown)} more remarks"
+        console.print(f"--details or the report: {more}, every index", style="dim", markup=False)
     _print_where(console, where, seconds)
 
 
@@ -233,11 +256,15 @@ def _longest_word(texts: Iterable[str]) -> int:
     return max((len(word) for text in texts for word in text.split()), default=1)
 
 
-def _print_over_slicings(console: Console, runs: Sequence[Run], best: Mapping[str, float]) -> None:
+def _print_over_slicings(
+    console: Console, runs: Sequence[Run], best: Mapping[str, float], details: bool
+) -> None:
     """Print the table over slicings: as many columns as the screen is wide."""
     values = {run.name: headline_values(run) for run in runs}
     known = {column for row in values.values() for column in row}
     heads = [head for head in HEADLINE_OF_SLICINGS if head.column in known]
+    if not details:
+        heads = [head for head in heads if head.column in (*SHORT, "interlayer_load")]
     shown = list(heads)
     table = _slicings_table(runs, shown, values, best)
     while len(shown) > 1 and _is_cut(console, table):
@@ -321,11 +348,13 @@ def print_solution(field: StressField, findings: Sequence[str], where: Path) -> 
     console.print(f"  {where}", markup=False, soft_wrap=True)
 
 
-def _headline_table(runs: Sequence[Run], best: Mapping[str, float]) -> Table:
+def _headline_table(runs: Sequence[Run], best: Mapping[str, float], details: bool) -> Table:
     """One column a run, one row an index; indices that no run has are left out."""
     table = Table(header_style="bold", box=box.SIMPLE_HEAD)
     values = [headline_values(run) for run in runs]
     heads = [head for head in HEADLINE if any(head.column in found for found in values)]
+    if not details:
+        heads = [head for head in heads if head.column in SHORT]
     table.add_column("", min_width=_longest_word(head.title for head in heads))
     for run in runs:
         table.add_column(run.name, justify="right", no_wrap=True)

@@ -12,6 +12,7 @@ from ccfem.virtual_testing.strength import FirstFailure
 __all__ = [
     "HEADLINE",
     "HEADLINE_OF_SLICINGS",
+    "SHORT",
     "TEST_COLUMNS",
     "Headline",
     "cell_text",
@@ -211,6 +212,17 @@ HEADLINE = (
     Headline("all_crossings", "crossings", "low", "{:.0f}"),
 )
 """The columns of the headline table; those that no run has are left out."""
+
+SHORT = (
+    "printable",
+    "stiffness_ratio_tension",
+    "share_of_gain",
+    "first_failure_load",
+    "fibre_per_layer",
+    "fibre_length",
+    "print_time_nearest",
+)
+"""Columns of the table that a terminal shows first."""
 
 _OVER_SLICINGS = (
     "printable",

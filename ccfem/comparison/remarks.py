@@ -14,7 +14,18 @@ from ccfem.fibre_aware.upper_bound import LOOSE, UpperBound
 from ccfem.layers.layer import Layer
 from ccfem.virtual_testing.stiffer import RESOLUTION, SAME, UNDECIDED
 
-__all__ = ["bound_remark", "open_remarks", "remarks", "why_above"]
+__all__ = ["bound_remark", "by_importance", "open_remarks", "remarks", "why_above"]
+
+_IMPORTANT = (
+    ("failed: ", "cannot cut the part: ", "cannot be printed as planned"),
+    ("not printable as planned: ",),
+    ("no virtual test: ", "undecided against", "no difference to"),
+    ("no paths of", "trust neither number", "bring the worst case above"),
+    ("planned for ", "takes ", "the stress of another program"),
+    ("strands cross", "no fibre on", "so it is placed below", "links lie"),
+    ("estimated error", "lock"),
+)
+"""Words of remarks, those first that a reader has to know first."""
 
 _FULL = 0.93
 """Coverage of a layer above which it counts as filled."""
@@ -43,6 +54,16 @@ def remarks(runs: Sequence[Run], wanted: Wanted, bound: UpperBound | None = None
     tested = [run for run in order if is_tested(run) and not off_length(run, wanted)]
     found += _about_orders(tested)
     return [*found, bound_remark(tested, bound)] if bound is not None and tested else found
+
+
+def by_importance(lines: Sequence[str]) -> list[str]:
+    """Remarks in the order in which a reader has to know them; others last, as they come."""
+
+    def rank(line: str) -> int:
+        kinds = (k for k, words in enumerate(_IMPORTANT) if any(word in line for word in words))
+        return next(kinds, len(_IMPORTANT))
+
+    return sorted(lines, key=rank)
 
 
 def _about(run: Run, wanted: Wanted, bounded: bool) -> list[str]:

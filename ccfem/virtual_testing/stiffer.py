@@ -3,7 +3,16 @@
 from ccfem.errors import InputError
 from ccfem.virtual_testing.virtual_test import Bracket
 
-__all__ = ["FIRST", "HONEST_PROMISE", "RESOLUTION", "SAME", "SECOND", "UNDECIDED", "stiffer"]
+__all__ = [
+    "FIRST",
+    "HONEST_PROMISE",
+    "IN_SHORT",
+    "RESOLUTION",
+    "SAME",
+    "SECOND",
+    "UNDECIDED",
+    "stiffer",
+]
 
 FIRST, SECOND, SAME, UNDECIDED = "first", "second", "no difference", "undecided"
 
@@ -18,6 +27,12 @@ HONEST_PROMISE = (
     "give the same order; a published load of 0.87 kN was not reproduced."
 )
 """What may be expected of the numbers; to be shown wherever they are."""
+
+IN_SHORT = (
+    "Predicted by a virtual test that was held against one published part: an indication, not a "
+    "validation."
+)
+"""The same in one sentence, where the report says the rest."""
 
 RESOLUTION = 0.02
 """Relative difference of stiffness below which two designs are not told apart.
