@@ -400,7 +400,7 @@ def test_bad_parts_end_in_one_line(ccfem, folder, text, message):
         (["lop"], r"two_pull_loop: did you mean 'loop'\? \(or name a part file"),
         (["part.toml", "--strategies", "isocurv"], "zigzag: did you mean 'isocurve'"),
         (["part.toml", "--set", "zigzag.spacin=2"], "turns: did you mean 'spacing'"),
-        (["part.toml", "--set", "zigzga.turn=2"], "contour_zigzag: did you mean 'zigzag'"),
+        (["part.toml", "--set", "zigzga.turn=2"], "contour_zigzag, zigzag: did you mean 'zigzag'"),
         (["bar", "--set-case", "element_siz=1"], "did you mean 'element_size'"),
         (["part.toml", "--strategies", ","], "at least one strategy"),
         (["part.toml", "--set", "zigzag.pitch=2"], "'zigzag' has no parameter 'pitch'; it has:"),
