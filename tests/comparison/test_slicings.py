@@ -167,7 +167,7 @@ def test_screen_shows_every_run_its_figures_and_the_verdict(
     monkeypatch.chdir(tmp_path)
     Path("somewhere").mkdir()
     Path("somewhere/report.html").touch()
-    print_comparison(compared, Path("somewhere"), 1.0)
+    print_comparison(compared, Path("somewhere"), 1.0, details=True)
     said = capsys.readouterr().out
     for run in compared.runs:
         assert run.name in said
@@ -177,6 +177,10 @@ def test_screen_shows_every_run_its_figures_and_the_verdict(
     assert "somewhere/report.html" in flat
     assert ("in the report: " in said) == (width == "90")
     assert "…" not in said
+    print_comparison(compared, Path("somewhere"), 1.0)
+    short = capsys.readouterr().out
+    assert len(short.splitlines()) < len(said.splitlines())
+    assert compared.verdict in " ".join(short.split())
 
 
 def test_flat_layers_named_alone_are_as_thick_as_the_parts_own(case):
