@@ -17,6 +17,9 @@ if TYPE_CHECKING:
 
 __all__ = ["front"]
 
+_FILES = ("front.csv", "front.png", "trade.png", "command.txt")
+"""All files that the command writes."""
+
 
 def front(
     case: CasePath,
@@ -81,7 +84,7 @@ def front(
     if load_case is not None and not for_all:
         check_known("load case", load_case, names)
     where = out if out is not None else Path("results") / f"{part.name}-front"
-    with whole_folder(where, force) as folder, progress_bar(lines=True) as progress:
+    with whole_folder(where, _FILES, force) as folder, progress_bar(lines=True) as progress:
         progress(f"solving {part.name}", 0.0)
         fields = solve(part.problem, backend=backend)
         cases = weighted_cases(part, fields) if for_all else None

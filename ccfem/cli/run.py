@@ -202,7 +202,7 @@ def run(
         raise InputError("--refine changes the mesh that the file of --stress is on: drop one")
     from ccfem.cli.screen import print_comparison, print_slicings
     from ccfem.comparison.compare import compare, create_all
-    from ccfem.comparison.files import write_drawings, write_results
+    from ccfem.comparison.files import RESULT_FILES, write_drawings, write_results
     from ccfem.comparison.slicings import SlicingComparison
     from ccfem.comparison.slicings_files import write_slicings
     from ccfem.io.result_folder import whole_folder
@@ -225,7 +225,7 @@ def run(
     where = out if out is not None else Path("results") / f"{case.name}{suffix}"
     part_file = _text_of(name)
     slicer = member_name(_slicer_of(case, options.get("layers")))
-    with whole_folder(where, force) as folder, progress_bar(lines=True) as progress:
+    with whole_folder(where, RESULT_FILES, force) as folder, progress_bar(lines=True) as progress:
         comparison = compare(case, chosen, progress=_part(progress, 0.0, _SOLVED), **options)
         _check(comparison)
         command, rest = shlex.join(["ccfem", *sys.argv[1:]]), _part(progress, _SOLVED, 1.0)

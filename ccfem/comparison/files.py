@@ -18,7 +18,16 @@ from ccfem.toolpaths import Toolpaths
 if TYPE_CHECKING:
     from ccfem.comparison.pictures import Pictures
 
-__all__ = ["write_drawings", "write_results"]
+__all__ = ["RESULT_FILES", "write_drawings", "write_results"]
+
+RESULT_FILES = (
+    *("results.csv", "results.json", "report.html", "paths.vtp", "curve.csv", "curve.png"),
+    *("tension.png", "overview.png", "part.png", "part.html"),
+    *("*_waypoints.txt", "*_waypoints.csv", "*.gcode", "*_cell.csv", "*_trim.csv"),
+    *("*_layer_[0-9]*.png", "*_layer_[0-9]*.svg", "*_layer_[0-9]*.dxf", "*_force.png"),
+    *("*_space.png", "*_space.html", "*_overview.png"),
+)
+"""Patterns of all files that comparisons, over slicings too, write (`whole_folder`)."""
 
 
 def write_results(

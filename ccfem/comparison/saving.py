@@ -3,7 +3,7 @@
 import os
 from pathlib import Path
 
-from ccfem.comparison.files import write_results
+from ccfem.comparison.files import RESULT_FILES, write_results
 from ccfem.comparison.result import Comparison
 from ccfem.comparison.slicings import SlicingComparison
 from ccfem.comparison.slicings_files import write_slicings
@@ -41,7 +41,7 @@ def save(
         When the folder cannot be written to, or holds files that would be overwritten.
     """
     folder, command = Path(folder), "ccfem.save(comparison) in Python"
-    with whole_folder(folder, force) as temporary:
+    with whole_folder(folder, RESULT_FILES, force) as temporary:
         if isinstance(comparison, SlicingComparison):
             write_slicings(comparison, temporary, command, {}, progress)
         else:

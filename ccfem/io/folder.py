@@ -1,0 +1,223 @@
+"""A folder held open: its entries by bare name, never through a link, and private folders in it.
+
+Everything is done relative to the open folder, so that nobody can put a link in its place between
+a look and a deed; where a system has no such calls (Windows), by path.
+"""
+
+import hashlib
+import os
+import platform
+import re
+import secrets
+import shutil
+import stat
+import tempfile
+from collections.abc import Callable, Iterator
+from contextlib import contextmanager, suppress
+from pathlib import Path
+from typing import Any
+
+__all__ = ["Folder", "private_folder", "remove_private_folders", "sweep"]
+
+_RELATIVE = {os.open, os.stat, os.unlink, os.rename, os.mkdir} <= os.supports_dir_fd
+_REAL = getattr(os, "O_NOFOLLOW", 0) | getattr(os, "O_NONBLOCK", 0) | getattr(os, "O_BINARY", 0)
+"""How files are opened: no link is followed, and no pipe waited for."""
+_TEMPORARY = re.compile(r"\.ccfem-(?P<host>[^-]*)-(?P<pid>\d+)-\w+")
+_PRIVATE: set[str] = set()
+"""Private folders that there are now."""
+
+
+class Folder:
+    """A folder held open; made by `Folder.opened` and `Folder.inner`.
+
+    Attributes
+    ----------
+    path : Path
+        For messages.
+    """
+
+    def __init__(self, path: Path, handle: int | None) -> None:
+        self.path, self._handle = path, handle
+
+    @classmethod
+    @contextmanager
+    def opened(cls, path: Path) -> Iterator["Folder"]:
+        """Hold a folder open; it may be a link itself, since the user named it."""
+        if not _RELATIVE:
+            yield cls(path.resolve(strict=True), None)
+            return
+        handle = os.open(path, os.O_RDONLY | os.O_DIRECTORY)
+        try:
+            yield cls(path, handle)
+        finally:
+            os.close(handle)
+
+    @contextmanager
+    def inner(self, name: str) -> Iterator["Folder"]:
+        """Hold a folder in this one open, made where there is none; a link is an OSError."""
+        with suppress(FileExistsError):
+            os.mkdir(**self._at(name))
+        if not self.is_folder(name):
+            raise NotADirectoryError(20, "no real folder", str(self.path / name))
+        if not _RELATIVE:
+            yield Folder(self.path / name, None)
+            return
+        handle = os.open(**self._at(name), flags=os.O_RDONLY | os.O_DIRECTORY | os.O_NOFOLLOW)
+        try:
+            yield Folder(self.path / name, handle)
+        finally:
+            os.close(handle)
+
+    def _at(self, name: str) -> dict[str, Any]:
+        """Place of an entry, as functions of `os` take it."""
+        if name in ("", ".", "..") or Path(name).name != name:
+            raise ValueError(f"{name!r} is no name of an entry of a folder")
+        if self._handle is None:
+            return {"path": self.path / name}
+        return {"path": name, "dir_fd": self._handle}
+
+    def names(self) -> list[str]:
+        """Names of all entries, sorted."""
+        return sorted(os.listdir(self.path if self._handle is None else self._handle))
+
+    def entry(self, name: str) -> os.stat_result | None:
+        """Return what an entry is itself, links not followed; None where there is none."""
+        try:
+            return os.stat(**self._at(name), follow_symlinks=False)
+        except FileNotFoundError:
+            return None
+
+    def is_file(self, name: str) -> bool:
+        """Whether an entry is a regular file, and no link to one."""
+        entry = self.entry(name)
+        return entry is not None and stat.S_ISREG(entry.st_mode)
+
+    def is_folder(self, name: str) -> bool:
+        """Whether an entry is a folder, and no link to one."""
+        entry = self.entry(name)
+        return entry is not None and stat.S_ISDIR(entry.st_mode)
+
+    def open(self, name: str, flags: int) -> int:
+        """Open a regular file, for the flags of `os.open`; anything else is an OSError."""
+        handle = os.open(**self._at(name), flags=flags | _REAL, mode=0o666)
+        if not stat.S_ISREG(os.fstat(handle).st_mode):
+            os.close(handle)
+            raise OSError(22, "no regular file", str(self.path / name))
+        return handle
+
+    def read(self, name: str) -> bytes:
+        """Content of a regular file; anything else is an OSError."""
+        with os.fdopen(self.open(name, os.O_RDONLY), "rb") as file:
+            return file.read()
+
+    def digest(self, name: str) -> str:
+        """SHA-256 of a regular file; empty for anything else."""
+        try:
+            with os.fdopen(self.open(name, os.O_RDONLY), "rb") as file:
+                return hashlib.file_digest(file, "sha256").hexdigest()
+        except OSError:
+            return ""
+
+    def write(self, name: str, content: bytes) -> None:
+        """Write a file whole; what has its name, be it a link, is replaced and never followed."""
+        temporary = f"{_prefix()}{secrets.token_hex(8)}"
+        handle = self.open(temporary, os.O_WRONLY | os.O_CREAT | os.O_EXCL)
+        try:
+            with os.fdopen(handle, "wb") as file:
+                file.write(content)
+            self.take(self, temporary, name)
+        except BaseException:
+            self.remove(temporary)
+            raise
+
+    def take(self, source: "Folder", name: str, new: str | None = None) -> None:
+        """Move a file of another folder here, by another name if wanted; it replaces what has it."""
+        there, here = source._at(name), self._at(name if new is None else new)
+        if self._handle is None:
+            os.replace(there["path"], here["path"])
+        else:
+            fds = {"src_dir_fd": there["dir_fd"], "dst_dir_fd": here["dir_fd"]}
+            os.replace(there["path"], here["path"], **fds)
+
+    def remove(self, name: str) -> None:
+        """Remove a file or a link, where there is one."""
+        with suppress(FileNotFoundError):
+            os.unlink(**self._at(name))
+
+    def remove_tree(self, name: str) -> None:
+        """Remove a folder and all in it; links in it are removed, not followed."""
+        shutil.rmtree(**self._at(name), ignore_errors=True)
+
+
+@contextmanager
+def private_folder(parent: Path | None = None) -> Iterator[Path]:
+    """Yield a new folder that no other user may enter; it is removed at the end, with all in it.
+
+    Parameters
+    ----------
+    parent : Path, optional
+        Where it is made; default the system's folder for temporary files.
+    """
+    name = tempfile.mkdtemp(prefix=_prefix(), dir=parent)
+    _PRIVATE.add(name)
+    try:
+        yield Path(name)
+    finally:
+        shutil.rmtree(name, ignore_errors=True)
+        _PRIVATE.discard(name)
+
+
+def remove_private_folders() -> None:
+    """Remove all private folders of this process, which is about to end at once."""
+    for name in tuple(_PRIVATE):
+        shutil.rmtree(name, ignore_errors=True)
+
+
+def _prefix() -> str:
+    """Beginning of temporary names of this process."""
+    return f".ccfem-{_host()}-{os.getpid()}-"
+
+
+def _host() -> str:
+    return re.sub(r"\W", "", platform.node())
+
+
+def sweep(folder: Folder, mend: Callable[[Folder], None] | None = None) -> None:
+    """Remove what killed programs of this user on this machine left in a folder.
+
+    That is, with the name of a temporary file of a process that is no more: private folders, and
+    files, of this user.
+
+    Parameters
+    ----------
+    folder : Folder
+    mend : callable, optional
+        Called with each private folder, held open, before it is removed.
+    """
+    for name in folder.names():
+        known = _TEMPORARY.fullmatch(name)
+        if known is None or known["host"] != _host() or _is_running(int(known["pid"])):
+            continue
+        entry = folder.entry(name)
+        if entry is None or (hasattr(os, "getuid") and entry.st_uid != os.getuid()):
+            continue
+        if stat.S_ISREG(entry.st_mode):
+            folder.remove(name)
+        elif stat.S_ISDIR(entry.st_mode) and (os.name != "posix" or not entry.st_mode & 0o077):
+            if mend is not None:
+                with folder.inner(name) as private:
+                    mend(private)
+            folder.remove_tree(name)
+
+
+def _is_running(pid: int) -> bool:
+    """Whether there is a process of this number, as far as the system says so safely."""
+    if os.name != "posix":
+        return True
+    try:
+        os.kill(pid, 0)
+    except (ProcessLookupError, OverflowError):
+        return False
+    except PermissionError:
+        return True
+    return True
