@@ -104,6 +104,22 @@ def test_no_name_twice_for_two_ideas():
     assert {stem for stem, those in named.items() if len(those) > 1} == set(TWICE)
 
 
+def test_pickles_are_read_in_one_place():
+    """What comes through pipes of its own; nothing that lies in a folder is unpickled."""
+    loading = {"pickle", "cloudpickle", "dill", "joblib", "shelve", "marshal"}
+    known = []
+    for name, path in modules().items():
+        text = path.read_text(encoding="utf-8")
+        for node in ast.walk(ast.parse(text)):
+            if isinstance(node, ast.Import | ast.ImportFrom):
+                wanted = [alias.name for alias in node.names] + [getattr(node, "module", "") or ""]
+                if loading.intersection(word.partition(".")[0] for word in wanted):
+                    known.append(name)
+        assert "allow_pickle=True" not in text, name
+        assert "read_pickle" not in text, name
+    assert set(known) == {"ccfem.studies.transport"}
+
+
 REDUCTIONS = ("sum", "min", "max", "any", "all", "argmin", "argmax", "mean")
 
 

@@ -4,6 +4,7 @@ Everything is done relative to the open folder, so that nobody can put a link in
 a look and a deed; where a system has no such calls (Windows), by path.
 """
 
+import errno
 import hashlib
 import os
 import platform
@@ -58,7 +59,9 @@ class Folder:
         with suppress(FileExistsError):
             os.mkdir(**self._at(name))
         if not self.is_folder(name):
-            raise NotADirectoryError(20, "no real folder", str(self.path / name))
+            raise NotADirectoryError(
+                errno.ENOTDIR, "it is no folder but a link or a file", str(self.path / name)
+            )
         if not _RELATIVE:
             yield Folder(self.path / name, None)
             return
@@ -99,10 +102,15 @@ class Folder:
 
     def open(self, name: str, flags: int) -> int:
         """Open a regular file, for the flags of `os.open`; anything else is an OSError."""
+        refusal = OSError(
+            errno.EINVAL, "it is no file but a link or a folder", str(self.path / name)
+        )
+        if self.entry(name) is not None and not self.is_file(name):
+            raise refusal
         handle = os.open(**self._at(name), flags=flags | _REAL, mode=0o666)
         if not stat.S_ISREG(os.fstat(handle).st_mode):
             os.close(handle)
-            raise OSError(22, "no regular file", str(self.path / name))
+            raise refusal
         return handle
 
     def read(self, name: str) -> bytes:
@@ -131,7 +139,7 @@ class Folder:
             raise
 
     def take(self, source: "Folder", name: str, new: str | None = None) -> None:
-        """Move a file of another folder here, by another name if wanted; it replaces what has it."""
+        """Move a file of another folder here, by another name if wanted, replacing what has it."""
         there, here = source._at(name), self._at(name if new is None else new)
         if self._handle is None:
             os.replace(there["path"], here["path"])

@@ -9,7 +9,7 @@ touch a file of another name. Links are never followed.
 import json
 import os
 from collections.abc import Iterator, Mapping, Sequence
-from contextlib import contextmanager
+from contextlib import contextmanager, suppress
 from fnmatch import fnmatchcase
 from pathlib import Path
 
@@ -57,9 +57,9 @@ def whole_folder(directory: Path, names: Sequence[str], force: bool = False) -> 
         parent = _existing_parent(directory)
         with _alone(parent):
             _mend(parent, directory, names)
-            if directory.exists() and not force:
+            if directory.exists():
                 with Folder.opened(directory) as target:
-                    refuse_foreign(target, names)
+                    refuse_foreign(target, names, force)
         # On one file system with the folder, which may be a link or have one of its own.
         with private_folder(directory if directory.exists() else parent) as private:
             (private / _UNREADY).mkdir()
@@ -113,33 +113,52 @@ def _mend(parent: Path, directory: Path, names: Sequence[str]) -> None:
     with Folder.opened(directory) as target:
 
         def finish(private: Folder) -> None:
-            if private.is_folder(_READY):
-                with private.inner(_READY) as new:
-                    ours = _ours(target, names)
-                    if _marked(new) and not any(_in_the_way(new, target, ours, force=False)):
-                        _replace(new, target, names)
+            if not private.is_folder(_READY):
+                return
+            # What has come into the way since then stays.
+            with private.inner(_READY) as new, suppress(InputError):
+                _refuse_in_the_way(new, target, _ours(target, names), force=False)
+                if _marked(new) is not None:  # the last that is moved
+                    _replace(new, target, names)
 
         sweep(target, finish)
 
 
-def refuse_foreign(target: Folder, names: Sequence[str]) -> None:
-    """Refuse a folder with files that ccfem did not write, unless it also holds its results."""
+def refuse_foreign(target: Folder, names: Sequence[str], force: bool) -> None:
+    """Refuse a folder with files that ccfem did not write, unless it also holds its results.
+
+    In that one, entries of others are refused that have the names of results: see `whole_folder`.
+    """
     there = [name for name in target.names() if name not in RESERVED]
-    marked = _marked(target)
-    if marked is None and (there or target.entry(_MARKER) is not None):
+    marked, ours = _marked(target), _ours(target, names)
+    if marked is None and (there or target.entry(_MARKER) is not None) and not force:
         raise InputError(
             f"{target.path} holds files that ccfem did not write, such as "
             f"{(there or [_MARKER])[0]}: choose another folder with --out, or replace files of the "
             "same names with --force"
         )
-    ours = _ours(target, names)
-    changed = [name for name in there if name in (marked or {}) and _is_known(name, names)]
-    for name in changed:
-        if name not in ours:
+    changed = {name for name in there if name in (marked or {}) and _is_known(name, names)}
+    for name in sorted(changed.difference(ours)):
+        if not force:
             raise InputError(
                 f"{target.path / name} was changed since ccfem wrote it: move it, choose another "
                 "folder with --out, or replace it with --force"
             )
+    for name in {*names, _MARKER}.intersection(target.names()):
+        _refuse_entry(target, name, ours, force)
+
+
+def _refuse_entry(target: Folder, name: str, ours: Mapping[str, str], force: bool) -> None:
+    """Refuse to replace an entry that is not by ccfem; a folder even where replacing is wanted."""
+    marker = name == _MARKER and _marked(target) is not None
+    if target.entry(name) is None or name in ours or marker:
+        return
+    if not force or target.is_folder(name):
+        cure = "" if target.is_folder(name) else ", or replace it with --force"
+        raise InputError(
+            f"{target.path / name} is not by ccfem and has the name of a result: move it"
+            f"{',' if cure else ' or'} choose another folder with --out{cure}"
+        )
 
 
 def _is_known(name: str, names: Sequence[str]) -> bool:
@@ -173,22 +192,14 @@ def _ours(target: Folder, names: Sequence[str]) -> dict[str, str]:
     return {name: digest for name, digest in hashes.items() if digest in marked[name]}
 
 
-def _in_the_way(
-    new: Folder, target: Folder, ours: dict[str, str], force: bool
-) -> Iterator[tuple[Path, str]]:
-    """Entries of the old folder whose places the new files may not take, and what to do."""
+def _refuse_in_the_way(new: Folder, target: Folder, ours: Mapping[str, str], force: bool) -> None:
+    """Refuse to go on where something that is not by ccfem has the place of a new file."""
     for name in {*new.names(), _MARKER}:
-        entry = target.entry(name)
-        if entry is None or name in ours or (name == _MARKER and _marked(target) is not None):
-            continue
         if new.is_folder(name) and target.is_folder(name):
             with new.inner(name) as inner, target.inner(name) as old:
-                yield from _in_the_way(inner, old, {}, force)
-        elif target.is_folder(name) or new.is_folder(name):
-            yield target.path / name, "choose another folder with --out"
-        elif not force:
-            cure = "choose another folder with --out, or replace it with --force"
-            yield target.path / name, cure
+                _refuse_in_the_way(inner, old, {}, force)
+        else:
+            _refuse_entry(target, name, ours, force and not new.is_folder(name))
 
 
 def _publish(private: Folder, directory: Path, names: Sequence[str], force: bool) -> None:
@@ -203,10 +214,7 @@ def _publish(private: Folder, directory: Path, names: Sequence[str], force: bool
             return
         with Folder.opened(directory) as target:
             before = _ours(target, names)
-            for path, cure in _in_the_way(new, target, before, force):
-                raise InputError(
-                    f"{path} is not by ccfem and has the name of a result: move it, {cure}"
-                )
+            _refuse_in_the_way(new, target, before, force)
             marked = (_marked(target) or {}).items()
             others = {name: list(hashes) for name, hashes in marked if not _is_known(name, names)}
             _mark(new, others | files)

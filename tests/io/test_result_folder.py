@@ -319,7 +319,10 @@ def test_force_takes_no_folder(tmp_path):
     where = tmp_path / "results"
     (where / "report.html").mkdir(parents=True)
     (where / "report.html" / "thesis.docx").write_text("three years")
-    with pytest.raises(InputError, match=r"report.html is not by ccfem .* with --out$"):
+    with pytest.raises(
+        InputError,
+        match=r"report.html is not by ccfem .*: move it or choose another folder with --out$",
+    ):
         write(where, force=True, report_html="new")
     assert (where / "report.html" / "thesis.docx").read_text() == "three years"
     assert [path.name for path in where.iterdir()] == ["report.html"]
