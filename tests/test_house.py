@@ -1,6 +1,7 @@
 """The house: no import circle, a room stands above all that it imports, few and short files."""
 
 import ast
+import re
 from collections import defaultdict
 from functools import cache
 from graphlib import CycleError, TopologicalSorter
@@ -118,6 +119,16 @@ def test_pickles_are_read_in_one_place():
         assert "allow_pickle=True" not in text, name
         assert "read_pickle" not in text, name
     assert set(known) == {"ccfem.studies.transport"}
+
+
+def test_tables_with_text_are_written_in_one_place():
+    """Where no name is taken for a formula; other CSV files hold numbers and fixed words."""
+    writing = {
+        name
+        for name, path in modules().items()
+        if {"writer(", "DictWriter(", "to_csv("} & set(re.findall(r"\w+\(", path.read_text()))
+    }
+    assert writing == {"ccfem.io.csv_table"}
 
 
 REDUCTIONS = ("sum", "min", "max", "any", "all", "argmin", "argmax", "mean")

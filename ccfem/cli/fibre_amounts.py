@@ -66,6 +66,7 @@ def front(
     from ccfem.comparison.fibre_front import counts_to_try, fibre_front
     from ccfem.elasticity.solve import solve
     from ccfem.errors import InputError
+    from ccfem.io.csv_table import write_csv
     from ccfem.io.result_folder import whole_folder
     from ccfem.progress import progress_bar
 
@@ -101,7 +102,8 @@ def front(
             strengths=strengths,
             progress=progress,
         )
-        found.to_frame().to_csv(folder / "front.csv", index=False)
+        frame = found.to_frame()
+        write_csv(folder / "front.csv", [*frame], frame.itertuples(index=False))
         found.plot().savefig(folder / "front.png")
         if len(strengths) > 1:
             found.plot_trade().savefig(folder / "trade.png")

@@ -11,6 +11,7 @@ import numpy as np
 from ccfem.comparison.record import record, results_rows, write_table
 from ccfem.comparison.result import Comparison
 from ccfem.comparison.shown import file_stem
+from ccfem.io.csv_table import write_csv
 from ccfem.printing.print_plan import PrintPlan
 from ccfem.progress import Progress, silent
 from ccfem.toolpaths import Toolpaths
@@ -78,7 +79,8 @@ def write_results(
     start = time.perf_counter()
     write_table(results_rows(comparison), folder / "results.csv")
     if comparison.curve is not None:
-        comparison.curve.frame.to_csv(folder / "curve.csv", index=False)
+        frame = comparison.curve.frame
+        write_csv(folder / "curve.csv", [*frame], frame.itertuples(index=False))
     _write_paths(comparison, folder)
     spent["files"] = time.perf_counter() - start
     progress("writing the report", 0.8)

@@ -12,6 +12,7 @@ from typing import Any
 from uuid import uuid4
 
 from ccfem.checks import check_number
+from ccfem.io.csv_table import write_csv
 from ccfem.io.folder import Folder, private_folder, sweep
 from ccfem.progress import Progress, silent
 from ccfem.studies.cluster import on_cluster
@@ -135,8 +136,8 @@ def _here(
 def _write_tables(result: StudyResult, folder: Path) -> None:
     """Write ``results.csv``, ``results.parquet``, ``times.csv`` and ``study.html``."""
     frame = result.frame
-    frame.to_csv(folder / "results.csv", index=False)
-    result.seconds.to_csv(folder / "times.csv", index=False)
+    for name, table in (("results.csv", frame), ("times.csv", result.seconds)):
+        write_csv(folder / name, [*table], table.itertuples(index=False))
     if find_spec("pyarrow") is not None:
         plain = frame.copy()
         for name in frame:  # a column of numbers and words becomes one of words
