@@ -13,17 +13,30 @@ import secrets
 import shutil
 import stat
 import tempfile
-from collections.abc import Callable, Iterator
+from collections.abc import Callable, Iterator, Sequence
 from contextlib import contextmanager, suppress
+from fnmatch import fnmatchcase
 from pathlib import Path
 from typing import Any
 
-__all__ = ["Folder", "private_folder", "remove_private_folders", "sweep"]
+__all__ = [
+    "PARTS",
+    "READY",
+    "UNREADY",
+    "Folder",
+    "private_folder",
+    "remove_private_folders",
+    "sweep",
+]
 
-_RELATIVE = {os.open, os.stat, os.unlink, os.rename, os.mkdir} <= os.supports_dir_fd
+_RELATIVE = {os.open, os.stat, os.unlink, os.rename, os.mkdir, os.rmdir} <= os.supports_dir_fd
 _REAL = getattr(os, "O_NOFOLLOW", 0) | getattr(os, "O_NONBLOCK", 0) | getattr(os, "O_BINARY", 0)
 """How files are opened: no link is followed, and no pipe waited for."""
-_TEMPORARY = re.compile(r"\.ccfem-(?P<host>[^-]*)-(?P<pid>\d+)-\w+")
+_TEMPORARY = re.compile(r"\.ccfem-(?P<host>[^-]*)-(?P<pid>\d+)-(?P<rest>\w{8}|[0-9a-f]{16})")
+_RANDOM = 8
+"""Random bytes in the name of a temporary file; a private folder has as many letters."""
+PARTS = UNREADY, READY = "new", "ready"
+"""Folders in a private folder: with files that are being written, and with whole ones."""
 _PRIVATE: set[str] = set()
 """Private folders that there are now."""
 
@@ -128,7 +141,7 @@ class Folder:
 
     def write(self, name: str, content: bytes) -> None:
         """Write a file whole; what has its name, be it a link, is replaced and never followed."""
-        temporary = f"{_prefix()}{secrets.token_hex(8)}"
+        temporary = f"{_prefix()}{secrets.token_hex(_RANDOM)}"
         handle = self.open(temporary, os.O_WRONLY | os.O_CREAT | os.O_EXCL)
         try:
             with os.fdopen(handle, "wb") as file:
@@ -152,9 +165,10 @@ class Folder:
         with suppress(FileNotFoundError):
             os.unlink(**self._at(name))
 
-    def remove_tree(self, name: str) -> None:
-        """Remove a folder and all in it; links in it are removed, not followed."""
-        shutil.rmtree(**self._at(name), ignore_errors=True)
+    def remove_empty(self, name: str) -> None:
+        """Remove a folder if there is nothing in it."""
+        with suppress(OSError):
+            os.rmdir(**self._at(name))
 
 
 @contextmanager
@@ -190,17 +204,21 @@ def _host() -> str:
     return re.sub(r"\W", "", platform.node())
 
 
-def sweep(folder: Folder, mend: Callable[[Folder], None] | None = None) -> None:
+def sweep(
+    folder: Folder, names: Sequence[str], mend: Callable[[Folder], None] | None = None
+) -> None:
     """Remove what killed programs of this user on this machine left in a folder.
 
-    That is, with the name of a temporary file of a process that is no more: private folders, and
-    files, of this user.
+    That is files with the temporary name of a process that is no more, and private folders that
+    hold nothing but files of known names, in themselves or in their folders `PARTS`.
 
     Parameters
     ----------
     folder : Folder
+    names : sequence of str
+        Patterns, as of `fnmatch`, of these files; others stay, and so does their folder.
     mend : callable, optional
-        Called with each private folder, held open, before it is removed.
+        Called with each private folder, held open, before it is emptied.
     """
     for name in folder.names():
         known = _TEMPORARY.fullmatch(name)
@@ -210,12 +228,24 @@ def sweep(folder: Folder, mend: Callable[[Folder], None] | None = None) -> None:
         if entry is None or (hasattr(os, "getuid") and entry.st_uid != os.getuid()):
             continue
         if stat.S_ISREG(entry.st_mode):
-            folder.remove(name)
+            if len(known["rest"]) == 2 * _RANDOM:
+                folder.remove(name)
         elif stat.S_ISDIR(entry.st_mode) and (os.name != "posix" or not entry.st_mode & 0o077):
-            if mend is not None:
-                with folder.inner(name) as private:
+            with folder.inner(name) as private:
+                if mend is not None:
                     mend(private)
-            folder.remove_tree(name)
+                for part in filter(private.is_folder, PARTS):
+                    _empty(private, part, names)
+            _empty(folder, name, names)
+
+
+def _empty(folder: Folder, name: str, names: Sequence[str]) -> None:
+    """Remove files of known names from an inner folder, and the folder if it is then empty."""
+    with folder.inner(name) as inner:
+        for file in filter(inner.is_file, inner.names()):
+            if any(fnmatchcase(file, pattern) for pattern in names):
+                inner.remove(file)
+    folder.remove_empty(name)
 
 
 def _is_running(pid: int) -> bool:

@@ -14,7 +14,7 @@ from fnmatch import fnmatchcase
 from pathlib import Path
 
 from ccfem.errors import InputError
-from ccfem.io.folder import Folder, private_folder, sweep
+from ccfem.io.folder import READY, UNREADY, Folder, private_folder, sweep
 
 __all__ = ["RESERVED", "refuse_foreign", "whole_folder"]
 
@@ -22,8 +22,6 @@ _MARKER = ".ccfem.json"
 """File in a folder of results: the files that ccfem wrote there, each with its SHA-256."""
 RESERVED = (_MARKER, ".lock")
 """Names in a folder of results that stand for nothing by themselves."""
-_UNREADY, _READY = "new", "ready"
-"""The new files in a private folder, before all are written and after."""
 _LARGEST_MARKER = 10_000_000
 """Bytes."""
 
@@ -62,8 +60,8 @@ def whole_folder(directory: Path, names: Sequence[str], force: bool = False) -> 
                     refuse_foreign(target, names, force)
         # On one file system with the folder, which may be a link or have one of its own.
         with private_folder(directory if directory.exists() else parent) as private:
-            (private / _UNREADY).mkdir()
-            yield private / _UNREADY
+            (private / UNREADY).mkdir()
+            yield private / UNREADY
             with _alone(parent), Folder.opened(private) as folder:
                 _publish(folder, directory, names, force)
     except OSError as error:
@@ -107,21 +105,21 @@ def _alone(parent: Path) -> Iterator[None]:
 def _mend(parent: Path, directory: Path, names: Sequence[str]) -> None:
     """Remove what killed runs left, and finish what they had begun to put into the folder."""
     with Folder.opened(parent) as above:
-        sweep(above)
+        sweep(above, (*names, _MARKER))
     if not directory.is_dir():
         return
     with Folder.opened(directory) as target:
 
         def finish(private: Folder) -> None:
-            if not private.is_folder(_READY):
+            if not private.is_folder(READY):
                 return
             # What has come into the way since then stays.
-            with private.inner(_READY) as new, suppress(InputError):
+            with private.inner(READY) as new, suppress(InputError):
                 _refuse_in_the_way(new, target, _ours(target, names), force=False)
                 if _marked(new) is not None:  # the last that is moved
                     _replace(new, target, names)
 
-        sweep(target, finish)
+        sweep(target, (*names, _MARKER), finish)
 
 
 def refuse_foreign(target: Folder, names: Sequence[str], force: bool) -> None:
@@ -204,13 +202,13 @@ def _refuse_in_the_way(new: Folder, target: Folder, ours: Mapping[str, str], for
 
 def _publish(private: Folder, directory: Path, names: Sequence[str], force: bool) -> None:
     """Put the new files of a private folder into the folder of results."""
-    with private.inner(_UNREADY) as new:
+    with private.inner(UNREADY) as new:
         files = {name: [new.digest(name)] for name in new.names() if new.is_file(name)}
         if not os.path.lexists(directory):
             _mark(new, files)
             directory.parent.mkdir(parents=True, exist_ok=True)
             with Folder.opened(directory.parent) as above:
-                above.take(private, _UNREADY, directory.name)
+                above.take(private, UNREADY, directory.name)
             return
         with Folder.opened(directory) as target:
             before = _ours(target, names)
@@ -221,7 +219,7 @@ def _publish(private: Folder, directory: Path, names: Sequence[str], force: bool
             # Both lists until all is done: a kill at any moment leaves nothing that is unknown.
             both = {name: [digest, *files.get(name, [])] for name, digest in before.items()}
             _mark(target, others | files | both)
-            private.take(private, _UNREADY, _READY)
+            private.take(private, UNREADY, READY)
             _replace(new, target, names)
 
 

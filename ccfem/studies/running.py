@@ -115,7 +115,7 @@ def _made(
         yield from on_cluster(parts, missing, address)
     elif workers:
         with Folder.opened(Path(gettempdir())) as temporary:
-            sweep(temporary)
+            sweep(temporary, ("*.npz",))
         with private_folder() as shared:
             yield from in_processes(parts, missing, workers, shared)
     else:

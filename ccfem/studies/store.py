@@ -68,10 +68,10 @@ class Store:
 
     def sweep(self) -> None:
         """Remove what killed programs left behind."""
-        sweep(self._folder)
+        sweep(self._folder, ("study.json", *TABLES))
         if self._folder.is_folder(_RUNS):
             with self._folder.inner(_RUNS) as runs:
-                sweep(runs)
+                sweep(runs, ())
 
 
 def _is_outcome(value: Any) -> bool:

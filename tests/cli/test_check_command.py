@@ -1,6 +1,5 @@
 """``ccfem check`` and ``ccfem mesh``: what they print and write."""
 
-
 import pytest
 
 PART = """

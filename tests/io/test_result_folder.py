@@ -130,7 +130,7 @@ def test_a_file_in_the_place_of_the_folder_is_refused(tmp_path):
         write(tmp_path / "results", report_html="new")
 
 
-def killed_folder(parent, pid, host=None, mode=0o700, rest="abc"):
+def killed_folder(parent, pid, host=None, mode=0o700, rest="abcdefgh"):
     """Make what a killed run leaves: a private folder with results that were not yet moved."""
     host = re.sub(r"\W", "", platform.node()) if host is None else host
     path = parent / f".ccfem-{host}-{pid}-{rest}"
@@ -154,12 +154,16 @@ def test_what_a_killed_run_left_is_removed_and_nothing_else(tmp_path, ended):
     for parent in (tmp_path, where):
         killed_folder(parent, ended)
     kept = [killed_folder(where, os.getpid()), killed_folder(where, ended, "elsewhere")]
-    public = killed_folder(tmp_path, ended, mode=0o755, rest="public")  # as none of ccfem's
-    link = tmp_path / public.name.replace("public", "link")
+    public = killed_folder(tmp_path, ended, mode=0o755, rest="publics_")  # as none of ccfem's
+    mine = killed_folder(where, ended, rest="has_mine") / "new" / "thesis.docx"
+    mine.write_text("three years")
+    kept.append(mine.parent.parent)
+    link = tmp_path / public.name.replace("publics_", "links_to")
     link.symlink_to(where)
     write(where, report_html="second")
     assert sorted(leftovers(tmp_path)) == sorted(p.name for p in [*kept, public, link])
     assert (where / "report.html").read_text() == "second"
+    assert [path.name for path in mine.parent.iterdir()] == ["thesis.docx"]
 
 
 def test_a_run_that_was_killed_while_it_replaced_files_is_finished(tmp_path, ended, monkeypatch):
