@@ -24,7 +24,7 @@ from pathlib import Path
 from benchmarks.fuzz.__main__ import verdict
 from ccfem.errors import InputError
 
-__all__ = ["COMMANDS", "damage", "odd_folder", "prepare", "see"]
+__all__ = ["COMMANDS", "MINE", "damage", "ended_process", "entries", "odd_folder", "prepare", "see"]
 
 BAR = ("bar", "--set-case", "element_size=12.5")
 QUICK = ("--layers", "1", "--no-virtual-test")
@@ -100,7 +100,7 @@ def _out(command: str) -> tuple[str, str]:
     return "-o" if command in ("solve", "mesh") else "--out", str(Path("out") / name)
 
 
-def _ended() -> int:
+def ended_process() -> int:
     """Return the number of a process that is no more."""
     process = subprocess.Popen([sys.executable, "-c", ""])
     process.wait()
@@ -180,7 +180,7 @@ def _forge(out: Path) -> None:
     (out / ".ccfem.json").write_text(json.dumps(about))
 
 
-def _entries(folder: Path) -> dict[str, object]:
+def entries(folder: Path) -> dict[str, object]:
     """Everything in a folder: files with their content, links with their targets."""
     found: dict[str, object] = {}
     for path in sorted(folder.rglob("*")):
@@ -205,7 +205,7 @@ def damage(box: Path, command: str, forced: bool, before: Mapping[str, object]) 
     before : mapping
         What was in the box, from `see`.
     """
-    after = _entries(box)
+    after = entries(box)
     known = re.compile(
         r".*_(waypoints|layer_\d+)\.\w+|trade.png|curve.csv|\.ccfem-\S*|\.ccfem.json"
     )
@@ -239,7 +239,7 @@ def see(box: Path, words: tuple[str, ...]) -> None:
 
     command, forced = words[0], "--force" in words
     os.chdir(box)
-    before, code = _entries(box), None
+    before, code = entries(box), None
     said, printed = io.StringIO(), io.StringIO()
     sys.argv = ["ccfem", *words]
     with contextlib.redirect_stderr(said), contextlib.redirect_stdout(printed):
@@ -260,7 +260,7 @@ def see(box: Path, words: tuple[str, ...]) -> None:
 def main(count: int = 300, seed: str = "1", wanted: tuple[str, ...] = ()) -> int:
     """Try `count` folders over all commands; return how many are not met as they should be."""
     tally: Counter[str] = Counter()
-    wrong, ended = 0, _ended()
+    wrong, ended = 0, ended_process()
     commands = wanted or tuple(COMMANDS)
     with tempfile.TemporaryDirectory() as name:
         shared = Path(name) / "shared"

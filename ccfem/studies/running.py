@@ -136,8 +136,8 @@ def _here(
 def _write_tables(result: StudyResult, folder: Path) -> None:
     """Write ``results.csv``, ``results.parquet``, ``times.csv`` and ``study.html``."""
     frame = result.frame
-    for name, table in (("results.csv", frame), ("times.csv", result.seconds)):
-        write_csv(folder / name, [*table], table.itertuples(index=False))
+    for file, table in (("results.csv", frame), ("times.csv", result.seconds)):
+        write_csv(folder / file, [*table], table.itertuples(index=False))
     if find_spec("pyarrow") is not None:
         plain = frame.copy()
         for name in frame:  # a column of numbers and words becomes one of words

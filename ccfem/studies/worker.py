@@ -10,7 +10,7 @@ import signal
 import sys
 import threading
 from functools import partial
-from typing import TYPE_CHECKING, BinaryIO
+from typing import TYPE_CHECKING, Any, BinaryIO
 
 if TYPE_CHECKING:
     from ccfem.studies.transport import Parted
@@ -62,8 +62,9 @@ def main() -> None:
     while True:
         what, name, file, task, rest = unpacked(found.get())
         if what == "solve":
-            done, arrays = solve_part(task)
+            rest, arrays = solve_part(task)
             np.savez(file, **arrays)
+            done: Any = rest
         else:
             done = run_job(partial(_stress, rest, file), name, task)
         send(out, packed(done))
