@@ -186,7 +186,7 @@ def run(
     frame : {"mesh", "tool"}, optional
         What the coordinates of these files are in.
     force : bool
-        Replace files in the folder that ccfem did not write, too.
+        Replace files with names of results that ccfem did not write, too.
     refine : bool
         Refine the cells by their estimated error first.
     pictures : bool

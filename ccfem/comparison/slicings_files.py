@@ -93,11 +93,11 @@ def _pictures(name: str, comparison: Comparison, folder: Path) -> None:
     (folder / f"{file_stem(name)}_overview.png").write_bytes(png(overview_picture(comparison)))
     for run in comparison.succeeded:
         title = f"{case.name}, {run.name} on {name}"
-        stem = f"{file_stem(name, run.name)}_space"
+        stem = file_stem(name, run.name)
         image = png(space_picture(layers, run.toolpaths, title, case.build))
-        (folder / f"{stem}.png").write_bytes(image)
+        (folder / f"{stem}_space.png").write_bytes(image)
         turning = turning_page(layers, run.toolpaths, title, case.build)
-        (folder / f"{stem}.html").write_text(turning, encoding="utf-8")
+        (folder / f"{stem}_space.html").write_text(turning, encoding="utf-8")
 
 
 def _write_waypoints(name: str, comparison: Comparison, run: Run, folder: Path) -> None:

@@ -7,6 +7,7 @@ import numpy as np
 import pandas as pd
 import pytest
 
+from ccfem.comparison.record import write_table
 from ccfem.io.csv_table import as_text, write_csv
 from ccfem.io.stress_table import table_stress
 from ccfem.virtual_testing.force_displacement import read_curve
@@ -62,3 +63,10 @@ def test_what_ccfem_reads_itself_is_read_back(tmp_path):
     names = ("element", *(f"S{axes} [MPa]" for axes in ("xx", "yy", "zz", "xy", "yz", "xz")))
     write_csv(tmp_path / "s.csv", names, stress)
     assert table_stress(tmp_path / "s.csv").cell[2].tolist() == [-3.0] * 6
+
+
+def test_names_of_runs_are_no_formulas_in_the_table_of_results(tmp_path):
+    rows = [{"strategy": "=cmd|calc!A0", "layer": "total", "failure": "", "stress": -1.5}]
+    write_table(rows, tmp_path / "results.csv")
+    text = (tmp_path / "results.csv").read_text()
+    assert text == "strategy,layer,failure,stress\n'=cmd|calc!A0,total,,-1.5\n"

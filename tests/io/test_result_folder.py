@@ -1,5 +1,6 @@
 """A folder of results: replaced as a whole, and nothing of others lost."""
 
+import ast
 import hashlib
 import json
 import multiprocessing
@@ -11,9 +12,13 @@ import subprocess
 import sys
 import time
 from contextlib import suppress
+from fnmatch import fnmatchcase
+from pathlib import Path
 
 import pytest
 
+from ccfem.comparison import files as files_of_comparisons
+from ccfem.comparison.files import RESULT_FILES
 from ccfem.errors import InputError
 from ccfem.io.folder import Folder
 from ccfem.io.result_folder import whole_folder
@@ -374,3 +379,26 @@ def test_a_file_is_written_in_place_of_a_link(tmp_path):
 def test_a_folder_knows_its_own_entries_alone(tmp_path, name):
     with Folder.opened(tmp_path) as folder, pytest.raises(ValueError, match="no name of an entry"):
         folder.write(name, b"")
+
+
+def filled(part):
+    """Piece of the name of a file, with values for what is not known before."""
+    if isinstance(part, ast.Constant):
+        return part.value
+    return "svg" if ast.unparse(part).strip("'f{}\"") == "suffix" else "07"
+
+
+@pytest.mark.parametrize("module", ["files", "slicings_files"])
+def test_all_files_that_comparisons_write_are_known(module):
+    """Every name behind ``folder /`` in the source, numbers and names in it filled in."""
+    source = Path(files_of_comparisons.__file__).with_name(f"{module}.py").read_text()
+    names = []
+    for node in ast.walk(ast.parse(source)):
+        if isinstance(node, ast.BinOp) and ast.unparse(node.left) == "folder":
+            parts = getattr(node.right, "values", [node.right])
+            names.append("".join(filled(part) for part in parts))
+    names = [name for name in names if name != "07"]
+    assert len(names) >= 6
+    for name in names:
+        assert any(fnmatchcase(name, pattern) for pattern in RESULT_FILES), name
+    assert not any(fnmatchcase("thesis.docx", pattern) for pattern in RESULT_FILES)

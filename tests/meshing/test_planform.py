@@ -5,8 +5,8 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from ccfem.errors import InputError
-from ccfem.mesh.check import check_mesh
 from ccfem.mesh import box_mesh
+from ccfem.mesh.check import check_mesh
 from ccfem.meshing import extrude, triangulate
 from ccfem.meshing.cache import kept
 
