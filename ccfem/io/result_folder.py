@@ -220,7 +220,8 @@ def _publish(private: Folder, directory: Path, names: Sequence[str], force: bool
             both = {name: [digest, *files.get(name, [])] for name, digest in before.items()}
             _mark(target, others | files | both)
             private.take(private, UNREADY, READY)
-            _replace(new, target, names)
+            with private.inner(READY) as ready:
+                _replace(ready, target, names)
 
 
 def _mark(target: Folder, files: Mapping[str, Sequence[str]]) -> None:

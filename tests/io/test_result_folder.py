@@ -402,3 +402,18 @@ def test_all_files_that_comparisons_write_are_known(module):
     for name in names:
         assert any(fnmatchcase(name, pattern) for pattern in RESULT_FILES), name
     assert not any(fnmatchcase("thesis.docx", pattern) for pattern in RESULT_FILES)
+
+
+def test_where_a_system_has_no_calls_relative_to_a_folder(tmp_path, monkeypatch):
+    monkeypatch.setattr("ccfem.io.folder._RELATIVE", False)
+    where = tmp_path / "results"
+    write(where, report_html="first", notes_txt="first")
+    (where / "thesis.docx").write_text("three years")
+    write(where, report_html="second")
+    assert contents(where) == {"report.html": "second", "thesis.docx": "three years"}
+    (where / "notes.txt").symlink_to(where / "thesis.docx")
+    with pytest.raises(InputError, match=r"notes.txt is not by ccfem"):
+        write(where, notes_txt="third")
+    (tmp_path / "link").symlink_to(where)
+    with Folder.opened(tmp_path) as folder, pytest.raises(NotADirectoryError), folder.inner("link"):
+        pass
