@@ -92,6 +92,12 @@ class Folder:
             return {"path": self.path / name}
         return {"path": name, "dir_fd": self._handle}
 
+    def check_place(self) -> None:
+        """Raise an OSError where another folder, or a link to one, has come into its place."""
+        held = None if self._handle is None else os.fstat(self._handle)
+        if held is not None and not os.path.samestat(held, os.stat(self.path)):
+            raise OSError(errno.ESTALE, "another folder has come into its place", str(self.path))
+
     def names(self) -> list[str]:
         """Names of all entries, sorted."""
         return sorted(os.listdir(self.path if self._handle is None else self._handle))

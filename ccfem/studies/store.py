@@ -63,6 +63,7 @@ class Store:
     @contextmanager
     def writing(self, *names: str) -> Iterator[Path]:
         """Yield a temporary folder for files beside the runs: see `whole_folder`."""
+        self._folder.check_place()
         with whole_folder(self._folder.path, names, self._force) as folder:
             yield folder
 

@@ -272,6 +272,17 @@ def test_runs_are_not_stored_through_a_link(beside):
         assert store["a" * 40] == {"failure": "solved"}
 
 
+def test_a_link_that_comes_into_the_place_of_the_folder_is_not_followed(beside, tmp_path):
+    out, docs = beside
+    with opened(out) as store:
+        out.rename(tmp_path / "moved")
+        out.symlink_to(docs)
+        store["a" * 40] = {"failure": ""}
+        with pytest.raises(OSError, match="another folder has come"), store.writing("study.json"):
+            pass
+    assert (tmp_path / "moved" / "runs" / f"{'a' * 40}.json").is_file()
+
+
 @pytest.mark.parametrize(
     "text",
     [
