@@ -20,7 +20,6 @@ Examples
 """
 
 import importlib
-from importlib.metadata import version
 from typing import TYPE_CHECKING, Any
 
 from ccfem import display
@@ -64,7 +63,7 @@ __all__ = [
     "virtual_test",
 ]
 
-__version__ = version("ccfem")
+__version__: str
 
 display.drawn_by("ccfem.plot.values")
 
@@ -102,6 +101,8 @@ _PACKAGES = frozenset(
 
 
 def __getattr__(name: str) -> Any:
+    if name == "__version__":
+        return importlib.import_module("importlib.metadata").version("ccfem")
     if name in _HOMES:
         return getattr(importlib.import_module(f"ccfem.{_HOMES[name]}"), name)
     if name in _PACKAGES:

@@ -1,6 +1,7 @@
 """The house: no import circle, a room stands above all that it imports, few and short files."""
 
 import ast
+import re
 from collections import defaultdict
 from functools import cache
 from graphlib import CycleError, TopologicalSorter
@@ -102,6 +103,32 @@ def test_no_name_twice_for_two_ideas():
         if path.stem != "__init__" and room(name) != "papers":  # each paper has the same shape
             named[path.stem].append(name)
     assert {stem for stem, those in named.items() if len(those) > 1} == set(TWICE)
+
+
+def test_pickles_are_read_in_one_place():
+    """What comes through pipes of its own; nothing that lies in a folder is unpickled."""
+    loading = {"pickle", "cloudpickle", "dill", "joblib", "shelve", "marshal"}
+    known = []
+    for name, path in modules().items():
+        text = path.read_text(encoding="utf-8")
+        for node in ast.walk(ast.parse(text)):
+            if isinstance(node, ast.Import | ast.ImportFrom):
+                wanted = [alias.name for alias in node.names] + [getattr(node, "module", "") or ""]
+                if loading.intersection(word.partition(".")[0] for word in wanted):
+                    known.append(name)
+        assert "allow_pickle=True" not in text, name
+        assert "read_pickle" not in text, name
+    assert set(known) == {"ccfem.studies.transport"}
+
+
+def test_tables_with_text_are_written_in_one_place():
+    """Where no name is taken for a formula; other CSV files hold numbers and fixed words."""
+    writing = {
+        name
+        for name, path in modules().items()
+        if {"writer(", "DictWriter(", "to_csv("} & set(re.findall(r"\w+\(", path.read_text()))
+    }
+    assert writing == {"ccfem.io.csv_table"}
 
 
 REDUCTIONS = ("sum", "min", "max", "any", "all", "argmin", "argmax", "mean")

@@ -17,6 +17,9 @@ if TYPE_CHECKING:
 
 __all__ = ["front"]
 
+_FILES = ("front.csv", "front.png", "trade.png", "command.txt")
+"""All files that the command writes."""
+
 
 def front(
     case: CasePath,
@@ -60,6 +63,7 @@ def front(
     from ccfem.comparison.fibre_front import front_of
     from ccfem.comparison.request import Request, named_strategies
     from ccfem.errors import InputError, spared
+    from ccfem.io.csv_table import write_csv
     from ccfem.io.result_folder import whole_folder
     from ccfem.progress import progress_bar
 
@@ -75,10 +79,11 @@ def front(
     chosen = named_strategies(part, (strategy,), parameters)
     request = Request(part, chosen, load_case=load_case, backend=backend)
     where = out if out is not None else Path("results") / f"{part.name}-front"
-    with whole_folder(where, force) as folder, progress_bar(lines=True) as progress:
+    with whole_folder(where, _FILES, force) as folder, progress_bar(lines=True) as progress:
         numbers = None if counts is None else [int(count) for count in counts]
         found = front_of(request, numbers, points, strengths, progress)
-        found.to_frame().to_csv(folder / "front.csv", index=False)
+        frame = found.to_frame()
+        write_csv(folder / "front.csv", [*frame], frame.itertuples(index=False))
         with spared("front.png", []):
             found.plot().savefig(folder / "front.png")
         if len(strengths) > 1:

@@ -11,6 +11,7 @@ import typer
 
 from ccfem.cli.commands import app
 from ccfem.cli.run import complain
+from ccfem.cli.stopping import Stopped, asked, say
 from ccfem.errors import InputError, SolveError
 
 __all__ = ["main"]
@@ -20,7 +21,6 @@ def main() -> None:
     """Run the command line; bad input and failed solves end in one line and exit code 2."""
     # The base class of a wrong option or argument, wherever typer keeps it.
     usage_error: Any = typer.BadParameter.__mro__[1]
-    signal.signal(signal.SIGTERM, signal.default_int_handler)
     for stream in (sys.stdout, sys.stderr):
         if isinstance(stream, io.TextIOWrapper):  # a title outside ASCII on an ASCII terminal
             stream.reconfigure(errors="replace")
@@ -29,23 +29,35 @@ def main() -> None:
     warnings.filterwarnings("ignore", message="Glyph .* missing from")
     try:
         code = typer.main.get_command(app)(standalone_mode=False)
+        if asked() is not None:  # a library took the stop for itself
+            code = _complain("")
     except (InputError, SolveError) as error:
-        code = complain(str(error))
+        code = _complain(str(error))
     except usage_error as error:
-        code = complain(error.format_message())
-    except (typer.Abort, KeyboardInterrupt):
-        code = 130
+        code = _complain(error.format_message())
+    except (typer.Abort, KeyboardInterrupt, Stopped):
+        code = say(asked() or signal.SIGINT)
     except BrokenPipeError:  # as under `ccfem cases | head -1`: nobody reads on
         os.dup2(os.open(os.devnull, os.O_WRONLY), sys.stdout.fileno())
         code = 141
     except OSError as error:
         where = f" {error.filename}" if error.filename else ""
-        code = complain(
+        code = _complain(
             f"cannot continue{where}: {error.strerror or error}: correct this and repeat"
         )
+    except BaseException:
+        if asked() is None:
+            raise
+        code = _complain("")  # a library made something else of the stop
     sys.exit(code if isinstance(code, int) else 0)
 
 
 def _line(message: Warning | str, *where: Any, **more: Any) -> str:
     """Warning as a line of its own: where in the code it arose says nothing to the user."""
     return f"ccfem: warning: {' '.join(str(message).split())}\n"
+
+
+def _complain(message: str) -> int:
+    """Print a message, or why all ends where that was asked for; returns the exit code."""
+    number = asked()
+    return complain(message) if number is None else say(number)

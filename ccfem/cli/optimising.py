@@ -2,6 +2,7 @@
 
 from collections.abc import Sequence
 from contextlib import ExitStack
+from os.path import lexists
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Any
 
@@ -161,7 +162,7 @@ def _files(part: Path, force: bool) -> tuple[Path, Path, Path, Path]:
     files = (part, *(part.with_suffix(suffix) for suffix in (".npz", ".png", ".csv")))
     for file in files:
         check_writable(file)
-        if file.exists() and not force:
+        if lexists(file) and not force:
             raise InputError(f"{file} is there already: name another part (--out), or --force")
     return files  # type: ignore[return-value]
 

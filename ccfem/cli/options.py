@@ -95,7 +95,9 @@ Slicings = Annotated[
 ]
 Force = Annotated[
     bool,
-    typer.Option("--force", help="Replace files in the folder that ccfem did not write, too."),
+    typer.Option(
+        "--force", help="Replace files with names of results that ccfem did not write, too."
+    ),
 ]
 Pictures = Annotated[
     bool,

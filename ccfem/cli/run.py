@@ -148,7 +148,7 @@ class Output:
     out : Path, optional
         Folder; default ``results/`` and the name of the case with `suffix`.
     force : bool
-        Replace files in the folder that ccfem did not write, too.
+        Replace files with names of results that ccfem did not write, too.
     pictures : bool
         Also draw PNG files of what the report shows.
     drawings : tuple of {"svg", "dxf"}
@@ -185,7 +185,7 @@ def run(name: str, ask: "Callable[[], Request]", output: Output) -> None:
     """
     from ccfem.cli.screen import print_comparison
     from ccfem.comparison.engine import answer
-    from ccfem.comparison.files import write_results
+    from ccfem.comparison.files import RESULT_FILES, write_results
     from ccfem.io.result_folder import whole_folder
 
     imported = time.perf_counter()
@@ -194,7 +194,10 @@ def run(name: str, ask: "Callable[[], Request]", output: Output) -> None:
         raise InputError("--drawings works with one slicing only; got --slicings: drop one")
     seconds = {"start": imported - _STARTED, "mesh": time.perf_counter() - imported}
     where = output.folder(request.case)
-    with whole_folder(where, output.force) as folder, progress_bar(lines=True) as progress:
+    with (
+        whole_folder(where, RESULT_FILES, output.force) as folder,
+        progress_bar(lines=True) as progress,
+    ):
         comparison = answer(request, _part(progress, 0.0, _SOLVED))
         _check(comparison)
         command, rest = shlex.join(["ccfem", *sys.argv[1:]]), _part(progress, _SOLVED, 1.0)

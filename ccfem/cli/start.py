@@ -1,24 +1,17 @@
-"""Where ``ccfem`` starts: quiet already when it is stopped while its libraries are being read."""
+"""Where ``ccfem`` starts: it can be stopped in one line while its libraries are being imported."""
 
-import os
-import signal
-from types import FrameType
+from ccfem.cli import stopping
 
 __all__ = ["start"]
 
 
 def start() -> None:
-    """Run the command line; Ctrl-C before it is there ends without a word, with code 130."""
-    heeded = signal.getsignal(signal.SIGINT) is not signal.SIG_IGN  # as behind nohup
-    signal.signal(signal.SIGTERM, _end)
-    if heeded:
-        signal.signal(signal.SIGINT, _end)
+    """Run the command line."""
+    stopping.end_at_once()
     from ccfem.cli.main import main
 
-    if heeded:
-        signal.signal(signal.SIGINT, signal.default_int_handler)
-    main()
-
-
-def _end(number: int, frame: FrameType | None) -> None:
-    os._exit(130)
+    stopping.unwind()
+    try:
+        main()
+    finally:
+        stopping.end_at_once()

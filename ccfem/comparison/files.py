@@ -14,6 +14,7 @@ from ccfem.comparison.result import Comparison
 from ccfem.comparison.runs import Run
 from ccfem.comparison.shown import file_stem
 from ccfem.errors import spared
+from ccfem.io.csv_table import write_csv
 from ccfem.io.result_folder import whole_folder
 from ccfem.printing.print_plan import PrintPlan
 from ccfem.progress import Progress, silent
@@ -22,7 +23,16 @@ from ccfem.toolpaths import Toolpaths
 if TYPE_CHECKING:
     from ccfem.comparison.pictures import Pictures
 
-__all__ = ["save", "write_results"]
+__all__ = ["RESULT_FILES", "save", "write_results"]
+
+RESULT_FILES = (
+    *("results.csv", "results.json", "report.html", "paths.vtp", "curve.csv", "curve.png"),
+    *("tension.png", "overview.png", "part.png", "part.html"),
+    *("*_waypoints.txt", "*_waypoints.csv", "*.gcode", "*_cell.csv", "*_trim.csv"),
+    *("*_layer_[0-9]*.png", "*_layer_[0-9]*.svg", "*_layer_[0-9]*.dxf", "*_force.png"),
+    *("*_space.png", "*_space.html", "*_overview.png"),
+)
+"""Patterns of all files that comparisons, over slicings too, write (`whole_folder`)."""
 
 
 def save(
@@ -53,7 +63,7 @@ def save(
         When the folder cannot be written to, or holds files that would be overwritten.
     """
     folder, command = Path(folder), "ccfem.save(comparison) in Python"
-    with whole_folder(folder, force) as temporary:
+    with whole_folder(folder, RESULT_FILES, force) as temporary:
         write_results(comparison, temporary, command, {}, progress)
     return folder / "report.html"
 
@@ -104,7 +114,8 @@ def write_results(
     progress("writing results", 0.0)
     write_table(results_rows(comparison), folder / "results.csv")
     if comparison.curve is not None:
-        comparison.curve.frame.to_csv(folder / "curve.csv", index=False)
+        frame = comparison.curve.frame
+        write_csv(folder / "curve.csv", [*frame], frame.itertuples(index=False))
     _write_paths(comparison, folder)
     spent["files"] = time.perf_counter() - start
     start = time.perf_counter()
@@ -186,12 +197,12 @@ def _write_in_space(comparison: Comparison, folder: Path, slicing: str) -> None:
 
     layers, build = comparison.layers, comparison.case.build
     for run in comparison.succeeded:
-        stem = f"{_stem(slicing, run)}_space"
+        stem = _stem(slicing, run)
         title = f"{comparison.case.name}, {comparison.request.on_slicing(run.name, slicing)}"
         picture = space_picture(layers, run.toolpaths, title, build)
-        (folder / f"{stem}.png").write_bytes(png(picture))
+        (folder / f"{stem}_space.png").write_bytes(png(picture))
         page = turning_page(layers, run.toolpaths, title, build)
-        (folder / f"{stem}.html").write_text(page, encoding="utf-8")
+        (folder / f"{stem}_space.html").write_text(page, encoding="utf-8")
 
 
 def _stem(slicing: str, run: Run) -> str:

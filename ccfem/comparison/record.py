@@ -1,6 +1,5 @@
 """The record of a comparison: all its numbers as a table, and what it takes to repeat it."""
 
-import csv
 import dataclasses
 import platform
 from collections.abc import Mapping, Sequence
@@ -17,6 +16,7 @@ from ccfem.comparison.result import Comparison
 from ccfem.comparison.runs import Run
 from ccfem.elasticity.stress_field import StressField
 from ccfem.fibre_aware.upper_bound import UpperBound
+from ccfem.io.csv_table import write_csv
 
 if TYPE_CHECKING:
     import pandas as pd
@@ -77,16 +77,7 @@ def write_table(rows: Sequence[Mapping[str, Any]], file: Path) -> None:
     Pandas, which takes a second to be imported, is not needed for this.
     """
     columns = _columns(rows)
-    with file.open("w", encoding="utf-8", newline="") as stream:
-        writer = csv.writer(stream, lineterminator="\n")
-        writer.writerow(columns)
-        for row in rows:
-            cells = (row.get(name) for name in columns)
-            writer.writerow(["" if _missing(cell) else cell for cell in cells])
-
-
-def _missing(value: Any) -> bool:
-    return value is None or (isinstance(value, float) and np.isnan(value))
+    write_csv(file, columns, ([row.get(name) for name in columns] for row in rows))
 
 
 def record(comparison: Comparison, command: str, seconds: Mapping[str, float]) -> dict[str, Any]:

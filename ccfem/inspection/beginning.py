@@ -101,7 +101,7 @@ def _faces_down(face: Face) -> bool:
 
 
 def _refuse_present(out: Path, force: bool) -> None:
-    if out.exists() and not force:
+    if os.path.lexists(out) and not force:
         raise InputError(f"{out} is there already: name another file (--out), or --force")
 
 

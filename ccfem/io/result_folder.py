@@ -1,42 +1,49 @@
-"""Writing a folder of results whole or not at all, without touching what others wrote there."""
+"""Writing a folder of results whole or not at all, without touching what others wrote there.
 
-import hashlib
+What ccfem may replace or remove in a folder has to satisfy three things: its name is one that the
+command at hand writes; the marker in the folder lists it with its SHA-256; and it is a regular file
+with that content. A marker can be forged, so it alone gives nothing away: it never makes ccfem
+touch a file of another name. Links are never followed.
+"""
+
 import json
 import os
-import platform
-import re
-import shutil
-import tempfile
-from collections.abc import Iterator
-from contextlib import contextmanager
+from collections.abc import Iterator, Mapping, Sequence
+from contextlib import contextmanager, suppress
+from fnmatch import fnmatchcase
 from pathlib import Path
 
 from ccfem.errors import InputError
+from ccfem.io.folder import READY, UNREADY, Folder, private_folder, sweep
 
-__all__ = ["whole_folder"]
+__all__ = ["RESERVED", "refuse_foreign", "whole_folder"]
 
 _MARKER = ".ccfem.json"
 """File in a folder of results: the files that ccfem wrote there, each with its SHA-256."""
-_TEMPORARY = re.compile(r"\.ccfem-(?P<host>[^-]*)-(?P<pid>\d+)-(?P<rest>.+)")
-_OLD = "old-"
-"""What the rest of a temporary name begins with where it holds the results before these."""
+RESERVED = (_MARKER, ".lock")
+"""Names in a folder of results that stand for nothing by themselves."""
+_LARGEST_MARKER = 10_000_000
+"""Bytes."""
 
 
 @contextmanager
-def whole_folder(directory: Path, force: bool = False) -> Iterator[Path]:
-    """Yield a temporary folder that takes the place of `directory` when the block ends well.
+def whole_folder(directory: Path, names: Sequence[str], force: bool = False) -> Iterator[Path]:
+    """Yield a temporary folder whose files all go into `directory` when the block ends well.
 
     Of what is in `directory`, only files that ccfem wrote there itself, and that nobody changed
     since, are replaced or removed; everything else stays. A folder that may not be written to, or
     whose files ccfem would have to replace without knowing them, is refused before the block runs.
     When the block raises, `directory` is as it was. What a run that was killed left behind is
-    removed.
+    removed; had it already begun to replace files, this is finished.
 
     Parameters
     ----------
     directory : Path
+    names : sequence of str
+        Patterns, as of `fnmatch`, of the files that the command writes: nothing else is ever
+        removed.
     force : bool, default False
-        Replace files of the same names whoever wrote them; others stay even so.
+        Replace files of the same names whoever wrote them; others, and folders, stay even so.
 
     Raises
     ------
@@ -47,22 +54,21 @@ def whole_folder(directory: Path, force: bool = False) -> Iterator[Path]:
     try:
         parent = _existing_parent(directory)
         with _alone(parent):
-            _sweep(parent)
-            if not force:
-                _refuse_foreign(directory)
-        folder = Path(tempfile.mkdtemp(prefix=_prefix(), dir=parent))
+            _mend(parent, directory, names)
+            if directory.exists():
+                with Folder.opened(directory) as target:
+                    refuse_foreign(target, names, force)
+        # On one file system with the folder, which may be a link or have one of its own.
+        with private_folder(directory if directory.exists() else parent) as private:
+            (private / UNREADY).mkdir()
+            yield private / UNREADY
+            with _alone(parent), Folder.opened(private) as folder:
+                _publish(folder, directory, names, force)
     except OSError as error:
-        raise _unwritable(directory, error) from error
-    try:
-        yield folder
-        _mark(folder)
-        with _alone(parent):
-            _keep_foreign(directory, folder, force)
-            _take_place(folder, directory)
-    except OSError as error:
-        raise _unwritable(directory, error) from error
-    finally:
-        shutil.rmtree(folder, ignore_errors=True)
+        raise InputError(
+            f"cannot write results to {directory}: {error.strerror or error}: choose another "
+            "folder with --out"
+        ) from error
 
 
 def _existing_parent(directory: Path) -> Path:
@@ -77,10 +83,9 @@ def _existing_parent(directory: Path) -> Path:
 
 @contextmanager
 def _alone(parent: Path) -> Iterator[None]:
-    """Keep other runs from changing places in the same parent folder meanwhile.
+    """Keep other runs from changing the same folder meanwhile.
 
-    Without it a run could fill its folder while another one has the old results set aside, and so
-    miss what others put there. Where a system or file system has no such locks, do without.
+    Where a system or file system has no such locks, do without.
     """
     handle = None
     try:
@@ -97,169 +102,152 @@ def _alone(parent: Path) -> Iterator[None]:
             os.close(handle)
 
 
-def _prefix() -> str:
-    host = re.sub(r"\W", "", platform.node())
-    return f".ccfem-{host}-{os.getpid()}-"
-
-
-def _sweep(parent: Path) -> None:
-    """Remove what killed runs of this machine left, and bring back results that they set aside."""
-    for path in parent.glob(".ccfem-*"):
-        found = _TEMPORARY.fullmatch(path.name)
-        if found is None or not path.name.startswith(f".ccfem-{_prefix().split('-')[1]}-"):
-            continue
-        if _is_running(int(found["pid"])):
-            continue
-        rest = found["rest"]
-        if rest.startswith(_OLD) and not (parent / rest.removeprefix(_OLD)).exists():
-            path.rename(parent / rest.removeprefix(_OLD))
-        else:
-            shutil.rmtree(path, ignore_errors=True)
-
-
-def _is_running(pid: int) -> bool:
-    """Whether there is a process of this number, as far as the system says so safely."""
-    if os.name != "posix":
-        return True
-    try:
-        os.kill(pid, 0)
-    except ProcessLookupError:
-        return False
-    except PermissionError:
-        return True
-    return True
-
-
-def _refuse_foreign(directory: Path) -> None:
-    """Refuse a folder with files that ccfem did not write, unless it also holds its results."""
-    if not directory.exists():
+def _mend(parent: Path, directory: Path, names: Sequence[str]) -> None:
+    """Remove what killed runs left, and finish what they had begun to put into the folder."""
+    with Folder.opened(parent) as above:
+        sweep(above, (*names, _MARKER))
+    if not directory.is_dir():
         return
-    there = sorted(path.name for path in directory.iterdir() if path.name != _MARKER)
-    if not there:
+    with Folder.opened(directory) as target:
+
+        def finish(private: Folder) -> None:
+            if not private.is_folder(READY):
+                return
+            # What has come into the way since then stays.
+            with private.inner(READY) as new, suppress(InputError):
+                _refuse_in_the_way(new, target, _ours(target, names), force=False)
+                if _marked(new) is not None:  # the last that is moved
+                    _replace(new, target, names)
+
+        sweep(target, (*names, _MARKER), finish)
+
+
+def refuse_foreign(target: Folder, names: Sequence[str], force: bool) -> None:
+    """Refuse a folder with files that ccfem did not write, unless it also holds its results.
+
+    In that one, entries of others are refused that have the names of results: see `whole_folder`.
+    """
+    there = [name for name in target.names() if name not in RESERVED]
+    marked, ours = _marked(target), _ours(target, names)
+    if marked is None and (there or target.entry(_MARKER) is not None) and not force:
+        raise InputError(
+            f"{target.path} holds files that ccfem did not write, such as "
+            f"{(there or [_MARKER])[0]}: choose another folder with --out, or replace files of the "
+            "same names with --force"
+        )
+    changed = {name for name in there if name in (marked or {}) and _is_known(name, names)}
+    for name in sorted(changed.difference(ours)):
+        if not force:
+            raise InputError(
+                f"{target.path / name} was changed since ccfem wrote it: move it, choose another "
+                "folder with --out, or replace it with --force"
+            )
+    for name in {*names, _MARKER}.intersection(target.names()):
+        _refuse_entry(target, name, ours, force)
+
+
+def _refuse_entry(target: Folder, name: str, ours: Mapping[str, str], force: bool) -> None:
+    """Refuse to replace an entry that is not by ccfem; a folder even where replacing is wanted."""
+    marker = name == _MARKER and _marked(target) is not None
+    if target.entry(name) is None or name in ours or marker:
         return
-    written = _written(directory)
-    if written is None:
+    if not force or target.is_folder(name):
+        cure = "" if target.is_folder(name) else ", or replace it with --force"
         raise InputError(
-            f"{directory} holds files that ccfem did not write, such as {there[0]}: choose another "
-            "folder with --out, or replace files of the same names with --force"
-        )
-    changed = [name for name in written if not _is_ours(directory, name, written)]
-    if changed:
-        raise InputError(
-            f"{directory / changed[0]} was changed since ccfem wrote it: move it, choose another "
-            "folder with --out, or replace it with --force"
+            f"{target.path / name} is not by ccfem and has the name of a result: move it"
+            f"{',' if cure else ' or'} choose another folder with --out{cure}"
         )
 
 
-def _written(directory: Path) -> dict[str, str] | None:
-    """Names and hashes of the files that ccfem wrote in a folder; None where no marker says so."""
+def _is_known(name: str, names: Sequence[str]) -> bool:
+    """Whether the command writes files of this name."""
+    return any(fnmatchcase(name, pattern) for pattern in names)
+
+
+def _marked(target: Folder) -> dict[str, tuple[str, ...]] | None:
+    """Hashes by name of the files that the marker lists; None where there is no marker.
+
+    While files are being replaced, one has two hashes: that of before and that of after.
+    """
+    entry = target.entry(_MARKER)
+    if entry is None or entry.st_size > _LARGEST_MARKER:
+        return None
     try:
-        files = json.loads((directory / _MARKER).read_text(encoding="utf-8"))["files"]
+        files = json.loads(target.read(_MARKER).decode("utf-8"))["files"]
         return {
-            str(name): str(digest)
-            for name, digest in files.items()
-            if Path(name).name == name and (directory / name).is_file()
+            str(name): tuple(map(str, hashes if isinstance(hashes, list) else [hashes]))
+            for name, hashes in files.items()
         }
-    except (OSError, ValueError, KeyError, TypeError, AttributeError):
+    except (OSError, ValueError, KeyError, TypeError, AttributeError, RecursionError):
         return None
 
 
-def _is_ours(directory: Path, name: str, written: dict[str, str]) -> bool:
-    """Whether a file is one that ccfem wrote, as it wrote it."""
-    return name in written and written[name] == _digest(directory / name)
+def _ours(target: Folder, names: Sequence[str]) -> dict[str, str]:
+    """Hash by name of the files that ccfem may replace or remove: see the top of this module."""
+    marked = _marked(target) or {}
+    known = [name for name in target.names() if name in marked and _is_known(name, names)]
+    hashes = {name: target.digest(name) for name in known}
+    return {name: digest for name, digest in hashes.items() if digest in marked[name]}
 
 
-def _digest(path: Path) -> str:
-    with path.open("rb") as file:
-        return hashlib.file_digest(file, "sha256").hexdigest()
-
-
-def _mark(folder: Path) -> None:
-    """Write down what the folder holds."""
-    files = {path.name: _digest(path) for path in sorted(folder.iterdir())}
-    text = json.dumps({"written by": "ccfem", "files": files}, indent=1)
-    (folder / _MARKER).write_text(text + "\n", encoding="utf-8")
-
-
-def _keep_foreign(directory: Path, folder: Path, force: bool) -> None:
-    """Give the new folder what others have put into the old one."""
-    if not directory.exists():
-        return
-    written = _written(directory) or {}
-    for path in sorted(directory.iterdir()):
-        if path.name == _MARKER or (path.is_file() and _is_ours(directory, path.name, written)):
-            continue
-        new = folder / path.name
-        if new.exists():
-            if force:
-                continue
-            raise InputError(
-                f"{path} is not by ccfem and has the name of a result: move it, choose another "
-                "folder with --out, or replace it with --force"
-            )
-        if path.is_dir() and not path.is_symlink():
-            shutil.copytree(path, new, symlinks=True, copy_function=_linked)
+def _refuse_in_the_way(new: Folder, target: Folder, ours: Mapping[str, str], force: bool) -> None:
+    """Refuse to go on where something that is not by ccfem has the place of a new file."""
+    for name in {*new.names(), _MARKER}:
+        if new.is_folder(name) and target.is_folder(name):
+            with new.inner(name) as inner, target.inner(name) as old:
+                _refuse_in_the_way(inner, old, {}, force)
         else:
-            _linked(path, new)
+            _refuse_entry(target, name, ours, force and not new.is_folder(name))
 
 
-def _linked(source: str | Path, target: str | Path) -> None:
-    """Give a file a second name, or copy it where the file system cannot."""
-    try:
-        os.link(source, target, follow_symlinks=False)
-    except OSError:
-        shutil.copy2(source, target, follow_symlinks=False)
+def _publish(private: Folder, directory: Path, names: Sequence[str], force: bool) -> None:
+    """Put the new files of a private folder into the folder of results."""
+    with private.inner(UNREADY) as new:
+        files = {name: [new.digest(name)] for name in new.names() if new.is_file(name)}
+        if not os.path.lexists(directory):
+            _mark(new, files)
+            directory.parent.mkdir(parents=True, exist_ok=True)
+            with Folder.opened(directory.parent) as above:
+                above.take(private, UNREADY, directory.name)
+            return
+        with Folder.opened(directory) as target:
+            before = _ours(target, names)
+            _refuse_in_the_way(new, target, before, force)
+            marked = (_marked(target) or {}).items()
+            others = {name: list(hashes) for name, hashes in marked if not _is_known(name, names)}
+            _mark(new, others | files)
+            # Both lists until all is done: a kill at any moment leaves nothing that is unknown.
+            both = {name: [digest, *files.get(name, [])] for name, digest in before.items()}
+            _mark(target, others | files | both)
+            private.take(private, UNREADY, READY)
+            with private.inner(READY) as ready:
+                _replace(ready, target, names)
 
 
-def _take_place(folder: Path, directory: Path) -> None:
-    """Put a folder in the place of another, as a whole."""
-    mask = os.umask(0)
-    os.umask(mask)
-    folder.chmod(0o777 & ~mask)
-    directory.parent.mkdir(parents=True, exist_ok=True)
-    if not directory.exists():
-        folder.rename(directory)
-        return
-    if directory.is_symlink() or os.path.ismount(directory) or _holds_us(directory):
-        _file_by_file(folder, directory)
-        return
-    folder.chmod(directory.stat().st_mode & 0o7777)
-    old = directory.parent / f"{_prefix()}{_OLD}{directory.name}"
-    directory.rename(old)
-    try:
-        folder.rename(directory)
-    except OSError:
-        old.rename(directory)
-        raise
-    written = _written(old) or {}
-    for late in sorted(old.iterdir()):  # what others put there in the last moment
-        if late.name == _MARKER or (late.is_file() and _is_ours(old, late.name, written)):
+def _mark(target: Folder, files: Mapping[str, Sequence[str]]) -> None:
+    """Write down files with their hashes."""
+    listed = {name: hashes[0] if len(hashes) == 1 else hashes for name, hashes in files.items()}
+    text = json.dumps({"written by": "ccfem", "files": listed}, indent=1)
+    target.write(_MARKER, (text + "\n").encode())
+
+
+def _replace(new: Folder, target: Folder, names: Sequence[str]) -> None:
+    """Put all files of a new folder into the old one, remove those of before, the marker last."""
+    latest, before = _marked(new) or {}, _ours(target, names)
+    _move(new, target)
+    for name in before:
+        if name not in latest:
+            target.remove(name)
+    target.take(new, _MARKER)
+
+
+def _move(new: Folder, target: Folder) -> None:
+    """Move all but the marker, into folders that are there already too."""
+    for name in new.names():
+        if name == _MARKER:
             continue
-        if not (directory / late.name).exists():
-            late.rename(directory / late.name)
-    shutil.rmtree(old, ignore_errors=True)
-
-
-def _holds_us(directory: Path) -> bool:
-    """Whether this process works in a folder, which then must stay where it is."""
-    return Path.cwd().is_relative_to(directory.resolve())
-
-
-def _file_by_file(folder: Path, directory: Path) -> None:
-    """Replace the files of a folder that cannot be replaced itself; the marker goes first."""
-    written = _written(directory) or {}
-    (directory / _MARKER).unlink(missing_ok=True)
-    earlier = {name for name in written if _is_ours(directory, name, written)}
-    names = sorted((path.name for path in folder.iterdir()), key=lambda name: name == _MARKER)
-    for name in names:
-        if not (directory / name).is_dir():
-            os.replace(folder / name, directory / name)
-    for name in earlier.difference(names):
-        (directory / name).unlink(missing_ok=True)
-
-
-def _unwritable(directory: Path, error: OSError) -> InputError:
-    return InputError(
-        f"cannot write results to {directory}: {error.strerror or error}: choose another folder "
-        "with --out"
-    )
+        if target.is_folder(name):
+            with new.inner(name) as inner, target.inner(name) as old:
+                _move(inner, old)
+        else:
+            target.take(new, name)

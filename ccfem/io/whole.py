@@ -6,6 +6,7 @@ from contextlib import contextmanager
 from pathlib import Path
 
 from ccfem.errors import InputError
+from ccfem.io.folder import Folder, private_folder
 
 __all__ = ["check_writable", "existing_file", "whole_file"]
 
@@ -22,8 +23,9 @@ def whole_file(path: str | os.PathLike[str]) -> Iterator[Path]:
     Yields
     ------
     Path
-        Name of a file in the same folder, with the same suffix, to write to. When the block
-        raises, it is removed and `path` stays as it was.
+        File of the same name to write to, in a private folder beside it, which is then removed.
+        When the block raises, `path` stays as it was. A link in its place is replaced, not
+        followed.
 
     Raises
     ------
@@ -40,17 +42,15 @@ def whole_file(path: str | os.PathLike[str]) -> Iterator[Path]:
     'all of it'
     """
     path = check_writable(path)
-    temporary = path.with_name(f".{path.stem}.{os.getpid()}{path.suffix}")
     try:
-        yield temporary
-        os.replace(temporary, path)
+        with private_folder(path.parent) as folder:
+            yield folder / path.name
+            with Folder.opened(folder) as private, Folder.opened(path.parent) as target:
+                target.take(private, path.name)
     except OSError as error:
         raise InputError(
             f"cannot write {path}: {error.strerror or error}: choose a folder you may write to"
         ) from error
-    finally:
-        if temporary.exists():
-            temporary.unlink()
 
 
 def check_writable(path: str | os.PathLike[str]) -> Path:

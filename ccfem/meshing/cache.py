@@ -3,6 +3,7 @@
 import hashlib
 import json
 import os
+import re
 import zipfile
 import zlib
 from collections.abc import Callable
@@ -23,6 +24,7 @@ _FORMAT = 2
 _MOST = 100
 """Meshes that are kept; the ones not used for longest go."""
 _PATCH = "patch:"
+_NAME = re.compile(r"[0-9a-f]{64}\.npz")
 
 
 def cache_folder() -> Path | None:
@@ -75,7 +77,7 @@ def _read(path: Path) -> tuple[TetMesh, tuple[str, ...]] | None:
     try:
         with np.load(path, allow_pickle=False) as file:
             arrays = {name: file[name] for name in file.files}
-        os.utime(path)
+        os.utime(path, follow_symlinks=os.utime not in os.supports_follow_symlinks)
         findings = tuple(arrays.pop("findings").tolist())
         points, cells = arrays.pop("points"), arrays.pop("cells")
         patches = {name.removeprefix(_PATCH): facets for name, facets in arrays.items()}
@@ -92,8 +94,9 @@ def _write(path: Path, mesh: TetMesh, findings: tuple[str, ...]) -> None:
         named |= {"points": mesh.points, "cells": mesh.cells, "findings": np.array(findings, "U")}
         with whole_file(path) as temporary:
             np.savez(temporary, **named)
-        files = sorted(path.parent.glob("*.npz"), key=lambda file: file.stat().st_mtime)
-        for old in files[:-_MOST]:
+        # The folder may hold other files, and even meshes of other names.
+        files = [file for file in path.parent.iterdir() if _NAME.fullmatch(file.name)]
+        for old in sorted(files, key=lambda file: file.lstat().st_mtime)[:-_MOST]:
             old.unlink(missing_ok=True)
     except (OSError, InputError):
         return

@@ -9,6 +9,7 @@ from pathlib import Path
 
 from ccfem.checks import check_known
 from ccfem.errors import InputError
+from ccfem.io.result_folder import whole_folder
 from ccfem.io.whole import whole_file
 from ccfem.papers.contents import Contents
 
@@ -60,10 +61,11 @@ def reproduce(paper: str, part: str = "", folder: str | Path | None = None) -> P
             "to name their folder: set it"
         )
     into = Path("results") / paper if folder is None else Path(folder)
-    into.mkdir(parents=True, exist_ok=True)
     if not part:
-        contents.whole(into)
+        with whole_folder(into, (), force=True) as files:
+            contents.whole(files)
         return into
+    into.mkdir(parents=True, exist_ok=True)
     study = cache(contents.run)
     if part in contents.tables:
         text = contents.tables[part](study)

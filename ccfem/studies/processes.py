@@ -39,7 +39,7 @@ def in_processes(
     workers : int
         Processes; each has its share of the processors for its threads.
     folder : Path
-        Where the stress of parts is kept meanwhile.
+        Where the stress of parts is kept meanwhile, as arrays; nobody else may write there.
     """
     done: _Done = queue.SimpleQueue()
     board = _Board(parts, jobs)
@@ -66,7 +66,7 @@ def in_processes(
                 left -= 1
                 yield task, unpacked(answer)
             else:
-                board.solved.add(cast(int, task))
+                board.solved[cast(int, task)] = unpacked(answer)
     finally:
         for worker in crew:
             worker.end()
@@ -80,7 +80,8 @@ class _Board:
     jobs: Sequence[Job]
     waiting: dict[int, deque[Job]] = field(init=False)
     unsolved: deque[int] = field(init=False)
-    solved: set[int] = field(default_factory=set)
+    solved: dict[int, bytes] = field(default_factory=dict)
+    """Of each solved part what stands in no array: see `ccfem.studies.transport.parted`."""
 
     def __post_init__(self) -> None:
         self.waiting = {number: deque() for number in self.parts}
@@ -144,11 +145,11 @@ class _Worker:
         if task is None:
             return
         if isinstance(task, Job):
-            part, what, data = task.part, "run", job_bytes(task)
+            part, what, data, rest = task.part, "run", job_bytes(task), board.solved[task.part]
         else:
-            part, what, data = task, "solve", board.parts[task]
+            part, what, data, rest = task, "solve", board.parts[task], b""
         self._held = part
-        self._tell(packed((what, str(part), str(folder / f"{part}.stress"), data)))
+        self._tell(packed((what, str(part), str(folder / f"{part}.npz"), data, rest)))
 
     def ending(self) -> str:
         """Say how the process ended."""

@@ -7,19 +7,21 @@ from collections.abc import Generator, Mapping
 from contextlib import closing
 from importlib.util import find_spec
 from pathlib import Path
+from tempfile import gettempdir
 from typing import Any
 from uuid import uuid4
 
 from ccfem.checks import check_number
 from ccfem.errors import spared
-from ccfem.io.whole import whole_file
+from ccfem.io.csv_table import write_csv
+from ccfem.io.folder import Folder, private_folder, sweep
 from ccfem.progress import Progress, silent
 from ccfem.studies.cluster import on_cluster
 from ccfem.studies.definition import Study, read_study
 from ccfem.studies.jobs import Job, Jobs, jobs_of
 from ccfem.studies.page import study_page
 from ccfem.studies.processes import in_processes
-from ccfem.studies.store import Store, opened
+from ccfem.studies.store import TABLES, opened
 from ccfem.studies.study_result import StudyResult
 from ccfem.studies.work import job_bytes, part_bytes, run_job, solve_part
 
@@ -55,7 +57,7 @@ def study(
     scheduler : str, optional
         Address of a Dask scheduler whose workers make the runs instead.
     force : bool, default False
-        Take a folder with other files in it.
+        Take a folder with other files in it, and replace those of the names of results.
     progress : callable, optional
         Told what was done last, the time left, and the share that is done.
 
@@ -74,11 +76,12 @@ def study(
         known = {job.key: store[job.key] for job in jobs.jobs}
         outcomes = {k: each for k, each in known.items() if each and not each.get("crashed")}
         missing = [job for job in jobs.jobs if job.key not in outcomes]
-        _write(folder / "study.json", _about(definition, jobs))
+        with store.writing("study.json") as files:
+            (files / "study.json").write_text(_about(definition, jobs), encoding="utf-8")
         count = (os.cpu_count() or 1) if workers is None else workers
         tell = _Teller(progress, len(jobs.jobs), len(outcomes))
         try:
-            with closing(_made(definition, jobs, missing, store, count, scheduler)) as made:
+            with closing(_made(definition, jobs, missing, count, scheduler)) as made:
                 for job, outcome in made:
                     store[job.key] = outcome
                     outcomes[job.key] = outcome
@@ -89,7 +92,8 @@ def study(
                 definition.name, folder, jobs.jobs, outcomes, jobs.repeated, made_now
             )
             if outcomes:
-                write_tables(result)
+                with store.writing(*TABLES) as files:
+                    _write_tables(result, files)
         return result
 
 
@@ -97,7 +101,6 @@ def _made(
     definition: Study,
     jobs: Jobs,
     missing: list[Job],
-    store: Store,
     workers: int,
     address: str | None,
 ) -> Generator[tuple[Job, dict[str, Any]], None, None]:
@@ -112,7 +115,10 @@ def _made(
     if address is not None:
         yield from on_cluster(parts, missing, address)
     elif workers:
-        yield from in_processes(parts, missing, workers, store.scratch)
+        with Folder.opened(Path(gettempdir())) as temporary:
+            sweep(temporary, ("*.npz",))
+        with private_folder() as shared:
+            yield from in_processes(parts, missing, workers, shared)
     else:
         yield from _here(parts, missing)
 
@@ -128,27 +134,19 @@ def _here(
                 yield job, run_job(stress, name, job_bytes(job))
 
 
-def write_tables(result: StudyResult) -> None:
+def _write_tables(result: StudyResult, folder: Path) -> None:
     """Write ``results.csv``, ``results.parquet``, ``times.csv`` and ``study.html``."""
-    folder, frame = result.folder, result.frame
-    with whole_file(folder / "results.csv") as temporary:
-        frame.to_csv(temporary, index=False)
-    with whole_file(folder / "times.csv") as temporary:
-        result.seconds.to_csv(temporary, index=False)
+    frame = result.frame
+    for file, table in (("results.csv", frame), ("times.csv", result.seconds)):
+        write_csv(folder / file, [*table], table.itertuples(index=False))
     if find_spec("pyarrow") is not None:
         plain = frame.copy()
         for name in frame:  # a column of numbers and words becomes one of words
             if len({type(value) for value in frame[name].dropna()}) > 1:
                 plain[name] = frame[name].map(lambda v: v if v is None else str(v))
-        with whole_file(folder / "results.parquet") as temporary:
-            plain.to_parquet(temporary, index=False)
+        plain.to_parquet(folder / "results.parquet", index=False)
     with spared("study.html", []):
-        _write(folder / "study.html", study_page(result))
-
-
-def _write(path: Path, text: str) -> None:
-    with whole_file(path) as temporary:
-        temporary.write_text(text, encoding="utf-8")
+        (folder / "study.html").write_text(study_page(result), encoding="utf-8")
 
 
 def _about(definition: Study, jobs: Jobs) -> str:

@@ -8,51 +8,82 @@ from pathlib import Path
 from typing import Any
 
 from ccfem.errors import InputError
-from ccfem.io.whole import whole_file
+from ccfem.io.folder import Folder, sweep
+from ccfem.io.result_folder import refuse_foreign, whole_folder
 
-__all__ = ["Store", "opened"]
+__all__ = ["TABLES", "Store", "opened"]
 
-_MARKER = "study.json"
 _LOCK = ".lock"
+_RUNS = "runs"
+TABLES = ("results.csv", "results.parquet", "times.csv", "study.html")
 
 
 class Store:
     """Outcomes of runs by their hash, on disk.
 
-    A run is there whole or not at all, however its program ended.
+    A run is there whole or not at all, however its program ended. Nothing is written or read
+    through links.
     """
 
-    def __init__(self, folder: Path) -> None:
-        self.folder = folder
-        self._runs = folder / "runs"
+    def __init__(self, folder: Folder, force: bool = False) -> None:
+        self._folder, self._force = folder, force
 
     def __getitem__(self, key: str) -> dict[str, Any] | None:
-        """Outcome of a run; None where it is not there, or cannot be read."""
-        try:
-            found = json.loads((self._runs / f"{key}.json").read_text(encoding="utf-8"))
-        except (OSError, ValueError):
+        """Outcome of a run; None where it is not there.
+
+        Raises
+        ------
+        InputError
+            Where something else has its place.
+        """
+        name = f"{key}.json"
+        if self._folder.entry(_RUNS) is None:
             return None
-        return found if isinstance(found, dict) and "failure" in found else None
+        with self._folder.inner(_RUNS) as runs:
+            if runs.entry(name) is None:
+                return None
+            try:
+                outcome = json.loads(runs.read(name))
+            except (OSError, ValueError, RecursionError):
+                outcome = None
+            if _is_outcome(outcome):
+                return dict(outcome)
+            if self._force and not runs.is_folder(name):
+                return None
+            raise InputError(
+                f"{runs.path / name} is not a run that ccfem stored: move it, or choose another "
+                "folder with --out"
+            )
 
     def __setitem__(self, key: str, outcome: Mapping[str, Any]) -> None:
-        self._runs.mkdir(exist_ok=True)
         text = json.dumps(outcome, indent=1, ensure_ascii=False, allow_nan=False)
-        with whole_file(self._runs / f"{key}.json") as temporary:
-            temporary.write_text(text + "\n", encoding="utf-8")
+        with self._folder.inner(_RUNS) as runs:
+            runs.write(f"{key}.json", (text + "\n").encode())
 
-    @property
-    def scratch(self) -> Path:
-        """Folder for what workers share; emptied when a study begins and ends."""
-        path = self.folder / ".stress"
-        path.mkdir(exist_ok=True)
-        return path
+    @contextmanager
+    def writing(self, *names: str) -> Iterator[Path]:
+        """Yield a temporary folder for files beside the runs: see `whole_folder`."""
+        self._folder.check_place()
+        with whole_folder(self._folder.path, names, self._force) as folder:
+            yield folder
 
     def sweep(self) -> None:
         """Remove what killed programs left behind."""
-        for path in [*self._runs.glob(".*.json"), *self.folder.glob(".stress/*")]:
-            path.unlink()
-        if (self.folder / ".stress").exists():
-            (self.folder / ".stress").rmdir()
+        sweep(self._folder, ("study.json", *TABLES))
+        if self._folder.is_folder(_RUNS):
+            with self._folder.inner(_RUNS) as runs:
+                sweep(runs, ())
+
+
+def _is_outcome(value: Any) -> bool:
+    """Whether a value is what is stored of a run."""
+    try:
+        for numbers in (value.get("values", {}), value.get("seconds", {})):
+            for number in numbers.values():
+                float(number)
+        return isinstance(value["failure"], str)
+    except (AttributeError, KeyError, TypeError, ValueError):
+        return False
 
 
 @contextmanager
@@ -64,7 +95,7 @@ def opened(folder: Path, force: bool = False) -> Iterator[Store]:
     folder : Path
         Made where it does not exist.
     force : bool, default False
-        Take a folder with other files in it.
+        Take a folder with other files in it, and replace files of the names of results.
 
     Raises
     ------
@@ -72,35 +103,25 @@ def opened(folder: Path, force: bool = False) -> Iterator[Store]:
         When the folder holds files of something else, another program runs a study in it, or it
         cannot be written to.
     """
+    if folder.exists() and not folder.is_dir():
+        raise InputError(f"cannot write a study to {folder}: it is a file: name a folder")
     try:
-        if folder.exists() and not folder.is_dir():
-            raise InputError(f"cannot write a study to {folder}: it is a file: name a folder")
-        others = [] if not folder.exists() else sorted(path.name for path in folder.iterdir())
-        if others and _MARKER not in others and _LOCK not in others and not force:
-            raise InputError(
-                f"{folder} holds files of something else, such as {others[0]}: choose another "
-                "folder with --out, or take it with --force"
-            )
         folder.mkdir(parents=True, exist_ok=True)
-        lock = os.open(folder / _LOCK, os.O_RDWR | os.O_CREAT, 0o666)
+        with Folder.opened(folder) as held:
+            refuse_foreign(held, ("study.json", *TABLES), force)
+            lock = held.open(_LOCK, os.O_RDWR | os.O_CREAT)
+            try:
+                _lock(lock, folder)
+                store = Store(held, force)
+                store.sweep()
+                yield store
+            finally:
+                os.close(lock)
     except OSError as error:
         raise InputError(
-            f"cannot write a study to {folder}: {error.strerror or error}: choose another folder "
-            "with --out"
+            f"cannot continue in {error.filename or folder}: {error.strerror or error}: finished "
+            "runs are kept; correct this and repeat, or choose another folder with --out"
         ) from error
-    try:
-        _lock(lock, folder)
-        store = Store(folder)
-        store.sweep()
-        yield store
-        store.sweep()
-    except OSError as error:
-        raise InputError(
-            f"cannot continue in {folder}: {error.strerror or error}: finished runs are kept; "
-            "correct this and repeat"
-        ) from error
-    finally:
-        os.close(lock)
 
 
 def _lock(handle: int, folder: Path) -> None:

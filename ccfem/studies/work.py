@@ -21,7 +21,7 @@ from ccfem.layers.slicer import Slicer
 from ccfem.planning.strategy import Strategy
 from ccfem.studies.fingerprint import fingerprint
 from ccfem.studies.jobs import Job, Part
-from ccfem.studies.transport import packed, unpacked
+from ccfem.studies.transport import Parted, packed, parted, unpacked
 from ccfem.toolpaths import Toolpaths
 from ccfem.virtual_testing.strand import Strand
 
@@ -57,7 +57,7 @@ class _Stress:
     seconds: Mapping[str, float]
 
 
-def solve_part(task: bytes) -> bytes:
+def solve_part(task: bytes) -> Parted:
     """Solve a part for all load cases that a study runs on it; a failure is told by its runs."""
     part, strand, backend = unpacked(task)
     seconds: dict[str, float] = {}
@@ -73,7 +73,7 @@ def solve_part(task: bytes) -> bytes:
                     alternative[name] = otherwise_held(part.case, stress, backend)
         except (InputError, SolveError) as error:
             failure = str(error)
-    return packed(_Stress(part, strand, backend, fields, alternative, failure, seconds))
+    return parted(_Stress(part, strand, backend, fields, alternative, failure, seconds))
 
 
 @dataclass
@@ -115,7 +115,7 @@ def run_job(stress: Any, name: str, task: bytes) -> dict[str, Any]:
 
     Parameters
     ----------
-    stress : bytes, or callable that returns them
+    stress : bytes and arrays, or callable that returns them
         From `solve_part`; asked for only where this worker does not hold the part yet.
     name : str
         Of the part, different for all parts.
@@ -133,7 +133,7 @@ def run_job(stress: Any, name: str, task: bytes) -> dict[str, Any]:
                 while len(_BENCHES) >= _HELD:
                     del _BENCHES[next(iter(_BENCHES))]
                 data = stress() if callable(stress) else stress
-                _BENCHES[name] = _Bench(unpacked(data))
+                _BENCHES[name] = _Bench(unpacked(*data))
             return _run(_BENCHES[name], *unpacked(task))
         except Exception as error:  # of a strategy or slicer of someone else: told, never dropped
             said = " ".join(f"{type(error).__name__}: {error}".split())

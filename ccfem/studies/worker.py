@@ -9,8 +9,11 @@ import queue
 import signal
 import sys
 import threading
-from pathlib import Path
-from typing import Any, BinaryIO
+from functools import partial
+from typing import TYPE_CHECKING, Any, BinaryIO
+
+if TYPE_CHECKING:
+    from ccfem.studies.transport import Parted
 
 __all__ = ["main", "receive", "send"]
 
@@ -51,17 +54,28 @@ def main() -> None:
         return
     sys.path += [path for path in json.loads(first) if path not in sys.path]
     threading.Thread(target=_tasks, args=(given, found), daemon=True).start()
+    import numpy as np
+
     from ccfem.studies.transport import packed, unpacked
     from ccfem.studies.work import run_job, solve_part
 
     while True:
-        what, name, file, task = unpacked(found.get())
+        what, name, file, task, rest = unpacked(found.get())
         if what == "solve":
-            Path(file).write_bytes(solve_part(task))
-            done: Any = None
+            rest, arrays = solve_part(task)
+            np.savez(file, **arrays)
+            done: Any = rest
         else:
-            done = run_job(Path(file).read_bytes, name, task)
+            done = run_job(partial(_stress, rest, file), name, task)
         send(out, packed(done))
+
+
+def _stress(rest: bytes, file: str) -> "Parted":
+    """Stress of a part: arrays of a file, and what came with the task."""
+    import numpy as np
+
+    with np.load(file, allow_pickle=False) as arrays:
+        return rest, dict(arrays)
 
 
 if __name__ == "__main__":

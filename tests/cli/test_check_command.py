@@ -1,8 +1,5 @@
 """``ccfem check`` and ``ccfem mesh``: what they print and write."""
 
-import subprocess
-import sys
-
 import pytest
 
 PART = """
@@ -82,18 +79,3 @@ def test_bad_words_are_one_line(ccfem, tmp_path, arguments, message):
     assert message in err
     assert err.count("\n") == 1
     assert list(tmp_path.iterdir()) == []
-
-
-def test_a_stop_while_importing_is_silent():
-    """The signal comes from within the import of the commands."""
-    code = (
-        "import os, signal, sys\n"
-        "class Finder:\n"
-        "    def find_spec(self, name, path=None, target=None):\n"
-        "        if name == 'typer': os.kill(os.getpid(), signal.SIGINT)\n"
-        "signal.signal(signal.SIGINT, signal.default_int_handler)\n"
-        "sys.meta_path.insert(0, Finder())\n"
-        "from ccfem.cli.start import start\nstart()\n"
-    )
-    done = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, check=False)
-    assert (done.returncode, done.stdout, done.stderr) == (130, "", "")

@@ -5,8 +5,10 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from ccfem.errors import InputError
+from ccfem.mesh import box_mesh
 from ccfem.mesh.check import check_mesh
 from ccfem.meshing import extrude, triangulate
+from ccfem.meshing.cache import kept
 
 
 def smallest_angles(points, triangles):
@@ -207,3 +209,17 @@ def test_what_is_remembered_is_neither_shared_nor_mixed_up():
     corners[:] = 0
     for one, other in zip(triangulate(square, 2.0), (points, triangles), strict=True):
         np.testing.assert_array_equal(one, other)
+
+
+def test_the_cache_removes_meshes_of_its_own_names_alone(tmp_path, monkeypatch):
+    """Where a user names a folder with other files in it."""
+    monkeypatch.setenv("CCFEM_CACHE", str(tmp_path))
+    monkeypatch.setattr("ccfem.meshing.cache._MOST", 2)
+    mine = {f"wing{k}.npz" for k in range(4)}
+    for name in mine:
+        (tmp_path / name).write_bytes(b"mine")
+    for k in range(4):
+        kept(b"%d" % k, {}, lambda: (box_mesh((1.0, 1.0, 1.0), (1, 1, 1)), ()))
+    names = {path.name for path in tmp_path.iterdir()}
+    assert names >= mine
+    assert len(names) == len(mine) + 2

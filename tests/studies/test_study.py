@@ -2,18 +2,24 @@
 
 import multiprocessing
 import os
+import pickle
 import signal
 import time
 from dataclasses import dataclass
 from typing import ClassVar
 
+import numpy as np
 import pandas as pd
 import pytest
 
 import ccfem
 from ccfem.errors import InputError
 from ccfem.planning import Amount
+from ccfem.studies.jobs import Part
 from ccfem.studies.store import opened
+from ccfem.studies.transport import unpacked
+from ccfem.studies.work import part_bytes, solve_part
+from ccfem.studies.worker import _stress
 
 CELL = """
 from dataclasses import dataclass
@@ -97,7 +103,7 @@ def test_a_killed_study_goes_on_where_it_was(disturbed):
     assert before >= 1
     assert result.computed == 9 - before
     assert count(result.folder) == 9
-    assert not list(result.folder.glob("**/.*.json"))
+    assert not list(result.folder.glob("**/.ccfem-*"))
     assert not (result.folder / ".stress").exists()
     if before < 9:
         assert told[-1][0].startswith("9 of 9 runs, about 0 s left: ")
@@ -184,6 +190,152 @@ def test_one_program_at_a_time_and_no_folder_of_others(tmp_path):
         ccfem.study(STUDY, tmp_path / "a")
     (tmp_path / "b").mkdir()
     (tmp_path / "b" / "thesis.tex").write_text("mine")
-    with pytest.raises(InputError, match=r"holds files of something else, such as thesis.tex"):
+    with pytest.raises(
+        InputError, match=r"holds files that ccfem did not write, such as thesis.tex"
+    ):
         ccfem.study(STUDY, tmp_path / "b")
     assert [path.name for path in (tmp_path / "b").iterdir()] == ["thesis.tex"]
+
+
+def snapshot(folder):
+    """Every entry of a folder, with its content or what it links to."""
+    return {
+        path.relative_to(folder).as_posix(): os.readlink(path)
+        if path.is_symlink()
+        else path.read_bytes()
+        if path.is_file()
+        else None
+        for path in sorted(folder.rglob("*"))
+    }
+
+
+@pytest.fixture
+def beside(tmp_path):
+    """A folder for a study, and one of a user beside it, which has to stay as it is."""
+    out, docs = tmp_path / "out", tmp_path / "docs"
+    out.mkdir()
+    docs.mkdir()
+    (docs / "t.docx").write_text("three years")
+    yield out, docs
+    assert snapshot(docs) == {"t.docx": b"three years"}
+
+
+def begun(out):
+    """Write what a study writes first."""
+    with opened(out) as store, store.writing("study.json") as files:
+        (files / "study.json").write_text("{}")
+
+
+@pytest.mark.parametrize("force", [False, True])
+@pytest.mark.parametrize("marker", ["study.json", ".lock"])
+def test_a_link_in_place_of_the_old_scratch_folder_is_left_alone(beside, marker, force):
+    out, _ = beside
+    (out / marker).write_text("{}" if marker == "study.json" else "")
+    (out / ".stress").symlink_to("../docs")
+    before = snapshot(out)
+    if force:
+        with opened(out, force=True) as store:
+            store["a" * 40] = {"failure": "none"}
+        assert (out / ".stress").is_symlink()
+        assert (out / "runs" / f"{'a' * 40}.json").is_file()
+    else:
+        with pytest.raises(InputError, match=r"holds files that ccfem did not write"):
+            ccfem.study(STUDY, out)
+        assert snapshot(out) == before
+
+
+def test_force_keeps_what_is_no_result(beside):
+    out, _ = beside
+    (out / ".stress").mkdir()
+    (out / ".stress" / "notes.txt").write_text("mine")
+    (out / "results.csv").write_text("mine")
+    with opened(out, force=True) as store, store.writing("results.csv") as files:
+        (files / "results.csv").write_text("new")
+    assert (out / ".stress" / "notes.txt").read_text() == "mine"
+    assert (out / "results.csv").read_text() == "new"
+
+
+def test_runs_are_not_stored_through_a_link(beside):
+    out, docs = beside
+    begun(out)
+    (out / "runs").symlink_to(docs)
+    with pytest.raises(InputError, match=r"out/runs: it is no folder but a link"), opened(out) as s:
+        s["a" * 40] = {"failure": ""}
+    (out / "runs").unlink()
+    (out / "runs").mkdir()
+    (out / "runs" / f"{'a' * 40}.json").symlink_to(docs / "t.docx")
+    with pytest.raises(InputError, match=r"is not a run that ccfem stored: move"), opened(out) as s:
+        s["a" * 40]
+    with opened(out, force=True) as store:
+        assert store["a" * 40] is None
+        store["a" * 40] = {"failure": "solved"}
+        assert store["a" * 40] == {"failure": "solved"}
+
+
+def test_a_link_that_comes_into_the_place_of_the_folder_is_not_followed(beside, tmp_path):
+    out, docs = beside
+    with opened(out) as store:
+        out.rename(tmp_path / "moved")
+        out.symlink_to(docs)
+        store["a" * 40] = {"failure": ""}
+        with pytest.raises(OSError, match="another folder has come"), store.writing("study.json"):
+            pass
+    assert (tmp_path / "moved" / "runs" / f"{'a' * 40}.json").is_file()
+
+
+@pytest.mark.parametrize(
+    "text",
+    [
+        *("[]", "[" * 10**5, '{"failure": 3}', '{"failure": "", "values": 3}'),
+        '{"failure": "", "values": {"stiffness": "=1"}}',
+    ],
+)
+def test_what_is_no_run_is_not_taken_for_one(beside, text):
+    out, _ = beside
+    begun(out)
+    (out / "runs").mkdir()
+    (out / "runs" / f"{'a' * 40}.json").write_text(text)
+    with pytest.raises(InputError, match="is not a run that ccfem stored"), opened(out) as store:
+        store["a" * 40]
+
+
+def test_the_lock_and_the_tables_are_not_written_through_links(beside):
+    out, docs = beside
+    (out / ".lock").symlink_to(docs / "new")
+    with pytest.raises(InputError, match=r"out/\.lock: it is no file but a link"), opened(out):
+        pass
+    (out / ".lock").unlink()
+    begun(out)
+    (out / "results.csv").symlink_to(docs / "t.docx")
+    with pytest.raises(InputError, match=r"results.csv is not by ccfem .*--force"), opened(out):
+        pass
+
+
+def test_stress_is_kept_as_plain_arrays_where_nobody_else_writes(tmp_path):
+    case = ccfem.read("bar", element_size=12.5)
+    task = part_bytes(Part(case, ("pull",)), None, "auto")
+    rest, arrays = solve_part(task)
+    assert len(rest) < 0.2 * sum(array.nbytes for array in arrays.values())
+    np.savez(tmp_path / "0.npz", **arrays)
+    known, kept = _stress(rest, str(tmp_path / "0.npz"))
+    stress = unpacked(known, kept)
+    field, solved = stress.fields["pull"], ccfem.solve(case.problem)["pull"]
+    assert np.array_equal(field.stress, solved.stress)
+    assert not field.stress.flags.writeable
+    assert field.problem.mesh.points is stress.fields["pull"].mesh.points
+
+
+def test_a_pickle_in_place_of_the_stress_is_not_opened(tmp_path):
+    class Foreign:
+        def __reduce__(self):
+            return os.mkdir, (str(tmp_path / "foreign"),)
+
+    for name, write in (
+        ("plain", lambda file: file.write_bytes(pickle.dumps(Foreign()))),
+        ("array", lambda file: np.savez(file, a=np.array([Foreign()], dtype=object))),
+    ):
+        file = tmp_path / f"{name}.npz"
+        write(file)
+        with pytest.raises(ValueError, match="allow_pickle"):
+            _stress(b"", str(file))
+    assert not (tmp_path / "foreign").exists()

@@ -1,8 +1,8 @@
 """The whole of the paper: its study, figures, tables and claims beside ours."""
 
-import csv
 from pathlib import Path
 
+from ccfem.io.csv_table import write_csv
 from ccfem.papers.chen_2021.claims import quantities, verdicts
 from ccfem.papers.chen_2021.figures import draw_all
 from ccfem.papers.chen_2021.study import PARTS_AT_HAND, Study, run_study
@@ -18,8 +18,7 @@ def write(study: Study, folder: Path) -> str:
     found = quantities(study)
     claims = claim_table(verdicts(found))
     drawn = draw_all(study, folder)
-    with (folder / "quantities.csv").open("w", newline="") as file:
-        csv.writer(file).writerows([("quantity", "value"), *found.items()])
+    write_csv(folder / "quantities.csv", ("quantity", "value"), found.items())
     parts = [
         "# Field-based toolpaths of Chen et al. (2021): ours beside theirs\n",
         "Written by `ccfem reproduce chen_2021`. The algorithm is the published one. "

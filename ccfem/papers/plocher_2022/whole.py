@@ -1,9 +1,9 @@
 """The whole of the paper: its study, figures, tables and claims beside ours."""
 
-import csv
 from pathlib import Path
 from time import perf_counter
 
+from ccfem.io.csv_table import write_csv
 from ccfem.papers.plocher_2022.claims import quantities, raster_quantities, verdicts
 from ccfem.papers.plocher_2022.figures import draw_all
 from ccfem.papers.plocher_2022.study import RASTER, run_study
@@ -49,15 +49,14 @@ def write_all(folder: Path) -> None:
     checks = verdicts(found)
     computed = perf_counter() - begun
     drawn = draw_all(study, raster, folder)
-    with (folder / "results.csv").open("w", newline="") as file:
-        writer = csv.writer(file)
-        writer.writerow(["case", "mode", "pattern", "index", "value"])
-        for mode, cases in (("polyline", study), ("raster", raster)):
-            for name, case in cases.items():
-                for pattern, one in case.patterns.items():
-                    writer.writerows(
-                        [name, mode, pattern, k, f"{v:.8g}"] for k, v in one.values.items()
-                    )
+    rows = [
+        [name, mode, pattern, k, f"{v:.8g}"]
+        for mode, cases in (("polyline", study), ("raster", raster))
+        for name, case in cases.items()
+        for pattern, one in case.patterns.items()
+        for k, v in one.values.items()
+    ]
+    write_csv(folder / "results.csv", ("case", "mode", "pattern", "index", "value"), rows)
     parts = [
         "# Infill patterns of Plocher, Wioland and Panesar (2022): ours beside theirs\n",
         "Written by `ccfem reproduce plocher_2022`.\n",
@@ -82,4 +81,4 @@ def write_all(folder: Path) -> None:
     ]
     (folder / "report.md").write_text("\n".join(parts))
     print(claim_table(checks))
-    print(f"{folder / 'report.md'}: {perf_counter() - begun:.1f} s")
+    print(f"report.md: {perf_counter() - begun:.1f} s")

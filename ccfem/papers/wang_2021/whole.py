@@ -1,10 +1,10 @@
 """The whole of the paper: its study, figures, tables and claims beside ours."""
 
-import csv
 from pathlib import Path
 from time import perf_counter
 
 from ccfem.evaluation.matching import READINGS, THRESHOLDS
+from ccfem.io.csv_table import write_csv
 from ccfem.papers.verdicts import claim_table
 from ccfem.papers.wang_2021.claims import quantities, verdicts
 from ccfem.papers.wang_2021.figures import draw_all
@@ -30,17 +30,16 @@ def write_all(folder: Path) -> None:
     checks = verdicts(found)
     computed = perf_counter() - begun
     drawn = draw_all(study, folder)
-    with (folder / "rates.csv").open("w", newline="") as file:
-        writer = csv.writer(file)
-        writer.writerow(["plate", "part", "pattern", "reading", *(f"{t:g}" for t in THRESHOLDS)])
-        for name, plate in study.items():
-            for which, part in (("optimised", plate.optimised), ("full", plate.original)):
-                for pattern, one in part.patterns.items():
-                    for reading in READINGS:
-                        values = [f"{v:.6g}" for v in one.rates[reading]]
-                        writer.writerow([name, which, pattern, reading, *values])
-    with (folder / "quantities.csv").open("w", newline="") as file:
-        csv.writer(file).writerows([("quantity", "value"), *found.items()])
+    rates = [
+        [name, which, pattern, reading, *(f"{v:.6g}" for v in one.rates[reading])]
+        for name, plate in study.items()
+        for which, part in (("optimised", plate.optimised), ("full", plate.original))
+        for pattern, one in part.patterns.items()
+        for reading in READINGS
+    ]
+    columns = ["plate", "part", "pattern", "reading", *(f"{t:g}" for t in THRESHOLDS)]
+    write_csv(folder / "rates.csv", columns, rates)
+    write_csv(folder / "quantities.csv", ("quantity", "value"), found.items())
     parts = [
         "# Load-dependent paths of Wang et al. (2021): ours beside theirs\n",
         "Written by `ccfem reproduce wang_2021`. lpp is strategy `svt`; lpp uncrossed "
@@ -62,4 +61,4 @@ def write_all(folder: Path) -> None:
     ]
     (folder / "report.md").write_text("\n".join(parts))
     print(claim_table(checks))
-    print(f"{folder / 'report.md'}: {perf_counter() - begun:.1f} s")
+    print(f"report.md: {perf_counter() - begun:.1f} s")
