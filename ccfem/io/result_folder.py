@@ -12,6 +12,7 @@ from contextlib import contextmanager
 from pathlib import Path
 
 from ccfem.errors import InputError
+from ccfem.io.whole import reason_and_cure
 
 __all__ = ["whole_folder"]
 
@@ -259,7 +260,5 @@ def _file_by_file(folder: Path, directory: Path) -> None:
 
 
 def _unwritable(directory: Path, error: OSError) -> InputError:
-    return InputError(
-        f"cannot write results to {directory}: {error.strerror or error}: choose another folder "
-        "with --out"
-    )
+    why = reason_and_cure(error, "another folder with --out")
+    return InputError(f"cannot write results to {directory}: {why}")

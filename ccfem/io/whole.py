@@ -1,5 +1,6 @@
 """Writing a file whole or not at all."""
 
+import errno
 import os
 from collections.abc import Iterator
 from contextlib import contextmanager
@@ -7,7 +8,7 @@ from pathlib import Path
 
 from ccfem.errors import InputError
 
-__all__ = ["check_writable", "existing_file", "whole_file"]
+__all__ = ["check_writable", "existing_file", "reason_and_cure", "whole_file"]
 
 
 @contextmanager
@@ -45,12 +46,23 @@ def whole_file(path: str | os.PathLike[str]) -> Iterator[Path]:
         yield temporary
         os.replace(temporary, path)
     except OSError as error:
-        raise InputError(
-            f"cannot write {path}: {error.strerror or error}: choose a folder you may write to"
-        ) from error
+        raise InputError(f"cannot write {path}: {reason_and_cure(error)}") from error
     finally:
         if temporary.exists():
             temporary.unlink()
+
+
+def reason_and_cure(error: OSError, folder: str = "a folder you may write to") -> str:
+    """Say why the system did not write, and what helps.
+
+    Examples
+    --------
+    >>> reason_and_cure(OSError(errno.ENOSPC, "No space left on device"))
+    'No space left on device: free some space there, or choose another disk'
+    """
+    full = error.errno in (errno.ENOSPC, errno.EDQUOT, errno.EFBIG)
+    cure = "free some space there, or choose another disk" if full else f"choose {folder}"
+    return f"{error.strerror or error}: {cure}"
 
 
 def check_writable(path: str | os.PathLike[str]) -> Path:

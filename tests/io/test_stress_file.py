@@ -5,6 +5,7 @@ import subprocess
 from dataclasses import replace
 from pathlib import Path
 
+import meshio
 import numpy as np
 import pytest
 import pyvista
@@ -73,10 +74,39 @@ def test_a_result_holds_all_that_it_promises(field, written):
     axes = np.stack([grid.cell_data[f"principal_direction_{k}"] for k in (1, 2, 3)], axis=2)
     again = np.einsum("mik,mk,mjk->mij", axes, values, axes)
     np.testing.assert_allclose(again, field.stress, atol=1e-9 * np.abs(field.stress).max())
-    assert grid.field_data["unit of stress"][0] == "MPa"
+    text = {name: bytes(grid.field_data[name]).decode() for name in ("load case", "unit of stress")}
+    assert text == {"load case": "pull", "unit of stress": "MPa"}
     mesh = read_mesh(written)
     assert set(mesh.patches) == set(field.mesh.patches)
     assert mesh.order == field.mesh.order
+
+
+def test_meshio_reads_the_same_result(field, written):
+    theirs, ours = meshio.read(written), pyvista.read(written)
+    assert [block.type for block in theirs.cells] == [
+        "tetra" if field.mesh.order == 1 else "tetra10"
+    ]
+    np.testing.assert_array_equal(theirs.points, field.mesh.points)
+    np.testing.assert_array_equal(theirs.cells[0].data, field.mesh.cells)
+    assert set(theirs.point_data) == set(ours.point_data.keys())
+    for name, values in theirs.point_data.items():
+        np.testing.assert_array_equal(values, ours.point_data[name])
+    assert set(theirs.cell_data) == set(ours.cell_data.keys())
+    for name, (values,) in theirs.cell_data.items():
+        np.testing.assert_array_equal(values, ours.cell_data[name])
+    np.testing.assert_array_equal(theirs.cell_data["stress"][0][:, 4], field.stress[:, 1, 2])
+    for name, facets in field.mesh.patches.items():
+        np.testing.assert_array_equal(theirs.field_data[f"patch:{name}"], facets)
+    assert bytes(theirs.field_data["unit of stress"]) == b"MPa"
+
+
+def test_a_unit_as_a_string_is_read_too(field, written):
+    """As ccfem wrote it before, and as other programs may."""
+    grid = pyvista.read(written)
+    grid.field_data["unit of stress"] = ["Pa"]
+    grid.save(written)
+    given = read_stress(written, field.mesh)
+    np.testing.assert_allclose(given.stress, 1e-6 * field.stress, rtol=1e-15)
 
 
 def test_other_numbers_of_nodes_and_cells_are_mapped(field, tmp_path):
