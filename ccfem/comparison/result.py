@@ -173,7 +173,10 @@ class Comparison:
             others = bool(self.case.alternative_supports)
             found += cases_remarks(*about, case, self.cases_bound, others)
         if self.given is not None:
-            found.append("paths are planned and evaluated on the stress of another program")
+            assumed = f"; {self.given.assumed}" if self.given.assumed else ""
+            found.append(
+                f"paths are planned and evaluated on the stress of another program{assumed}"
+            )
         return found
 
     @property
