@@ -27,7 +27,10 @@ def main() -> None:
     warnings.filterwarnings("ignore", message="Glyph .* missing from")
     try:
         code = typer.main.get_command(app)(standalone_mode=False)
-    except (InputError, SolveError) as error:
+    except InputError as error:
+        # All mistakes where they are asked for; elsewhere the first, and how many there are.
+        code = _complain(*(error.mistakes if sys.argv[1:2] == ["check"] else (str(error),)))
+    except SolveError as error:
         code = _complain(str(error))
     except usage_error as error:
         code = _complain(error.format_message())
@@ -44,6 +47,7 @@ def main() -> None:
     sys.exit(code if isinstance(code, int) else 0)
 
 
-def _complain(message: str) -> int:
-    print("ccfem: error:", " ".join(message.split()), file=sys.stderr)
+def _complain(*messages: str) -> int:
+    for message in messages:
+        print("ccfem: error:", " ".join(message.split()), file=sys.stderr)
     return 2

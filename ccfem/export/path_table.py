@@ -8,7 +8,7 @@ import numpy as np
 from ccfem.arrays import FloatArray
 from ccfem.errors import InputError
 from ccfem.export.waypoints import LARGEST_NUMBER, check_near, read_waypoints
-from ccfem.io.whole import existing_file
+from ccfem.io.whole import text_of
 from ccfem.toolpaths import FIBRE, Toolpaths
 
 __all__ = ["FRAMES", "read_path_table", "read_paths"]
@@ -87,13 +87,8 @@ def read_path_table(path: str | Path, axes: FloatArray, normal: FloatArray) -> T
     InputError
         With the line that is not what the format says.
     """
-    file = existing_file(path, "path table")
     try:
-        text = file.read_text(encoding="utf-8-sig")
-    except UnicodeDecodeError:
-        raise InputError(f"{path} is no path table: it holds no text: check its name") from None
-    try:
-        first, *rows = [*csv.reader(text.splitlines())] or [[]]
+        first, *rows = [*csv.reader(text_of(path, "path table").splitlines())] or [[]]
     except csv.Error as error:
         raise InputError(f"{path} is no path table: {error}: check its name") from None
     head = [word.strip().lower() for word in first]

@@ -14,7 +14,7 @@ import numpy as np
 from ccfem.arrays import FloatArray
 from ccfem.errors import InputError
 from ccfem.geometry.polylines import pack
-from ccfem.io.whole import existing_file, whole_file
+from ccfem.io.whole import text_of, whole_file
 from ccfem.layers.layer import Layer
 from ccfem.toolpaths import FIBRE, Toolpaths
 
@@ -49,12 +49,7 @@ def read_waypoints(path: str | Path, frame: FloatArray) -> Toolpaths:
     InputError
         When the file cannot be read, or a line is not what the format says.
     """
-    file = existing_file(path, "waypoint file")
-    try:
-        text = file.read_text(encoding="utf-8")
-    except UnicodeDecodeError:
-        raise InputError(f"{path} is not a waypoint file: it is not text: check its name") from None
-    lines, layers = _parse(text, str(path))
+    lines, layers = _parse(text_of(path, "waypoint file"), str(path))
     if not lines:
         return Toolpaths.empty()
     check_near(np.concatenate(lines), str(path))

@@ -8,6 +8,7 @@ import numpy as np
 
 from ccfem.errors import InputError, shown
 from ccfem.io.stress_data import StressData, component_of, component_order
+from ccfem.io.whole import text_of
 
 __all__ = ["table_stress"]
 
@@ -25,13 +26,9 @@ def table_stress(path: Path) -> StressData:
     InputError
         When the file cannot be read, a column or a line is missing, or a value is no number.
     """
-    try:
-        text = path.read_text(encoding="utf-8-sig")
-    except (OSError, UnicodeDecodeError) as error:
-        raise InputError(f"expected a CSV file at {path}; it cannot be read: {error}") from None
     lines = {
         number: line
-        for number, line in enumerate(text.splitlines(), 1)
+        for number, line in enumerate(text_of(path, "table of stress").splitlines(), 1)
         if line.strip() and not line.startswith("#")
     }
     if len(lines) < 2:

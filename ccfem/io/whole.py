@@ -1,5 +1,6 @@
 """Writing a file whole or not at all."""
 
+import codecs
 import errno
 import os
 from collections.abc import Iterator
@@ -8,7 +9,7 @@ from pathlib import Path
 
 from ccfem.errors import InputError
 
-__all__ = ["check_writable", "existing_file", "reason_and_cure", "whole_file"]
+__all__ = ["check_writable", "existing_file", "reason_and_cure", "text_of", "whole_file"]
 
 
 @contextmanager
@@ -92,6 +93,11 @@ def existing_file(path: str | os.PathLike[str], what: str) -> Path:
         When it is not; the message begins with `what`.
     """
     path = Path(path)
+    if not str(path).isprintable():  # a path of Windows whose \\t and \\n were read as escapes
+        raise InputError(
+            f"{what} {str(path)!r} has a tab, a line break or the like in its name: write paths "
+            "with / or, in a TOML file, in single quotes"
+        )
     if path.is_dir():
         raise InputError(f"{what} {path} is a folder: name the file in it")
     if not path.exists():
@@ -99,3 +105,30 @@ def existing_file(path: str | os.PathLike[str], what: str) -> Path:
     if not os.access(path, os.R_OK):
         raise InputError(f"{what} {path} cannot be read: check its permissions")
     return path
+
+
+def text_of(path: str | os.PathLike[str], what: str) -> str:
+    """Text of a file in UTF-8, with or without a byte order mark.
+
+    Raises
+    ------
+    InputError
+        When the file cannot be read, or is in another encoding; the message begins with `what`.
+    """
+    path = existing_file(path, what)
+    try:
+        data = path.read_bytes()
+    except OSError as error:
+        raise InputError(
+            f"{what} {path} cannot be read: {error.strerror or error}: copy it to another disk"
+        ) from None
+    came = "got UTF-16"
+    if not data.startswith((codecs.BOM_UTF16_LE, codecs.BOM_UTF16_BE)) and b"\0" not in data[:2]:
+        try:
+            return data.decode("utf-8-sig")
+        except UnicodeDecodeError as error:
+            line = data[: error.start].count(b"\n") + 1
+            came = f"line {line} has the byte 0x{data[error.start]:02x}, which is none"
+    raise InputError(
+        f"{what} {path} must be text in UTF-8; {came}: save it as UTF-8, or check its name"
+    )
