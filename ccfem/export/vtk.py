@@ -49,7 +49,8 @@ def write_paths(
     for name, values in paths.items():
         if np.shape(values)[:1] != (len(toolpaths),):
             raise InputError(
-                f"'{name}' must have one value per path, {len(toolpaths)} in all; got {len(values)}"
+                f"'{name}' must have one value per path, {len(toolpaths)} in all; got "
+                f"{np.size(values)}"
             )
     with whole_file(path) as temporary:
         write_vtk_xml(
