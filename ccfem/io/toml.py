@@ -193,7 +193,7 @@ def _bare_number(value: object) -> str:
     if isinstance(value, int | float) and not isinstance(value, bool):
         return "give a finite number"
     quantity = _QUANTITY.fullmatch(value) if isinstance(value, str) else None
-    if quantity is None:
+    if quantity is None or re.search(r",\d{3}\b", quantity[0]):  # 1,000 may be a thousand
         return "write the bare number, as 2.5"
     number, unit = float(quantity[1].replace(",", ".")), quantity[2]
     if unit in _UNITS:

@@ -124,6 +124,7 @@ def test_assignments_take_numbers_as_people_write_them(text, value):
         ("5 stone", "write 5 without quotes and unit"),
         ("1e3", "write 1000 without quotes"),
         ("thick", "write the bare number, as 2.5"),
+        ("1,000 mm", "write the bare number, as 2.5"),
         ("1.2.3", "write the bare number, as 2.5"),
         ([], "write the bare number, as 2.5"),
         (float("inf"), "give a finite number"),
