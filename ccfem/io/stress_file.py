@@ -175,6 +175,8 @@ def _by_number(
 
 def _nodes(points: FloatArray, mesh: TetMesh, corners: IntArray, path: Path) -> IntArray:
     """Row of the file for each node (n,) of the mesh; -1 for middles that it does not have."""
+    if not np.isfinite(points).all():
+        raise InputError(f"{path}: nodes must be finite; got NaN or infinity: write it again")
     near = _SAME * float(np.linalg.norm(np.ptp(mesh.bounds, axis=0)))
     n = len(mesh.points)
     if len(points) >= len(corners) and len(points) <= n:

@@ -103,6 +103,14 @@ def test_meshio_reads_the_same_result(field, written):
     assert bytes(theirs.field_data["unit of stress"]) == b"MPa"
 
 
+def test_a_node_that_is_nowhere_is_one_line(field, written):
+    grid = pyvista.read(written)
+    grid.points[3, 1] = np.nan
+    grid.save(written)
+    with pytest.raises(InputError, match="nodes must be finite; got NaN or infinity"):
+        read_stress(written, field.mesh, "MPa")
+
+
 def test_a_unit_as_a_string_is_read_too(field, written):
     """As ccfem wrote it before, and as other programs may."""
     grid = pyvista.read(written)
