@@ -58,7 +58,7 @@ def check_number(
     >>> check_number("width", 0.4, above=0.0, unit="mm")
     >>> check_number("share", 2.0, above=0.0, at_most=1.0)
     Traceback (most recent call last):
-    ccfem.errors.InputError: share must be above 0 and at most 1; got 2.0: correct it
+    ccfem.errors.InputError: share must be above 0 and at most 1; got 2.0: give one in this range
     """
     number = isinstance(value, Real) and not isinstance(value, bool)
     finite = number and math.isfinite(value)
@@ -77,7 +77,8 @@ def check_number(
         words.append(f"{' and '.join(bounds)} {unit}".strip())
     elif unit:
         words = [f"a finite number of {unit}"]
-    raise InputError(f"{what} must be {', '.join(words)}; got {value!r}: correct it")
+    cure = f"give {'one in this range' if bounds else 'a number'}"
+    raise InputError(f"{what} must be {', '.join(words)}; got {value!r}: {cure}")
 
 
 def check_fields(value: object, *names: str, **bounds: Any) -> None:
@@ -117,7 +118,7 @@ def check_choices(value: object) -> None:
             words = ", ".join(map(repr, get_args(hint)))
             raise InputError(
                 f"{member_name(value)}.{name} must be one of {words}; got "
-                f"{getattr(value, name)!r}: correct it"
+                f"{getattr(value, name)!r}: name one of them"
             )
 
 

@@ -81,12 +81,12 @@ class Material:
         if self.mass_density is not None and not 0.0 < self.mass_density < np.inf:
             raise InputError(
                 f"material '{self.name}': mass density must be above 0 g/cm^3; got "
-                f"{self.mass_density}: correct it"
+                f"{self.mass_density}: give it as 1.24"
             )
         if self.expansion is not None and not np.isfinite(self.expansion).all():
             raise InputError(
                 f"material '{self.name}': expansion must be finite numbers, 1/K; got "
-                f"{self.expansion}: correct it"
+                f"{self.expansion}: give it as 7e-5"
             )
 
 

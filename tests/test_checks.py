@@ -44,16 +44,40 @@ def test_numbers_within_bounds_pass(value, bounds):
 @pytest.mark.parametrize(
     ("value", "bounds", "message"),
     [
-        (-1.0, {"at_least": 0.0, "unit": "mm"}, "at least 0 mm; got -1.0: correct it"),
-        (0.0, {"above": 0.0, "at_most": 1.0}, "above 0 and at most 1; got 0.0: correct it"),
-        (1.0, {"above": 0.0, "below": 1.0}, "above 0 and below 1; got 1.0: correct it"),
-        (1.5, {"at_most": 1.0}, "at most 1; got 1.5: correct it"),
-        (np.inf, {"above": 0.0, "unit": "N"}, "a finite number, above 0 N; got inf: correct it"),
-        ("a", {}, "a finite number; got 'a': correct it"),
-        (np.nan, {"unit": "degrees"}, "a finite number of degrees; got nan: correct it"),
-        ("2", {"at_least": 1}, "a finite number, at least 1; got '2': correct it"),
-        (True, {"at_least": 1}, "a finite number, at least 1; got True: correct it"),
-        (None, {"at_least": 1}, "a finite number, at least 1; got None: correct it"),
+        (
+            -1.0,
+            {"at_least": 0.0, "unit": "mm"},
+            "at least 0 mm; got -1.0: give one in this range",
+        ),
+        (
+            0.0,
+            {"above": 0.0, "at_most": 1.0},
+            "above 0 and at most 1; got 0.0: give one in this range",
+        ),
+        (
+            1.0,
+            {"above": 0.0, "below": 1.0},
+            "above 0 and below 1; got 1.0: give one in this range",
+        ),
+        (1.5, {"at_most": 1.0}, "at most 1; got 1.5: give one in this range"),
+        (
+            np.inf,
+            {"above": 0.0, "unit": "N"},
+            "a finite number, above 0 N; got inf: give one in this range",
+        ),
+        ("a", {}, "a finite number; got 'a': give a number"),
+        (np.nan, {"unit": "degrees"}, "a finite number of degrees; got nan: give a number"),
+        ("2", {"at_least": 1}, "a finite number, at least 1; got '2': give one in this range"),
+        (
+            True,
+            {"at_least": 1},
+            "a finite number, at least 1; got True: give one in this range",
+        ),
+        (
+            None,
+            {"at_least": 1},
+            "a finite number, at least 1; got None: give one in this range",
+        ),
     ],
 )
 def test_other_values_are_refused_in_one_line(value, bounds, message):
@@ -73,7 +97,7 @@ def test_fields_are_named_by_their_class_and_may_be_left_out():
 
 def test_fields_with_choices_hold_one_of_them():
     check_choices(WideStrand(end="flat"))
-    message = r"^wide_strand\.end must be one of 'round', 'flat'; got 'pointed': correct it$"
+    message = r"^wide_strand\.end must be one of 'round', 'flat'; got 'pointed': name one of them$"
     with pytest.raises(InputError, match=message):
         check_choices(WideStrand(end="pointed"))
 

@@ -14,10 +14,13 @@ from collections import Counter
 from collections.abc import Callable
 from pathlib import Path
 
-from benchmarks.fuzz.mutants import good_files, mutants
+import numpy as np
+
+from benchmarks.fuzz.mutants import MESH, good_files, mutants
 from ccfem.cases.part_file import read_part
 from ccfem.errors import InputError
-from ccfem.io import read_mesh, read_surface
+from ccfem.export.path_table import read_paths
+from ccfem.io import read_mesh, read_stress, read_surface
 from ccfem.io.surface import is_surface
 
 SECONDS, MEMORY = 20.0, 2e9
@@ -25,7 +28,11 @@ SECONDS, MEMORY = 20.0, 2e9
 
 def read(path: Path) -> None:
     """Read a file as ccfem does by its name."""
-    if path.suffix == ".toml":
+    if "stress" in path.stem:
+        read_stress(path, MESH)
+    elif "paths" in path.stem:
+        read_paths(path, np.eye(3))
+    elif path.suffix == ".toml":
         read_part(path)
     elif is_surface(path):
         read_surface(path)
@@ -91,7 +98,7 @@ def main(count: int = 3000, seed: str = "1", wanted: tuple[str, ...] = ()) -> in
         for file in files:
             before = time.perf_counter()
             content = file.read_bytes()
-            target = file.with_name(f"mutant{file.suffix}")
+            target = file.with_name(f"mutant_{file.name}")
             for k, spoiled in enumerate(mutants(content, count // len(files), seed + file.name)):
                 target.write_bytes(spoiled)
                 found = verdict(target)

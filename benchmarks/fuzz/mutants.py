@@ -9,7 +9,10 @@ import numpy as np
 from ccfem.io import write_mesh
 from ccfem.mesh import box_mesh
 
-__all__ = ["good_files", "mutants"]
+__all__ = ["MESH", "frd", "good_files", "mutants"]
+
+MESH = box_mesh((20.0, 10.0, 5.0), (4, 2, 1))
+"""What the good files hold, and stress and paths are on."""
 
 PART = """name = "box"
 mesh = "box.npz"
@@ -43,7 +46,7 @@ def good_files(folder: Path) -> list[Path]:
     """Write one good file of each format."""
     import pyvista
 
-    mesh = box_mesh((20.0, 10.0, 5.0), (4, 2, 1))
+    mesh = MESH
     for name in ("box.npz", "box.tet", "box.vtu"):
         write_mesh(mesh, folder / name)
     used, triangles = np.unique(mesh.boundary, return_inverse=True)
@@ -60,6 +63,17 @@ def good_files(folder: Path) -> list[Path]:
     (folder / "box.inp").write_text(_deck(mesh))
     (folder / "box.msh").write_text(_msh(mesh))
     (folder / "part.toml").write_text(PART)
+    (folder / "stress.frd").write_text(frd(mesh, np.tile((1.5, -2, 0.5, 0.01, 0, 3), (30, 1))))
+    rows = ["element;Sxx [MPa];Syy [MPa];Szz [MPa];Syz [MPa];Sxz [MPa];Sxy [MPa]"]
+    rows += [f"{k};1.5;-2.0;0.5;1e-3;0;{k}.25" for k in range(1, len(mesh.cells) + 1)]
+    (folder / "stress.csv").write_text("\n".join(rows) + "\n")
+    grid.cell_data["stress"] = np.ones((len(mesh.cells), 9))
+    grid.field_data["unit of stress"] = np.frombuffer(b"MPa", dtype=np.uint8)
+    grid.save(folder / "stress.vtu", binary=False)
+    rows = [f"{x},{y},2.5,{y},0" for y in range(1, 9) for x in range(2, 19, 4)]
+    (folder / "paths.csv").write_text("\n".join(["x,y,z,path,layer", *rows]) + "\n")
+    rows = [f"S\nX2.0 Y{y}.0 Z2.5\nX18.0 Y{y}.5 Z2.5\nE" for y in range(1, 9)]
+    (folder / "paths.txt").write_text("\n".join([";Layer_CCF: 0", *rows]) + "\n")
     return sorted(folder.iterdir())
 
 
@@ -89,6 +103,26 @@ def _msh(mesh) -> str:
         for k, (kind, tag, nodes) in enumerate(rows, 1)
     ]
     return "\n".join([*lines, "$EndElements"]) + "\n"
+
+
+def frd(mesh, stress) -> str:
+    """Results of CalculiX on a linear mesh; stress (n, 6) at the nodes: xx, yy, zz, xy, yz, zx."""
+    number = [f" -1{k:10d}" for k in range(1, len(mesh.points) + 1)]
+    lines = ["    1C", f"    2C{len(mesh.points):30d}{1:38d}"]
+    lines += [
+        n + "".join(f"{x:12.5E}" for x in p)
+        for n, p in zip(number, mesh.points.tolist(), strict=True)
+    ]
+    lines += [" -3", f"    3C{len(mesh.cells):30d}{1:38d}"]
+    for k, nodes in enumerate(mesh.cells.tolist(), 1):
+        lines += [f" -1{k:10d}    3    0    1", " -2" + "".join(f"{n + 1:10d}" for n in nodes)]
+    lines += [" -3", " -4  STRESS      6    1"]
+    lines += [f" -5  S{name:11s} 1    4    1    1" for name in ("XX", "YY", "ZZ", "XY", "YZ", "ZX")]
+    lines += [
+        n + "".join(f"{s:12.5E}" for s in row)
+        for n, row in zip(number, stress.tolist(), strict=True)
+    ]
+    return "\n".join([*lines, " -3", " 9999"]) + "\n"
 
 
 def mutants(content: bytes, count: int, seed: str) -> Iterator[bytes]:

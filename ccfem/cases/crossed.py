@@ -10,7 +10,8 @@ from typing import Any
 import numpy as np
 import shapely
 
-from ccfem.arrays import FloatArray, IntArray
+from ccfem.arrays import FloatArray
+from ccfem.io.surface import write_stl
 from ccfem.mesh.check import check_mesh
 from ccfem.mesh.patches import PatchRule, patches_from_rules
 from ccfem.mesh.tet_mesh import TetMesh
@@ -62,7 +63,7 @@ def crossed_mesh(
             placed[:, [k for k in range(3) if k != along]] = body.points[:, :2]
             placed[:, along] = body.points[:, 2] + low[along] - _BEYOND
             # Seen along y the first two axes change their sense, and so do the triangles.
-            _write_surface(f"{axis}.stl", placed, body.boundary[:, :: -1 if axis == "y" else 1])
+            write_stl(Path(f"{axis}.stl"), placed, body.boundary[:, :: -1 if axis == "y" else 1])
         first, *others = (f"{axis}.stl" for axis in outlines)
         tree: Any = first
         for other in others:
@@ -89,11 +90,3 @@ def _bounds(outlines: Mapping[str, shapely.Polygon]) -> tuple[FloatArray, FloatA
         low[across] = np.maximum(low[across], ends[0])
         high[across] = np.minimum(high[across], ends[1])
     return low, high
-
-
-def _write_surface(name: str, points: FloatArray, triangles: IntArray) -> None:
-    """Write a closed surface as STL."""
-    import pyvista
-
-    faces = np.column_stack([np.full(len(triangles), 3), triangles])
-    pyvista.PolyData(points, faces.ravel()).save(name)

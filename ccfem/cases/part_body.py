@@ -75,6 +75,9 @@ class Body:
             )
         if self.planform is not None and self.scale != 1.0:
             found.lines.append("scale goes with mesh or surface: leave it out of a planform")
+        if self.planform is not None:
+            with found.noted():
+                from_table(_Planform, self.planform, "planform")
         with found.noted():
             check_number("scale", self.scale, above=0.0)
         for key in ("mesh", "surface"):

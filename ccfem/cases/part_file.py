@@ -226,7 +226,6 @@ them with a minus ("-z"), or three numbers.
 """
 
 import os
-import tomllib
 from collections.abc import Mapping
 from dataclasses import dataclass
 from pathlib import Path
@@ -251,8 +250,7 @@ from ccfem.elasticity.load_kinds import patches_in_use
 from ccfem.elasticity.problem import Problem
 from ccfem.errors import InputError, Mistakes
 from ccfem.io.surface import Surface
-from ccfem.io.toml import from_table
-from ccfem.io.whole import existing_file
+from ccfem.io.toml import from_table, read_toml
 from ccfem.layers.slicer import Slicer
 from ccfem.machine.machine import Machine
 from ccfem.machine.named_machines import machine_from
@@ -283,12 +281,8 @@ def read_part(path: str | os.PathLike[str]) -> Case:
     InputError
         With the name of the file, what was expected, what came and the cure.
     """
-    path = existing_file(path, "part file")
-    try:
-        with path.open("rb") as file:
-            content = tomllib.load(file)
-    except (ValueError, RecursionError) as error:
-        raise InputError(f"{path} is not a TOML file: {error}: correct it") from None
+    path = Path(path)
+    content = read_toml(path, "part file")
     try:
         return _case(content, path)
     except InputError as error:

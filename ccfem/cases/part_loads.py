@@ -31,7 +31,7 @@ from ccfem.elasticity.support_kinds import (
     Support,
 )
 from ccfem.errors import InputError, Mistakes, known_names, shown
-from ccfem.io.toml import from_table
+from ccfem.io.toml import cure_of, from_table
 
 __all__ = [
     "LOADS",
@@ -105,7 +105,7 @@ def _cases_of(table: Mapping[str, Any], cases: Mapping[str, Any], where: str) ->
     if not isinstance(names, list) or not names or not all(isinstance(n, str) for n in names):
         raise InputError(
             f"{where}.case must be the name of a load case, or a list of names; got "
-            f"{shown(given)}: correct it, or leave it out for a support in all load cases"
+            f"{shown(given)}: name some, or leave it out for a support in all load cases"
         )
     for name in names:
         if name not in cases:
@@ -177,9 +177,11 @@ def _factors(name: str, table: object, cases: Mapping[str, Any]) -> dict[str, fl
                 f"{where} names no load case '{case}'; there are: {known_names(case, cases)}"
             )
         if isinstance(factor, bool) or not isinstance(factor, int | float):
-            raise InputError(f"{where}.{case} must be a number; got {shown(factor)}: correct it")
+            raise InputError(
+                f"{where}.{case} must be a number; got {shown(factor)}: {cure_of(factor, float)}"
+            )
         if not abs(factor) < 1e300:
-            raise InputError(f"{where}.{case} must be finite; got {shown(factor)}: correct it")
+            raise InputError(f"{where}.{case} must be finite; got {shown(factor)}: give a number")
     if name in cases:
         raise InputError(f"{where} has the name of a load case: rename one of them")
     return {case: float(factor) for case, factor in table.items()}

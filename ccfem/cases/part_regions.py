@@ -38,7 +38,7 @@ def _region(where: str, table: object) -> tuple[Material, CellRule]:
     material = rest.pop("material")
     if not isinstance(material, str | dict):
         raise InputError(
-            f"{where}.material must be a string or a table; got {shown(material)}: correct it"
+            f"{where}.material must be a string or a table; got {shown(material)}: name one"
         )
     chooses = from_table(REGIONS[rule], rest, where, infinite=rule == "box")
     return material_of(material, f"{where}.material"), chooses

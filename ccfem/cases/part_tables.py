@@ -63,7 +63,7 @@ def named_table(
     if not isinstance(table, Mapping) or not isinstance(name, str) or name not in known:
         raise InputError(
             f"{where} must be a table with {key} one of {', '.join(known)}; got "
-            f"{shown(table if name is None else name)}: correct it"
+            f"{shown(table if name is None else name)}: name one"
         )
     return name, {k: value for k, value in table.items() if k != key}
 

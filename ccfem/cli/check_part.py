@@ -4,7 +4,6 @@ from collections.abc import Callable
 from pathlib import Path
 
 from ccfem.cli.run import complain, load
-from ccfem.errors import InputError
 from ccfem.inspection import check
 from ccfem.io.whole import check_writable, whole_file
 from ccfem.machine.machine import Machine
@@ -44,12 +43,7 @@ def check_part(
     """
     if picture is not None:
         check_picture(picture)
-    try:
-        checked = check(load(part, set_case, machine=machine, fibre=fibre))
-    except InputError as error:
-        if len(error.mistakes) < 2:
-            raise
-        return complain(*error.mistakes)
+    checked = check(load(part, set_case, machine=machine, fibre=fibre))
     if picture is None:
         picture = check_picture(Path(f"{checked.case.name}-check.png"))
     page = check_writable(picture.with_suffix(".html"))

@@ -31,7 +31,10 @@ def main() -> None:
         code = typer.main.get_command(app)(standalone_mode=False)
         if asked() is not None:  # a library took the stop for itself
             code = _complain("")
-    except (InputError, SolveError) as error:
+    except InputError as error:
+        # All mistakes where they are asked for; elsewhere the first, and how many there are.
+        code = _complain(*(error.mistakes if sys.argv[1:2] == ["check"] else (str(error),)))
+    except SolveError as error:
         code = _complain(str(error))
     except usage_error as error:
         code = _complain(error.format_message())
@@ -57,7 +60,7 @@ def _line(message: Warning | str, *where: Any, **more: Any) -> str:
     return f"ccfem: warning: {' '.join(str(message).split())}\n"
 
 
-def _complain(message: str) -> int:
-    """Print a message, or why all ends where that was asked for; returns the exit code."""
+def _complain(*messages: str) -> int:
+    """Print messages, or why all ends where that was asked for; returns the exit code."""
     number = asked()
-    return complain(message) if number is None else say(number)
+    return complain(*messages) if number is None else say(number)

@@ -286,7 +286,10 @@ class Comparison:
             others = bool(self.case.alternative_supports)
             lines += cases_remarks(self.runs, self.wanted, self.cases, together, others)
         if self.given is not None:
-            lines.append("paths are planned and evaluated on the stress of another program")
+            assumed = f"; {self.given.assumed}" if self.given.assumed else ""
+            lines.append(
+                f"paths are planned and evaluated on the stress of another program{assumed}"
+            )
         return lines
 
     def _count(self, slicing: str) -> str:

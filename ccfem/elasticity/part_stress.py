@@ -3,12 +3,23 @@
 from dataclasses import dataclass
 from typing import Protocol
 
+import numpy as np
+
 from ccfem.arrays import FloatArray, freeze
 from ccfem.errors import InputError
 from ccfem.materials import Material
 from ccfem.mesh.tet_mesh import TetMesh
 
-__all__ = ["GivenStress", "PartStress"]
+__all__ = ["LARGEST_STRESS", "GivenStress", "PartStress", "impossible_stress"]
+
+LARGEST_STRESS = 1e7
+"""Largest stress that is taken for meant, MPa: ten times the modulus of diamond."""
+
+
+def impossible_stress(stress: FloatArray) -> tuple[int, ...] | None:
+    """Index of the first entry that is NaN, infinite or beyond `LARGEST_STRESS`; None without."""
+    wrong = np.argwhere(~(np.abs(stress) <= LARGEST_STRESS))
+    return tuple(wrong[0].tolist()) if len(wrong) else None
 
 
 class PartStress(Protocol):
@@ -62,6 +73,13 @@ class GivenStress:
         Those of them that carry a load.
     material : Material, optional
         Of the part, where it is known.
+    assumed : str, default none
+        What was assumed when it was read from a file; said with the results.
+
+    Raises
+    ------
+    InputError
+        For arrays of the wrong shape, and stress that is not finite or beyond `LARGEST_STRESS`.
     """
 
     mesh: TetMesh
@@ -70,6 +88,7 @@ class GivenStress:
     held_or_loaded: tuple[str, ...] = ()
     loaded: tuple[str, ...] = ()
     material: Material | None = None
+    assumed: str = ""
 
     def __repr__(self) -> str:
         return f"GivenStress on {self.mesh!r}"
@@ -83,4 +102,10 @@ class GivenStress:
                     f"{name} must have shape ({count}, 3, 3), one tensor for each "
                     f"{'cell' if name == 'stress' else 'node'}; got {value.shape}: use "
                     "tensor.from_voigt for six components"
+                )
+            at = impossible_stress(value)
+            if at is not None:
+                raise InputError(
+                    f"stress must be finite and within {LARGEST_STRESS:g} MPa; got "
+                    f"{value[at]:g} at {name}[{', '.join(map(str, at))}]: correct it, or its unit"
                 )

@@ -293,12 +293,14 @@ def _check_finite(support: Any, *names: str) -> None:
     for name in names:
         value = getattr(support, name)
         if value is not None and not np.isfinite(value).all():
-            raise InputError(f"a support must be held at finite values; got {support}: correct it")
+            raise InputError(
+                f"a support must be held at finite values; got {support}: give mm as numbers"
+            )
 
 
 def _check_stiffness(support: Any, stiffness: tuple[float, ...], what: str, unit: str) -> None:
     if not np.isfinite(stiffness).all() or min(stiffness) < 0.0 or not any(stiffness):
         raise InputError(
             f"stiffness of {what} must be numbers of at least 0 {unit}, not all zero; got "
-            f"{stiffness}: correct it"
+            f"{stiffness}: give one above 0, or drop the support"
         )

@@ -7,8 +7,8 @@ import numpy as np
 
 from ccfem.arrays import FloatArray
 from ccfem.errors import InputError
-from ccfem.export.waypoints import read_waypoints
-from ccfem.io.whole import existing_file
+from ccfem.export.waypoints import LARGEST_NUMBER, check_near, read_waypoints
+from ccfem.io.whole import text_of
 from ccfem.toolpaths import FIBRE, Toolpaths
 
 __all__ = ["FRAMES", "read_path_table", "read_paths"]
@@ -19,10 +19,6 @@ FRAMES = ("mesh", "tool")
 _COLUMNS = ("x", "y", "z", "path", "layer")
 _CLOSED = 1e-3
 """Largest distance, mm, between the ends of a closed path."""
-_LARGEST_NUMBER = 1e15
-"""Of paths and layers: larger ones are not told apart from their neighbours."""
-_FARTHEST = 1e5
-"""Coordinate, mm, beyond which a unit is wrong."""
 
 
 def read_paths(path: str | Path, frame: FloatArray, named: str | None = None) -> Toolpaths:
@@ -50,10 +46,10 @@ def read_paths(path: str | Path, frame: FloatArray, named: str | None = None) ->
     axes = frame if tool else np.eye(3)
     if table:
         found = read_path_table(path, axes, frame[2])
-        _check_sizes(found, str(path))
+        _check_lengths(found, str(path))
         return found
     found = read_waypoints(path, axes)
-    _check_sizes(found, str(path))
+    _check_lengths(found, str(path))
     # The normals are those of the layers, whatever the points are in.
     return Toolpaths(
         found.points, np.broadcast_to(frame[2], found.points.shape), found.offsets, found.layer,
@@ -61,16 +57,8 @@ def read_paths(path: str | Path, frame: FloatArray, named: str | None = None) ->
     )  # fmt: skip
 
 
-def _check_sizes(paths: Toolpaths, name: str) -> None:
-    """Raise on coordinates that no printer reaches, and on paths without length."""
-    if not len(paths):
-        return
-    farthest = float(np.abs(paths.points).max())
-    if farthest > _FARTHEST:
-        raise InputError(
-            f"{name}: the points of paths must lie within {_FARTHEST:g} mm; got a coordinate of "
-            f"{farthest:.3g} mm: repair the file, or give it in mm"
-        )
+def _check_lengths(paths: Toolpaths, name: str) -> None:
+    """Raise on paths without length."""
     short = np.flatnonzero(paths.lengths == 0.0)
     if len(short):
         where = ", ".join(f"{x:.4g}" for x in paths.points[paths.offsets[short[0]]])
@@ -99,13 +87,11 @@ def read_path_table(path: str | Path, axes: FloatArray, normal: FloatArray) -> T
     InputError
         With the line that is not what the format says.
     """
-    file = existing_file(path, "path table")
     try:
-        text = file.read_text(encoding="utf-8-sig")
-    except UnicodeDecodeError:
-        raise InputError(f"{path} is no path table: it holds no text: check its name") from None
-    rows = csv.reader(text.splitlines())
-    head = [word.strip().lower() for word in next(rows, [])]
+        first, *rows = [*csv.reader(text_of(path, "path table").splitlines())] or [[]]
+    except csv.Error as error:
+        raise InputError(f"{path} is no path table: {error}: check its name") from None
+    head = [word.strip().lower() for word in first]
     missing = [name for name in _COLUMNS if name not in head]
     if missing:
         raise InputError(
@@ -121,7 +107,7 @@ def read_path_table(path: str | Path, axes: FloatArray, normal: FloatArray) -> T
             values.append([float(row[k]) for k in place])
             whole = values[-1][3:]
             if not np.isfinite(values[-1]).all() or any(
-                v != int(v) or abs(v) > _LARGEST_NUMBER for v in whole
+                v != int(v) or abs(v) > LARGEST_NUMBER for v in whole
             ):
                 raise ValueError
         except (ValueError, IndexError):
@@ -150,6 +136,7 @@ def _toolpaths(values: FloatArray, axes: FloatArray, normal: FloatArray, name: s
     if (np.repeat(layer[starts], np.diff(offsets)) != layer).any():
         raise InputError(f"{name}: a path lies on one layer; one changes it: cut it there")
     points = values[:, :3]
+    check_near(points, name)
     first, last = offsets[:-1], offsets[1:] - 1
     closed = (np.linalg.norm(points[first] - points[last], axis=1) <= _CLOSED) & (
         np.diff(offsets) > 3

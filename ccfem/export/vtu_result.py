@@ -2,12 +2,11 @@
 
 from pathlib import Path
 
-import numpy as np
-
 from ccfem.elasticity.stress_field import StressField
 from ccfem.errors import InputError
-from ccfem.io.vtu import grid_of
-from ccfem.io.vtu_tensors import UNIT, set_tensors
+from ccfem.io.vtk_xml import as_bytes
+from ccfem.io.vtu import write_vtu
+from ccfem.io.vtu_tensors import UNIT, VTK_COMPONENTS, vtk_tensors
 from ccfem.io.whole import whole_file
 from ccfem.tensor import principal
 
@@ -34,8 +33,9 @@ def write_result(field: StressField, path: str | Path) -> None:
     At the nodes: displacement, reaction, and recovered stress and strain. In the cells: stress,
     strain, principal stresses, largest first, with a unit vector along the axis of each, and the
     estimated error over the mean stress. Patches are field data ``patch:NAME``; units of stress and
-    length, and the load case, are field data too. Tensors have six components by name, shear of
-    the strain being half the engineering one.
+    length, and the load case, are field data too, as the bytes of their UTF-8, since meshio reads
+    no strings. Tensors have six components by name, shear of the strain being half the engineering
+    one.
 
     Parameters
     ----------
@@ -48,20 +48,28 @@ def write_result(field: StressField, path: str | Path) -> None:
         When the name does not end in ``.vtu``, or the file cannot be written.
     """
     path = result_path(path)
-    grid = grid_of(field.mesh)
-    grid.point_data["displacement"] = np.array(field.displacement)
-    grid.point_data["reaction"] = np.array(field.reactions)
-    set_tensors(grid.point_data, "stress", field.nodal)
-    set_tensors(grid.point_data, "strain", field.nodal_strain)
-    set_tensors(grid.cell_data, "stress", field.stress)
-    set_tensors(grid.cell_data, "strain", field.strain)
     values, axes = principal(field.stress)
-    grid.cell_data["principal_stress"] = np.array(values)
-    for k in range(3):
-        grid.cell_data[f"principal_direction_{k + 1}"] = np.ascontiguousarray(axes[:, :, k])
-    grid.cell_data["error"] = field.error.densities(field.mesh.volumes)
-    grid.field_data["load case"] = [field.case]
-    grid.field_data[UNIT] = ["MPa"]
-    grid.field_data["unit of length"] = ["mm"]
     with whole_file(path) as temporary:
-        grid.save(temporary)
+        write_vtu(
+            field.mesh,
+            temporary,
+            {
+                "displacement": field.displacement,
+                "reaction": field.reactions,
+                "stress": vtk_tensors(field.nodal),
+                "strain": vtk_tensors(field.nodal_strain),
+            },
+            {
+                "stress": vtk_tensors(field.stress),
+                "strain": vtk_tensors(field.strain),
+                "principal_stress": values,
+                **{f"principal_direction_{k + 1}": axes[:, :, k] for k in range(3)},
+                "error": field.error.densities(field.mesh.volumes),
+            },
+            {
+                "load case": as_bytes(field.case),
+                UNIT: as_bytes("MPa"),
+                "unit of length": as_bytes("mm"),
+            },
+            dict.fromkeys(("stress", "strain"), VTK_COMPONENTS),
+        )

@@ -14,15 +14,18 @@ import numpy as np
 from ccfem.arrays import FloatArray
 from ccfem.errors import InputError
 from ccfem.geometry.polylines import pack
-from ccfem.io.whole import existing_file, whole_file
+from ccfem.io.whole import text_of, whole_file
 from ccfem.layers.layer import Layer
 from ccfem.toolpaths import FIBRE, Toolpaths
 
-__all__ = ["read_waypoints", "write_waypoints"]
+__all__ = ["LARGEST_NUMBER", "check_near", "read_waypoints", "write_waypoints"]
 
 _CLOSED = 1e-3
 """Largest distance, mm, between the ends of a closed path: the files round to 6 digits."""
-
+LARGEST_NUMBER = 1e15
+"""Of paths and layers: larger ones are not told apart from their neighbours."""
+_FARTHEST = 1e5
+"""Coordinate, mm, beyond which a unit is wrong."""
 _MARK = ";Layer_CCF:"
 
 
@@ -46,14 +49,10 @@ def read_waypoints(path: str | Path, frame: FloatArray) -> Toolpaths:
     InputError
         When the file cannot be read, or a line is not what the format says.
     """
-    file = existing_file(path, "waypoint file")
-    try:
-        text = file.read_text(encoding="utf-8")
-    except UnicodeDecodeError:
-        raise InputError(f"{path} is not a waypoint file: it is not text: check its name") from None
-    lines, layers = _parse(text, str(path))
+    lines, layers = _parse(text_of(path, "waypoint file"), str(path))
     if not lines:
         return Toolpaths.empty()
+    check_near(np.concatenate(lines), str(path))
     closed = [len(a) > 3 and float(np.linalg.norm(a[0] - a[-1])) <= _CLOSED for a in lines]
     for line, ring in zip(lines, closed, strict=True):
         if ring:
@@ -69,6 +68,22 @@ def read_waypoints(path: str | Path, frame: FloatArray) -> Toolpaths:
     )
 
 
+def check_near(points: FloatArray, name: str) -> None:
+    """Raise on points (n, 3) of paths that no printer reaches.
+
+    Raises
+    ------
+    InputError
+        The message begins with `name`.
+    """
+    farthest = float(np.abs(points).max())
+    if farthest > _FARTHEST:
+        raise InputError(
+            f"{name}: the points of paths must lie within {_FARTHEST:g} mm; got a coordinate of "
+            f"{farthest:.3g} mm: repair the file, or give it in mm"
+        )
+
+
 def _parse(text: str, name: str) -> tuple[list[FloatArray], list[int]]:
     """Paths in tool coordinates (n_i, 3), and the layer of each."""
     lines: list[FloatArray] = []
@@ -82,6 +97,8 @@ def _parse(text: str, name: str) -> tuple[list[FloatArray], list[int]]:
         try:
             if word.startswith(_MARK):
                 layer = int(word[len(_MARK) :])
+                if layer > LARGEST_NUMBER:
+                    raise ValueError(word)
             elif word == "S" and current is None and layer >= 0:
                 current = []
             elif word == "E" and current is not None and len(current) > 1:

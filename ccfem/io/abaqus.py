@@ -77,7 +77,8 @@ def read_inp(path: Path) -> TetMesh:
             if isinstance(error, InputError):
                 raise
             raise InputError(
-                f"{path}, line {block.where}: *{block.keyword} does not read ({error}): correct it"
+                f"{path}, line {block.where}: *{block.keyword} does not read ({error}): write "
+                "the deck again"
             ) from None
     if deck.parts > 1:
         raise InputError(
@@ -102,7 +103,7 @@ def read_inp(path: Path) -> TetMesh:
 
 def _blocks(path: Path) -> Iterator[_Block]:
     """Keywords of a deck with their data lines; comments are dropped."""
-    text = path.read_text(encoding="utf-8", errors="replace")
+    text = path.read_text(encoding="utf-8-sig", errors="replace")
     current: _Block | None = None
     heading = ""
     for number, raw in enumerate(text.splitlines(), 1):

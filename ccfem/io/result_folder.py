@@ -15,6 +15,7 @@ from pathlib import Path
 
 from ccfem.errors import InputError
 from ccfem.io.folder import READY, UNREADY, Folder, private_folder, sweep
+from ccfem.io.whole import reason_and_cure
 
 __all__ = ["RESERVED", "refuse_foreign", "whole_folder"]
 
@@ -65,10 +66,8 @@ def whole_folder(directory: Path, names: Sequence[str], force: bool = False) -> 
             with _alone(parent), Folder.opened(private) as folder:
                 _publish(folder, directory, names, force)
     except OSError as error:
-        raise InputError(
-            f"cannot write results to {directory}: {error.strerror or error}: choose another "
-            "folder with --out"
-        ) from error
+        why = reason_and_cure(error, "another folder with --out")
+        raise InputError(f"cannot write results to {directory}: {why}") from error
 
 
 def _existing_parent(directory: Path) -> Path:

@@ -29,6 +29,8 @@ class StressData:
         Voigt.
     unit : str
         Of the stress, as the file says; empty where it does not.
+    nodes, cells : (n,) and (c,) int array, or None
+        Numbers by which the file calls its nodes and cells; None where it counts them from 0.
     """
 
     points: FloatArray | None
@@ -36,9 +38,11 @@ class StressData:
     nodal: FloatArray | None
     cell: FloatArray | None
     unit: str = ""
+    nodes: IntArray | None = None
+    cells: IntArray | None = None
 
     def __post_init__(self) -> None:
-        freeze(self, points=float, corners=int, nodal=float, cell=float)
+        freeze(self, points=float, corners=int, nodal=float, cell=float, nodes=int, cells=int)
 
 
 def component_of(name: str) -> int:

@@ -7,10 +7,10 @@ import numpy as np
 from scipy.spatial import cKDTree
 
 from ccfem.arrays import FloatArray, IntArray
-from ccfem.elasticity.part_stress import GivenStress
-from ccfem.errors import InputError
+from ccfem.elasticity.part_stress import LARGEST_STRESS, GivenStress, impossible_stress
+from ccfem.errors import InputError, shown
 from ccfem.io.frd import frd_stress
-from ccfem.io.stress_data import StressData
+from ccfem.io.stress_data import COMPONENTS, StressData
 from ccfem.io.stress_table import table_stress
 from ccfem.io.vtu_tensors import vtu_stress
 from ccfem.io.whole import existing_file
@@ -42,7 +42,8 @@ def read_stress(
         Of the part. The file must have stress for each of its corners or cells: nodes are found by
         their place, cells by their corners, and in a table both by their number.
     unit : str, optional
-        Pa, kPa, MPa, N/mm^2 or GPa; needed where the file does not say.
+        Pa, kPa, MPa, N/mm^2 or GPa; needed where the file does not say. A ``.frd`` never does: its
+        stress is taken for MPa, since its nodes have to lie where those of the part do, in mm.
     array : str, default "stress"
         Name of the stress in a ``.vtu`` file.
     held_or_loaded : tuple of str
@@ -57,7 +58,8 @@ def read_stress(
     Raises
     ------
     InputError
-        For another format, a missing unit or component, and stress on another mesh.
+        For another format, a missing unit or component, stress on another mesh, and stress that is
+        not finite or larger than in any solid.
     """
     path = existing_file(path, "stress file")
     suffix = path.suffix.lower()
@@ -69,24 +71,53 @@ def read_stress(
         data = table_stress(path)
     else:
         raise InputError(f"stress is read from .vtu, .frd or .csv; got {path}: convert it")
-    factor = _factor(path, data.unit, unit)
-    for values in (data.nodal, data.cell):
-        if values is not None and not np.isfinite(values).all():
-            raise InputError(f"{path}: stress must be finite; got NaN or infinity: write it again")
+    assumed = ""
+    if suffix == ".frd" and unit is None:
+        unit, assumed = "MPa", f"the stress of {path.name} is taken for MPa, as its nodes are in mm"
+    unit = _unit(path, data.unit, unit)
+    factor = _MPA[unit.lower()]
+    _check_values(path, data, unit)
     nodal, cell = _on_mesh(data, mesh, path)
-    return GivenStress(mesh, factor * from_voigt(cell), factor * from_voigt(nodal), held_or_loaded)
+    return GivenStress(
+        mesh,
+        factor * from_voigt(cell),
+        factor * from_voigt(nodal),
+        held_or_loaded,
+        assumed=assumed,
+    )
 
 
-def _factor(path: Path, said: str, given: str | None) -> float:
-    """MPa in the unit of a file."""
+def _unit(path: Path, said: str, given: str | None) -> str:
+    """Find the unit of the stress in a file: a key of `_MPA` but for its case."""
     if said and given and _MPA.get(said.lower()) != _MPA.get(given.lower()):
         raise InputError(f"{path} holds stress in {said}; got the unit {given}: leave it out")
     unit = said or given
     if not unit:
-        raise InputError(f"{path} does not say the unit of its stress: give it, as MPa or Pa")
+        raise InputError(
+            f"{path} does not say the unit of its stress: give it, as MPa or Pa, with --stress-unit"
+        )
     if unit.lower() not in _MPA:
-        raise InputError(f"unit of stress must be Pa, kPa, MPa, N/mm^2 or GPa; got '{unit}'")
-    return _MPA[unit.lower()]
+        raise InputError(f"unit of stress must be Pa, kPa, MPa, N/mm^2 or GPa; got {shown(unit)}")
+    return unit
+
+
+def _check_values(path: Path, data: StressData, unit: str) -> None:
+    """Raise where the stress of a node or an element is none that a solid has."""
+    for what, values, numbers in (
+        ("node", data.nodal, data.nodes),
+        ("element", data.cell, data.cells),
+    ):
+        if values is None:
+            continue
+        with np.errstate(over="ignore"):  # what overflows is beyond all bounds
+            at = impossible_stress(_MPA[unit.lower()] * values)
+        if at is not None:
+            row, column = at
+            raise InputError(
+                f"{path}: stress must be finite and within {LARGEST_STRESS:g} MPa; got "
+                f"{values[row, column]:g} {unit} as {COMPONENTS[column]} of {what} "
+                f"{row if numbers is None else numbers[row]}: correct it, or the unit of all"
+            )
 
 
 def _on_mesh(data: StressData, mesh: TetMesh, path: Path) -> tuple[FloatArray, FloatArray]:
@@ -144,6 +175,8 @@ def _by_number(
 
 def _nodes(points: FloatArray, mesh: TetMesh, corners: IntArray, path: Path) -> IntArray:
     """Row of the file for each node (n,) of the mesh; -1 for middles that it does not have."""
+    if not np.isfinite(points).all():
+        raise InputError(f"{path}: nodes must be finite; got NaN or infinity: write it again")
     near = _SAME * float(np.linalg.norm(np.ptp(mesh.bounds, axis=0)))
     n = len(mesh.points)
     if len(points) >= len(corners) and len(points) <= n:

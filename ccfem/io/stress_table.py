@@ -6,8 +6,9 @@ from pathlib import Path
 
 import numpy as np
 
-from ccfem.errors import InputError
+from ccfem.errors import InputError, shown
 from ccfem.io.stress_data import StressData, component_of, component_order
+from ccfem.io.whole import text_of
 
 __all__ = ["table_stress"]
 
@@ -25,42 +26,49 @@ def table_stress(path: Path) -> StressData:
     InputError
         When the file cannot be read, a column or a line is missing, or a value is no number.
     """
-    try:
-        text = path.read_text(encoding="utf-8-sig")
-    except (OSError, UnicodeDecodeError) as error:
-        raise InputError(f"expected a CSV file at {path}; it cannot be read: {error}") from None
-    lines = [line for line in text.splitlines() if line.strip() and not line.startswith("#")]
+    lines = {
+        number: line
+        for number, line in enumerate(text_of(path, "table of stress").splitlines(), 1)
+        if line.strip() and not line.startswith("#")
+    }
     if len(lines) < 2:
         raise InputError(f"{path}: expected a line of column names and lines of numbers; got none")
-    rows = list(csv.reader(lines, delimiter=max(";\t,", key=lines[0].count)))
-    names, units = zip(*(_name_and_unit(cell) for cell in rows[0]), strict=True)
+    heading = next(iter(lines.values()))
+    delimiter = max(";\t,", key=heading.count)
+    try:
+        titles, *rows = (next(csv.reader([line], delimiter=delimiter)) for line in lines.values())
+    except csv.Error as error:
+        raise InputError(f"{path} is not a table of comma-separated values: {error}") from None
+    names, units = zip(*(_name_and_unit(cell) for cell in titles), strict=True)
     kinds = [name.lower() for name in names if name.lower() in ("element", "node")]
     if len(kinds) != 1:
-        raise InputError(f"{path}: expected one column named element or node; got {rows[0]}")
+        raise InputError(f"{path}: expected one column named element or node; got {titles}")
     stressed = [k for k, name in enumerate(names) if component_of(name) >= 0]
     order = component_order([names[k] for k in stressed], f"{path}: the columns")
     given = sorted({units[k] for k in stressed})
     if len(given) > 1:
         raise InputError(f"{path}: the components have units {', '.join(given)}: give them one")
     at = [name.lower() for name in names].index(kinds[0])
-    try:
-        values = np.array([[float(row[stressed[k]]) for k in order] for row in rows[1:]])
-        numbers = np.array([int(row[at]) for row in rows[1:]])
-    except (ValueError, IndexError):
-        raise InputError(
-            f"{path}: expected a whole number and six numbers on each line: correct or delete the "
-            "others"
-        ) from None
+    values, numbers = np.empty((len(rows), 6)), np.empty(len(rows), dtype=np.int64)
+    for k, (number, row) in enumerate(zip(list(lines)[1:], rows, strict=True)):
+        try:
+            values[k] = [float(row[stressed[column]]) for column in order]
+            numbers[k] = int(row[at])
+        except (ValueError, IndexError, OverflowError):
+            raise InputError(
+                f"{path}, line {number}: expected a whole number and six numbers; got "
+                f"{shown(lines[number])}: correct or delete it"
+            ) from None
     first = int(numbers.min())
     if first not in (0, 1) or not np.array_equal(np.sort(numbers), first + np.arange(len(numbers))):
         raise InputError(
             f"{path}: expected every {kinds[0]} from 0 or from 1 on, each once; got "
             f"{len(numbers)} lines from {first} to {numbers.max()}: number them as the mesh does"
         )
-    values = values[np.argsort(numbers, kind="stable")]
-    on_nodes = kinds[0] == "node"
-    return StressData(None, None, values if on_nodes else None, None if on_nodes else values,
-                      given[0])  # fmt: skip
+    values, numbers = values[np.argsort(numbers, kind="stable")], np.sort(numbers)
+    if kinds[0] == "node":
+        return StressData(None, None, values, None, given[0], nodes=numbers)
+    return StressData(None, None, None, values, given[0], cells=numbers)
 
 
 def _name_and_unit(cell: str) -> tuple[str, str]:

@@ -13,7 +13,7 @@ from ccfem.io.whole import existing_file
 from ccfem.isolated.limited import read_isolated
 from ccfem.isolated.process import ChildError
 
-__all__ = ["Surface", "is_surface", "read_surface"]
+__all__ = ["Surface", "is_surface", "read_surface", "write_stl"]
 
 _SUFFIXES = (".obj", ".ply", ".stl")
 _NOTHING = 1e-12
@@ -110,6 +110,21 @@ def read_surface(path: str | os.PathLike[str], scale: float = 1.0) -> Surface:
         return Surface(*_merged(points, found["triangles"]))
     except InputError as error:
         raise InputError(f"{path}: {error}") from None
+
+
+def write_stl(path: Path, points: FloatArray, triangles: IntArray) -> None:
+    """Write triangles as binary STL, without normals: readers make them of the order of corners.
+
+    Raises
+    ------
+    OSError
+        When the file cannot be written; VTK's own writer then ends the process.
+    """
+    facets = np.zeros(
+        len(triangles), dtype=[("normal", "<f4", 3), ("corners", "<f4", (3, 3)), ("spare", "<u2")]
+    )
+    facets["corners"] = points[triangles]
+    path.write_bytes(bytes(80) + np.array(len(facets), "<u4").tobytes() + facets.tobytes())
 
 
 def _merged(points: FloatArray, triangles: IntArray) -> tuple[FloatArray, IntArray]:

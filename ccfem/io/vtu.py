@@ -1,20 +1,24 @@
-"""VTK unstructured grids (``.vtu``): read by VTK in a process of its own, written by pyvista."""
+"""VTK unstructured grids (``.vtu``): read by VTK in a process of its own."""
 
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
+from xml.sax.saxutils import quoteattr
 
 import numpy as np
+from numpy.typing import ArrayLike
 
 from ccfem.arrays import FloatArray, IntArray
 from ccfem.errors import InputError
 from ccfem.io.cells import tetrahedra
+from ccfem.io.vtk_xml import write_vtk_xml
 from ccfem.isolated.limited import read_isolated
 from ccfem.isolated.process import ChildError
 from ccfem.mesh.patches import with_groups
 from ccfem.mesh.tet_mesh import TetMesh
 
-__all__ = ["Grid", "grid_of", "read_grid", "read_vtu", "write_vtu"]
+__all__ = ["Grid", "read_grid", "read_vtu", "write_vtu"]
 
 _PATCH = "patch:"
 _TYPES = {
@@ -129,18 +133,57 @@ def _tagged_triangles(grid: Grid) -> dict[str, IntArray]:
     return {name: np.concatenate(parts) for name, parts in groups.items()}
 
 
-def write_vtu(mesh: TetMesh, path: Path) -> None:
-    """Write a mesh as VTK unstructured grid, its patches as field data ``patch:NAME``."""
-    grid_of(mesh).save(path)
+def write_vtu(
+    mesh: TetMesh,
+    path: Path,
+    point: Mapping[str, ArrayLike] | None = None,
+    cell: Mapping[str, ArrayLike] | None = None,
+    field: Mapping[str, ArrayLike] | None = None,
+    components: Mapping[str, Sequence[str]] | None = None,
+) -> None:
+    """Write a mesh as VTK unstructured grid, its patches as field data ``patch:NAME``.
+
+    To be called with a file of `whole_file`.
+
+    Parameters
+    ----------
+    mesh : TetMesh
+    path : path
+    point, cell, field : mapping of name to array, optional
+        Data of points, of cells, and of the whole.
+    components : mapping of name to names, optional
+        Names of the components of data of points and cells.
+
+    Raises
+    ------
+    InputError
+        When a name has characters that XML does not know.
+    OSError
+        When the file cannot be written.
+    """
+    number, corners = mesh.cells.shape
+    write_vtk_xml(
+        path,
+        "UnstructuredGrid",
+        {"Points": len(mesh.points), "Cells": number},
+        {
+            _active("PointData", point): point or {},
+            _active("CellData", cell): cell or {},
+            "Points": {"Points": mesh.points},
+            "Cells": {
+                "connectivity": mesh.cells.ravel(),
+                "offsets": corners * np.arange(1, number + 1),
+                "types": np.full(number, 10 if mesh.order == 1 else 24, dtype=np.uint8),
+            },
+        },
+        {
+            **{_PATCH + name: facets for name, facets in mesh.patches.items() if len(facets)},
+            **(field or {}),
+        },
+        components,
+    )
 
 
-def grid_of(mesh: TetMesh) -> Any:
-    """Unstructured grid of pyvista of a mesh, its patches as field data ``patch:NAME``."""
-    import pyvista
-
-    code = 10 if mesh.order == 1 else 24
-    grid = pyvista.UnstructuredGrid({code: mesh.cells}, np.array(mesh.points))
-    for name, facets in mesh.patches.items():
-        if len(facets):
-            grid.field_data[_PATCH + name] = np.array(facets)
-    return grid
+def _active(tag: str, arrays: Mapping[str, ArrayLike] | None) -> str:
+    """Tag of a section that makes its first array the one that viewers draw."""
+    return f"{tag} Scalars={quoteattr(next(iter(arrays)))}" if arrays else tag

@@ -1,9 +1,9 @@
 """Stress tensors in VTK unstructured grids, with names of their components and their unit."""
 
 from pathlib import Path
-from typing import Any
 
 import numpy as np
+from numpy.typing import NDArray
 
 from ccfem.arrays import FloatArray
 from ccfem.errors import InputError
@@ -11,21 +11,17 @@ from ccfem.io.stress_data import COMPONENTS, StressData, component_order
 from ccfem.io.vtu import Grid, read_grid
 from ccfem.tensor import to_voigt
 
-__all__ = ["UNIT", "set_tensors", "vtu_stress"]
+__all__ = ["UNIT", "VTK_COMPONENTS", "vtk_tensors", "vtu_stress"]
 
 UNIT = "unit of stress"
 """Field data that holds the unit."""
-_VTK = ("xx", "yy", "zz", "xy", "yz", "xz")
+VTK_COMPONENTS = ("xx", "yy", "zz", "xy", "yz", "xz")
 """Components of VTK's symmetric tensors in their order."""
 
 
-def set_tensors(data: Any, name: str, tensors: FloatArray) -> None:
-    """Store symmetric tensors (k, 3, 3) in the point or cell data of a grid, components named."""
-    order = [COMPONENTS.index(component) for component in _VTK]
-    data[name] = np.ascontiguousarray(to_voigt(tensors)[:, order])
-    array = data.VTKObject.GetArray(name)
-    for k, component in enumerate(_VTK):
-        array.SetComponentName(k, component)
+def vtk_tensors(tensors: FloatArray) -> FloatArray:
+    """Symmetric tensors (k, 3, 3) as the six components (k, 6) of `VTK_COMPONENTS`."""
+    return to_voigt(tensors)[:, [COMPONENTS.index(component) for component in VTK_COMPONENTS]]
 
 
 def vtu_stress(path: Path, array: str) -> StressData:
@@ -45,9 +41,16 @@ def vtu_stress(path: Path, array: str) -> StressData:
     tetrahedra = [nodes for kind, nodes in grid.cells.items() if kind in (10, 24)]
     if len(tetrahedra) != 1 or len(tetrahedra[0]) != len(grid.types):
         raise InputError(f"{path}: expected tetrahedra of one kind only; mesh the part with those")
-    unit = str(grid.field[UNIT][0]) if len(grid.field.get(UNIT, ())) else ""
+    unit = _text(grid.field.get(UNIT, np.array([])))
     corners = np.asarray(tetrahedra[0], dtype=np.int64)[:, :4]
     return StressData(grid.points, corners, nodal, cell, unit)
+
+
+def _text(values: NDArray[np.generic]) -> str:
+    """Text of field data: bytes of its UTF-8, or strings, of which the first counts."""
+    if values.dtype == np.uint8:
+        return values.tobytes().decode(errors="replace")
+    return str(values.flat[0]) if values.size else ""
 
 
 def _tensors(grid: Grid, where: str, name: str, path: Path) -> FloatArray | None:

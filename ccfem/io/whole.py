@@ -1,5 +1,7 @@
 """Writing a file whole or not at all."""
 
+import codecs
+import errno
 import os
 from collections.abc import Iterator
 from contextlib import contextmanager
@@ -8,7 +10,7 @@ from pathlib import Path
 from ccfem.errors import InputError
 from ccfem.io.folder import Folder, private_folder
 
-__all__ = ["check_writable", "existing_file", "whole_file"]
+__all__ = ["check_writable", "existing_file", "reason_and_cure", "text_of", "whole_file"]
 
 
 @contextmanager
@@ -48,9 +50,20 @@ def whole_file(path: str | os.PathLike[str]) -> Iterator[Path]:
             with Folder.opened(folder) as private, Folder.opened(path.parent) as target:
                 target.take(private, path.name)
     except OSError as error:
-        raise InputError(
-            f"cannot write {path}: {error.strerror or error}: choose a folder you may write to"
-        ) from error
+        raise InputError(f"cannot write {path}: {reason_and_cure(error)}") from error
+
+
+def reason_and_cure(error: OSError, folder: str = "a folder you may write to") -> str:
+    """Say why the system did not write, and what helps.
+
+    Examples
+    --------
+    >>> reason_and_cure(OSError(errno.ENOSPC, "No space left on device"))
+    'No space left on device: free some space there, or choose another disk'
+    """
+    full = error.errno in (errno.ENOSPC, errno.EDQUOT, errno.EFBIG)
+    cure = "free some space there, or choose another disk" if full else f"choose {folder}"
+    return f"{error.strerror or error}: {cure}"
 
 
 def check_writable(path: str | os.PathLike[str]) -> Path:
@@ -80,6 +93,11 @@ def existing_file(path: str | os.PathLike[str], what: str) -> Path:
         When it is not; the message begins with `what`.
     """
     path = Path(path)
+    if not str(path).isprintable():  # a path of Windows whose \\t and \\n were read as escapes
+        raise InputError(
+            f"{what} {str(path)!r} has a tab, a line break or the like in its name: write paths "
+            "with / or, in a TOML file, in single quotes"
+        )
     if path.is_dir():
         raise InputError(f"{what} {path} is a folder: name the file in it")
     if not path.exists():
@@ -87,3 +105,30 @@ def existing_file(path: str | os.PathLike[str], what: str) -> Path:
     if not os.access(path, os.R_OK):
         raise InputError(f"{what} {path} cannot be read: check its permissions")
     return path
+
+
+def text_of(path: str | os.PathLike[str], what: str) -> str:
+    """Text of a file in UTF-8, with or without a byte order mark.
+
+    Raises
+    ------
+    InputError
+        When the file cannot be read, or is in another encoding; the message begins with `what`.
+    """
+    path = existing_file(path, what)
+    try:
+        data = path.read_bytes()
+    except OSError as error:
+        raise InputError(
+            f"{what} {path} cannot be read: {error.strerror or error}: copy it to another disk"
+        ) from None
+    came = "got UTF-16"
+    if not data.startswith((codecs.BOM_UTF16_LE, codecs.BOM_UTF16_BE)) and b"\0" not in data[:2]:
+        try:
+            return data.decode("utf-8-sig")
+        except UnicodeDecodeError as error:
+            line = data[: error.start].count(b"\n") + 1
+            came = f"line {line} has the byte 0x{data[error.start]:02x}, which is none"
+    raise InputError(
+        f"{what} {path} must be text in UTF-8; {came}: save it as UTF-8, or check its name"
+    )

@@ -7,6 +7,7 @@ from pathlib import Path
 import numpy as np
 
 from ccfem.errors import InputError
+from ccfem.isolated.process import NOT_WRITTEN
 
 
 def main() -> None:
@@ -34,8 +35,11 @@ def main() -> None:
         found = {"failed": "it takes too much memory"}
     except Exception as error:
         found = {"failed": " ".join(f"{error}".split())[:200] or type(error).__name__}
-    np.savez(folder / "new.npz", **found)
-    (folder / "new.npz").rename(folder / "out.npz")
+    try:
+        np.savez(folder / "new.npz", **found)
+        (folder / "new.npz").rename(folder / "out.npz")
+    except OSError:
+        sys.exit(NOT_WRITTEN)
 
 
 if __name__ == "__main__":

@@ -12,7 +12,10 @@ import numpy as np
 
 from ccfem.errors import InputError
 
-__all__ = ["ChildError", "in_own_process"]
+__all__ = ["NOT_WRITTEN", "ChildError", "in_own_process"]
+
+NOT_WRITTEN = 74
+"""Exit code of a child that cannot write what it found, as on a full disk."""
 
 _PACKAGES = Path(__file__).resolve().parents[2]
 """Folder from which ccfem is imported."""
@@ -50,7 +53,7 @@ def in_own_process(
     Raises
     ------
     InputError
-        What the function raises itself.
+        What the function raises itself, and a temporary folder that is full.
     ChildError
         For any other failure: too much time or memory, a crash, an exception.
     """
@@ -77,6 +80,11 @@ def in_own_process(
         except subprocess.TimeoutExpired:
             raise ChildError(f"it takes more than {seconds:.0f} s") from None
         out = Path(folder) / "out.npz"
+        if done.returncode == NOT_WRITTEN:
+            raise InputError(
+                f"cannot write to the temporary folder {Path(folder).parent}: free some space "
+                "there, or name another folder in the environment variable TMPDIR"
+            )
         if work > 0.0 and _ending(done.returncode) == "SIGXCPU":
             raise ChildError(f"it takes more than {work:.0f} s")
         if not out.exists():

@@ -56,7 +56,7 @@ class FeedAxes:
             if len(letter) != 1 or letter not in "ABCDEHIJKLNOPQRSUVW":
                 raise InputError(
                     f"gcode.axes.{name} must be one capital letter that is no X, Y, Z, F, G, M or "
-                    f"T; got {letter!r}: correct it"
+                    f'T; got {letter!r}: write "E" or so'
                 )
         if self.fibre == self.matrix:
             raise InputError(

@@ -14,8 +14,7 @@ from typing import Any
 
 from ccfem.checks import check_known
 from ccfem.errors import InputError, shown
-from ccfem.io.toml import from_table
-from ccfem.io.whole import existing_file
+from ccfem.io.toml import from_table, read_toml
 from ccfem.machine.machine import Machine
 
 __all__ = ["machine_about", "machine_from", "machine_names", "machine_table", "updated"]
@@ -57,12 +56,8 @@ def machine_table(name: str | Path) -> dict[str, Any]:
         check_known("machine", text, machine_names(), "or name a file, .toml")
         content = tomllib.loads((_FOLDER / f"{text}.toml").read_text(encoding="utf-8"))
         return _whole_table(content["machine"])
-    file = existing_file(text, "machine file")
-    try:
-        with file.open("rb") as stream:
-            content = tomllib.load(stream)
-    except (ValueError, RecursionError) as error:
-        raise InputError(f"{file} is not a TOML file: {error}: correct it") from None
+    file = Path(text)
+    content = read_toml(file, "machine file")
     last = content.get("last_table")
     if last is not None and not (isinstance(last, str) and last in content):
         raise InputError(

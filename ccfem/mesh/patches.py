@@ -107,7 +107,7 @@ class Plane:
         check_fields(self, "tolerance", at_least=0.0, unit="mm")
         if isinstance(self.offset, str) and self.offset not in ("min", "max"):
             raise InputError(
-                f"plane offset must be a number, 'min' or 'max'; got '{self.offset}': correct it"
+                f"plane offset must be a number, 'min' or 'max'; got '{self.offset}': write one"
             )
 
     @classmethod
@@ -335,13 +335,15 @@ def unit_vector(value: str | ArrayLike, what: str) -> FloatArray:
         if value.removeprefix("-") not in _AXES:
             raise InputError(
                 f"{what} must be 'x', 'y', 'z', one of them with a minus, or 3 numbers; got "
-                f"'{value}': correct it"
+                f'\'{value}\': write "z", "-z" or [0, 0, 1]'
             )
         return (-1.0 if value.startswith("-") else 1.0) * np.array(_AXES[value.removeprefix("-")])
     vector = _vector(value, what)
     largest = float(np.abs(vector).max())
     if not 0.0 < largest < np.inf:
-        raise InputError(f"{what} must have a finite length above 0; got {value}: correct it")
+        raise InputError(
+            f"{what} must have a finite length above 0; got {value}: write [0, 0, 1] or so"
+        )
     return np.asarray(vector / largest / np.linalg.norm(vector / largest))
 
 
@@ -349,9 +351,9 @@ def _vector(value: ArrayLike, what: str) -> FloatArray:
     try:
         vector = np.asarray(value, dtype=np.float64)
     except (TypeError, ValueError):
-        raise InputError(f"{what} must be 3 numbers; got {value!r}: correct it") from None
+        raise InputError(f"{what} must be 3 numbers; got {value!r}: write [x, y, z]") from None
     if vector.shape != (3,) or np.isnan(vector).any():
-        raise InputError(f"{what} must be 3 numbers; got {value!r}: correct it")
+        raise InputError(f"{what} must be 3 numbers; got {value!r}: write [x, y, z]")
     return vector
 
 

@@ -111,7 +111,7 @@ def _check(polygon: shapely.Polygon, edge_length: float) -> None:
         )
     if not polygon.is_valid:
         raise InputError(
-            f"the planform is not a valid polygon: {shapely.is_valid_reason(polygon)}: correct it"
+            f"the planform is not a valid polygon: {shapely.is_valid_reason(polygon)}: uncross it"
         )
     check_number("edge length", edge_length, above=0.0, unit="mm")
     expected = polygon.area / (0.433 * edge_length**2)

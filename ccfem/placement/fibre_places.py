@@ -223,7 +223,7 @@ def _slice(text: str) -> slice:
     except (ValueError, TypeError):
         raise InputError(
             f"fibre.layers must be a range FIRST:END:STEP as '3:20:2', or a list; got '{text}': "
-            "correct it"
+            'write "2:-2" or [0, 1, 2]'
         ) from None
     return found
 

@@ -220,11 +220,14 @@ def save(figure: "Figure", path: str | Path, dpi: float = _DPI) -> None:
         When the file cannot be written, or the format is another one.
     """
     path = check_picture(path)
+    if path.suffix.lower() == ".png":
+        content = png(figure, dpi)
+    else:  # to memory: on a full disk the writer of PDF raises errors of zlib
+        target = io.BytesIO()
+        figure.savefig(target, format=path.suffix[1:].lower(), dpi=dpi)
+        content = target.getvalue()
     with whole_file(path) as temporary:
-        if path.suffix.lower() == ".png":
-            temporary.write_bytes(png(figure, dpi))
-        else:
-            figure.savefig(temporary, dpi=dpi)
+        temporary.write_bytes(content)
 
 
 def check_picture(path: str | Path) -> Path:

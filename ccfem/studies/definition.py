@@ -1,7 +1,6 @@
 """What a study runs: parts, slicings, strategies and parameters, from a file or from Python."""
 
 import os
-import tomllib
 from collections.abc import Mapping
 from dataclasses import dataclass
 from pathlib import Path
@@ -12,8 +11,7 @@ from ccfem.cases.case import check_name
 from ccfem.checks import check_number
 from ccfem.comparison.request import DEFAULT_STRAND
 from ccfem.errors import InputError
-from ccfem.io.toml import from_table
-from ccfem.io.whole import existing_file
+from ccfem.io.toml import from_table, read_toml
 from ccfem.virtual_testing.strand import Strand
 
 __all__ = ["Study", "read_study"]
@@ -105,11 +103,8 @@ def read_study(path: str | os.PathLike[str]) -> Study:
     InputError
         For a file that cannot be read, an unknown key, or a value of another type.
     """
-    path = existing_file(path, "study file")
-    try:
-        table = tomllib.loads(path.read_text(encoding="utf-8"))
-    except (tomllib.TOMLDecodeError, UnicodeDecodeError) as error:
-        raise InputError(f"study file {path} is no TOML: {error}: correct it") from None
+    path = Path(path)
+    table = read_toml(path, "study file")
     if not table:
         raise InputError(f"study file {path} is empty: give it parts and strategies")
 

@@ -7,7 +7,6 @@ values are far off for printed parts, which deflect a lot and are not solid.
 
 import json
 import math
-import tomllib
 from dataclasses import dataclass, replace
 from pathlib import Path
 
@@ -18,7 +17,7 @@ from ccfem.elasticity.problem import Problem
 from ccfem.elasticity.solve import solve
 from ccfem.elasticity.stress_field import StressField
 from ccfem.errors import InputError
-from ccfem.io.toml import from_table
+from ccfem.io.toml import from_table, read_toml
 from ccfem.io.whole import existing_file, whole_file
 from ccfem.materials import Material, isotropic
 from ccfem.toolpaths import Toolpaths
@@ -212,9 +211,9 @@ def read_calibration(path: str | Path) -> Calibration:
     """
     path = existing_file(path, "material file")
     try:
-        values = {"name": path.stem, **tomllib.loads(path.read_text(encoding="utf-8"))}
+        values = {"name": path.stem, **read_toml(path, "material file")}
         return from_table(Calibration, values, "material")
-    except (OSError, UnicodeDecodeError, tomllib.TOMLDecodeError, InputError) as error:
+    except InputError as error:
         raise InputError(
             f"expected a material file at {path}; it cannot be read: {error}: write it by ccfem "
             "calibrate"

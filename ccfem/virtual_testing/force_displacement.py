@@ -8,7 +8,7 @@ import numpy as np
 
 from ccfem.arrays import FloatArray, freeze
 from ccfem.errors import InputError
-from ccfem.io.whole import existing_file
+from ccfem.io.whole import text_of
 
 __all__ = ["Curve", "read_curve"]
 
@@ -91,11 +91,8 @@ def read_curve(path: str | Path) -> Curve:
     InputError
         When the file cannot be read, a column is missing, or a value is not a number.
     """
-    path = existing_file(path, "CSV file")
-    try:
-        text = path.read_text(encoding="utf-8-sig")
-    except (OSError, UnicodeDecodeError) as error:
-        raise InputError(f"expected a CSV file at {path}; it cannot be read: {error}") from None
+    path = Path(path)
+    text = text_of(path, "CSV file")
     lines = [
         (number, line)
         for number, line in enumerate(text.splitlines(), start=1)

@@ -318,7 +318,7 @@ def test_missing_part_file(tmp_path):
     with pytest.raises(InputError, match="is a folder"):
         read_part(tmp_path)
     (tmp_path / "b.toml").write_bytes(b"\xff\xfe\x00")
-    with pytest.raises(InputError, match="is not a TOML file"):
+    with pytest.raises(InputError, match="must be text in UTF-8; got UTF-16: save it as UTF-8"):
         read_part(tmp_path / "b.toml")
 
 

@@ -38,15 +38,16 @@ def test_check_says_and_draws(ccfem, tmp_path):
 
 
 def test_check_names_all_mistakes_and_writes_nothing(ccfem, tmp_path):
-    wrong = PART.replace('"pla"', '"plaa"').replace('patch = "foot"', 'pacth = "foot"', 1)
+    wrong = PART.replace('"pla"', '"plaa"').replace("edge_length = 5", 'edge_length = "5 mm"')
+    wrong = wrong.replace('patch = "foot"', 'pacth = "foot"', 1)
     (tmp_path / "strip.toml").write_text(wrong)
     code, out, err = ccfem("check", "strip.toml")
     assert (code, out) == (2, "")
     lines = err.splitlines()
-    assert len(lines) == 3
     assert all(line.startswith("ccfem: error: strip.toml: ") for line in lines)
     assert any("no material named 'plaa'" in line for line in lines)
     assert any("no key 'pacth'; it has: patch" in line for line in lines)
+    assert any("got '5 mm': write 5 without quotes and unit, in mm" in line for line in lines)
     assert [path.name for path in tmp_path.iterdir()] == ["strip.toml"]
 
 

@@ -1,9 +1,21 @@
 """``ccfem solve``, and planning on the stress that it wrote."""
 
 import json
+import re
+from pathlib import Path
 
 import numpy as np
 import pyvista
+
+from benchmarks.fuzz.mutants import frd
+from ccfem.cases.part_file import read_part
+from ccfem.elasticity import solve
+from ccfem.io import read_stress
+from ccfem.mesh import TetMesh, box_mesh
+from ccfem.tensor import to_voigt
+
+ROOT = Path(__file__).parents[2]
+PAGE = (ROOT / "docs" / "how_to" / "foreign_stress.md").read_text()
 
 
 def test_solve_writes_and_prints_each_load_case(ccfem, tmp_path):
@@ -54,3 +66,33 @@ def test_a_comparison_on_the_written_stress_is_the_same(ccfem, tmp_path):
     code, _, err = ccfem(*plan, "--stress-unit", "MPa")
     assert code == 2
     assert "--stress-unit belongs to --stress" in err
+
+
+def test_the_page_on_stress_of_another_program_works_as_written(ccfem, tmp_path):
+    mesh = box_mesh((60.0, 24.0, 4.0), (10, 4, 1))
+    lines = ["*NODE", *(f"{k}, {x}, {y}, {z}" for k, (x, y, z) in enumerate(mesh.points, 1))]
+    lines += ["*ELEMENT, TYPE=C3D4"]
+    lines += [f"{k}, " + ", ".join(map(str, c)) for k, c in enumerate(mesh.cells + 1, 1)]
+    for name, patch in (("HELD", "x_min"), ("PULLED", "x_max")):
+        lines += [f"*NSET, NSET={name}", *map(str, np.unique(mesh.patches[patch]) + 1)]
+    (tmp_path / "beam.inp").write_text("\n".join(lines) + "\n")
+    (block,) = re.findall(r"```toml\n(.*?)```", PAGE, flags=re.S)
+    (tmp_path / "beam.toml").write_text(block)
+    nodal = to_voigt(solve(read_part(tmp_path / "beam.toml").problem)["pull"].nodal)
+    (tmp_path / "beam.frd").write_text(frd(mesh, nodal[: len(mesh.points), [0, 1, 2, 5, 3, 4]]))
+    (command,) = re.findall(r"^    ccfem (compare beam.toml --stress .*)$", PAGE, flags=re.M)
+    assert f"    ccfem {command}\n" in (ROOT / "README.md").read_text()
+    quick = ("--strategies", "zigzag", "--layers", 1, "--natural", "--no-virtual-test")
+    code, out, _ = ccfem(*command.split(), *quick)
+    assert code == 0
+    assert "taken for MPa, as its nodes are in mm" in " ".join(out.split())
+
+
+def test_the_table_of_the_page_reads(tmp_path):
+    (block,) = re.findall(r"```csv\n(.*?)```", PAGE, flags=re.S)
+    (tmp_path / "stress.csv").write_text(block)
+    points = [[0, 0, 0], [1, 0, 0], [0, 1, 0], [0, 0, 1], [1, 1, 1]]
+    mesh = TetMesh(points, [[0, 1, 2, 3], [1, 2, 3, 4]])
+    stress = read_stress(tmp_path / "stress.csv", mesh).stress
+    assert stress[:, 0, 0].tolist() == [12.5, 11.75]
+    assert stress[1, 0, 2] == 0.1

@@ -111,7 +111,7 @@ def test_files_that_cannot_be_read_or_written(tmp_path):
     with pytest.raises(InputError, match=r"waypoint file .* does not exist"):
         read_waypoints(tmp_path / "missing.txt", ALONG_Y)
     (tmp_path / "binary.txt").write_bytes(b"\xff\xfe\x00S")
-    with pytest.raises(InputError, match="it is not text"):
+    with pytest.raises(InputError, match="must be text in UTF-8"):
         read_waypoints(tmp_path / "binary.txt", ALONG_Y)
     layers = Planar(count=1).cut(box_mesh((10.0, 10.0, 2.0), (1, 1, 1)))
     with pytest.raises(InputError, match=r"cannot write .* there is no folder"):

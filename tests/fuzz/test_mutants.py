@@ -11,7 +11,11 @@ from ccfem.errors import InputError
 from ccfem.io import read_mesh
 from ccfem.mesh import box_mesh
 
-COUNTS = {".toml": 40, ".inp": 40, ".tet": 40, ".npz": 40, ".vtu": 1, ".stl": 1, ".msh": 1}
+COUNTS = {
+    **dict.fromkeys(("part.toml", "box.inp", "box.tet", "box.npz"), 40),
+    **dict.fromkeys(("stress.frd", "stress.csv", "paths.csv", "paths.txt"), 40),
+    **dict.fromkeys(("box.vtu", "box.stl", "box.msh", "stress.vtu"), 1),
+}
 
 
 @pytest.fixture(scope="module")
@@ -22,16 +26,15 @@ def folder(tmp_path_factory):
 
 
 def test_the_good_ones_read(folder):
-    for name in ("box.npz", "box.tet", "box.inp", "part.toml"):
+    for name in COUNTS:
         read(folder / name)
     assert set(read_mesh(folder / "box.inp").patches) >= {"FOOT", "OUTER", "SKIN"}
 
 
-@pytest.mark.parametrize("suffix", COUNTS)
-def test_spoiled_files(folder, suffix, capfd):
-    good = next(folder.glob(f"[bp]*{suffix}"))
-    target, said = folder / f"mutant{suffix}", []
-    for spoiled in mutants(good.read_bytes(), COUNTS[suffix], "short"):
+@pytest.mark.parametrize("name", COUNTS)
+def test_spoiled_files(folder, name, capfd):
+    target, said = folder / f"mutant_{name}", []
+    for spoiled in mutants((folder / name).read_bytes(), COUNTS[name], "short"):
         target.write_bytes(spoiled)
         with warnings.catch_warnings():
             warnings.simplefilter("error")
@@ -39,7 +42,7 @@ def test_spoiled_files(folder, suffix, capfd):
                 read(target)
             except InputError as error:
                 said.append(str(error))
-    assert said or COUNTS[suffix] == 1
+    assert said or COUNTS[name] == 1
     assert not [line for line in said if "\n" in line or len(line) >= 2000]
     assert capfd.readouterr() == ("", "")
 

@@ -1,8 +1,10 @@
 import os
 from pathlib import Path
 
+import meshio
 import numpy as np
 import pytest
+import pyvista
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
@@ -67,6 +69,26 @@ def test_equal_meshes_make_equal_archives(box, tmp_path):
     for name in ("one.npz", "two.npz"):
         write_mesh(box, tmp_path / name)
     assert (tmp_path / "one.npz").read_bytes() == (tmp_path / "two.npz").read_bytes()
+
+
+@pytest.mark.parametrize("order", [1, 2])
+def test_other_programs_read_a_written_grid(tmp_path, box, order):
+    mesh = (box if order == 1 else box.quadratic()).with_patches({"Fläche <1>": box.boundary[:5]})
+    write_mesh(mesh, tmp_path / "part.vtu")
+    theirs, ours = meshio.read(tmp_path / "part.vtu"), pyvista.read(tmp_path / "part.vtu")
+    cells = ours.cells_dict[10 if order == 1 else 24]
+    for points, nodes in ((theirs.points, theirs.cells[0].data), (ours.points, cells)):
+        np.testing.assert_array_equal(points, mesh.points)
+        np.testing.assert_array_equal(nodes, mesh.cells)
+    for data in (theirs.field_data, ours.field_data):
+        np.testing.assert_array_equal(data["patch:Fläche <1>"], box.boundary[:5])
+    # Volume and facing of the cells, by VTK: quadratic ones need their nodes in its order.
+    volumes = ours.compute_cell_sizes().cell_data["Volume"]
+    np.testing.assert_allclose(volumes, mesh.volumes)
+    wrong = box.with_patches({"a\x01": box.boundary[:5]})
+    with pytest.raises(InputError, match="characters that a file of VTK cannot hold"):
+        write_mesh(wrong, tmp_path / "wrong.vtu")
+    assert os.listdir(tmp_path) == ["part.vtu"]
 
 
 @pytest.mark.parametrize("version", [2.2, 4.1])
@@ -220,7 +242,6 @@ def test_bad_abaqus_decks(tmp_path, change, message):
 
 def test_vtu_of_other_programs(tmp_path, box):
     """Triangles with a number in a cell array become patches; single precision is read."""
-    pyvista = pytest.importorskip("pyvista")
     left, right = box.patches["left"], box.patches["right"]
     grid = pyvista.UnstructuredGrid(
         {5: np.concatenate([left, right[:, ::-1]]), 10: box.cells}, box.points.astype(np.float32)

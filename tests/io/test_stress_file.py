@@ -1,18 +1,21 @@
 """Stress of other programs: what comes in is what was written, and nothing else is taken for it."""
 
+import re
 import shutil
 import subprocess
 from dataclasses import replace
 from pathlib import Path
 
+import meshio
 import numpy as np
 import pytest
 import pyvista
 
+from benchmarks.fuzz.mutants import frd
 from ccfem.cases.case import Case
 from ccfem.comparison import compare
 from ccfem.comparison.request import ForeignStress
-from ccfem.elasticity import Force, Problem, Support, solve
+from ccfem.elasticity import Force, GivenStress, Problem, Support, solve
 from ccfem.elasticity.loads import nodal_forces
 from ccfem.errors import InputError
 from ccfem.export.vtu_result import write_result
@@ -24,6 +27,7 @@ from ccfem.mesh import TetMesh
 from ccfem.mesh.box import box_mesh
 from ccfem.planning import plan
 from ccfem.strategies import create
+from ccfem.tensor import to_voigt
 
 LOADS = {"pull": (Force("x_max", (300.0, 40.0, 20.0)),)}
 
@@ -73,10 +77,47 @@ def test_a_result_holds_all_that_it_promises(field, written):
     axes = np.stack([grid.cell_data[f"principal_direction_{k}"] for k in (1, 2, 3)], axis=2)
     again = np.einsum("mik,mk,mjk->mij", axes, values, axes)
     np.testing.assert_allclose(again, field.stress, atol=1e-9 * np.abs(field.stress).max())
-    assert grid.field_data["unit of stress"][0] == "MPa"
+    text = {name: bytes(grid.field_data[name]).decode() for name in ("load case", "unit of stress")}
+    assert text == {"load case": "pull", "unit of stress": "MPa"}
     mesh = read_mesh(written)
     assert set(mesh.patches) == set(field.mesh.patches)
     assert mesh.order == field.mesh.order
+
+
+def test_meshio_reads_the_same_result(field, written):
+    theirs, ours = meshio.read(written), pyvista.read(written)
+    assert [block.type for block in theirs.cells] == [
+        "tetra" if field.mesh.order == 1 else "tetra10"
+    ]
+    np.testing.assert_array_equal(theirs.points, field.mesh.points)
+    np.testing.assert_array_equal(theirs.cells[0].data, field.mesh.cells)
+    assert set(theirs.point_data) == set(ours.point_data.keys())
+    for name, values in theirs.point_data.items():
+        np.testing.assert_array_equal(values, ours.point_data[name])
+    assert set(theirs.cell_data) == set(ours.cell_data.keys())
+    for name, (values,) in theirs.cell_data.items():
+        np.testing.assert_array_equal(values, ours.cell_data[name])
+    np.testing.assert_array_equal(theirs.cell_data["stress"][0][:, 4], field.stress[:, 1, 2])
+    for name, facets in field.mesh.patches.items():
+        np.testing.assert_array_equal(theirs.field_data[f"patch:{name}"], facets)
+    assert bytes(theirs.field_data["unit of stress"]) == b"MPa"
+
+
+def test_a_node_that_is_nowhere_is_one_line(field, written):
+    grid = pyvista.read(written)
+    grid.points[3, 1] = np.nan
+    grid.save(written)
+    with pytest.raises(InputError, match="nodes must be finite; got NaN or infinity"):
+        read_stress(written, field.mesh, "MPa")
+
+
+def test_a_unit_as_a_string_is_read_too(field, written):
+    """As ccfem wrote it before, and as other programs may."""
+    grid = pyvista.read(written)
+    grid.field_data["unit of stress"] = ["Pa"]
+    grid.save(written)
+    given = read_stress(written, field.mesh)
+    np.testing.assert_allclose(given.stress, 1e-6 * field.stress, rtol=1e-15)
 
 
 def test_other_numbers_of_nodes_and_cells_are_mapped(field, tmp_path):
@@ -178,9 +219,37 @@ def test_tables_by_element_and_by_node(field, tmp_path):
     path.write_text(table("element", field.stress).replace("S13 [MPa]", "S13 [Pa]"))
     with pytest.raises(InputError, match="give them one"):
         read_stress(path, mesh)
-    path.write_text(table("element", np.full_like(field.stress, np.nan)))
-    with pytest.raises(InputError, match="stress must be finite"):
+    path.write_text(table("element", field.stress) + "\n5;1;2;x;4;5;6")
+    with pytest.raises(InputError, match=rf"line {len(mesh.cells) + 2}: expected .* '5;1;2;x;4"):
         read_stress(path, mesh)
+    path.write_text("node,Sxx\n1," + "1" * 200_000)
+    with pytest.raises(InputError, match="field larger than field limit"):
+        read_stress(path, mesh)
+
+
+@pytest.mark.parametrize(
+    ("value", "unit", "said"),
+    [
+        (-1e300, "MPa", r"got -1e\+300 MPa as xz of element 8: correct it, or the unit of all"),
+        (2e7, "MPa", r"within 1e\+07 MPa; got 2e\+07 MPa as xz of element 8"),
+        (1e306, "GPa", r"got 1e\+306 GPa as xz of element 8"),
+        (np.nan, "MPa", "must be finite and .*; got nan MPa as xz of element 8"),
+        (-np.inf, "Pa", "got -inf Pa as xz of element 8"),
+        (2e7, "Pa", ""),
+    ],
+)
+def test_stress_that_no_solid_has_is_refused(tmp_path, value, unit, said):
+    mesh, path = box_mesh((6.0, 3.0, 2.0), (2, 1, 1)), tmp_path / "stress.csv"
+    stress = np.ones((len(mesh.cells), 3, 3))
+    stress[7, 0, 2] = stress[7, 2, 0] = value
+    path.write_text(table("element", stress, 1, f" [{unit}]"))
+    if not said:
+        assert read_stress(path, mesh).stress[7, 0, 2] == pytest.approx(20.0)
+        return
+    with pytest.raises(InputError, match=said):
+        read_stress(path, mesh)
+    with pytest.raises(InputError, match=r"at stress\[7, 0, 2\]: correct it, or its unit"):
+        GivenStress(mesh, 1e3 * stress, np.ones((len(mesh.points), 3, 3)))
 
 
 def calculix(problem: Problem, folder: Path) -> Path:
@@ -230,6 +299,57 @@ def test_a_comparison_on_stress_of_calculix_is_that_on_ours(tmp_path):
             assert found[0] == pytest.approx(found[1], rel=1e-4)
         tested = one.tested.bracket.tension.ratio, other.tested.bracket.tension.ratio
         assert tested[0] == pytest.approx(tested[1], rel=1e-4)
+
+
+@pytest.fixture
+def results():
+    """Text of a result file of CalculiX, its mesh, and the stress in it (n, 6), Voigt."""
+    mesh = box_mesh((6.0, 3.0, 2.0), (2, 1, 1))
+    stress = np.random.default_rng(2).normal(size=(len(mesh.points), 6)).round(5)
+    return frd(mesh, stress[:, [0, 1, 2, 5, 3, 4]]), mesh, stress
+
+
+def test_results_of_calculix_are_in_mpa_as_the_mesh_is_in_mm(tmp_path, results):
+    text, mesh, stress = results
+    path = tmp_path / "part.frd"
+    path.write_text(text)
+    given = read_stress(path, mesh)
+    np.testing.assert_allclose(to_voigt(given.nodal), stress, rtol=1e-5)
+    assert given.assumed == "the stress of part.frd is taken for MPa, as its nodes are in mm"
+    given = read_stress(path, mesh, "kPa")
+    np.testing.assert_allclose(to_voigt(given.nodal), 1e-3 * stress, rtol=1e-5)
+    assert given.assumed == ""
+
+
+def test_a_node_of_a_large_number_takes_no_memory(tmp_path, results):
+    text, mesh, stress = results
+    text = text.replace(f" -1{1:10d}", " -19999999999")  # nodes and stress, and an element
+    text = re.sub(rf"^( -2.*?){1:10d}", r"\g<1>9999999999", text, flags=re.M)
+    (tmp_path / "part.frd").write_text(text)
+    given = read_stress(tmp_path / "part.frd", mesh)
+    np.testing.assert_allclose(to_voigt(given.nodal), stress, rtol=1e-5)
+
+
+@pytest.mark.parametrize(
+    ("old", "new", "said"),
+    [
+        (r"^( -2 .*).{10}$", r"\1", "element 1 has 3 nodes in place of 4"),
+        (r"^( -2 .*)1$", r"\g<1>1\n -2         1", "element 1 has 5 nodes in place of 4"),
+        (r"^( -2.{30}).{10}$", r"\g<1>9999999999", "names node 9999999999, which the block 2C"),
+        (r"^( -1.{34}).{12}$", r"\1", "the block 2C is not as CalculiX writes it"),
+        (r"^( -1.{70}).*$", r"\1", "the block STRESS is not as CalculiX writes it"),
+        (r"^( -1.{10}).{12}", r"\1         nan", "nan .* is not finite"),
+        (r"^ -4.*$", " -4", "has no stress: ask ccx"),
+        (r"(?s)\n -3\n 9999.*", "", "is cut off in its block STRESS: copy it again"),
+    ],
+)
+def test_spoiled_results_are_one_line(tmp_path, results, old, new, said):
+    text, count = re.subn(old, new, results[0], count=1, flags=re.M)
+    assert count == 1
+    (tmp_path / "part.frd").write_text(text)
+    with pytest.raises(InputError, match=said) as refused:
+        read_stress(tmp_path / "part.frd", results[1])
+    assert "\n" not in str(refused.value)
 
 
 def test_a_result_file_must_be_one(tmp_path):

@@ -33,7 +33,7 @@ def test_a_grid_is_every_combination_and_a_list_each_of_its_tables():
     ("text", "said"),
     [
         ("", "is empty: give it parts and strategies"),
-        ("parts = [", "is no TOML"),
+        ("parts = [", "is not a TOML file"),
         ("parts = ['bar']", "needs the key 'strategies'"),
         ("parts = ['bar']\nstrategies = ['zigzag']\nstrategy = 1", "has no key 'strategy'"),
         ("parts = []\nstrategies = ['zigzag']", "at least one of its parts"),

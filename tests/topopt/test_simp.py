@@ -250,7 +250,7 @@ def test_filled_cells_have_the_volume():
     [
         (
             {"volume_fraction": 1.0},
-            r"simp\.volume_fraction must be above 0 and below 1; got 1.0: correct it",
+            r"simp\.volume_fraction must be above 0 and below 1; got 1.0: give one in this range",
         ),
         ({"penalty": 0.5}, "penalty must be at least 1; got 0.5"),
         ({"filter": "none"}, "filter must be one of 'sensitivity', 'density'; got 'none'"),

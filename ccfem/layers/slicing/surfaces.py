@@ -52,7 +52,7 @@ class Surfaces:
 
 
 def _number(path: Path) -> tuple[int, str]:
-    digits = "".join(c for c in path.stem if c.isdigit())
+    digits = "".join(c for c in path.stem if c.isdecimal())
     return int(digits or 0), path.stem
 
 
@@ -68,7 +68,7 @@ def _read(path: Path) -> tuple[FloatArray, IntArray]:
                 triangles.append([int(word.split("/")[0]) for word in words[1:]])
         found = np.array(points, dtype=np.float64).reshape(-1, 3)
         corners = np.array(triangles, dtype=np.int64).reshape(-1, 3) - 1
-    except (ValueError, IndexError):
+    except (ValueError, IndexError, OverflowError):
         raise InputError(f"{path} is no OBJ file of triangles: export it again") from None
     if not len(corners) or corners.min() < 0 or corners.max() >= len(found):
         raise InputError(f"{path} has no triangles, or they name points that it has not")

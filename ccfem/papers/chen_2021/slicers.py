@@ -21,6 +21,7 @@ from ccfem.arrays import FloatArray
 from ccfem.elasticity import solve
 from ccfem.errors import InputError
 from ccfem.evaluation import evaluate
+from ccfem.io.surface import write_stl
 from ccfem.layers.layer import Layer
 from ccfem.papers.chen_2021.loop import authors_loop
 from ccfem.planning.equal_fibre import TOLERANCE, length_per_layer
@@ -208,12 +209,7 @@ def _write_slab(path: Path, layer: Layer) -> None:
         triangles += [
             np.stack(c, axis=1) for c in ((loop, after, after + n), (loop, after + n, loop + n))
         ]
-    corners = points[np.concatenate(triangles)]
-    facets = np.zeros(
-        len(corners), dtype=[("normal", "<f4", 3), ("corners", "<f4", (3, 3)), ("spare", "<u2")]
-    )
-    facets["corners"] = corners
-    path.write_bytes(bytes(80) + np.uint32(len(facets)).tobytes() + facets.tobytes())
+    write_stl(path, points, np.concatenate(triangles))
 
 
 def extrusion_lines(text: str, name: str = "G-code") -> list[FloatArray]:
