@@ -22,8 +22,9 @@ def reproduce(
     ] = None,
 ) -> None:
     """Make the figures, tables and claims of a paper again, ours beside theirs."""
-    from ccfem.papers.reproduce import named_papers
+    from ccfem.papers.reproduce import KEPT, named_papers
     from ccfem.papers.reproduce import reproduce as make
+    from ccfem.progress import progress_bar
 
     if paper is None:
         for name, contents in named_papers().items():
@@ -31,4 +32,8 @@ def reproduce(
             if contents.parts:
                 print(f"    {', '.join(contents.parts)}")
         return
-    print(make(paper, part or "", None if out is None else path_of(out)))
+    with progress_bar(lines=True) as progress:
+        made = make(paper, part or "", None if out is None else path_of(out), progress)
+    print(made)
+    if part:
+        print(f"kept; made again only where code or data have changed ({made.parent / KEPT})")

@@ -12,8 +12,9 @@ from ccfem.comparison.ranking import stiffness_ratio
 from ccfem.comparison.runs import Run
 from ccfem.evaluation.matching import THRESHOLDS, along_fibre, matching_curve
 from ccfem.evaluation.plane_paths import pool
+from ccfem.virtual_testing.stiffer import RESOLUTION
 
-__all__ = ["curve_charts", "front", "fronts", "spreads"]
+__all__ = ["curve_charts", "front", "fronts", "spreads", "wide_enough"]
 
 _LEAST, _MOST = 0.01, 10.0
 """Ends, 1/mm, of the scale of curvature; what is straighter counts at its left end."""
@@ -26,13 +27,17 @@ _COSTS = (
 )
 """Against which indices stiffness is drawn: factor, title, and which end is better."""
 
+_LEAST_SPAN = 0.2
+"""Length of an axis over its largest value, so that what hardly differs looks so."""
+
 _STIFFNESS = "times unreinforced stiffness"
 
 
 def fronts(runs: Sequence[Run], colours: Mapping[str, str]) -> list[dict[str, Any]]:
     """Charts of stiffness over fibre, time to lay it and first-failure load, with their fronts.
 
-    The front joins the runs that can be printed and that no other such run equals or beats in both.
+    The front joins the runs that can be printed and that no other such run equals or beats in both;
+    it is not drawn where they differ by less than the resolution of the test.
     """
     found = []
     values = {run.name: headline_values(run) for run in runs}
@@ -58,15 +63,43 @@ def fronts(runs: Sequence[Run], colours: Mapping[str, str]) -> list[dict[str, An
             for run, x, y in points
         ]
         line = front(kept, better)
-        if len(line) > 1:
+        if all(_spread(values) > RESOLUTION for values in zip(*line, strict=True)):
             joined: dict[str, Any] = {"name": "front", "colour": "#8a94a3", "mode": "lines"}
             ends = {"x": [x for x, _ in line], "y": [y for _, y in line]}
             series.insert(0, {**joined, "legend": False, **ends})
         name = title.split(",")[0]
         found.append(
-            {"title": f"Stiffness over {name}", "x": title, "y": _STIFFNESS, "series": series}
+            {
+                "title": f"Stiffness over {name}",
+                "x": title,
+                "y": _STIFFNESS,
+                "x_range": wide_enough([x for _, x, _ in points]),
+                "y_range": wide_enough([y for _, _, y in points]),
+                "series": series,
+            }
         )
     return found
+
+
+def wide_enough(values: Sequence[float]) -> list[float]:
+    """Return the ends of an axis, round the values and at least a fifth of the largest apart.
+
+    Examples
+    --------
+    >>> wide_enough([1.0, 3.0])
+    [0.8, 3.2]
+    >>> [round(x, 3) for x in wide_enough([4.73, 4.76])]
+    [4.269, 5.221]
+    """
+    low, high = min(values), max(values)
+    margin = 0.1 * (high - low)
+    lacking = max(0.0, _LEAST_SPAN * max(abs(low), abs(high)) - (high - low) - 2.0 * margin)
+    return [low - margin - 0.5 * lacking, high + margin + 0.5 * lacking]
+
+
+def _spread(values: Sequence[float]) -> float:
+    """Largest over smallest value, less 1."""
+    return max(values) / min(values) - 1.0 if min(values) > 0.0 else np.inf
 
 
 def front(points: Sequence[tuple[float, float]], better: str) -> list[tuple[float, float]]:

@@ -4,7 +4,7 @@ from collections.abc import Sequence
 
 import numpy as np
 
-from ccfem.comparison.headline import HEADLINE, headline_values
+from ccfem.comparison.headline import HEADLINE, cell_text, headline_values
 from ccfem.comparison.request import InAll, Wanted
 from ccfem.comparison.runs import Run
 from ccfem.planning.equal_fibre import TOLERANCE
@@ -73,7 +73,7 @@ def best_values(runs: Sequence[Run], wanted: Wanted) -> dict[str, float]:
     Runs that cannot be printed, lay another length than the wanted one, or leave layers empty have
     no best value. Stiffnesses are best of the run that is stiffer than every other (`order_of`), if
     there is one. A load at first failure is best if it is the largest by more than the resolution
-    of the test.
+    of the test. What another run shows with the same digits is not best.
     """
     equal = [
         run
@@ -95,7 +95,18 @@ def best_values(runs: Sequence[Run], wanted: Wanted) -> dict[str, float]:
             found = headline_values(order[0])[head.column]
         if head.column == "first_failure_load" and not _strongest(equal, found):
             continue
-        best[head.column] = found
+        texts = [
+            cell_text(run, head)[0]
+            for run in runs
+            if run.evaluation is not None and headline_values(run).get(head.column) != found
+        ]
+        own = next(
+            cell_text(run, head)[0]
+            for run in equal
+            if headline_values(run).get(head.column) == found
+        )
+        if own not in texts:
+            best[head.column] = found
     return best
 
 

@@ -97,6 +97,7 @@ function sortable(table) {
   let down = true;
   choice.onchange = () => sort(+choice.value, (down = +choice.value > 0));
   flip.onclick = () => sort(+choice.value, (down = !down));
+  choice.setAttribute("aria-label", "sort by");
   bar.append("sort by", choice, flip);
   table.parentElement.before(bar);
 }
@@ -121,14 +122,39 @@ function tooltips() {
 
 // ---- scenes in space --------------------------------------------------------------------------
 
+// Ranges of the axes, and the sizes in space by which all that is drawn fits into the view: half of
+// the view is 1 high, seen from EYE without perspective.
+const EYE = { x: -0.8, y: -1.3, z: 1.2 }, FILLED = 0.8, WORDS = 120; // pixels beside the part for words at its ends
+function fitted(view, traces) {
+  const names = ["x", "y", "z"], away = Math.hypot(EYE.x, EYE.y, EYE.z), flat = Math.hypot(EYE.x, EYE.y);
+  const right = [-EYE.y / flat, EYE.x / flat, 0], e = names.map((n) => EYE[n] / away);
+  const up = [-e[2] * (e[0] / Math.hypot(e[0], e[1])), -e[2] * (e[1] / Math.hypot(e[0], e[1])), Math.hypot(e[0], e[1])];
+  const ranges = names.map((name) => {
+    let low = Infinity, high = -Infinity;
+    for (const trace of traces)
+      for (const v of trace[name]) if (v !== null) { low = Math.min(low, v); high = Math.max(high, v); }
+    return [low, high];
+  });
+  const most = Math.max(...ranges.map(([low, high]) => high - low)) || 1;
+  const sizes = ranges.map((range) => {
+    const size = Math.max(range[1] - range[0], 1e-3 * most), middle = (range[0] + range[1]) / 2;
+    range.splice(0, 2, middle - size / 2, middle + size / 2);
+    return size;
+  });
+  const half = (along) => sizes.reduce((sum, size, c) => sum + 0.5 * size * Math.abs(along[c]), 0);
+  const free = Math.max(view.clientWidth - WORDS, 0.5 * view.clientWidth), wide = free / Math.max(view.clientHeight, 1);
+  const scale = FILLED * Math.min(1 / half(up), wide / half(right));
+  return { ranges, ratio: Object.fromEntries(names.map((name, c) => [name, sizes[c] * scale])) };
+}
+
 // The layout of a scene; its words lie above everything, at places in space.
-function scene(view, words) {
-  const away = 1.05 * Math.max(1, (1.55 * view.clientHeight) / view.clientWidth);
+function scene(view, words, traces) {
+  const { ranges, ratio } = fitted(view, traces);
   return {
     margin: { l: 0, r: 0, t: 0, b: 0 }, showlegend: false, uirevision: 1,
     scene: {
-      aspectmode: "data", dragmode: "orbit", camera: { projection: { type: "orthographic" }, eye: { x: -0.8 * away, y: -1.3 * away, z: 1.2 * away } },
-      ...Object.fromEntries(["xaxis", "yaxis", "zaxis"].map((axis) => [axis, { visible: false }])),
+      aspectmode: "manual", aspectratio: ratio, dragmode: "orbit", camera: { projection: { type: "orthographic" }, eye: EYE },
+      ...Object.fromEntries(["xaxis", "yaxis", "zaxis"].map((axis, c) => [axis, { visible: false, range: ranges[c] }])),
       annotations: words.map(({ text, at, colour }) => ({ text: plain(text), x: at[0], y: at[1], z: at[2], showarrow: false, yshift: 12,
         font: { color: colour || INK, size: 13 }, bgcolor: "#ffffffc0" })),
     },
@@ -136,13 +162,48 @@ function scene(view, words) {
 }
 const CONFIG = { responsive: true, displaylogo: false, displayModeBar: false };
 
-// Calls once the element is near the screen, for a scene takes time.
+// Calls once the element is near the screen, for a scene takes time; or when there is time for it.
+const WAITING = [];
 function whenSeen(element, draw) {
+  let drawn = null;
+  const once = () => (drawn = drawn || draw());
   new IntersectionObserver((entries, watch) => {
     if (!entries.some((e) => e.isIntersecting)) return;
     watch.disconnect();
-    draw();
+    once();
   }, { rootMargin: "200px" }).observe(element);
+  let wide = element.clientWidth;
+  new ResizeObserver(() => {
+    if (!drawn || !element.clientWidth || element.clientWidth === wide) return; // on paper it is hidden
+    wide = element.clientWidth;
+    draw();
+  }).observe(element);
+  WAITING.push(async () => {
+    await once();
+    await printed(element);
+  });
+}
+
+// A picture of a view, for paper: scenes cannot be printed, and charts keep the width of the screen.
+async function printed(element) {
+  const wide = element.clientWidth || 600, high = element.clientHeight || 400;
+  let picture = element.nextElementSibling;
+  if (!picture || picture.className !== "printed") {
+    picture = document.createElement("img");
+    picture.className = "printed";
+    picture.alt = element.getAttribute("aria-label") || "chart";
+    element.after(picture);
+  }
+  picture.src = await Plotly.toImage(element, { format: "png", width: wide, height: high, scale: 1.5 });
+}
+
+async function printable() {
+  const idle = window.requestIdleCallback || ((then) => setTimeout(then, 50));
+  for (const work of WAITING) {
+    await new Promise((then) => idle(then));
+    await work();
+  }
+  document.body.dataset.printable = "yes";
 }
 
 const MATT = { lighting: { ambient: 0.7, diffuse: 0.5, specular: 0.03, facenormalsepsilon: 0, vertexnormalsepsilon: 0 } };
@@ -199,9 +260,10 @@ function partScene(part) {
     const moved = modes.value === "moved";
     byId("part-scale-label").hidden = !moved;
     const traces = moved ? deformed() : setUp();
-    return Plotly.react(view, traces, scene(view, words), CONFIG);
+    return Plotly.react(view, traces, scene(view, words, traces), CONFIG);
   };
   modes.onchange = byId("part-scale").oninput = draw;
+  modes.addEventListener("change", () => printed(view));
   whenSeen(view, draw);
 }
 
@@ -545,7 +607,7 @@ function spaceScene(part, layers) {
     }
     byId("space-said").textContent = `${limit} of ${stack().layers.length}` +
       (stack().count > stack().layers.length ? ` drawn, ${stack().count} in all` : "");
-    return Plotly.react(view, traces, scene(view, words), CONFIG);
+    return Plotly.react(view, traces, scene(view, words, traces), CONFIG);
   }
   choices();
   stackChoice.onchange = () => {
@@ -553,6 +615,7 @@ function spaceScene(part, layers) {
     draw();
   };
   choice.onchange = colour.onchange = top.oninput = draw;
+  for (const each of [choice, colour, top]) each.addEventListener("change", () => printed(view));
   byId("space").hidden = false;
   whenSeen(view, draw);
 }
@@ -571,7 +634,7 @@ function chart(element, given) {
   const flat = (x) => (given.x_log ? Math.log10(x) : x);
   return Plotly.newPlot(element, traces, {
     title: { text: plain(given.title), font: { size: 15 }, x: 0, xref: "paper" }, margin: { l: 56, r: 12, t: 36, b: 48 },
-    xaxis: { ...axis, title: { text: given.x }, type: given.x_log ? "log" : "linear", automargin: true },
+    xaxis: { ...axis, title: { text: given.x }, range: given.x_range, type: given.x_log ? "log" : "linear", automargin: true },
     yaxis: { ...axis, title: { text: given.y }, range: given.y_range, automargin: true },
     legend: { orientation: "h", y: -0.24 }, font: { color: INK, size: 12 }, hovermode: "closest", dragmode: false,
     shapes: marks.map((m) => ({ type: "line", x0: m.x, x1: m.x, y0: 0, y1: 1, yref: "paper", line: { color: "#8a94a3", dash: "dash", width: 1 } })),
@@ -585,9 +648,10 @@ function charts(all) {
     if (!given.length) continue;
     place.closest("section").hidden = false;
     for (const each of given) {
-      const element = document.createElement("div");
+      const element = document.createElement("div"), frame = document.createElement("div");
       element.className = "chart";
-      place.append(element);
+      frame.append(element);
+      place.append(frame);
       whenSeen(element, () => chart(element, each));
     }
   }
@@ -613,6 +677,7 @@ async function start() {
   } else byId("part-view").hidden = true;
   charts(data.charts);
   document.body.dataset.ready = "yes";
+  await printable();
 }
 
 start().catch((error) => {

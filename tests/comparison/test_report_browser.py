@@ -138,3 +138,70 @@ def test_a_phone_cuts_nothing(page):
     assert page.evaluate(over) == []
     assert page.locator(".sorter select").is_visible()
     assert page.said == []
+
+
+def test_words_stand_out_and_everything_has_a_name_and_a_place(page):
+    """What axe asks for: contrast of 4.5, one main landmark, a name for every choice."""
+    assert page.locator("main").count() == 1
+    assert page.locator("main section").count() == page.locator("section").count()
+    assert page.evaluate(NAMELESS) == 0
+    page.locator("details").evaluate_all("all => all.forEach(each => { each.open = true; })")
+    low = [ratio for ratio in page.evaluate(CONTRASTS) if ratio < 4.5]
+    assert low == []
+
+
+NAMELESS = """[...document.querySelectorAll('select, input, button')].filter(
+    (each) => !each.labels?.length && !each.getAttribute('aria-label') && !each.textContent.trim()
+      || each.tagName === 'SELECT' && !each.labels?.length && !each.getAttribute('aria-label')
+).length"""
+CONTRASTS = """(() => {
+  const parts = (css) => css.match(/[\\d.]+/g).map(Number);
+  const light = (css) => parts(css).slice(0, 3).map((v) => v / 255)
+    .map((v) => (v <= 0.04045 ? v / 12.92 : ((v + 0.055) / 1.055) ** 2.4))
+    .reduce((sum, v, k) => sum + [0.2126, 0.7152, 0.0722][k] * v, 0);
+  const behind = (each) => {
+    for (let at = each; at; at = at.parentElement) {
+      const css = getComputedStyle(at).backgroundColor, alpha = parts(css)[3];
+      if (alpha === undefined || alpha > 0.9) return css;
+    }
+    return 'rgb(255, 255, 255)';
+  };
+  return [...document.querySelectorAll('h1, h2, p, b, li, th, td, td span, small, dt, dd, label')]
+    .filter((each) => each.textContent.trim() && each.getClientRects().length)
+    .map((each) => [light(getComputedStyle(each).color), light(behind(each))])
+    .map(([a, b]) => (Math.max(a, b) + 0.05) / (Math.min(a, b) + 0.05));
+})()"""
+"""WCAG 2 contrast of the words of the page against what lies behind them."""
+
+
+def test_paper_shows_the_views(page):
+    page.wait_for_selector("body[data-printable]", state="attached", timeout=60_000)
+    assert page.locator("img.printed").count() == 2 + page.locator(".chart").count() > 4
+    page.emulate_media(media="print")
+    try:
+        assert page.locator(".scene:visible, .chart:visible, .controls:visible").count() == 0
+        for picture in range(page.locator("img.printed").count()):
+            assert shades(page, f"img.printed >> nth={picture}") > 20
+    finally:
+        page.emulate_media(media="screen")
+
+
+@pytest.mark.parametrize("size", [(390, 844), (1200, 500), (800, 1200)])
+def test_the_part_lies_in_its_view_whatever_its_shape(page, size):
+    """No pixel of the part or its loads touches the border of the view."""
+    from PIL import Image
+
+    page.set_viewport_size({"width": size[0], "height": size[1]})
+    page.wait_for_timeout(1500)
+    view = page.locator("#part-view")
+    view.scroll_into_view_if_needed()
+    page.wait_for_timeout(500)
+    image = Image.open(io.BytesIO(view.screenshot(timeout=60_000))).convert("L")
+    dark = np.asarray(image)[4:-4, 4:-4] < 240
+    rows, columns = np.flatnonzero(dark.any(axis=1)), np.flatnonzero(dark.any(axis=0))
+    assert rows[0] > 0
+    assert rows[-1] < dark.shape[0] - 1
+    assert columns[0] > 0
+    assert columns[-1] < dark.shape[1] - 1
+    share = max(np.ptp(rows) / dark.shape[0], np.ptp(columns) / dark.shape[1])
+    assert share > 0.4  # and it is not lost in it

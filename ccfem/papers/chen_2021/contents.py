@@ -13,7 +13,7 @@ __all__ = ["CONTENTS"]
 CONTENTS = Contents(
     title="Chen et al. 2021, field-based toolpaths",
     seconds=90.0,
-    run=run_study,
+    run=lambda progress: run_study(progress=progress),
     whole=write_all,
     tables={
         "claims": lambda study: claim_table(verdicts(quantities(study()))),

@@ -1,5 +1,6 @@
 """Figures 4 to 10 and 14 of the paper, redrawn from a run."""
 
+from collections.abc import Callable
 from pathlib import Path
 from typing import Any
 
@@ -12,6 +13,7 @@ from ccfem.layers.layer import Layer
 from ccfem.papers.chen_2021.claims import agreement
 from ccfem.papers.chen_2021.pipeline import LayerStages
 from ccfem.papers.chen_2021.study import Model, Study
+from ccfem.papers.contents import drawn_of
 from ccfem.papers.wang_2021.panels import bar, curves, lines_of, panels, section, title
 from ccfem.plot.canvas import save
 from ccfem.plot.colours import INK, OUTLINE
@@ -30,18 +32,21 @@ def draw_all(study: Study, folder: Path) -> list[str]:
     return [f"{name}.png" for name in made]
 
 
-def figures(study: Study) -> dict[str, Figure]:
-    """Every figure, by name."""
-    return {
-        "figure_04_pipeline": _pipeline(study.loop),
-        "figure_05_connection": _connection(study.loop),
-        "figure_06_layers_of_a_part": _layers(study.models.get("lifting_eye", study.loop)),
-        "figure_07_pushed": _pushed(study),
-        "figure_08_agreement_of_vectors": _histograms(study),
-        "figure_09_powers": _powers(study),
-        "figure_10_field_processing": _processing(study),
-        "figure_14_large_displacement": _turns(study),
+def figures(study: Study, number: int | None = None) -> dict[str, Figure]:
+    """Every figure, or those of a number, by name."""
+    drawn: dict[str, Callable[[], Figure]] = {
+        "figure_04_pipeline": lambda: _pipeline(study.loop),
+        "figure_05_connection": lambda: _connection(study.loop),
+        "figure_06_layers_of_a_part": lambda: _layers(
+            study.models["lifting_eye" if "lifting_eye" in study.models else "Loop"]
+        ),
+        "figure_07_pushed": lambda: _pushed(study),
+        "figure_08_agreement_of_vectors": lambda: _histograms(study),
+        "figure_09_powers": lambda: _powers(study),
+        "figure_10_field_processing": lambda: _processing(study),
+        "figure_14_large_displacement": lambda: _turns(study),
     }
+    return drawn_of(drawn, number)
 
 
 def _middle(model: Model) -> LayerStages:

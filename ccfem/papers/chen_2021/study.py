@@ -10,6 +10,7 @@ Piston's does.
 import os
 from collections.abc import Mapping
 from dataclasses import dataclass, replace
+from functools import cached_property
 
 import numpy as np
 
@@ -19,13 +20,16 @@ from ccfem.cases.case import Case
 from ccfem.elasticity import Force, solve
 from ccfem.elasticity.stress_field import StressField
 from ccfem.evaluation import Evaluation, evaluate
+from ccfem.fields.tensile import Tension
 from ccfem.layers.layer import Layer
 from ccfem.layers.slicing.planar import Planar
 from ccfem.papers.chen_2021.large_displacement import Turned, turns_at
 from ccfem.papers.chen_2021.loop import FOLDER, authors_loop
 from ccfem.papers.chen_2021.pipeline import LayerStages, VectorField, planned, vector_field
+from ccfem.papers.contents import WhenAsked
 from ccfem.planning import plan
 from ccfem.planning.equal_fibre import plan_to_length
+from ccfem.progress import Progress, silent
 from ccfem.strategies import create
 from ccfem.toolpaths import Toolpaths
 from ccfem.virtual_testing.specimen import Specimen
@@ -70,32 +74,49 @@ class Model:
 
 @dataclass(frozen=True)
 class Study:
-    """All that figures, tables and claims are made of.
+    """All that figures, tables and claims are made of, computed when it is first asked for.
 
     Attributes
     ----------
     models : mapping of name to Model
         "Loop", "Loop, pushed", "bar", "open_hole", "lifting_eye".
-    powers : mapping of p to Toolpaths
-        Figure 9, on the Loop.
-    unprocessed : Toolpaths
-        Figure 10 (a): without orientation and filter.
-    compared : mapping of name to (Toolpaths, stiffness ratio)
-        Table 2: the paper's algorithm and contour and zigzag of its length.
-    turns : mapping of displacement to Turned
-        Figure 14.
+    step : float, mm
+        Of the large displacement.
     """
 
     models: Mapping[str, Model]
-    powers: Mapping[float, Toolpaths]
-    unprocessed: Toolpaths
-    compared: Mapping[str, tuple[Toolpaths, float]]
-    turns: Mapping[float, Turned]
+    step: float = 1.0
 
     @property
     def loop(self) -> Model:
         """The part that most figures show."""
         return self.models["Loop"]
+
+    @cached_property
+    def powers(self) -> Mapping[float, Toolpaths]:
+        """Figure 9: paths of the Loop by the power p."""
+        return {power: self._planned(self.loop.vectors.tension, power) for power in POWERS}
+
+    @cached_property
+    def unprocessed(self) -> Toolpaths:
+        """Figure 10 (a): without orientation and filter."""
+        return self._planned(self.loop.vectors.unfiltered)
+
+    @cached_property
+    def compared(self) -> Mapping[str, tuple[Toolpaths, float]]:
+        """Table 2: paths of equal length and the stiffness ratio of each."""
+        return _compared(self.loop)
+
+    @cached_property
+    def turns(self) -> Mapping[float, Turned]:
+        """Figure 14, by displacement, mm."""
+        case = self.loop.case
+        return turns_at(case.problem, _pull(case), DISPLACEMENTS, self.step)
+
+    def _planned(self, tension: Tension, power: float = 1.0) -> Toolpaths:
+        loop = self.loop
+        machine = loop.case.machine
+        return joined(planned(loop.layers, tension, loop.stress.held_or_loaded, machine, power))
 
 
 def joined(stages: list[LayerStages]) -> Toolpaths:
@@ -121,8 +142,13 @@ def pushed(case: Case) -> Case:
     return replace(case, problem=replace(case.problem, loads={name: (back,)}))
 
 
-def run_study(element_size: float | None = None, layers: int = 12, step: float = 1.0) -> Study:
-    """Run everything; a minute and a half with the defaults.
+def run_study(
+    element_size: float | None = None,
+    layers: int = 12,
+    step: float = 1.0,
+    progress: Progress = silent,
+) -> Study:
+    """Prepare the study; all of it takes a minute and a half with the defaults.
 
     Parameters
     ----------
@@ -131,32 +157,22 @@ def run_study(element_size: float | None = None, layers: int = 12, step: float =
     layers : int, default 12
     step : float, mm, default 1
         Of the large displacement.
+    progress : callable, optional
     """
     sized = {} if element_size is None else {"element_size": element_size}
-    authors = element_size is None and bool(os.environ.get(FOLDER))
-    loop_case = authors_loop(layers) if authors else create_case("loop", **sized)
-    cases = {
-        "Loop": loop_case,
-        "Loop, pushed": pushed(loop_case),
-        "bar": create_case("bar", **sized),
-        "open_hole": create_case("open_hole", **sized),
-    }
-    models = {name: model(name, case, layers) for name, case in cases.items()}
-    if element_size is None:
-        models["lifting_eye"] = model("lifting_eye", create_case("lifting_eye"), PISTON_LAYERS)
-    loop = models["Loop"]
-    patches, machine = loop.stress.held_or_loaded, loop.case.machine
 
-    def with_power(power: float) -> Toolpaths:
-        return joined(planned(loop.layers, loop.vectors.tension, patches, machine, power))
+    def compute(name: str) -> Model:
+        if name == "lifting_eye":
+            return model(name, create_case(name), PISTON_LAYERS)
+        if name in ("bar", "open_hole"):
+            return model(name, create_case(name, **sized), layers)
+        authors = element_size is None and bool(os.environ.get(FOLDER))
+        loop = authors_loop(layers) if authors else create_case("loop", **sized)
+        return model(name, loop if name == "Loop" else pushed(loop), layers)
 
-    return Study(
-        models,
-        {power: with_power(power) for power in POWERS},
-        joined(planned(loop.layers, loop.vectors.unfiltered, patches, machine)),
-        _compared(loop),
-        turns_at(loop.case.problem, _pull(loop.case), DISPLACEMENTS, step),
-    )
+    names = ("Loop", "Loop, pushed", "bar", "open_hole", "lifting_eye")
+    chosen = names if element_size is None else names[:-1]
+    return Study(WhenAsked(chosen, compute, progress, "solving and planning"), step)
 
 
 def _compared(loop: Model) -> dict[str, tuple[Toolpaths, float]]:

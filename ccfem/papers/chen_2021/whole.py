@@ -8,6 +8,7 @@ from ccfem.papers.chen_2021.figures import draw_all
 from ccfem.papers.chen_2021.study import PARTS_AT_HAND, Study, run_study
 from ccfem.papers.chen_2021.tables import length_table, time_table
 from ccfem.papers.verdicts import claim_table
+from ccfem.progress import Progress, silent
 
 __all__ = ["write", "write_all"]
 
@@ -33,6 +34,6 @@ def write(study: Study, folder: Path) -> str:
     return claims
 
 
-def write_all(folder: Path) -> None:
+def write_all(folder: Path, progress: Progress = silent) -> None:
     """Run the study, and write figures, tables and claims into a folder."""
-    print(write(run_study(), folder))
+    print(write(run_study(progress=progress), folder))

@@ -23,14 +23,18 @@ from ccfem.papers.fang_2024.where_layers_open import (
 from ccfem.papers.verdicts import claim_table
 from ccfem.plot.canvas import png
 from ccfem.plot.stack_page import space_picture, turning_page
+from ccfem.progress import Progress, silent
 from ccfem.toolpaths import MATRIX
 
 __all__ = ["write_all"]
 
 
-def write_all(folder: Path, loads: Sequence[str] = ("pull", "side")) -> None:
+def write_all(
+    folder: Path, progress: Progress = silent, loads: Sequence[str] = ("pull", "side")
+) -> None:
     """Run the study, and write figures, tables and claims into a folder."""
     folder.mkdir(parents=True, exist_ok=True)
+    progress("solving the authors' part", 0.0)
     stress = authors_stress(authors_mesh())
     chain = timed_chain(stress)
     sliced, paths = chain.sliced, chain.strands
@@ -54,6 +58,7 @@ def write_all(folder: Path, loads: Sequence[str] = ("pull", "side")) -> None:
     print(f"\n{field_table(field)}", flush=True)
     tests = {}
     for load in loads:
+        progress(f"comparing slicings under load {load}", 0.3 + 0.3 * len(tests))
         tests[load] = against(load)
         (folder / load).mkdir(exist_ok=True)
         write_results(tests[load], folder / load)

@@ -1,21 +1,24 @@
 """What of Kipping and Schueppstuhl 2023 can be made again."""
 
-from ccfem.papers.contents import Contents
+from collections.abc import Mapping
+
+from ccfem.papers.contents import Contents, WhenAsked
 from ccfem.papers.kipping_2023.chain import PARTS, Chain, chain, table_1, table_2
 from ccfem.papers.kipping_2023.claims import support_table
 from ccfem.papers.kipping_2023.fiso_shapes import shapes_table
 from ccfem.papers.kipping_2023.strength import failure_loads, on_pressing_supports, strength_table
 from ccfem.papers.kipping_2023.whole import write_all
+from ccfem.progress import Progress
 
 __all__ = ["CONTENTS"]
 
 
-def _run() -> dict[str, Chain]:
+def _run(progress: Progress) -> Mapping[str, Chain]:
     """Both parts, from stress to paths."""
-    return {part: chain(name) for part, name in PARTS.items()}
+    return WhenAsked(tuple(PARTS), lambda part: chain(PARTS[part]), progress, "planning part")
 
 
-def _strength(chains: dict[str, Chain]) -> str:
+def _strength(chains: Mapping[str, Chain]) -> str:
     loads = {part: failure_loads(run) for part, run in chains.items()}
     loads["B, pressed"] = failure_loads(chains["B"], on_pressing_supports(chains["B"]))
     return strength_table(loads)

@@ -15,14 +15,18 @@ from ccfem.papers.kipping_2023.strength import (
 )
 from ccfem.papers.kipping_2023.trade import trade, trade_picture, trade_table
 from ccfem.papers.verdicts import claim_table
+from ccfem.progress import Progress, silent
 
 __all__ = ["write_all"]
 
 
-def write_all(folder: Path) -> None:
+def write_all(folder: Path, progress: Progress = silent) -> None:
     """Run the study, and write figures, tables and claims into a folder."""
     folder.mkdir(parents=True, exist_ok=True)
-    chains = {part: chain(name) for part, name in PARTS.items()}
+    chains = {}
+    for part, name in PARTS.items():
+        progress(f"planning part {part}", len(chains) / len(PARTS))
+        chains[part] = chain(name)
     tables = [table_1(chains), table_2(chains), support_table(chains)]
     print("\n".join(tables), flush=True)
     trades = {part: trade(run) for part, run in chains.items()}

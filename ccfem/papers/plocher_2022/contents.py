@@ -9,16 +9,17 @@ from ccfem.papers.plocher_2022.study import RASTER, CaseStudy, run_study
 from ccfem.papers.plocher_2022.tables import case_table, index_table, material_table
 from ccfem.papers.plocher_2022.whole import write_all
 from ccfem.papers.verdicts import claim_table
+from ccfem.progress import Progress
 
 __all__ = ["CONTENTS"]
 
 _Both = tuple[Mapping[str, CaseStudy], Mapping[str, CaseStudy]]
 
 
-def _run() -> _Both:
+def _run(progress: Progress) -> _Both:
     """Study on polylines, and on pixels."""
-    study = run_study()
-    return study, run_study(patterns=RASTER, known=study)
+    study = run_study(progress=progress)
+    return study, run_study(patterns=RASTER, known=study, progress=progress)
 
 
 def _claims(study: _Both) -> str:
@@ -37,6 +38,6 @@ CONTENTS = Contents(
         "table3": lambda study: case_table(study()[0]),
         "table5": lambda study: material_table(),
     },
-    figures=lambda study: figures(*study),
+    figures=lambda study, number: figures(*study, number),
     numbers=(2, 3, 4, 6, 7, 8, 9, 10, 11, 12, 13, 14),
 )

@@ -1,6 +1,6 @@
 """Figures of the paper that are computations, redrawn from a run."""
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from pathlib import Path
 from typing import Any
 
@@ -15,6 +15,7 @@ from ccfem.evaluation.sensitivity import OffAxis
 from ccfem.evaluation.sinuosity import LONG
 from ccfem.evaluation.stiffness_alignment import agreement
 from ccfem.materials import named_material
+from ccfem.papers.contents import drawn_of
 from ccfem.papers.plocher_2022.benchmark_figures import (
     benchmark_fields,
     layups,
@@ -61,45 +62,58 @@ def draw_all(
     return [f"{name}.png" for name in made]
 
 
-def figures(study: Mapping[str, CaseStudy], raster: Mapping[str, CaseStudy]) -> dict[str, Figure]:
-    """Every figure that the cases run allow, by name.
+def figures(
+    study: Mapping[str, CaseStudy], raster: Mapping[str, CaseStudy], number: int | None = None
+) -> dict[str, Figure]:
+    """Every figure that the cases run allow, or those of a number, by name.
 
     Polylines, but for what the paper shows of pixels: figures 2 to 4, and those named raster.
     """
-    tension = {name: case for name, case in study.items() if name != "III"}
-    beam = {name: case for name, case in study.items() if name == "III"}
-    pixels = {name: case for name, case in raster.items() if name != "III"}
-    made: dict[str, Figure] = {}
-    if tension:
-        made |= {
-            "figure_02_medial_axis": _medial_axis(next(iter(pixels.values()))),
-            "figure_03_simplification": _simplification(list(pixels.values())[-1]),
-            "figure_04_long_and_short": _long_and_short(raster),
-            "figure_06_patterns": _patterns(tension),
-            "figure_06_patterns_raster": _patterns(pixels),
-            "figure_06_benchmark": benchmark_fields(tension),
-            "figure_06_bars": _bars(tension, ("C",)),
-            "figure_07_agreement": _maps(tension, _agreement_of, (0.0, 100.0), "agreement, %"),
-            "figure_07_moduli": layups(),
-            "figure_08_sensitivity": _sensitivity(tension),
-            "figure_08_turned_fibre": turned_fibre(next(iter(tension.values()))),
-            "figure_09_energy": _energies(tension),
-            "figure_10_radar": _radars(tension, "C"),
-            "figure_10_radar_raster": _radars(pixels, "C", {"SI": ("si_raw_mean", "low")}),
+
+    def tension() -> dict[str, CaseStudy]:
+        return {name: study[name] for name in study if name != "III"}
+
+    def pixels() -> dict[str, CaseStudy]:
+        return {name: raster[name] for name in raster if name != "III"}
+
+    def beam() -> dict[str, CaseStudy]:
+        return {"III": study["III"]}
+
+    drawn: dict[str, Callable[[], Figure | None]] = {}
+    if set(study) - {"III"}:
+        drawn |= {
+            "figure_02_medial_axis": lambda: _medial_axis(next(iter(pixels().values()))),
+            "figure_03_simplification": lambda: _simplification(list(pixels().values())[-1]),
+            "figure_04_long_and_short": lambda: _long_and_short(raster),
+            "figure_06_patterns": lambda: _patterns(tension()),
+            "figure_06_patterns_raster": lambda: _patterns(pixels()),
+            "figure_06_benchmark": lambda: benchmark_fields(tension()),
+            "figure_06_bars": lambda: _bars(tension(), ("C",)),
+            "figure_07_agreement": lambda: _maps(
+                tension(), _agreement_of, (0.0, 100.0), "agreement, %"
+            ),
+            "figure_07_moduli": layups,
+            "figure_08_sensitivity": lambda: _sensitivity(tension()),
+            "figure_08_turned_fibre": lambda: turned_fibre(next(iter(tension().values()))),
+            "figure_09_energy": lambda: _energies(tension()),
+            "figure_10_radar": lambda: _radars(tension(), "C"),
+            "figure_10_radar_raster": lambda: _radars(
+                pixels(), "C", {"SI": ("si_raw_mean", "low")}
+            ),
         }
-    if beam:
-        made |= {
-            "figure_11_patterns": _patterns(beam),
-            "figure_11_patterns_raster": _patterns({n: raster[n] for n in beam}),
-            "figure_11_shear": shear(next(iter(beam.values()))),
-            "figure_12_radar_C": _radars(beam, "C"),
-            "figure_12_radar_S": _radars(beam, "S"),
-            "figure_13_energy_C": _energies(beam),
-            "figure_13_energy_S": _energies(beam, "S"),
-            "figure_13_sensitivity": _sensitivity(beam),
+    if "III" in study:
+        drawn |= {
+            "figure_11_patterns": lambda: _patterns(beam()),
+            "figure_11_patterns_raster": lambda: _patterns({"III": raster["III"]}),
+            "figure_11_shear": lambda: shear(study["III"]),
+            "figure_12_radar_C": lambda: _radars(beam(), "C"),
+            "figure_12_radar_S": lambda: _radars(beam(), "S"),
+            "figure_13_energy_C": lambda: _energies(beam()),
+            "figure_13_energy_S": lambda: _energies(beam(), "S"),
+            "figure_13_sensitivity": lambda: _sensitivity(beam()),
         }
-    made["figure_14_both_materials"] = _mixed_bars(study)
-    return made
+    drawn["figure_14_both_materials"] = lambda: _mixed_bars(study)
+    return drawn_of(drawn, number)
 
 
 def _lines(paths: PlanePaths) -> list[FloatArray]:

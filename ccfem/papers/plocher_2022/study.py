@@ -7,6 +7,7 @@ is what the paper does.
 
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
+from functools import cache
 from time import perf_counter
 from typing import Any
 
@@ -24,6 +25,7 @@ from ccfem.layers.layer_stress import stress_on
 from ccfem.linking.print_order import nearest_end_order
 from ccfem.machine import Machine, Process
 from ccfem.materials import named_material
+from ccfem.papers.contents import WhenAsked
 from ccfem.papers.plocher_2022.fibre_map import FibreMap, fibre_map
 from ccfem.papers.plocher_2022.plane_study import (
     PRINT_SPEED,
@@ -41,6 +43,7 @@ from ccfem.papers.plocher_2022.plates import Plate, five_holes, plates
 from ccfem.planning import plan
 from ccfem.plates import solve_plane
 from ccfem.printing.print_plan import PrintPlan
+from ccfem.progress import Progress, silent
 from ccfem.raster.raster_plan import RasterPlan
 from ccfem.strategies import create
 from ccfem.toolpaths import FIBRE, Toolpaths
@@ -135,19 +138,32 @@ def run_study(
     cases: Sequence[str] = ("I", "II", "III"),
     patterns: Patterns = PATTERNS,
     known: Mapping[str, CaseStudy] | None = None,
-) -> dict[str, CaseStudy]:
-    """Run the whole study, or a part of it; compiled code is loaded before any clock runs.
+    progress: Progress = silent,
+) -> Mapping[str, CaseStudy]:
+    """Prepare the study, or a part of it: a case is run when it is asked for.
 
-    `known` holds the same cases with other patterns: their benchmarks are taken over.
+    Compiled code is loaded before any clock runs. `known` holds the same cases with other patterns:
+    their benchmarks are taken over.
     """
+    ready = cache(lambda: _load(patterns))
+
+    def compute(name: str) -> CaseStudy:
+        ready()
+        if known is None:
+            return run_case(plates()[name](), patterns)
+        return run_case(known[name].plate, patterns, known[name].benchmarks)
+
+    what = "planning and judging case" if known is None else "pixels of case"
+    return WhenAsked(cases, compute, progress, what)
+
+
+def _load(patterns: Patterns) -> None:
+    """Lay every pattern once, so that its code is compiled."""
     plate = five_holes(bead=1.6)
     layers, stress = plate.planned_on(1)
     for strategy, parameters in patterns.values():
         toolpaths = plan(create(strategy, parameters), layers, stress, machine_of(plate))
         _printed(toolpaths, machine_of(plate))
-    if known is None:
-        return {name: run_case(plates()[name](), patterns) for name in cases}
-    return {name: run_case(known[name].plate, patterns, known[name].benchmarks) for name in cases}
 
 
 def run_case(

@@ -22,6 +22,7 @@ from ccfem.papers.plocher_2022.variants import (
     variant_table,
 )
 from ccfem.papers.verdicts import claim_table
+from ccfem.progress import Progress, silent
 
 __all__ = ["write_all"]
 
@@ -38,12 +39,12 @@ Both chains follow the same rules; they share no code. Where they differ:
 """
 
 
-def write_all(folder: Path) -> None:
+def write_all(folder: Path, progress: Progress = silent) -> None:
     """Run the study, and write figures, tables and claims into a folder."""
     folder.mkdir(parents=True, exist_ok=True)
     begun = perf_counter()
-    study = run_study()
-    raster = run_study(patterns=RASTER, known=study)
+    study = run_study(progress=progress)
+    raster = run_study(patterns=RASTER, known=study, progress=progress)
     tried = try_variants()
     found = quantities(study) | raster_quantities(raster) | variant_quantities(tried)
     checks = verdicts(found)

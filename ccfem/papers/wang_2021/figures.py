@@ -1,6 +1,6 @@
 """Figures of the paper that are computations, redrawn from a run."""
 
-from collections.abc import Mapping
+from collections.abc import Callable, Mapping
 from pathlib import Path
 from typing import Any
 
@@ -12,6 +12,7 @@ from scipy.spatial import Voronoi
 from ccfem.evaluation.matching import THRESHOLDS
 from ccfem.geometry.medial_axis import medial_axis
 from ccfem.linking.print_speed import step_speeds
+from ccfem.papers.contents import drawn_of
 from ccfem.papers.wang_2021.panels import (
     COLOURS,
     bar,
@@ -49,32 +50,35 @@ def draw_all(study: Mapping[str, PlateStudy], folder: Path) -> list[str]:
     return [f"{name}.png" for name in made]
 
 
-def figures(study: Mapping[str, PlateStudy]) -> dict[str, Figure]:
-    """Every figure that the plates and patterns run allow, by name."""
-    made: dict[str, Figure] = {}
-    if "bridge" in study:
-        made["figure_03_voronoi_and_medial_axis"] = _voronoi(study["bridge"])
-        made["figure_05_bridge_stress"] = _stresses(study["bridge"])
-    for name, number in (("bridge", "06"), ("suspension", "06b")):
-        if name in study and "lpp" in study[name].optimised.patterns:
-            made[f"figure_{number}_{name}_speeds"] = _speeds(study[name])
-    if "suspension" in study and "lpp" in study["suspension"].optimised.patterns:
-        made["figure_07_suspension"] = _process(study["suspension"])
+def figures(study: Mapping[str, PlateStudy], number: int | None = None) -> dict[str, Figure]:
+    """Every figure that the plates and patterns run allow, or those of a number, by name."""
+    made: dict[str, Callable[[], Figure | None]] = {}
+
+    def add(name: str, draw: Callable[[PlateStudy], Figure], plate: str, lpp: bool = False) -> None:
+        def drawn() -> Figure | None:
+            there = not lpp or "lpp" in study[plate].optimised.patterns
+            return draw(study[plate]) if there else None
+
+        if plate in study:
+            made[name] = drawn
+
+    add("figure_03_voronoi_and_medial_axis", _voronoi, "bridge")
+    add("figure_05_bridge_stress", _stresses, "bridge")
+    for name, prefix in (("bridge", "06"), ("suspension", "06b")):
+        add(f"figure_{prefix}_{name}_speeds", _speeds, name, lpp=True)
+    add("figure_07_suspension", _process, "suspension", lpp=True)
     for name, maps, rates in (("bridge", "08", "10"), ("suspension", "09", "11")):
-        if name in study:
-            made[f"figure_{maps}_{name}_curvature"] = _curvature_maps(study[name])
-            made[f"figure_{maps}_{name}_curvature_shares"] = _curvature_shares(study[name])
-            made[f"figure_{rates}_{name}_matching"] = _matching(study[name])
+        add(f"figure_{maps}_{name}_curvature", _curvature_maps, name)
+        add(f"figure_{maps}_{name}_curvature_shares", _curvature_shares, name)
+        add(f"figure_{rates}_{name}_matching", _matching, name)
     for name, others, own in (
         ("cantilever", 12, 13),
         ("m_shape", 14, 15),
         ("l_shape", 16, 17),
     ):
-        if name in study:
-            made[f"figure_{others}_{name}_other_methods"] = _other_methods(study[name])
-            if "lpp" in study[name].optimised.patterns:
-                made[f"figure_{own}_{name}_lpp"] = _lpp(study[name])
-    return made
+        add(f"figure_{others}_{name}_other_methods", _other_methods, name)
+        add(f"figure_{own}_{name}_lpp", _lpp, name, lpp=True)
+    return drawn_of(made, number)
 
 
 def _voronoi(plate: PlateStudy) -> Figure:

@@ -7,6 +7,7 @@ neighbours; lpp is strategy `svt`.
 
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
+from functools import cache
 from importlib import import_module
 from time import perf_counter
 from types import MappingProxyType
@@ -29,7 +30,9 @@ from ccfem.layers.layer import Layer
 from ccfem.layers.layer_stress import stress_on
 from ccfem.layers.slicing.planar import Planar
 from ccfem.machine import Machine
+from ccfem.papers.contents import WhenAsked
 from ccfem.planning import plan
+from ccfem.progress import Progress, silent
 from ccfem.strategies import create, named
 from ccfem.toolpaths import Toolpaths
 from ccfem.topopt import Design
@@ -178,20 +181,28 @@ def run_study(
     plates: Sequence[str] = PLATES,
     patterns: Sequence[str] = tuple(PATTERNS),
     design: bool = True,
-) -> dict[str, PlateStudy]:
-    """Run the whole study, or a part of it; patterns whose strategy is not there are left out.
+    progress: Progress = silent,
+) -> Mapping[str, PlateStudy]:
+    """Prepare the study, or a part of it; patterns whose strategy is not there are left out.
+
+    A plate is run when it is asked for.
 
     Parameters
     ----------
     plates, patterns : sequence of str
     design : bool, default True
         Whether to optimise the plates again, beside the outlines that are stored.
+    progress : callable, optional
     """
     known = named()
     chosen = [name for name in patterns if PATTERNS[name][0] in known]
-    # Compiled code is loaded before any clock runs.
-    run_plate("l_shape", chosen, element_size=6.0)
-    return {name: run_plate(name, chosen, design) for name in plates}
+    ready = cache(lambda: run_plate("l_shape", chosen, element_size=6.0))
+
+    def compute(name: str) -> PlateStudy:
+        ready()  # compiled code is loaded before any clock runs
+        return run_plate(name, chosen, design)
+
+    return WhenAsked(plates, compute, progress, "optimising, planning and judging")
 
 
 def run_plate(

@@ -16,15 +16,16 @@ from ccfem.papers.wang_2021.variants import (
     variant_quantities,
     variant_table,
 )
+from ccfem.progress import Progress, silent
 
 __all__ = ["write_all"]
 
 
-def write_all(folder: Path) -> None:
+def write_all(folder: Path, progress: Progress = silent) -> None:
     """Run the study, and write figures, tables and claims into a folder."""
     folder.mkdir(parents=True, exist_ok=True)
     begun = perf_counter()
-    study = run_study()
+    study = run_study(progress=progress)
     tried = try_radii(study)
     found = quantities(study) | variant_quantities(tried, try_hole())
     checks = verdicts(found)
