@@ -20,7 +20,7 @@ from ccfem.elasticity.load_kinds import (
     Temperature,
     Traction,
 )
-from ccfem.elasticity.nodes import nearest_node, patch_facets
+from ccfem.elasticity.nodes import facet_normals, nearest_node, patch_facets
 from ccfem.elasticity.problem import Problem
 from ccfem.elasticity.volume_loads import heat_forces, volume_forces
 from ccfem.errors import InputError
@@ -84,9 +84,12 @@ def _pressure(mesh: LoadedBody, load: Pressure) -> FloatArray:
 def _bearing(mesh: LoadedBody, load: Bearing) -> FloatArray:
     """Pressure ``-normal . a`` where that is positive, with a fitted to the total force.
 
-    On an evenly meshed half cylinder a is parallel to the force, and the pressure is a cosine.
+    On an evenly meshed half cylinder a is parallel to the force, and the pressure is a cosine. On a
+    round wall it acts through the axis: a pin without friction passes no moment about it.
     """
     facets, area, normal = _outward(mesh, load.patch)
+    if mesh.points.shape[1] == 3:
+        normal = facet_normals(mesh, facets, mesh.points[facets].mean(axis=1)[:, None])[:, 0]
     force = _vector(mesh, load)
     touched = normal @ force < 0.0
     for _ in range(50):

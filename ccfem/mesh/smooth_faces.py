@@ -26,6 +26,10 @@ _ROUND = 0.02
 _STRAIGHT = 0.15
 """Root mean square share of the normals of a round wall along its axis: a coarse mesh of 12 edges a
 turn has 0.05. What is a cone or a torus is told by the distance of its nodes."""
+_COLUMNS = 4
+"""Places round the axis at which a wall has nodes, at least: three lie on a circle anyway."""
+_STEPS = 4
+"""Steps towards the nearest cylinder: each doubles the digits."""
 _CLOSED = 0.02
 """Resultant of the normals of a wall, over its area, below which it goes all round."""
 _WIDE = 4.0
@@ -70,6 +74,19 @@ class Face:
 
     def __post_init__(self) -> None:
         freeze(self, facets=int, centre=float, direction=float)
+
+    def normals_at(self, places: FloatArray) -> FloatArray | None:
+        """Outward unit normals (k, 3) of a cylinder at places (k, 3), mm, on it or near it.
+
+        They are radial, wherever a place lies between the axis and the wall, as the middle of a
+        chord does. None for a face of another kind.
+        """
+        if self.kind != "cylinder":
+            return None
+        arm = places - self.centre
+        arm -= np.outer(arm @ self.direction, self.direction)
+        length = np.maximum(np.linalg.norm(arm, axis=1), 1e-300)[:, None]
+        return np.asarray((-arm if self.hollow else arm) / length)
 
     @property
     def about(self) -> str:
@@ -243,7 +260,6 @@ def _cylinder(surface: _Surface, rows: IntArray) -> Face | None:
     spread, axes = np.linalg.eigh((area * normal.T) @ normal / area.sum())
     if spread[0] > _STRAIGHT**2 or spread[1] < 1e-3:
         return None
-    axis = axes[:, 0] * np.sign(axes[np.argmax(np.abs(axes[:, 0]) > _STRAIGHT), 0])
     nodes = np.unique(surface.triangles[rows])
     plane = surface.points[nodes] @ axes[:, 1:]
     # The circle |p|^2 = 2 m p + c through the nodes, by least squares.
@@ -252,19 +268,63 @@ def _cylinder(surface: _Surface, rows: IntArray) -> Face | None:
     squares = ((plane - shift) ** 2).sum(axis=1)
     (*middle, constant), _, rank, _ = np.linalg.lstsq(system, squares)
     radius = float(np.sqrt(max(constant + np.dot(middle, middle), 0.0)))
-    arm = plane - shift - middle
-    if rank < 3 or np.abs(np.linalg.norm(arm, axis=1) - radius).max() > _ROUND * radius:
+    if rank < 3 or not radius > 0.0:
         return None
-    height = surface.points[nodes] @ axis
-    centre = axes[:, 1:] @ (shift + middle) + 0.5 * (height.min() + height.max()) * axis
+    through, axes, radius = _fitted(
+        surface.points[nodes], axes[:, 1:] @ (shift + middle), axes, radius
+    )
+    arm = (surface.points[nodes] - through) @ axes[:, 1:]
+    if np.abs(np.linalg.norm(arm, axis=1) - radius).max() > _ROUND * radius:
+        return None
+    axis = axes[:, 0] * np.sign(axes[np.argmax(np.abs(axes[:, 0]) > _STRAIGHT), 0])
+    height = (surface.points[nodes] - through) @ axis
+    centre = through + 0.5 * (height.min() + height.max()) * axis
     outward = surface.points[surface.triangles[rows]].mean(axis=1) - centre
     inward = float(np.einsum("i,ij,ij->", area, normal, outward)) < 0.0
     turn = np.sort(np.arctan2(arm[:, 1], arm[:, 0]))
+    if 1 + (np.diff(turn) > 1e-3 * np.ptp(turn)).sum() < _COLUMNS:
+        return None
     gap = float(np.diff(np.append(turn, turn[0] + 2.0 * np.pi)).max())
     step = float(np.median(np.diff(np.unique(np.round(turn, 6)))))
     closed = gap < 2.5 * step or np.linalg.norm(area @ normal) < _CLOSED * area.sum()
     degrees = 360.0 if closed else 360.0 - float(np.degrees(gap))
     return Face(rows, "cylinder", float(area.sum()), centre, axis, radius, inward, degrees)
+
+
+def _fitted(
+    nodes: FloatArray, through: FloatArray, axes: FloatArray, radius: float
+) -> tuple[FloatArray, FloatArray, float]:
+    """Point of the axis, axes with that of the cylinder first, and radius: nearest to the nodes.
+
+    Normals of facets give the axis to some degrees; nodes on the wall give it to rounding. Gauss
+    and Newton's steps for the distances of the nodes from the wall start where the normals lead,
+    and are given up where they lead away.
+    """
+    middle = nodes.mean(axis=0)
+    nodes = nodes - middle
+    through = axes[:, 1:] @ ((through - middle) @ axes[:, 1:])
+    start, best = (through, axes, radius), _distances(nodes, through, axes, radius)
+    length = max(float(np.ptp(nodes @ axes[:, 0])), 1e-9 * radius)
+    for _ in range(_STEPS):
+        arm = (nodes - through) @ axes
+        away = np.maximum(np.linalg.norm(arm[:, 1:], axis=1), 1e-300)[:, None]
+        radial = arm[:, 1:] / away
+        # Unknowns, all in mm: shift across the axis, its tilt over the wall's length, radius.
+        system = np.column_stack([radial, radial * arm[:, :1] / length, np.ones(len(nodes))])
+        step = np.linalg.lstsq(system, away[:, 0] - radius, rcond=1e-6)[0]
+        through = through + axes[:, 1:] @ step[:2]
+        radius = radius + float(step[4])
+        turned = np.column_stack([axes[:, 0] + axes[:, 1:] @ step[2:4] / length, axes[:, 1:]])
+        axes = np.linalg.qr(turned)[0]
+    if not _distances(nodes, through, axes, radius) <= best:
+        through, axes, radius = start
+    return middle + through, axes, radius
+
+
+def _distances(nodes: FloatArray, through: FloatArray, axes: FloatArray, radius: float) -> float:
+    """Sum of squared distances of nodes from a cylinder."""
+    arm = np.linalg.norm((nodes - through) @ axes[:, 1:], axis=1)
+    return float(((arm - radius) ** 2).sum())
 
 
 def _numbers(place: FloatArray) -> str:
