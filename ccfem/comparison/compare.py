@@ -322,7 +322,7 @@ def compare(
     solved, seconds = _solved(case, strand, load_case, backend, stress, progress)
     with timed(seconds, "slice"):
         stack, below = solved.cut(slicer, support)
-    part = solved.part(stack, below)
+    part = solved.part(stack, below, slicer)
     tell = counted(progress, 0.1, (5 if print_plans else 4) * len(strategies) + 1)
     runs = [
         Run(name, one.on(stack) if isinstance(one, GivenPaths) else one, Toolpaths.empty(), None)

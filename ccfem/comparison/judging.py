@@ -26,7 +26,7 @@ from ccfem.errors import InputError
 from ccfem.fibre_aware.cases_bound import CasesBound, cases_bound
 from ccfem.fibre_aware.upper_bound import UpperBound, upper_bound
 from ccfem.layers import Layer
-from ccfem.layers.slicer import Slicer
+from ccfem.layers.slicer import Slicer, slicer_remarks
 from ccfem.layers.slicing.planar import Planar
 from ccfem.planning.given_paths import GivenPaths
 from ccfem.support import SupportLayers, slice_with_support
@@ -102,12 +102,18 @@ class Solved:
             )
         return stack, below
 
-    def part(self, layers: Sequence[Layer], support: SupportLayers | None = None) -> Part:
-        """Return what all runs on a stack of layers share."""
+    def part(
+        self,
+        layers: Sequence[Layer],
+        support: SupportLayers | None = None,
+        slicer: Slicer | None = None,
+    ) -> Part:
+        """Return what all runs on a stack of layers share, by the part's own slicer or another."""
         strand = None if self.tests is None else self.tests.strand
         case = self.case
         stack, cases = tuple(layers), self.cases
-        return Part(self.planned_on, stack, case.machine, strand, case.build, cases, support)
+        said = slicer_remarks(case.slicing if slicer is None else slicer, self.planned_on)
+        return Part(self.planned_on, stack, case.machine, strand, case.build, cases, support, said)
 
 
 def judged(
@@ -166,7 +172,18 @@ def judged(
     case, field, given = solved.case, solved.field, solved.given
     stack, cases = part.layers, solved.cases
     return Comparison(
-        case, field, stack, tuple(runs), wanted, seconds, bound, given, along, cases, together
+        case,
+        field,
+        stack,
+        tuple(runs),
+        wanted,
+        seconds,
+        bound,
+        given,
+        along,
+        cases,
+        together,
+        part.remarks,
     )
 
 

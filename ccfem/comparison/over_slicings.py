@@ -61,8 +61,9 @@ def over_slicings(
     """
     case = solved.case
     with timed(seconds, "slice"):
-        stacks, refused = _stacks(solved, _as_thick(solved, slicings))
-    parts = {name: solved.part(layers) for name, layers in stacks.items()}
+        slicers = _as_thick(solved, slicings)
+        stacks, refused = _stacks(solved, slicers)
+    parts = {name: solved.part(layers, slicer=slicers[name]) for name, layers in stacks.items()}
     tell = counted(progress, 0.1, 4 * len(strategies) * len(parts) + 1)
     bare = [Run(name, each, Toolpaths.empty(), None) for name, each in strategies.items()]
     planned_runs, length = _planned(bare, parts, fibre, natural_amounts, tell)

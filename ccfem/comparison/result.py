@@ -59,6 +59,8 @@ class Comparison:
         weight, the first of several.
     cases_bound : CasesBound, optional
         What no paths can exceed in all load cases together.
+    of_slicer : tuple of str
+        Remarks of the slicer, one line each.
     curve : Curve, optional
         The strategies at several lengths of fibre, if that was asked for, or if a strategy cannot
         lay the length of the others.
@@ -75,6 +77,7 @@ class Comparison:
     curve: Curve | None = None
     cases: WeightedCases | None = None
     cases_bound: CasesBound | None = None
+    of_slicer: tuple[str, ...] = ()
 
     @property
     def planned_on(self) -> PartStress:
@@ -166,6 +169,7 @@ class Comparison:
         """Remarks to be shown with the numbers, one line each."""
         found = remarks(self.runs, self.fibre_per_layer, self.bound)
         found += open_remarks(self.succeeded, self.layers, self.case.machine.fibre_width)
+        found += self.of_slicer
         if self.case.fibre is not None:
             found.insert(0, f"fibre on {len(self.layers)} layers: {self.case.fibre.about()}")
         if self.cases is not None:

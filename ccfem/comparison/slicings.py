@@ -134,6 +134,9 @@ class SlicingComparison:
     def remarks(self) -> list[str]:
         """Remarks that must be shown with the numbers, one line each."""
         found = [f"{name}: cannot cut the part: {why}" for name, why in self.refused.items()]
+        found += [
+            f"{name}: {line}" for name, each in self.slicings.items() for line in each.of_slicer
+        ]
         thick = ", ".join(f"{name} {_stack(each)}" for name, each in self.slicings.items())
         chosen = next(iter(self.slicings.values())).case.fibre
         if chosen is not None:

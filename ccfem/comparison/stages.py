@@ -83,6 +83,7 @@ class Part:
     """Data shared by all runs: stress, layers, their support, machine and strand.
 
     With `cases`, paths are planned for and tested under all of them; the stress is that of one.
+    `remarks` are those of the slicer.
     """
 
     stress: PartStress
@@ -92,6 +93,7 @@ class Part:
     build: tuple[float, float, float] | None = None
     cases: WeightedCases | None = None
     support: SupportLayers | None = None
+    remarks: tuple[str, ...] = ()
 
 
 def planned(

@@ -13,7 +13,7 @@ from ccfem.arrays import BoolArray, FloatArray, IntArray, freeze
 from ccfem.checks import check_number
 from ccfem.mesh.facets import facet_keys
 
-__all__ = ["FEATURE_ANGLE", "Face", "given_faces", "smooth_faces"]
+__all__ = ["FEATURE_ANGLE", "Face", "fitted_cylinder", "given_faces", "smooth_faces"]
 
 FEATURE_ANGLE = 30.0
 """Angle between facets, degrees, from which an edge separates two faces."""
@@ -270,7 +270,7 @@ def _cylinder(surface: _Surface, rows: IntArray) -> Face | None:
     radius = float(np.sqrt(max(constant + np.dot(middle, middle), 0.0)))
     if rank < 3 or not radius > 0.0:
         return None
-    through, axes, radius = _fitted(
+    through, axes, radius = fitted_cylinder(
         surface.points[nodes], axes[:, 1:] @ (shift + middle), axes, radius
     )
     arm = (surface.points[nodes] - through) @ axes[:, 1:]
@@ -291,14 +291,15 @@ def _cylinder(surface: _Surface, rows: IntArray) -> Face | None:
     return Face(rows, "cylinder", float(area.sum()), centre, axis, radius, inward, degrees)
 
 
-def _fitted(
+def fitted_cylinder(
     nodes: FloatArray, through: FloatArray, axes: FloatArray, radius: float
 ) -> tuple[FloatArray, FloatArray, float]:
-    """Point of the axis, axes with that of the cylinder first, and radius: nearest to the nodes.
+    """Fit a cylinder to nodes (n, 3), mm, by least squares of their distances from it.
 
-    Normals of facets give the axis to some degrees; nodes on the wall give it to rounding. Gauss
-    and Newton's steps for the distances of the nodes from the wall start where the normals lead,
-    and are given up where they lead away.
+    Returns a point of its axis, axes (3, 3) as columns with that of the cylinder first, and its
+    radius, from a first guess of them. Normals of facets give the axis to some degrees; nodes on
+    the wall give it to rounding. Gauss and Newton's steps for the distances of the nodes start
+    where the normals lead, and are given up where they lead away.
     """
     middle = nodes.mean(axis=0)
     nodes = nodes - middle
