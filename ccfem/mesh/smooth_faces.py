@@ -13,7 +13,15 @@ from ccfem.arrays import BoolArray, FloatArray, IntArray, freeze
 from ccfem.checks import check_number
 from ccfem.mesh.facets import facet_keys
 
-__all__ = ["FEATURE_ANGLE", "Face", "fitted_cylinder", "given_faces", "smooth_faces"]
+__all__ = [
+    "FEATURE_ANGLE",
+    "Face",
+    "direction_text",
+    "fitted_cylinder",
+    "given_faces",
+    "place_text",
+    "smooth_faces",
+]
 
 FEATURE_ANGLE = 30.0
 """Angle between facets, degrees, from which an edge separates two faces."""
@@ -91,25 +99,29 @@ class Face:
     @property
     def about(self) -> str:
         """One phrase: what it is, how large, and where."""
-        at = _numbers(self.centre)
         if self.kind == "cylinder":
+            return self.shape
+        normal = f", normal {self.along}" if self.kind == "plane" else ""
+        at = place_text(self.centre, 4)
+        what = "plane" if normal else "face"
+        return f"{what} of {self.area:.4g} mm^2{normal}, centre {at}"
+
+    @property
+    def shape(self) -> str:
+        """One phrase: what it is."""
+        if self.kind == "cylinder":
+            at = place_text(self.centre, 4)
             what = "wall of a hole" if self.hollow else "wall of a pin"
             if self.turn < 180.0:
                 what = "hollow round" if self.hollow else "outer round"
             part = "" if self.turn > 359.0 else f", {self.turn:.0f} degrees of it"
             return f"{what} of radius {self.radius:.3g} mm{part}, axis {self.along} through {at}"
-        if self.kind == "plane":
-            return f"plane of {self.area:.4g} mm^2, normal {self.along}, centre {at}"
-        return f"face of {self.area:.4g} mm^2, centre {at}"
+        return f"plane, normal {self.along}" if self.kind == "plane" else "free-form face"
 
     @property
     def along(self) -> str:
         """Direction as a part file has it: x, -y, or three numbers."""
-        for name, axis in zip("xyz", np.eye(3), strict=True):
-            cosine = float(self.direction @ axis)
-            if abs(cosine) > 1.0 - 1e-6:
-                return name if cosine > 0.0 else f"-{name}"
-        return "[" + ", ".join(f"{x:.4g}" for x in np.round(self.direction, 5) + 0.0) + "]"
+        return direction_text(self.direction)
 
 
 def smooth_faces(
@@ -328,6 +340,15 @@ def _distances(nodes: FloatArray, through: FloatArray, axes: FloatArray, radius:
     return float(((arm - radius) ** 2).sum())
 
 
-def _numbers(place: FloatArray) -> str:
+def direction_text(direction: FloatArray) -> str:
+    """Write a unit vector as a part file has it: x, -y, or three numbers."""
+    for name, axis in zip("xyz", np.eye(3), strict=True):
+        cosine = float(direction @ axis)
+        if abs(cosine) > 1.0 - 1e-6:
+            return name if cosine > 0.0 else f"-{name}"
+    return "[" + ", ".join(f"{x:.4g}" for x in np.round(direction, 5) + 0.0) + "]"
+
+
+def place_text(place: FloatArray, digits: int = 8) -> str:
     """Write a place, mm, as a part file has it."""
-    return "[" + ", ".join(f"{x:.4g}" for x in np.round(place, 4) + 0.0) + "]"
+    return "[" + ", ".join(f"{x:.{digits}g}" for x in np.round(place, 4) + 0.0) + "]"
