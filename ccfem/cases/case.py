@@ -17,7 +17,7 @@ from ccfem.layers.slicer import Slicer
 from ccfem.layers.slicing.planar import Planar
 from ccfem.machine.machine import Machine
 from ccfem.materials import printed_pla
-from ccfem.mesh.body_faces import BodyFaces
+from ccfem.mesh.face_places import BodyFaces
 from ccfem.mesh.tet_mesh import TetMesh
 from ccfem.placement.fibre_places import FibrePlaces
 

@@ -14,8 +14,8 @@ from ccfem.errors import InputError, Mistakes
 from ccfem.io import Surface, read_mesh
 from ccfem.io.toml import from_table
 from ccfem.io.whole import existing_file
-from ccfem.mesh.body_faces import BodyFaces
 from ccfem.mesh.check import check_mesh
+from ccfem.mesh.face_places import BodyFaces
 from ccfem.mesh.face_rules import numbered_faces
 from ccfem.mesh.smooth_faces import FEATURE_ANGLE
 from ccfem.mesh.tet_mesh import TetMesh

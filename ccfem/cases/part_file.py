@@ -263,7 +263,7 @@ from ccfem.layers.slicer import Slicer
 from ccfem.machine.machine import Machine
 from ccfem.machine.named_machines import machine_from
 from ccfem.materials import Material
-from ccfem.mesh.body_faces import BodyFaces
+from ccfem.mesh.face_places import BodyFaces
 from ccfem.mesh.face_rules import Faces, Holes, OnBody, numbered_faces, without_faces
 from ccfem.mesh.patch_findings import about_patches
 from ccfem.mesh.patches import PatchRule, patches_from_rules, unit_vector

@@ -12,7 +12,7 @@ from ccfem.errors import InputError
 from ccfem.inspection.body_faces import faces as faces_of
 from ccfem.io.surface import is_surface
 from ccfem.io.whole import existing_file, whole_file
-from ccfem.mesh.body_faces import BodyFaces
+from ccfem.mesh.face_places import BodyFaces
 from ccfem.mesh.smooth_faces import Face, direction_text, place_text
 from ccfem.meshing.cad import is_cad
 

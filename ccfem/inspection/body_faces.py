@@ -9,7 +9,7 @@ from ccfem.cases.reading import read
 from ccfem.errors import InputError
 from ccfem.io.mesh_file import read_mesh
 from ccfem.io.surface import is_surface
-from ccfem.mesh.body_faces import BodyFaces
+from ccfem.mesh.face_places import BodyFaces
 from ccfem.mesh.face_rules import numbered_faces
 from ccfem.mesh.smooth_faces import FEATURE_ANGLE
 from ccfem.meshing import faces_of_body

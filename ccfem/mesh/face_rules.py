@@ -8,8 +8,8 @@ import numpy as np
 from ccfem.arrays import FloatArray, IntArray
 from ccfem.checks import check_fields
 from ccfem.errors import InputError
-from ccfem.mesh.body_faces import BodyFaces
 from ccfem.mesh.face_names import number_of_face
+from ccfem.mesh.face_places import BodyFaces
 from ccfem.mesh.facets import are_among
 from ccfem.mesh.patches import Bounded, Vector, unit_vector
 from ccfem.mesh.smooth_faces import FEATURE_ANGLE, Face, given_faces, smooth_faces

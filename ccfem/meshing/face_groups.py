@@ -6,8 +6,8 @@ from dataclasses import replace
 import numpy as np
 
 from ccfem.io.surface import Surface, read_surface
-from ccfem.mesh.body_faces import BodyFaces
 from ccfem.mesh.face_names import face_name
+from ccfem.mesh.face_places import BodyFaces
 from ccfem.mesh.smooth_faces import FEATURE_ANGLE, given_faces, smooth_faces
 from ccfem.mesh.tet_mesh import TetMesh
 from ccfem.meshing.cad import is_cad, read_cad
