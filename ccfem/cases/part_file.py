@@ -417,8 +417,8 @@ def _on_body(
     Numbers of a CAD file are those of its groups: it is read for places alone.
     """
     faces = {name: rule for name, rule in rules.items() if isinstance(rule, Faces)}
-    by_face = (*faces.values(), *(rule for rule in rules.values() if isinstance(rule, Holes)))
-    angles = {rule.angle for rule in by_face} or {FEATURE_ANGLE}
+    angles = {rule.angle for rule in rules.values() if isinstance(rule, Faces | Holes)}
+    angles = angles or {FEATURE_ANGLE}
     if part.surface is None:
         return dict(rules), FEATURE_ANGLE
     if len(angles) > 1:

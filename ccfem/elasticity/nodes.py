@@ -70,14 +70,14 @@ def nearest_node(mesh: CellMesh | LoadedBody, point: Sequence[float], what: str)
     return node
 
 
-def facet_normals(mesh: LoadedBody, facets: IntArray, nodes: IntArray) -> FloatArray:
+def facet_normals(mesh: LoadedBody, facets: IntArray, nodes: IntArray | FloatArray) -> FloatArray:
     """Outward unit normals (k, q, 3) at nodes (k, q) of facets (k, 3), or places (k, q, 3), mm.
 
     On round walls they are those of the cylinder that the nodes lie on: the normals of its facets
     are off by degrees, which holds a part against turning on a bore. Elsewhere those of the facets.
     """
     _, normal = mesh.facet_areas(facets)
-    places = mesh.points[nodes] if nodes.ndim == 2 else nodes
+    places: FloatArray = mesh.points[nodes] if nodes.ndim == 2 else nodes
     result = np.repeat(normal[:, None], places.shape[1], axis=1)
     rows = np.arange(len(facets))
     for angle in (_COARSE, FEATURE_ANGLE):

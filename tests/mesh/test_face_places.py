@@ -6,6 +6,7 @@ import numpy as np
 import pytest
 import shapely
 
+from ccfem.cases.part_file import read_part
 from ccfem.errors import InputError
 from ccfem.inspection import faces
 from ccfem.io import write_mesh
@@ -163,3 +164,51 @@ def test_a_mesh_lists_the_faces_of_its_body(coarse, tmp_path):
 def write(mesh: TetMesh, folder):
     write_mesh(replace(mesh, patches={}), folder / "bare.npz")
     return folder / "bare.npz"
+
+
+PART = """surface = "plate.stl"
+edge_length = 4.0
+material = "pla"
+[patches.foot]
+rule = "face"
+at = [40, 40, 0]
+normal = "-z"
+[patches.bolt]
+rule = "face"
+at = [14, 10, 3]
+axis = "z"
+radius = 4.0
+[[supports]]
+patch = "foot"
+[[loads.pull]]
+kind = "force"
+patch = "bolt"
+vector = [0, 0, 1]
+"""
+
+
+def test_a_part_file_says_before_meshing_where_its_face_is_no_more(coarse, tmp_path):
+    pyvista = pytest.importorskip("pyvista")
+    used, rows = np.unique(coarse.boundary, return_inverse=True)
+    shell = pyvista.PolyData.from_regular_faces(coarse.points[used], rows.reshape(-1, 3))
+    shell.save(tmp_path / "plate.stl")
+    path = tmp_path / "part.toml"
+    # The listing needs the body alone, and has its numbers.
+    path.write_text(PART)
+    listed = faces(path)
+    assert [face.about for face in listed.faces] == [
+        face.about for face in faces(tmp_path / "plate.stl").faces
+    ]
+    for old, new, expected in (
+        ("[14, 10, 3]", "[14, 16, 3]", r"patch 'bolt': no round wall of radius 4 mm.*face \d+, "),
+        ("radius = 4.0", "radius = 3.0", "patch 'bolt': no round wall of radius 3 mm"),
+        ('"-z"', '"-z"\nangle = 20.0', "need one feature angle; got 20, 30 degrees"),
+        ('at = [40, 40, 0]\nnormal = "-z"', "number = 19", "'foot': the part has 18 faces; got"),
+        ("4.0\nmat", "400.0\nmat", "edge length must be below 100"),
+    ):
+        assert old in PART
+        path.write_text(PART.replace(old, new))
+        with pytest.raises(InputError, match=expected) as caught:
+            read_part(path)
+        assert str(caught.value).startswith(str(path))
+        assert len(caught.value.mistakes) == 1
