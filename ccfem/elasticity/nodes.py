@@ -70,14 +70,13 @@ def nearest_node(mesh: CellMesh | LoadedBody, point: Sequence[float], what: str)
     return node
 
 
-def facet_normals(mesh: LoadedBody, facets: IntArray, nodes: IntArray | FloatArray) -> FloatArray:
-    """Outward unit normals (k, q, 3) at nodes (k, q) of facets (k, 3), or places (k, q, 3), mm.
+def facet_normals(mesh: LoadedBody, facets: IntArray, places: FloatArray) -> FloatArray:
+    """Outward unit normals (k, q, 3) of facets (k, 3) at places on them (k, q, 3), mm.
 
-    On round walls they are those of the cylinder that the nodes lie on: the normals of its facets
+    On round walls they are those of the cylinder that their nodes lie on: the normals of its facets
     are off by degrees, which holds a part against turning on a bore. Elsewhere those of the facets.
     """
     _, normal = mesh.facet_areas(facets)
-    places: FloatArray = mesh.points[nodes] if nodes.ndim == 2 else nodes
     result = np.repeat(normal[:, None], places.shape[1], axis=1)
     rows = np.arange(len(facets))
     for angle in (_COARSE, FEATURE_ANGLE):
@@ -97,7 +96,7 @@ def patch_normals(mesh: LoadedBody, facets: IntArray, nodes: IntArray) -> FloatA
     """Average unit normals (k, 3) at nodes of facets, weighted by the areas of the facets."""
     area, _ = mesh.facet_areas(facets)
     all_nodes = mesh.facet_nodes(facets)
-    weighted = area[:, None, None] * facet_normals(mesh, facets, all_nodes)
+    weighted = area[:, None, None] * facet_normals(mesh, facets, mesh.points[all_nodes])
     total = np.zeros(mesh.points.shape)
     np.add.at(total, all_nodes, weighted)
     size = np.linalg.norm(total[nodes], axis=1)

@@ -43,7 +43,7 @@ def soft_holds(
     if isinstance(support, Foundation):
         # At the corners of each facet, since directions differ between them on a curved patch.
         facets = patch_facets(surface, support.patch)
-        across = _across(facet_normals(surface, facets, facets).reshape(-1, 3))
+        across = _across(facet_normals(surface, facets, surface.points[facets]).reshape(-1, 3))
         chosen = [across[:, 0]] if support.normal > 0.0 else []
         chosen += [across[:, 1], across[:, 2]] if support.tangential > 0.0 else []
         return [(facets.reshape(-1), held) for held in chosen]
@@ -88,7 +88,7 @@ def _elements(mesh: LoadedBody, support: Soft) -> tuple[IntArray, FloatArray]:
         blocks = np.einsum("k,ab,ij->kaibj", area, shapes, bed)
     else:
         # Across and along the bed at each node, interpolated between them.
-        normal = facet_normals(mesh, facets, nodes)
+        normal = facet_normals(mesh, facets, mesh.points[nodes])
         along = np.eye(3) - normal[..., :, None] * normal[..., None, :]
         bed = support.normal * np.einsum("kai,kbj->kabij", normal, normal)
         bed += support.tangential * np.einsum("kail,kblj->kabij", along, along)

@@ -204,7 +204,7 @@ def test_a_part_file_says_before_meshing_where_its_face_is_no_more(coarse, tmp_p
         ("radius = 4.0", "radius = 3.0", "patch 'bolt': no round wall of radius 3 mm"),
         ('"-z"', '"-z"\nangle = 20.0', "need one feature angle; got 20, 30 degrees"),
         ('at = [40, 40, 0]\nnormal = "-z"', "number = 19", "'foot': the part has 18 faces; got"),
-        ("4.0\nmat", "400.0\nmat", "edge length must be below 100"),
+        ("4.0\nmat", "400.0\nmat", "edge length must be above 0 and below 100"),
     ):
         assert old in PART
         path.write_text(PART.replace(old, new))
