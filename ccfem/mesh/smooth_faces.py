@@ -1,7 +1,7 @@
 """Smooth faces of a boundary, as a designer sees them: planes, round walls, others."""
 
 from collections.abc import Iterable
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import Literal
 
 import numpy as np
@@ -36,6 +36,9 @@ _STRAIGHT = 0.15
 turn has 0.05. What is a cone or a torus is told by the distance of its nodes."""
 _COLUMNS = 4
 """Places round the axis at which a wall has nodes, at least: three lie on a circle anyway."""
+_EXACT, _MANY, _ALIKE = 5e-3, 12, 0.97
+"""Largest distance of the nodes of a cone or a sphere from it, in radii, their least number, and
+least mean cosine between its normals and those of its facets: a free-form face is neither."""
 _STEPS = 4
 """Steps towards the nearest cylinder: each doubles the digits."""
 _CLOSED = 0.02
@@ -56,45 +59,51 @@ class Face:
     ----------
     facets : (k,) int array
         Rows of the triangles that were given.
-    kind : {"plane", "cylinder", "other"}
+    kind : {"plane", "cylinder", "cone", "sphere", "other"}
     area : float, mm^2
     centre : (3,) array, mm
-        Of the area; of a cylinder, the point of its axis at the middle of its length.
+        Of the area; of a cylinder, the point of its axis at the middle of its length; of a cone, a
+        point of its axis; of a sphere, its centre.
     direction : (3,) array
         Of length 1: the outward normal of a plane, the axis of a cylinder (its first component
-        that is not zero is positive), the mean normal of another face (zero where it closes).
+        that is not zero is positive) or a cone, the mean normal of another face (zero where it
+        closes, and of a sphere).
     radius : float, mm
-        Of a cylinder; NaN for other faces.
+        Of a cylinder, of a sphere, of a cone at its centre; NaN for other faces.
     hollow : bool
-        Whether a cylinder is the wall of a hole, not of a pin.
+        Whether a round face is the wall of a hole, not of a pin.
     turn : float, degrees
         How far a cylinder goes round its axis: 360 for a whole wall; NaN for other faces.
+    slope : float
+        Growth of the radius of a cone along its direction; 0 for other faces.
     """
 
     facets: IntArray
-    kind: Literal["plane", "cylinder", "other"]
+    kind: Literal["plane", "cylinder", "cone", "sphere", "other"]
     area: float
     centre: FloatArray
     direction: FloatArray
     radius: float = np.nan
     hollow: bool = False
     turn: float = np.nan
+    slope: float = 0.0
 
     def __post_init__(self) -> None:
         freeze(self, facets=int, centre=float, direction=float)
 
     def normals_at(self, places: FloatArray) -> FloatArray | None:
-        """Outward unit normals (k, 3) of a cylinder at places (k, 3), mm, on it or near it.
+        """Outward unit normals (k, 3) of a round face at places (k, 3), mm, on it or near it.
 
-        They are radial, wherever a place lies between the axis and the wall, as the middle of a
-        chord does. None for a face of another kind.
+        They point from the axis or the centre, wherever a place lies between it and the wall, as
+        the middle of a chord does. None for a face that is not round.
         """
-        if self.kind != "cylinder":
+        if self.kind not in ("cylinder", "cone", "sphere"):
             return None
         arm = places - self.centre
         arm -= np.outer(arm @ self.direction, self.direction)
-        length = np.maximum(np.linalg.norm(arm, axis=1), 1e-300)[:, None]
-        return np.asarray((-arm if self.hollow else arm) / length)
+        radial = arm / np.maximum(np.linalg.norm(arm, axis=1), 1e-300)[:, None]
+        normal = (radial - self.slope * self.direction) / np.hypot(1.0, self.slope)
+        return np.asarray(-normal if self.hollow else normal)
 
     @property
     def about(self) -> str:
@@ -103,7 +112,7 @@ class Face:
             return self.shape
         normal = f", normal {self.along}" if self.kind == "plane" else ""
         at = place_text(self.centre, 4)
-        what = "plane" if normal else "face"
+        what = {"other": "face"}.get(self.kind, self.kind)
         return f"{what} of {self.area:.4g} mm^2{normal}, centre {at}"
 
     @property
@@ -116,6 +125,14 @@ class Face:
                 what = "hollow round" if self.hollow else "outer round"
             part = "" if self.turn > 359.0 else f", {self.turn:.0f} degrees of it"
             return f"{what} of radius {self.radius:.3g} mm{part}, axis {self.along} through {at}"
+        if self.kind == "sphere":
+            at = place_text(self.centre, 4)
+            hollow = "hollow " if self.hollow else ""
+            return f"{hollow}sphere of radius {self.radius:.3g} mm about {at}"
+        if self.kind == "cone":
+            half = np.degrees(np.arctan(abs(self.slope)))
+            hollow = "hollow " if self.hollow else ""
+            return f"{hollow}cone of half angle {half:.3g} degrees, axis {self.along}"
         return f"plane, normal {self.along}" if self.kind == "plane" else "free-form face"
 
     @property
@@ -263,7 +280,9 @@ def _face(surface: _Surface, rows: IntArray) -> Face:
             return Face(rows, "plane", total, centre, direction)
     if total == 0.0:  # triangles whose corners lie on a line
         return Face(rows, "other", total, centre, direction)
-    return _cylinder(surface, rows) or Face(rows, "other", total, centre, direction)
+    # Two rings of nodes lie on a sphere too: of facets between them a cone has the normals.
+    round_face = _cylinder(surface, rows) or _cone(surface, rows) or _sphere(surface, rows)
+    return round_face or Face(rows, "other", total, centre, direction)
 
 
 def _cylinder(surface: _Surface, rows: IntArray) -> Face | None:
@@ -303,6 +322,64 @@ def _cylinder(surface: _Surface, rows: IntArray) -> Face | None:
     return Face(rows, "cylinder", float(area.sum()), centre, axis, radius, inward, degrees)
 
 
+def _sphere(surface: _Surface, rows: IntArray) -> Face | None:
+    """Face of triangles that lie on a sphere; None where they do not."""
+    nodes = surface.points[np.unique(surface.triangles[rows])]
+    if len(nodes) < _MANY:
+        return None
+    shift = nodes.mean(axis=0)
+    # The sphere |p|^2 = 2 m p + c through the nodes, by least squares.
+    system = np.column_stack([2.0 * (nodes - shift), np.ones(len(nodes))])
+    (*middle, constant), _, rank, _ = np.linalg.lstsq(system, ((nodes - shift) ** 2).sum(axis=1))
+    radius = float(np.sqrt(max(constant + np.dot(middle, middle), 0.0)))
+    centre = shift + middle
+    off = np.abs(np.linalg.norm(nodes - centre, axis=1) - radius).max()
+    if rank < 4 or not off <= _EXACT * radius:
+        return None
+    return _agreeing(surface, Face(rows, "sphere", 0.0, centre, np.zeros(3), radius))
+
+
+def _cone(surface: _Surface, rows: IntArray) -> Face | None:
+    """Face of triangles that lie on a cone; None where they do not."""
+    area, normal = surface.area[rows], surface.normal[rows]
+    nodes = surface.points[np.unique(surface.triangles[rows])]
+    if len(nodes) < _MANY:
+        return None
+    # The normals make one angle with the axis.
+    away = normal - area @ normal / area.sum()
+    spread, axes = np.linalg.eigh((area * away.T) @ away / area.sum())
+    if spread[0] > _STRAIGHT**2 or spread[1] < 1e-3:
+        return None
+    origin = nodes.mean(axis=0)
+    height, *plane = ((nodes - origin) @ axes).T
+    # (x - m)^2 + (y - n)^2 = (r + k h)^2 is linear in m, n, r^2 - m^2 - n^2, r k and k^2.
+    system = np.column_stack([*(2.0 * x for x in plane), np.ones(len(nodes)), height, height**2])
+    x, y, constant, mixed, _ = np.linalg.lstsq(system, plane[0] ** 2 + plane[1] ** 2)[0]
+    radius = float(np.sqrt(max(constant + x**2 + y**2, 0.0)))
+    if not radius > 0.0:
+        return None
+    through = origin + axes[:, 1:] @ np.array([x, y])
+    slope = 0.5 * float(mixed) / radius
+    through, axes, radius, slope = _revolved(nodes, through, axes, radius, slope)
+    arm = (nodes - through) @ axes
+    distance = np.linalg.norm(arm[:, 1:], axis=1)
+    if not np.abs(distance - radius - slope * arm[:, 0]).max() <= _EXACT * distance.max():
+        return None
+    return _agreeing(surface, Face(rows, "cone", 0.0, through, axes[:, 0], radius, slope=slope))
+
+
+def _agreeing(surface: _Surface, face: Face) -> Face | None:
+    """Face with its area and its side, where normals of its facets are those of its shape."""
+    area, normal = surface.area[face.facets], surface.normal[face.facets]
+    places = surface.points[surface.triangles[face.facets]].mean(axis=1)
+    exact = face.normals_at(places)
+    assert exact is not None
+    along = float(area @ np.einsum("ij,ij->i", exact, normal)) / float(area.sum())
+    if abs(along) < _ALIKE:
+        return None
+    return replace(face, area=float(area.sum()), hollow=along < 0.0)
+
+
 def fitted_cylinder(
     nodes: FloatArray, through: FloatArray, axes: FloatArray, radius: float
 ) -> tuple[FloatArray, FloatArray, float]:
@@ -313,31 +390,49 @@ def fitted_cylinder(
     the wall give it to rounding. Gauss and Newton's steps for the distances of the nodes start
     where the normals lead, and are given up where they lead away.
     """
+    return _revolved(nodes, through, axes, radius)[:3]
+
+
+def _revolved(
+    nodes: FloatArray,
+    through: FloatArray,
+    axes: FloatArray,
+    radius: float,
+    slope: float | None = None,
+) -> tuple[FloatArray, FloatArray, float, float]:
+    """Fit a cylinder, or a cone from a first guess of the growth of its radius along its axis.
+
+    The radius that is returned is that at the point of the axis.
+    """
     middle = nodes.mean(axis=0)
     nodes = nodes - middle
-    through = axes[:, 1:] @ ((through - middle) @ axes[:, 1:])
-    start, best = (through, axes, radius), _distances(nodes, through, axes, radius)
+    through, conical, slope = through - middle, slope is not None, slope or 0.0
+    radius = radius - slope * float(through @ axes[:, 0])
+    through = axes[:, 1:] @ (through @ axes[:, 1:])
+
+    def distances() -> FloatArray:
+        arm = (nodes - through) @ axes
+        return np.asarray(np.linalg.norm(arm[:, 1:], axis=1) - radius - slope * arm[:, 0])
+
+    start, best = (through, axes, radius, slope), (distances() ** 2).sum()
     length = max(float(np.ptp(nodes @ axes[:, 0])), 1e-9 * radius)
     for _ in range(_STEPS):
         arm = (nodes - through) @ axes
-        away = np.maximum(np.linalg.norm(arm[:, 1:], axis=1), 1e-300)[:, None]
-        radial = arm[:, 1:] / away
-        # Unknowns, all in mm: shift across the axis, its tilt over the wall's length, radius.
-        system = np.column_stack([radial, radial * arm[:, :1] / length, np.ones(len(nodes))])
-        step = np.linalg.lstsq(system, away[:, 0] - radius, rcond=1e-6)[0]
+        radial = arm[:, 1:] / np.maximum(np.linalg.norm(arm[:, 1:], axis=1), 1e-300)[:, None]
+        # Unknowns, all in mm: shift across the axis, its tilt over the wall's length, radius, and
+        # its growth over that length.
+        height = arm[:, :1] / length
+        tilt = radial * height + slope * arm[:, 1:] / length
+        system = np.column_stack([radial, tilt, np.ones(len(nodes)), height][: 3 + conical])
+        step = np.linalg.lstsq(system, distances(), rcond=1e-6)[0]
         through = through + axes[:, 1:] @ step[:2]
-        radius = radius + float(step[4])
         turned = np.column_stack([axes[:, 0] + axes[:, 1:] @ step[2:4] / length, axes[:, 1:]])
-        axes = np.linalg.qr(turned)[0]
-    if not _distances(nodes, through, axes, radius) <= best:
-        through, axes, radius = start
-    return middle + through, axes, radius
-
-
-def _distances(nodes: FloatArray, through: FloatArray, axes: FloatArray, radius: float) -> float:
-    """Sum of squared distances of nodes from a cylinder."""
-    arm = np.linalg.norm((nodes - through) @ axes[:, 1:], axis=1)
-    return float(((arm - radius) ** 2).sum())
+        radius, slope = radius + float(step[4]), slope + float(step[5:].sum()) / length
+        axis, axes = axes[:, 0], np.linalg.qr(turned)[0]
+        axes[:, 0] *= np.sign(axes[:, 0] @ axis)
+    if not (distances() ** 2).sum() <= best:
+        through, axes, radius, slope = start
+    return middle + through, axes, radius, slope
 
 
 def direction_text(direction: FloatArray) -> str:

@@ -19,9 +19,10 @@ from ccfem.elasticity.support_kinds import (
 from ccfem.elasticity.supports import held
 from ccfem.errors import InputError
 from ccfem.materials import isotropic
-from ccfem.mesh import TetMesh
+from ccfem.mesh import TetMesh, box_mesh
 from ccfem.mesh.face_rules import Holes
 from ccfem.mesh.patches import Plane, patches_from_rules
+from ccfem.mesh.smooth_faces import smooth_faces
 from ccfem.meshing import extrude
 
 TURN = np.linalg.qr([[1.0, 2.0, 3.0], [4.0, -1.0, 2.0], [0.5, 1.0, -3.0]])[0]
@@ -103,3 +104,40 @@ def test_a_whole_tube_in_a_rigid_sleeve_is_stressed_as_lame_found():
     exact = a * (inner - outer**2 / inner)
     assert radial[inside].mean() == pytest.approx(exact, rel=0.005)
     assert np.abs(around / radius).max() < 0.02 * abs(exact)
+
+
+def seat(half: float) -> TetMesh:
+    """A washer whose bore opens upwards by a half angle, degrees, as a countersink does; turned."""
+    mesh = plate(1, 2.5, np.eye(3)).linear()
+    points = mesh.points.copy()
+    arm = points[:, :2] - CENTRE
+    away = np.linalg.norm(arm, axis=1)
+    grown = np.maximum(1.0 - (away - RADIUS) / 5.0, 0.0) * np.tan(np.radians(half)) * points[:, 2]
+    points[:, :2] += arm / away[:, None] * grown[:, None]
+    return replace(mesh, points=points @ TURN.T)
+
+
+@pytest.mark.parametrize("half", [10.0, 40.0])
+def test_a_body_on_a_conical_seat_is_free_to_turn(half):
+    mesh = seat(half)
+    (face,) = smooth_faces(mesh.points, mesh.patches["bore"])
+    assert (face.kind, face.hollow) == ("cone", True)
+    assert np.degrees(np.arctan(abs(face.slope))) == pytest.approx(half, abs=0.05)
+    problem = Problem(mesh, isotropic(100.0, 0.3), (SlidingSupport("bore"),), {}, order=1)
+    with pytest.raises(InputError, match=r"free to .*rotate about the axis through"):
+        held(problem)
+
+
+def test_a_body_in_a_spherical_socket_is_free_to_turn_every_way():
+    mesh = box_mesh((2.0, 2.0, 2.0), (5, 5, 5), (-1.0, -1.0, -1.0))
+    # Cube to ball: each shell of the cube becomes one of the ball.
+    length = np.maximum(np.linalg.norm(mesh.points, axis=1), 1e-9)
+    factor = 4.0 * np.abs(mesh.points).max(axis=1) / length
+    points = np.array([5.0, 6.0, 7.0]) + mesh.points * factor[:, None]
+    mesh = replace(mesh, points=points, patches={"ball": mesh.boundary})
+    (face,) = smooth_faces(mesh.points, mesh.boundary)
+    assert (face.kind, face.hollow) == ("sphere", False)
+    np.testing.assert_allclose([*face.centre, face.radius], [5.0, 6.0, 7.0, 4.0], rtol=1e-9)
+    problem = Problem(mesh, isotropic(100.0, 0.3), (SlidingSupport("ball"),), {}, order=1)
+    with pytest.raises(InputError, match=r"(rotate about .*){3}"):
+        held(problem)
