@@ -378,9 +378,10 @@ def _case(content: Mapping[str, Any], path: Path) -> Case:
     near = patches_of_fibre(given.fibre)
     for each in near:
         mesh.patch(each)
-    body = numbered_faces(mesh) if part.surface is not None or part.mesh is not None else None
     held = (*supports, *others, *(each for some in own.values() for each in some))
-    mesh = without_faces(mesh, (*rules, *near, *patches_in_use(held, loads)))
+    bare = without_faces(mesh, (*rules, *near, *patches_in_use(held, loads)))
+    body = numbered_faces(mesh) if len(bare.patches) < len(mesh.patches) else None
+    mesh = bare
     build, slicing, machine, material = given.whole()
     findings = (*findings, *about_patches(mesh, rules), *about_material(material))
     return Case(

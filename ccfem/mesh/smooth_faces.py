@@ -398,7 +398,7 @@ def _revolved(
     through: FloatArray,
     axes: FloatArray,
     radius: float,
-    slope: float | None = None,
+    growth: float | None = None,
 ) -> tuple[FloatArray, FloatArray, float, float]:
     """Fit a cylinder, or a cone from a first guess of the growth of its radius along its axis.
 
@@ -406,7 +406,7 @@ def _revolved(
     """
     middle = nodes.mean(axis=0)
     nodes = nodes - middle
-    through, conical, slope = through - middle, slope is not None, slope or 0.0
+    through, slope = through - middle, growth or 0.0
     radius = radius - slope * float(through @ axes[:, 0])
     through = axes[:, 1:] @ (through @ axes[:, 1:])
 
@@ -423,7 +423,9 @@ def _revolved(
         # its growth over that length.
         height = arm[:, :1] / length
         tilt = radial * height + slope * arm[:, 1:] / length
-        system = np.column_stack([radial, tilt, np.ones(len(nodes)), height][: 3 + conical])
+        system = np.column_stack(
+            [radial, tilt, np.ones(len(nodes)), height][: 3 + (growth is not None)]
+        )
         step = np.linalg.lstsq(system, distances(), rcond=1e-6)[0]
         through = through + axes[:, 1:] @ step[:2]
         turned = np.column_stack([axes[:, 0] + axes[:, 1:] @ step[2:4] / length, axes[:, 1:]])
