@@ -17,7 +17,7 @@ from ccfem.mesh.cell_mesh import CellMesh
 from ccfem.mesh.face_names import face_name
 from ccfem.mesh.patches import PatchRule, patches_from_rules
 from ccfem.mesh.shell import Shell, refined
-from ccfem.mesh.smooth_faces import smooth_faces
+from ccfem.mesh.smooth_faces import FEATURE_ANGLE, smooth_faces
 
 __all__ = ["check_before_meshing"]
 
@@ -39,8 +39,11 @@ def check_before_meshing(
     supports: tuple[AnySupport, ...],
     loads: Mapping[str, tuple[Load, ...]],
     case_supports: Mapping[str, tuple[AnySupport, ...]] = MappingProxyType({}),
+    angle: float = FEATURE_ANGLE,
 ) -> None:
     """Try rules, supports and loads on the surface, cut finer than the mesh will be.
+
+    The feature angle, degrees, is that between the faces of the surface.
 
     Raises
     ------
@@ -52,7 +55,7 @@ def check_before_meshing(
     points, triangles, origin = refined(surface.points, surface.triangles, 0.5 * edge_length)
     groups = {
         face_name(k): triangles[np.isin(origin, face.facets)]
-        for k, face in enumerate(smooth_faces(surface.points, surface.triangles), 1)
+        for k, face in enumerate(smooth_faces(surface.points, surface.triangles, angle), 1)
     }
     shell = Shell(points, triangles, groups)
     for name, rule in rules.items():

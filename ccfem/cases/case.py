@@ -17,6 +17,7 @@ from ccfem.layers.slicer import Slicer
 from ccfem.layers.slicing.planar import Planar
 from ccfem.machine.machine import Machine
 from ccfem.materials import printed_pla
+from ccfem.mesh.face_places import BodyFaces
 from ccfem.mesh.tet_mesh import TetMesh
 from ccfem.placement.fibre_places import FibrePlaces
 
@@ -61,6 +62,8 @@ class Case(Shown):
         count. Default: all load cases equally, without combinations.
     findings : tuple of str
         Problems found and repaired in a mesh from a file, one line each.
+    body : BodyFaces, optional
+        Faces of the mesh with the numbers that they have on the body it was made from.
     """
 
     name: str
@@ -75,6 +78,7 @@ class Case(Shown):
     alternative_supports: tuple[AnySupport, ...] = ()
     fibre: FibrePlaces | None = None
     weights: Mapping[str, float] = field(default_factory=dict)
+    body: BodyFaces | None = None
 
     def __repr__(self) -> str:
         return f"Case {self.name}: {self.title}"

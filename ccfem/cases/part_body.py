@@ -15,7 +15,11 @@ from ccfem.io import Surface, read_mesh
 from ccfem.io.toml import from_table
 from ccfem.io.whole import existing_file
 from ccfem.mesh.check import check_mesh
+from ccfem.mesh.face_places import BodyFaces
+from ccfem.mesh.face_rules import numbered_faces
+from ccfem.mesh.smooth_faces import FEATURE_ANGLE
 from ccfem.mesh.tet_mesh import TetMesh
+from ccfem.meshing import extrude, faces_of_body, mesh_body
 from ccfem.meshing.volume import Mesher
 
 __all__ = ["Body"]
@@ -86,12 +90,26 @@ class Body:
                     existing_file(folder / getattr(self, key), f"{key} file")
         found.complain()
 
+    def faces(self, folder: Path, angle: float = FEATURE_ANGLE) -> BodyFaces:
+        """Faces of the part, numbered on its body: of a surface before any meshing.
+
+        The feature angle is in degrees.
+        """
+        self.check(folder)
+        if self.surface is None:
+            return numbered_faces(self.read(folder)[0], angle)
+        return faces_of_body(folder / self.surface, self.scale, angle)
+
     def read(
-        self, folder: Path, before: Callable[[Surface], None] | None = None
+        self,
+        folder: Path,
+        before: Callable[[Surface], None] | None = None,
+        angle: float = FEATURE_ANGLE,
     ) -> tuple[TetMesh, tuple[str, ...]]:
         """Mesh of the part, checked, and what was found in it; files are relative to a folder.
 
-        `before` is called with a surface that has to be meshed.
+        `before` is called with a surface that has to be meshed; the feature angle between its
+        faces is in degrees.
         """
         self.check(folder)
         made: tuple[str, ...] = ()
@@ -101,10 +119,8 @@ class Body:
                 mesh = mesh.linear()
             mesh, report = check_mesh(mesh, merge=self.merge_nodes)
         elif self.surface is not None and self.edge_length is not None:
-            from ccfem.meshing import mesh_body
-
             file = folder / self.surface
-            mesh, made = mesh_body(file, self.edge_length, self.scale, self.mesher, before)
+            mesh, made = mesh_body(file, self.edge_length, self.scale, self.mesher, before, angle)
             mesh, report = check_mesh(mesh)
         else:
             mesh, report = check_mesh(_extruded(self))
@@ -155,8 +171,6 @@ class _Planform:
 
 def _extruded(body: Body) -> TetMesh:
     """Mesh of a planform."""
-    from ccfem.meshing import extrude
-
     plan = from_table(_Planform, body.planform, "planform")
     rings = []
     for k, table in enumerate(plan.holes):

@@ -97,8 +97,14 @@ them with a minus ("-z"), or three numbers.
     name = "Surface_12"
 
     [patches.bore]                    # a surface's faces also are groups: face_1, face_2, ...
-    rule = "face"                     # smooth faces by their numbers (ccfem faces BODY)
-    number = [3, 4]
+    rule = "face"                     # the smooth face at a place (ccfem faces BODY) ...
+    at = [12.5, 15, 3]                # ... a point on it, or several: [[0, 0, 0], [9, 0, 0]]
+    axis = "z"                        # axis and radius of a round wall ...
+    radius = 2.5
+    normal = "x"                      # ... or the outward normal of any other face
+    tolerance = 0.5                   # optional: how far the face may be from the point
+    number = [3, 4]                   # or faces by their numbers, which change with the body
+    angle = 30.0                      # optional: feature angle of the listing, degrees
 
     [patches.bolts]
     rule = "holes"                    # the walls of all holes of a radius
@@ -226,10 +232,10 @@ them with a minus ("-z"), or three numbers.
 """
 
 import os
-from collections.abc import Mapping
+from collections.abc import Callable, Mapping
 from dataclasses import dataclass
 from pathlib import Path
-from typing import Any
+from typing import Any, TypeVar
 
 from ccfem.arrays import FloatArray
 from ccfem.cases.before_meshing import check_before_meshing
@@ -255,12 +261,19 @@ from ccfem.layers.slicer import Slicer
 from ccfem.machine.machine import Machine
 from ccfem.machine.named_machines import machine_from
 from ccfem.materials import Material
-from ccfem.mesh.face_rules import without_faces
+from ccfem.mesh.face_places import BodyFaces
+from ccfem.mesh.face_rules import Faces, Holes, OnBody, numbered_faces, without_faces
 from ccfem.mesh.patch_findings import about_patches
-from ccfem.mesh.patches import patches_from_rules, unit_vector
+from ccfem.mesh.patches import PatchRule, patches_from_rules, unit_vector
+from ccfem.mesh.smooth_faces import FEATURE_ANGLE
+from ccfem.meshing.cad import is_cad
+from ccfem.meshing.volume import check_edge_length
 from ccfem.placement.fibre_places import FibrePlaces
 
-__all__ = ["read_part"]
+__all__ = ["faces_of_part", "read_part"]
+
+
+T = TypeVar("T")
 
 
 def read_part(path: str | os.PathLike[str]) -> Case:
@@ -281,10 +294,31 @@ def read_part(path: str | os.PathLike[str]) -> Case:
     InputError
         With the name of the file, what was expected, what came and the cure.
     """
+    return _of_file(path, _case)
+
+
+def faces_of_part(path: str | os.PathLike[str], angle: float = FEATURE_ANGLE) -> BodyFaces:
+    """Faces of a part file's body, numbered as its rules have them; only the body is read.
+
+    The feature angle is in degrees.
+
+    Raises
+    ------
+    InputError
+    """
+
+    def faces(content: Mapping[str, Any], path: Path) -> BodyFaces:
+        return _readable(content, Mistakes())[0].faces(path.parent, angle)
+
+    return _of_file(path, faces)
+
+
+def _of_file(path: str | os.PathLike[str], take: Callable[[Mapping[str, Any], Path], T]) -> T:
+    """Take something of a part file's content; the file's name is in every mistake."""
     path = Path(path)
     content = read_toml(path, "part file")
     try:
-        return _case(content, path)
+        return take(content, path)
     except InputError as error:
         raise InputError(
             *(line if str(path) in line else f"{path}: {line}" for line in error.mistakes)
@@ -323,11 +357,14 @@ def _case(content: Mapping[str, Any], path: Path) -> Case:
         part.check(path.parent)
     found.complain()
 
+    rules, angle = _on_body(rules, part, path.parent, found)
+    found.complain()
+
     def before(surface: Surface) -> None:
         assert part.edge_length is not None
-        check_before_meshing(surface, part.edge_length, rules, supports, loads, own)
+        check_before_meshing(surface, part.edge_length, rules, supports, loads, own, angle)
 
-    mesh, findings = part.read(path.parent, before)
+    mesh, findings = part.read(path.parent, before, angle)
     for each, rule in rules.items():
         with found.noted():
             mesh = patches_from_rules(mesh, {each: rule})
@@ -336,7 +373,9 @@ def _case(content: Mapping[str, Any], path: Path) -> Case:
     for each in near:
         mesh.patch(each)
     held = (*supports, *others, *(each for some in own.values() for each in some))
-    mesh = without_faces(mesh, (*rules, *near, *patches_in_use(held, loads)))
+    bare = without_faces(mesh, (*rules, *near, *patches_in_use(held, loads)))
+    body = numbered_faces(mesh) if len(bare.patches) < len(mesh.patches) else None
+    mesh = bare
     build, slicing, machine, material = given.whole()
     findings = (*findings, *about_patches(mesh, rules), *about_material(material))
     return Case(
@@ -361,7 +400,42 @@ def _case(content: Mapping[str, Any], path: Path) -> Case:
         alternative_supports=others,
         fibre=given.fibre,
         weights=weights,
+        body=body,
     )
+
+
+def _on_body(
+    rules: Mapping[str, PatchRule], part: Part, folder: Path, found: Mistakes
+) -> tuple[dict[str, PatchRule], float]:
+    """Rules for faces looked up on the surface before it is meshed, and its feature angle.
+
+    Numbers of a CAD file are those of its groups: it is read for places alone.
+    """
+    faces = {name: rule for name, rule in rules.items() if isinstance(rule, Faces)}
+    angles = {rule.angle for rule in rules.values() if isinstance(rule, Faces | Holes)}
+    angles = angles or {FEATURE_ANGLE}
+    if part.surface is None:
+        return dict(rules), FEATURE_ANGLE
+    if len(angles) > 1:
+        raise InputError(
+            "rules face and holes of one part need one feature angle; got "
+            f"{', '.join(f'{angle:g}' for angle in sorted(angles))} degrees: choose one"
+        )
+    (angle,) = angles
+    if is_cad(part.surface):
+        faces = {name: rule for name, rule in faces.items() if rule.at is not None}
+    if not faces:
+        return dict(rules), angle
+    body = part.faces(folder, angle)
+    assert part.edge_length is not None
+    check_edge_length(Surface(body.points, body.triangles), part.edge_length)
+    for name, rule in faces.items():
+        with found.noted():
+            try:
+                rule.numbers_on(body)
+            except InputError as error:
+                raise InputError(f"patch '{name}': {error}") from None
+    return {**rules, **{name: OnBody(rule, body) for name, rule in faces.items()}}, angle
 
 
 @dataclass

@@ -8,7 +8,7 @@ from rich.table import Table
 
 from ccfem.arrays import FloatArray, IntArray
 from ccfem.inspection.body_faces import faces as faces_of
-from ccfem.mesh.smooth_faces import Face
+from ccfem.mesh.smooth_faces import Face, place_text
 from ccfem.meshing.cad import is_cad
 from ccfem.plot.canvas import check_picture
 from ccfem.plot.part_views import Label, draw_part
@@ -37,12 +37,13 @@ def list_faces(body: Path, angle: float, scale: float, picture: Path) -> None:
     check_picture(picture)
     found = faces_of(body, angle, scale)
     points, triangles, faces, names = found.points, found.triangles, found.faces, found.names
-    columns = ("face", "area, mm^2", "what", "name")[: 4 if any(names) else 3]
+    columns = ("face", "area, mm^2", "at", "what", "name")[: 5 if any(names) else 4]
     table = Table(box=None, padding=(0, 2, 0, 0))
     for column in columns:
-        table.add_column(column, justify="left" if column in ("what", "name") else "right")
-    for number, face in enumerate(faces, 1):
-        row = (str(number), f"{face.area:.4g}", face.about, *names[number - 1 : number])
+        table.add_column(column, justify="right" if column in columns[:2] else "left")
+    for k, (number, face) in enumerate(zip(found.numbers, faces, strict=True)):
+        at = place_text(found.point_on(face))
+        row = (str(number), f"{face.area:.4g}", at, face.shape, *names[k : k + 1])
         table.add_row(*row[: len(columns)])
     console = Console(highlight=False, markup=False)
     console.print(table)
@@ -50,13 +51,15 @@ def list_faces(body: Path, angle: float, scale: float, picture: Path) -> None:
     for k, face in enumerate(faces):
         of[face.facets] = k
     colour = [_COLOURS[k % len(_COLOURS)] for k in of.tolist()]
-    labels = [_label(points, triangles, face, k) for k, face in enumerate(faces[:_NAMED], 1)]
+    largest = sorted(range(len(faces)), key=lambda k: -faces[k].area)[:_NAMED]
+    labels = [_label(points, triangles, faces[k], found.numbers[k]) for k in sorted(largest)]
     draw_part(points, triangles, colour, labels, picture, title=f"{body.name}: {len(faces)} faces")
     about = "" if is_cad(body) else f" at a feature angle of {angle:g} degrees"
     console.print(
         f"{len(faces)} faces{about}; picture: {picture}\n"
         + (f"warning: {found.doubt}\n" if found.doubt else "")
-        + 'in a part file: [patches.NAME] with rule = "face", number = [1, 2]; lengths are mm'
+        + 'in a part file: [patches.NAME] with rule = "face", at = [...] and normal, or axis and '
+        "radius; lengths are mm"
     )
 
 

@@ -59,7 +59,7 @@ from ccfem.errors import InputError
 from ccfem.fibre_aware.cases_bound import cases_bound
 from ccfem.fibre_aware.upper_bound import UpperBound, upper_bound
 from ccfem.io.stress_file import read_stress
-from ccfem.layers.slicer import Slicer
+from ccfem.layers.slicer import Slicer, slicer_remarks
 from ccfem.layers.slicing.planar import Planar
 from ccfem.planning.given_paths import GivenPaths
 from ccfem.planning.strategy import Strategy
@@ -151,7 +151,9 @@ class Solved:
                 "given without one: leave out support, or choose --slicing load_oriented or spatial"
             )
         strand = None if self.tests is None else self.tests.strand
-        return Part(stress, tuple(layers), case.machine, self.cases, strand, case.build, below)
+        said = slicer_remarks(chosen, stress)
+        stack = tuple(layers)
+        return Part(stress, stack, case.machine, self.cases, strand, case.build, below, said)
 
 
 def solved(request: Request, seconds: dict[str, float] | None = None) -> Solved:
@@ -258,8 +260,12 @@ def answer(
     bounds = _bounds(request, basis, parts, runs, wanted, tell, seconds)
     runs = [_bounded(run, bounds, wanted) for run in runs]
     stacks = {name: part.layers for name, part in parts.items()}
+    said = tuple(
+        f"{name}: {line}" if name else line for name, part in parts.items() for line in part.remarks
+    )
     shared = (request, basis.cases, stacks)
-    return Comparison(*shared, tuple(runs), wanted, seconds, refused, basis.given, bounds, curve)
+    results = (tuple(runs), wanted, seconds, refused, basis.given, bounds, curve, said)
+    return Comparison(*shared, *results)
 
 
 def _cut(request: Request, basis: Solved) -> tuple[dict[str, Part], dict[str, str]]:

@@ -65,6 +65,8 @@ class Comparison:
     bounds : mapping of float to UpperBound or CasesBound
         Stiffness that no paths can exceed, by the length of fibre in all, mm: the largest of the
         runs, and others where several lengths are asked for. Empty without virtual tests.
+    of_slicers : tuple of str
+        Remarks of the slicers, one line each.
     curve : Curve, optional
         The strategies at several lengths of fibre, if that was asked for, or if a strategy cannot
         lay the length of the others.
@@ -80,6 +82,7 @@ class Comparison:
     given: GivenStress | None = None
     bounds: Mapping[float, Bound] = field(default_factory=dict)
     curve: Curve | None = None
+    of_slicers: tuple[str, ...] = ()
 
     def __post_init__(self) -> None:
         freeze(self, stacks=dict, runs=tuple, seconds=dict, refused=dict, bounds=dict)
@@ -192,6 +195,7 @@ class Comparison:
                 refused={},
                 seconds={},
                 bounds={},
+                of_slicers=(),
             )
         return parts
 
@@ -271,6 +275,7 @@ class Comparison:
     def remarks(self) -> list[str]:
         """Remarks to be shown with the numbers, one line each."""
         lines = [f"{name}: cannot cut the part: {why}" for name, why in self.refused.items()]
+        lines += self.of_slicers
         if self.case.fibre is not None:
             where = "fibre" if self.over_slicings else f"fibre on {len(self.layers)} layers"
             lines.append(f"{where}: {self.case.fibre.about()}")

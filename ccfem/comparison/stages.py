@@ -95,6 +95,8 @@ class Part:
     strand : Strand, optional
     build : tuple of 3 floats, optional
     support : SupportLayers, optional
+    remarks : tuple of str
+        Of the slicer, one line each.
     """
 
     stress: PartStress
@@ -104,6 +106,7 @@ class Part:
     strand: Strand | None = None
     build: tuple[float, float, float] | None = None
     support: SupportLayers | None = None
+    remarks: tuple[str, ...] = ()
 
     @property
     def several_cases(self) -> bool:

@@ -8,8 +8,19 @@ from ccfem.arrays import FloatArray, IntArray
 from ccfem.elasticity.body import LoadedBody
 from ccfem.errors import InputError
 from ccfem.mesh.cell_mesh import CellMesh
+from ccfem.mesh.smooth_faces import FEATURE_ANGLE, smooth_faces
 
-__all__ = ["edge_nodes", "nearest_node", "patch_facets", "patch_nodes", "patch_normals"]
+__all__ = [
+    "edge_nodes",
+    "facet_normals",
+    "nearest_node",
+    "patch_facets",
+    "patch_nodes",
+    "patch_normals",
+]
+
+_COARSE = 50.0
+"""Feature angle, degrees, at which a bore of 8 facets is a round wall, and a hexagon is none."""
 
 
 def patch_facets(mesh: CellMesh | LoadedBody, name: str) -> IntArray:
@@ -59,13 +70,34 @@ def nearest_node(mesh: CellMesh | LoadedBody, point: Sequence[float], what: str)
     return node
 
 
+def facet_normals(mesh: LoadedBody, facets: IntArray, places: FloatArray) -> FloatArray:
+    """Outward unit normals (k, q, 3) of facets (k, 3) at places on them (k, q, 3), mm.
+
+    On round walls they are those of the cylinder that their nodes lie on: the normals of its facets
+    are off by degrees, which holds a part against turning on a bore. Elsewhere those of the facets.
+    """
+    _, normal = mesh.facet_areas(facets)
+    result = np.repeat(normal[:, None], places.shape[1], axis=1)
+    rows = np.arange(len(facets))
+    for angle in (_COARSE, FEATURE_ANGLE):
+        flat = []
+        for face in smooth_faces(mesh.points, facets[rows], angle):
+            chosen = rows[face.facets]
+            exact = face.normals_at(places[chosen].reshape(-1, 3))
+            if exact is None:
+                flat.append(chosen)
+            else:
+                result[chosen] = exact.reshape(-1, *result.shape[1:])
+        rows = np.concatenate([*flat, np.zeros(0, dtype=np.int64)])
+    return result
+
+
 def patch_normals(mesh: LoadedBody, facets: IntArray, nodes: IntArray) -> FloatArray:
     """Average unit normals (k, 3) at nodes of facets, weighted by the areas of the facets."""
-    area, normal = mesh.facet_areas(facets)
+    area, _ = mesh.facet_areas(facets)
     all_nodes = mesh.facet_nodes(facets)
+    weighted = area[:, None, None] * facet_normals(mesh, facets, mesh.points[all_nodes])
     total = np.zeros(mesh.points.shape)
-    for column in all_nodes.T:
-        np.add.at(total, column, area[:, None] * normal)
-    found = total[nodes]
-    size = np.linalg.norm(found, axis=1)
-    return found / np.maximum(size, 1e-300)[:, None]
+    np.add.at(total, all_nodes, weighted)
+    size = np.linalg.norm(total[nodes], axis=1)
+    return total[nodes] / np.maximum(size, 1e-300)[:, None]

@@ -6,7 +6,7 @@ import scipy.sparse as sp
 from ccfem.arrays import FloatArray, IntArray
 from ccfem.elasticity.assembly import add_blocks
 from ccfem.elasticity.body import LoadedBody, SupportedProblem
-from ccfem.elasticity.nodes import nearest_node, patch_facets, patch_nodes
+from ccfem.elasticity.nodes import facet_normals, nearest_node, patch_facets, patch_nodes
 from ccfem.elasticity.support_kinds import Foundation, PointSpring, Spring
 from ccfem.mesh.cell_mesh import CellMesh
 
@@ -43,10 +43,10 @@ def soft_holds(
     if isinstance(support, Foundation):
         # At the corners of each facet, since directions differ between them on a curved patch.
         facets = patch_facets(surface, support.patch)
-        across = _across(surface.facet_areas(facets)[1])
+        across = _across(facet_normals(surface, facets, surface.points[facets]).reshape(-1, 3))
         chosen = [across[:, 0]] if support.normal > 0.0 else []
         chosen += [across[:, 1], across[:, 2]] if support.tangential > 0.0 else []
-        return [(facets.reshape(-1), np.repeat(held, facets.shape[1], axis=0)) for held in chosen]
+        return [(facets.reshape(-1), held) for held in chosen]
     if isinstance(support, Spring):
         nodes = patch_nodes(mesh, support.patch)
     else:
@@ -80,15 +80,19 @@ def _elements(mesh: LoadedBody, support: Soft) -> tuple[IntArray, FloatArray]:
         node = nearest_node(mesh, support.point, "a spring")
         return np.array([[node]]), np.diag(support.stiffness)[None]
     facets = patch_facets(mesh, support.patch)
-    area, normal = mesh.facet_areas(facets)
-    if isinstance(support, Spring):
-        bed = np.tile(np.diag(support.stiffness) / area.sum(), (len(facets), 1, 1))
-    else:
-        outer = normal[:, :, None] * normal[:, None]
-        bed = support.normal * outer + support.tangential * (np.eye(3) - outer)
+    area, _ = mesh.facet_areas(facets)
     nodes = mesh.facet_nodes(facets)
     shapes = _LINEAR if nodes.shape[1] == 3 else _QUADRATIC
-    blocks = np.einsum("k,ab,kij->kaibj", area, shapes, bed)
+    if isinstance(support, Spring):
+        bed = np.diag(support.stiffness) / area.sum()
+        blocks = np.einsum("k,ab,ij->kaibj", area, shapes, bed)
+    else:
+        # Across and along the bed at each node, interpolated between them.
+        normal = facet_normals(mesh, facets, mesh.points[nodes])
+        along = np.eye(3) - normal[..., :, None] * normal[..., None, :]
+        bed = support.normal * np.einsum("kai,kbj->kabij", normal, normal)
+        bed += support.tangential * np.einsum("kail,kblj->kabij", along, along)
+        blocks = np.einsum("k,ab,kabij->kaibj", area, shapes, bed)
     return nodes, blocks.reshape(len(nodes), 3 * nodes.shape[1], -1)
 
 

@@ -99,7 +99,8 @@ class SlidingSupport:
     Attributes
     ----------
     patch : str
-        A plane of any orientation; on a curved patch each node slides on its own tangent plane.
+        A plane of any orientation; on a curved patch each node slides on its own tangent plane,
+        on a round wall that of the cylinder, so that it turns freely about its axis.
     normal : str or tuple of 3 floats, optional
         Direction that is held, of any length, or "x", "-z" ...; by default the outward normal of
         the patch.

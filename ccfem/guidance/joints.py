@@ -11,6 +11,7 @@ from scipy.sparse.csgraph import connected_components
 from ccfem.arrays import FloatArray, IntArray, read_only
 from ccfem.elasticity.part_stress import PartStress
 from ccfem.errors import InputError
+from ccfem.mesh.smooth_faces import fitted_cylinder
 from ccfem.mesh.tet_mesh import TetMesh
 
 __all__ = ["Joint", "joining_pairs", "joint_of", "joints_of"]
@@ -19,6 +20,10 @@ _FLAT = 0.02
 """Share of a patch's squared normals that may lie along the axis of a cylinder."""
 _ROUND = 0.05
 """Largest distance of a cylinder's nodes from its surface, in radii."""
+_ROUGH, _UNROUND = 0.1, 0.1
+"""The same share of squared normals, and median distance of the nodes, of a rough wall."""
+_ROUNDS = 20
+"""Fits of the circle of a rough wall."""
 
 
 @dataclass(frozen=True)
@@ -34,10 +39,13 @@ class Joint:
     region : (r,) int array
         Cells all of whose nodes are within a number of edges of the wall.
     direction : (3,) array or None
-        Unit vector normal to the wanted layers: the axis of the hole, or as the user specifies. Its
-        sign is arbitrary. None where the wall is no cylinder and nothing is specified.
+        Unit vector normal to the wanted layers: as the user specifies, else the axis that the rule
+        of the patch states, else that of the cylinder nearest to the wall. Its sign is arbitrary.
+        None where the wall is no cylinder and nothing is specified.
     radius : float, mm
         Of the hole; 0 where the patch is no cylinder.
+    dropped : bool
+        Whether the wall goes round an axis that it is too rough to show.
     """
 
     name: str
@@ -45,6 +53,7 @@ class Joint:
     region: IntArray
     direction: FloatArray | None
     radius: float = 0.0
+    dropped: bool = False
 
     def __post_init__(self) -> None:
         object.__setattr__(self, "wall", read_only(self.wall, np.int64))
@@ -66,7 +75,7 @@ def joint_of(
     rings : int, default 4
         Extent of its region in edges round the wall (Fang et al. 2024: 4).
     direction : (3,) array, optional
-        Replaces the axis of the hole.
+        Replaces the axis of the hole, and that which the rule of the patch states.
 
     Raises
     ------
@@ -80,12 +89,17 @@ def joint_of(
     if (found := _cylinder(mesh, facets)) is not None:
         axis, centre, radius = found
         wall = _whole_wall(mesh, wall, axis, centre, radius)
+    elif (rough := _rough_cylinder(mesh, facets)) is not None:
+        axis, radius = rough
+    if name in mesh.axes:
+        axis = mesh.axes[name] * np.sign(mesh.axes[name][np.argmax(np.abs(mesh.axes[name]))])
     if direction is not None:
         axis = np.asarray(direction, dtype=np.float64)
         if axis.shape != (3,) or not 0.0 < np.linalg.norm(axis) < np.inf:
             raise InputError(f"direction of joint '{name}' must be three numbers; got {direction}")
         axis = axis / np.linalg.norm(axis)
-    return Joint(name, wall, _cells_within(mesh, wall, rings), axis, radius)
+    dropped = axis is None and _normal_spread(mesh, facets)[0][1] >= 2.0 * _FLAT
+    return Joint(name, wall, _cells_within(mesh, wall, rings), axis, radius, dropped)
 
 
 def joints_of(
@@ -149,9 +163,7 @@ def _cylinder(mesh: TetMesh, facets: IntArray) -> tuple[FloatArray, FloatArray, 
     The axis is normal to all normals; the circle is fitted to the nodes (Kasa, IEEE Trans. Instrum.
     Meas. 25 (1976) 8-14).
     """
-    area, normal = mesh.facet_areas(facets)
-    spread = np.einsum("f,fi,fj->ij", area / area.sum(), normal, normal)
-    values, vectors = np.linalg.eigh(spread)
+    values, vectors = _normal_spread(mesh, facets)
     # For a plane the two smallest values vanish.
     if values[0] > _FLAT or values[1] < 2.0 * _FLAT:
         return None
@@ -169,6 +181,45 @@ def _cylinder(mesh: TetMesh, facets: IntArray) -> tuple[FloatArray, FloatArray, 
         return None
     axis = frame[2] * np.sign(frame[2][np.argmax(np.abs(frame[2]))])
     return axis, centre @ frame[:2], radius
+
+
+def _normal_spread(mesh: TetMesh, facets: IntArray) -> tuple[FloatArray, FloatArray]:
+    """Mean squares of the normals along three directions, ascending, and these as columns."""
+    area, normal = mesh.facet_areas(facets)
+    values, vectors = np.linalg.eigh((area / area.sum() * normal.T) @ normal)
+    return values, vectors
+
+
+def _rough_cylinder(mesh: TetMesh, facets: IntArray) -> tuple[FloatArray, float] | None:
+    """Axis and radius of a wall of voxels, or one with other facets in it; None if there is none.
+
+    The normals give a first axis. The circle is fitted again and again with less weight for nodes
+    that lie off it (Tukey's, of four median distances), then the cylinder to those near it.
+    """
+    values, vectors = _normal_spread(mesh, facets)
+    if values[0] > _ROUGH or values[1] < 2.0 * _FLAT:
+        return None
+    points = mesh.points[np.unique(facets)]
+    origin = points.mean(axis=0)
+    plane = (points - origin) @ vectors[:, 1:]
+    weight = np.ones(len(plane))
+    for _ in range(_ROUNDS):
+        root = np.sqrt(weight)[:, None]
+        system = np.column_stack([2.0 * plane, np.ones(len(plane))])
+        *centre, rest = np.linalg.lstsq(root * system, root[:, 0] * (plane**2).sum(axis=1))[0]
+        square = rest + float(np.dot(centre, centre))
+        if not square > 0.0:
+            return None
+        radius = float(np.sqrt(square))
+        off = np.abs(np.linalg.norm(plane - centre, axis=1) - radius)
+        scale = max(float(np.median(off)), 1e-9 * radius)
+        weight = np.maximum(1.0 - (off / (4.0 * scale)) ** 2, 0.0) ** 2
+    if scale > _UNROUND * radius:
+        return None
+    through = origin + vectors[:, 1:] @ centre
+    _, axes, radius = fitted_cylinder(points[weight > 0.0], through, vectors, radius)
+    axis = axes[:, 0]
+    return axis * np.sign(axis[np.argmax(np.abs(axis))]), radius
 
 
 def _whole_wall(

@@ -12,11 +12,14 @@ from ccfem.errors import InputError
 from ccfem.inspection.body_faces import faces as faces_of
 from ccfem.io.surface import is_surface
 from ccfem.io.whole import existing_file, whole_file
-from ccfem.mesh.smooth_faces import Face
+from ccfem.mesh.face_places import BodyFaces
+from ccfem.mesh.smooth_faces import Face, direction_text, place_text
 from ccfem.meshing.cad import is_cad
 
 __all__ = ["examples", "new_part", "write_example"]
 
+_PARALLEL = np.cos(np.radians(5.0))
+"""Cosine of the angle up to which planes face the same way."""
 _LISTED = 40
 """Faces that are listed in a new part file."""
 
@@ -62,33 +65,39 @@ def new_part(
     doubt = found.doubt
     if doubt:
         found = faces_of(body, scale=1000.0)
-    points, faces, names = found.points, found.faces, found.names
-    edge = float(np.linalg.norm(np.ptp(points, axis=0))) / 25.0
-    held = max(
-        range(len(faces)),
-        key=lambda k: (_faces_down(faces[k]), faces[k].area),
-    )
-    feet = _beside(faces, held, 1e-3 * 25.0 * edge)
+    faces, edge = found.faces, found.size / 25.0
+    held = max(range(len(faces)), key=lambda k: (_faces_down(faces[k]), faces[k].area))
+    feet = _beside(faces, held, 1e-3 * found.size)
     centre = np.average([faces[k].centre for k in feet], axis=0, weights=_areas(faces, feet))
     away = [float(np.linalg.norm(face.centre - centre)) for face in faces]
-    pulled = max((k for k in range(len(faces)) if k not in feet), key=away.__getitem__, default=0)
+    others = [k for k in range(len(faces)) if k not in feet]
+    meshable = [k for k in others if faces[k].area > edge**2]
+    pulled = max(meshable or others, key=away.__getitem__, default=0)
     pull = faces[pulled].centre - centre
     pull = 100.0 * pull / max(float(np.linalg.norm(pull)), 1e-300)
     meshed = is_surface(body) or is_cad(body)
     with whole_file(out) as temporary:
         cells = edge if meshed else None
-        text = _text(body, cells, faces, names, feet, pulled, pull.tolist(), doubt)
+        text = _text(body, cells, found, feet, pulled, pull.tolist(), doubt)
         temporary.write_text(text, encoding="utf-8")
     return out
 
 
 def _beside(faces: Sequence[Face], held: int, reach: float) -> list[int]:
-    """Planes that face down no farther above or below a face than `reach`, mm, and itself."""
-    height = faces[held].centre[2]
+    """Planes beside the one that is held, no farther above or below than `reach`, mm, and itself.
+
+    They face the same way, so that one normal says where all of them are.
+    """
+    foot = faces[held]
     return [
         k
         for k, face in enumerate(faces)
-        if k == held or (_faces_down(face) and abs(face.centre[2] - height) <= reach)
+        if k == held
+        or (
+            foot.kind == face.kind == "plane"
+            and face.direction @ foot.direction > _PARALLEL
+            and abs((face.centre - foot.centre) @ foot.direction) <= reach
+        )
     ]
 
 
@@ -108,8 +117,7 @@ def _refuse_present(out: Path, force: bool) -> None:
 def _text(
     body: Path,
     edge: float | None,
-    faces: Sequence[Face],
-    names: Sequence[str],
+    found: BodyFaces,
     held: Sequence[int],
     pulled: int,
     pull: Sequence[float],
@@ -123,10 +131,11 @@ def _text(
     if doubt:
         given.append(f"scale = 1000                 # CHANGE: {doubt.partition(': scale')[0]}")
     listed = [
-        f"#   {k:>3}  {face.about}" + (f"  ({names[k - 1]})" if any(names) else "")
-        for k, face in enumerate(faces[:_LISTED], 1)
-    ]
-    more = len(faces) - len(listed)
+        f"#   {number:>3}  at {place_text(found.point_on(face))}, {face.shape}"
+        + (f"  ({found.names[k]})" if any(found.names) else "")
+        for k, (number, face) in enumerate(zip(found.numbers, found.faces, strict=True))
+    ][:_LISTED]
+    more = len(found.faces) - len(listed)
     if more > 0:
         listed.append(f"#   and {more} smaller ones: ccfem faces {path}")
     name = "".join(c if c.isalnum() or c in "-_" else "_" for c in body.stem)
@@ -149,12 +158,10 @@ def _text(
             *listed,
             "",
             "[patches.held]               # CHANGE: what is fixed",
-            'rule = "face"',
-            f"number = {[k + 1 for k in held]}",
+            *_rule(found, held),
             "",
             "[patches.pulled]             # CHANGE: where the load acts",
-            'rule = "face"',
-            f"number = [{pulled + 1}]",
+            *_rule(found, [pulled]),
             "",
             "[[supports]]",
             'patch = "held"',
@@ -166,6 +173,24 @@ def _text(
             "",
         ]
     )
+
+
+def _rule(found: BodyFaces, chosen: Sequence[int]) -> list[str]:
+    """Lines of the rule for faces of one kind, by their places."""
+    numbers = [found.numbers[k] for k in chosen]
+    places = [found.place(number) for number in numbers]
+    points = [place_text(np.array(place["at"])) for place in places]
+    at = points[0] if len(points) == 1 else f"[{', '.join(points)}]"
+    named = f"face{'s' if len(numbers) > 1 else ''} {', '.join(map(str, numbers))}"
+    lines = ['rule = "face"', f"at = {at}   # on {named} of the list above"]
+    for key in ("normal", "axis"):
+        if key in places[0]:
+            direction = direction_text(places[0][key])
+            lines.append(f"{key} = " + (direction if "[" in direction else f'"{direction}"'))
+    return [
+        *lines,
+        *(f"radius = {place['radius']:.5g}" for place in places[:1] if "radius" in place),
+    ]
 
 
 def examples() -> dict[str, str]:

@@ -6,7 +6,7 @@ from ccfem.elasticity.part_stress import PartStress
 from ccfem.layers.layer import Layer
 from ccfem.machine.machine import Machine
 
-__all__ = ["Slicer", "Vector"]
+__all__ = ["Slicer", "Vector", "slicer_remarks"]
 
 Vector = tuple[float, float, float]
 
@@ -32,3 +32,9 @@ class Slicer(Protocol):
         machine : Machine
         """
         ...
+
+
+def slicer_remarks(slicer: Slicer, stress: PartStress) -> tuple[str, ...]:
+    """Ask a slicer with a method ``remarks`` what it has to say of a part, one line each."""
+    remarks = getattr(slicer, "remarks", None)
+    return () if remarks is None else tuple(remarks(stress))

@@ -4,6 +4,7 @@ from abc import ABC, abstractmethod
 from collections.abc import Mapping
 from dataclasses import dataclass, field, replace
 from functools import cached_property
+from types import MappingProxyType
 from typing import ClassVar, Self
 
 import numpy as np
@@ -14,6 +15,8 @@ from ccfem.errors import InputError
 from ccfem.mesh.facets import paired
 
 __all__ = ["CellMesh"]
+
+_NONE: Mapping[str, FloatArray] = MappingProxyType({})
 
 
 @dataclass(frozen=True)
@@ -27,11 +30,14 @@ class CellMesh(ABC):
         Nodes of each cell.
     patches : mapping of name to int arrays
         Boundary facets by their corners.
+    axes : mapping of name to (3,) arrays
+        Axes of round patches where the rule of the patch states one: a rough wall does not show it.
     """
 
     points: FloatArray
     cells: IntArray
     patches: Mapping[str, IntArray] = field(default_factory=dict)
+    axes: Mapping[str, FloatArray] = field(default_factory=dict)
 
     dimension: ClassVar[int]
     sizes: ClassVar[tuple[int, ...]]
@@ -40,7 +46,7 @@ class CellMesh(ABC):
     """What such cells are called."""
 
     def __post_init__(self) -> None:
-        freeze(self, points=float, cells=int, patches=int)
+        freeze(self, points=float, cells=int, patches=int, axes=float)
         d, known = self.dimension, " or ".join(f"(m, {size})" for size in self.sizes)
         if self.points.ndim != 2 or self.points.shape[1] != d:
             raise InputError(
@@ -107,9 +113,12 @@ class CellMesh(ABC):
         """All nodes of facets: of linear cells their corners."""
         return facets
 
-    def with_patches(self, patches: Mapping[str, IntArray]) -> Self:
-        """Return the same mesh with more named patches."""
-        return replace(self, patches={**self.patches, **patches})
+    def with_patches(
+        self, patches: Mapping[str, IntArray], axes: Mapping[str, FloatArray] = _NONE
+    ) -> Self:
+        """Return the same mesh with more named patches, and the axes of some of them."""
+        kept = {name: axis for name, axis in self.axes.items() if name not in patches}
+        return replace(self, patches={**self.patches, **patches}, axes={**kept, **axes})
 
     def patch(self, name: str) -> IntArray:
         """Facets of a named patch.

@@ -5,7 +5,7 @@ from collections.abc import Mapping
 import numpy as np
 
 from ccfem.arrays import BoolArray, FloatArray
-from ccfem.mesh.face_rules import faces_of
+from ccfem.mesh.face_rules import numbered_faces
 from ccfem.mesh.facets import are_among
 from ccfem.mesh.patches import Box, Cylinder, PatchRule, Plane
 from ccfem.mesh.smooth_faces import Face
@@ -40,7 +40,7 @@ def about_patches(mesh: TetMesh, rules: Mapping[str, PatchRule]) -> tuple[str, .
     if not guessed:
         return ()
     area, normal = mesh.facet_areas(mesh.boundary)
-    faces = faces_of(mesh)
+    faces = numbered_faces(mesh).faces
     taken = {name: are_among(mesh.boundary, mesh.patches[name]) for name in rules}
     anywhere = np.any(list(taken.values()), axis=0)
     lines: list[str] = []

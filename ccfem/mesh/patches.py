@@ -67,8 +67,10 @@ class Bounded(Protocol):
         """Areas, mm^2, and unit normals of facets."""
         ...
 
-    def with_patches(self, patches: Mapping[str, IntArray]) -> Self:
-        """Return the same with more patches."""
+    def with_patches(
+        self, patches: Mapping[str, IntArray], axes: Mapping[str, FloatArray] = ...
+    ) -> Self:
+        """Return the same with more patches, and the axes of some of them."""
         ...
 
 
@@ -286,21 +288,23 @@ def patches_from_rules(mesh: BoundedT, rules: Mapping[str, PatchRule]) -> Bounde
     Returns
     -------
     TetMesh
-        The same mesh with these patches besides those it had.
+        The same mesh with these patches besides those it had, and the axes that rules state.
 
     Raises
     ------
     InputError
         When a rule chooses no facet; the message names the patch and the nearest candidate.
     """
-    patches = {}
+    patches, axes = {}, {}
     for name, rule in rules.items():
         check_free(name)
+        if getattr(rule, "axis", None) is not None:
+            axes[name] = unit_vector(rule.axis, "axis")  # type: ignore[attr-defined]
         try:
             patches[name] = rule(mesh)
         except InputError as error:
             raise InputError(f"patch '{name}': {error}") from None
-    return mesh.with_patches(patches)
+    return mesh.with_patches(patches, axes)
 
 
 def match_boundary(mesh: Bounded, facets: IntArray) -> IntArray:

@@ -34,6 +34,8 @@ class TetMesh(CellMesh, Shown):
         Nodes of each tetrahedron, positively oriented; quadratic cells in VTK order.
     patches : mapping of name to (k, 3) int arrays
         Boundary facets by their corner nodes.
+    axes : mapping of name to (3,) arrays
+        Axes of round patches where the rule of the patch states one.
     """
 
     dimension = 3
@@ -138,7 +140,7 @@ class TetMesh(CellMesh, Shown):
         edges, edge = unique_edges(self.cells[:, _EDGES].reshape(-1, 2))
         points = np.concatenate([self.points, self.points[edges].mean(axis=1)])
         extra = len(self.points) + edge.reshape(-1, 6)
-        return TetMesh(points, np.hstack([self.cells, extra]), self.patches)
+        return TetMesh(points, np.hstack([self.cells, extra]), self.patches, self.axes)
 
     def linear(self) -> "TetMesh":
         """Return the P1 mesh of the corners alone; nodes are renumbered, patches stay."""
@@ -148,4 +150,4 @@ class TetMesh(CellMesh, Shown):
         number = np.full(len(self.points), -1)
         number[kept] = np.arange(len(kept))
         patches = {name: number[facets] for name, facets in self.patches.items()}
-        return TetMesh(self.points[kept], cells.reshape(-1, 4), patches)
+        return TetMesh(self.points[kept], cells.reshape(-1, 4), patches, self.axes)

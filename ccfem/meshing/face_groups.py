@@ -1,15 +1,48 @@
-"""Faces of a surface carried over to the mesh that was made from it."""
+"""Faces of a surface or a CAD file, and of a surface on the mesh that was made from it."""
 
+import os
 from dataclasses import replace
 
 import numpy as np
 
-from ccfem.io.surface import Surface
+from ccfem.io.surface import Surface, read_surface
 from ccfem.mesh.face_names import face_name
-from ccfem.mesh.smooth_faces import FEATURE_ANGLE, smooth_faces
+from ccfem.mesh.face_places import BodyFaces
+from ccfem.mesh.smooth_faces import FEATURE_ANGLE, given_faces, smooth_faces
 from ccfem.mesh.tet_mesh import TetMesh
+from ccfem.meshing.cad import is_cad, read_cad
 
-__all__ = ["with_faces_of"]
+__all__ = ["faces_of_body", "with_faces_of"]
+
+
+def faces_of_body(
+    path: str | os.PathLike[str], scale: float = 1.0, angle: float = FEATURE_ANGLE
+) -> BodyFaces:
+    """Faces of a closed surface, or of a CAD file as it has them, numbered before any meshing.
+
+    Parameters
+    ----------
+    path : path
+        STL, OBJ, PLY, STEP, IGES or BREP.
+    scale : float, default 1
+        Factor on the coordinates.
+    angle : float, degrees
+        Feature angle, of a surface.
+
+    Raises
+    ------
+    InputError
+    """
+    if not is_cad(path):
+        surface = read_surface(path, scale)
+        faces = smooth_faces(surface.points, surface.triangles, angle)
+        return BodyFaces(surface.points, surface.triangles, faces)
+    cad = read_cad(path, scale)
+    points, triangles = cad.surface.points, cad.surface.triangles
+    rows = {k: np.flatnonzero(cad.face == k) for k in np.unique(cad.face).tolist()}
+    names = tuple(cad.names[k - 1] for k in rows)
+    faces = given_faces(points, triangles, rows.values())
+    return BodyFaces(points, triangles, faces, names, tuple(rows))
 
 
 def with_faces_of(surface: Surface, mesh: TetMesh, angle: float = FEATURE_ANGLE) -> TetMesh:

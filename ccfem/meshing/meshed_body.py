@@ -7,6 +7,7 @@ from pathlib import Path
 from ccfem.checks import check_number
 from ccfem.io.surface import Surface, read_surface
 from ccfem.io.whole import existing_file
+from ccfem.mesh.smooth_faces import FEATURE_ANGLE
 from ccfem.mesh.tet_mesh import TetMesh
 from ccfem.meshing.cache import kept
 from ccfem.meshing.cad import is_cad, mesh_cad
@@ -22,6 +23,7 @@ def mesh_body(
     scale: float = 1.0,
     mesher: Mesher = "auto",
     before: Callable[[Surface], None] | None = None,
+    angle: float = FEATURE_ANGLE,
 ) -> tuple[TetMesh, tuple[str, ...]]:
     """Mesh a file of a closed surface (STL, OBJ, PLY) or of solids (STEP, IGES, BREP).
 
@@ -35,6 +37,8 @@ def mesh_body(
         For surfaces: see `ccfem.meshing.tetrahedralise`. CAD files are meshed by Gmsh.
     before : callable, optional
         Called with the surface before it is meshed, to complain early.
+    angle : float, degrees
+        Feature angle between the faces of a surface.
 
     Returns
     -------
@@ -67,12 +71,13 @@ def mesh_body(
                 "; fTetWild gives a different mesh each time, so this one is stored on this "
                 "machine for reuse"
             )
-        return with_faces_of(surface, mesh), (about,)
+        return with_faces_of(surface, mesh, angle), (about,)
 
     asked: dict[str, object] = {
         "edge_length": float(edge_length),
         "scale": float(scale),
         "mesher": mesher,
+        "angle": float(angle),
         "suffix": Path(path).suffix.lower(),
     }
     return kept(path.read_bytes(), asked, make)

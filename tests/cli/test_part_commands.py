@@ -31,7 +31,8 @@ def test_a_body_is_no_part_and_a_new_part_file_is_one(ccfem, tmp_path):
     assert areas["held"] == pytest.approx(60.0 * 24.0)
     text = (tmp_path / "lever.toml").read_text()
     assert text.count("CHANGE") == 6
-    assert "6  plane of" in text
+    assert "6  at [60, 12, 2], plane, normal x" in text
+    assert 'at = [30, 12, 0]   # on face 1 of the list above\nnormal = "-z"' in text
     code, _, err = ccfem("new", "lever.npz")
     assert (code, "is there already" in err) == (2, True)
     assert ccfem("new", "lever.npz", "--force")[0] == 0

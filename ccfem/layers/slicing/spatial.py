@@ -87,6 +87,7 @@ class Spatial:
         Weight of equal gradients in neighbouring cells.
     joint_weight : float, default 1
         Weight of layers normal to the axes of the joints; smaller values follow the stress better.
+        An axis is the one that the rule of the patch states, else that of its wall.
     length : float, mm, optional
         Length over which the field is smoothed; by default a thirtieth of the part's diagonal.
     form : {"axis", "ring", "literal"}
@@ -200,6 +201,17 @@ class Spatial:
             found = level_surfaces(mesh, guidance.values, levels, step, edge, self.least_area)
             layers, bubbles, specks = found.layers, found.bubbles, found.specks
         return SpatialSlicing(layers, guidance, region, joints, quality, step, bubbles, specks)
+
+    def remarks(self, stress: PartStress) -> tuple[str, ...]:
+        """Say which joints have no axis that layers could be normal to."""
+        joints = joints_of(stress, self.joints, self.rings, self.directions)
+        return tuple(
+            f"joint '{joint.name}' has no axis, since its wall is too rough for a cylinder: its "
+            f"joint_weight does nothing; state the axis (slicing.directions.{joint.name} = [x, y, "
+            "z]), or take rule 'cylinder' with an axis"
+            for joint in joints
+            if joint.dropped
+        )
 
     @property
     def _nominal(self) -> float:

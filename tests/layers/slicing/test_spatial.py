@@ -1,15 +1,18 @@
 """Curved slicing: what it makes of parts whose layers are known, and what it refuses."""
 
+from dataclasses import replace
+
 import numpy as np
 import pytest
 import shapely
 
 from ccfem.elasticity import Force, GivenStress, Problem, Support, solve
 from ccfem.errors import InputError
+from ccfem.guidance import joint_of
 from ccfem.layers.slicing import Planar, Spatial, create
 from ccfem.machine import Machine
 from ccfem.materials import isotropic
-from ccfem.mesh import box_mesh
+from ccfem.mesh import TetMesh, box_mesh
 from ccfem.mesh.patches import Cylinder, Plane, patches_from_rules
 from ccfem.meshing import extrude
 
@@ -130,3 +133,72 @@ def test_one_joint_alone_needs_other_lines(bar):
     layers = Spatial(lines="touching", count=4)(stress, (0.0, 0.0, 1.0), Machine())
     assert len(layers) == 4
     assert all(layer.flat is not None for layer in layers)
+
+
+def rough(mesh, by, seed=0):
+    """Move the nodes on the wall of the bar's hole to and from its axis by up to `by`, mm."""
+    wall = np.unique(mesh.patches["left"])
+    arm = mesh.points[wall] * [1.0, 1.0, 0.0] - [12.0, 12.0, 0.0]
+    shift = np.random.default_rng(seed).uniform(-by, by, len(wall))[:, None]
+    points = mesh.points.copy()
+    points[wall] += shift * arm / np.linalg.norm(arm, axis=1)[:, None]
+    return replace(mesh, points=points)
+
+
+def tilt(stress, weight, **options):
+    """Mean angle, degrees, between the layers near the hole and its axis, z."""
+    spatial = Spatial(thickness=1.0, lines="all", joint_weight=weight, **options)
+    layers = spatial(stress, (0.0, 0.0, 1.0), Machine())
+    points = np.concatenate([layer.points for layer in layers])
+    normals = np.concatenate([layer.point_normals for layer in layers])
+    near = np.hypot(*(points[:, :2] - 12.0).T) < 8.0
+    return np.degrees(np.arccos(np.clip(np.abs(normals[near, 2]), 0.0, 1.0))).mean()
+
+
+@pytest.mark.parametrize("states", [True, False])
+def test_layers_near_a_rough_wall_follow_its_joint(bar, states):
+    """By the axis of its rule; or of the nearest cylinder, where the rule states none."""
+    mesh = rough(bar, 0.6)
+    mesh = mesh if states else replace(mesh, axes={})
+    assert mesh.flaw == ""
+    assert ("left" in mesh.axes) == states
+    tension = np.tile([1.0, 0.0, 0.2], (len(mesh.cells), 1))
+    stress = given(mesh, tension, ("left", "x_max"), ("x_max",))
+    found = [tilt(stress, weight) for weight in (0.01, 1.0, 20.0)]
+    # Without the joint layers lie along the tension, 11.3 degrees off.
+    assert found[0] == pytest.approx(np.degrees(np.arctan(0.2)), abs=1.0)
+    assert found[0] > found[1] > found[2]
+    assert found[2] < (1.0 if states else 3.0)
+    assert Spatial().remarks(stress) == ()
+
+
+def test_the_stated_axis_goes_before_that_of_the_wall(bar):
+    """And stays with the mesh of quadratic cells; an axis that is asked for goes before both."""
+    wall = Cylinder((12.0, 12.0, 0.0), (0.0, 0.1, 1.0), 5.0)
+    mesh = patches_from_rules(bar, {"left": wall}).quadratic()
+    stated = np.array([0.0, 0.1, 1.0]) / np.hypot(0.1, 1.0)
+    np.testing.assert_allclose(joint_of(mesh, "left").direction, stated)
+    asked = joint_of(mesh, "left", direction=[1.0, 0.0, 0.0])
+    np.testing.assert_allclose(asked.direction, [1.0, 0.0, 0.0])
+
+
+def test_a_wall_without_an_axis_is_said_to_have_none():
+    """Three sides of a block: they go round a corner, not round an axis."""
+    mesh = box_mesh((20.0, 20.0, 20.0), (4, 4, 4))
+    sides = np.concatenate([mesh.patches[name] for name in ("x_min", "y_min", "z_min")])
+    mesh = mesh.with_patches({"corner": sides})
+    stress = given(mesh, np.ones((len(mesh.cells), 3)), ("corner", "x_max"), ("x_max",))
+    (line,) = Spatial().remarks(stress)
+    assert "joint 'corner' has no axis" in line
+    assert Spatial(directions={"corner": [0, 0, 1]}).remarks(stress) == ()
+
+
+def test_a_hole_of_voxels_has_its_axis():
+    mesh = box_mesh((14.0, 14.0, 4.0), (14, 14, 4))
+    voxel = np.floor(mesh.points[mesh.corners].mean(axis=1)) + 0.5
+    mesh = TetMesh(mesh.points, mesh.cells[np.hypot(*(voxel[:, :2] - 7.0).T) > 4.0])
+    wall = np.hypot(*(mesh.points[mesh.boundary].mean(axis=1)[:, :2] - 7.0).T) < 6.0
+    wall &= np.abs(mesh.facet_areas(mesh.boundary)[1][:, 2]) < 0.1
+    joint = joint_of(mesh.with_patches({"hole": mesh.boundary[wall]}), "hole")
+    np.testing.assert_allclose(joint.direction, [0.0, 0.0, 1.0], atol=0.02)
+    assert joint.radius == pytest.approx(4.0, abs=0.5)
