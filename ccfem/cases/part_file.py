@@ -246,7 +246,7 @@ from ccfem.cases.part_loads import (
 )
 from ccfem.cases.part_regions import region_rules_of, regions_of
 from ccfem.cases.part_slicing import slicing_of
-from ccfem.cases.part_tables import about_material, check_strategies, material_of, rules_of
+from ccfem.cases.part_tables import check_strategies, material_of, rules_of
 from ccfem.elasticity.load_kinds import patches_in_use
 from ccfem.elasticity.problem import Problem
 from ccfem.errors import InputError, Mistakes
@@ -344,7 +344,7 @@ def _case(content: Mapping[str, Any], path: Path) -> Case:
     held = (*supports, *others, *(each for some in own.values() for each in some))
     mesh = without_faces(mesh, (*rules, *near, *patches_in_use(held, loads)))
     build, slicing, machine, material = given.whole()
-    findings = (*findings, *about_patches(mesh, rules), *about_material(material))
+    findings = (*findings, *about_patches(mesh, rules))
     return Case(
         name=name,
         title=part.title or name,

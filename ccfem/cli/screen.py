@@ -163,8 +163,10 @@ def print_comparison(comparison: Comparison, where: Path, seconds: float) -> Non
     console.print(comparison.case.title, style="bold", markup=False)
     console.print(_headline_table(runs, best_values(comparison.runs, comparison.fibre_per_layer)))
     _print_load_cases(console, runs)
-    for line in (*comparison.case.findings, *comparison.stress.findings):
+    for line in comparison.case.findings:
         console.print(f"mesh: {line}", style="dim", markup=False)
+    for line in comparison.stress.findings:
+        console.print(f"warning: {line}", style="dim", markup=False)
     console.print(about_cells(comparison.stress), style="dim", markup=False)
     for line in comparison.remarks:
         console.print(line, style="dim", markup=False)
@@ -274,8 +276,10 @@ def print_solution(field: StressField, findings: Sequence[str], where: Path) -> 
     console.print(f"load case {field.case}", style="bold", markup=False)
     for line in lines:
         console.print(f"  {line}", markup=False, soft_wrap=True)
-    for line in (*findings, *field.findings):
+    for line in findings:
         console.print(f"  mesh: {line}", style="dim", markup=False, soft_wrap=True)
+    for line in field.findings:
+        console.print(f"  warning: {line}", style="dim", markup=False, soft_wrap=True)
     console.print(f"  {where}", markup=False, soft_wrap=True)
 
 

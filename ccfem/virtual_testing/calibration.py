@@ -14,6 +14,7 @@ from pathlib import Path
 import numpy as np
 from scipy.optimize import brentq
 
+from ccfem.checks import MODULUS, STRENGTH
 from ccfem.elasticity.problem import Problem
 from ccfem.elasticity.solve import solve
 from ccfem.elasticity.stress_field import StressField
@@ -116,7 +117,8 @@ def calibrate(
     Raises
     ------
     InputError
-        For curves that do not suit each other or the part.
+        For curves that do not suit each other or the part, rows that leave their curve, and values
+        that no printed material has.
     """
     if (reinforced is None) != (toolpaths is None):
         raise InputError(
@@ -136,6 +138,16 @@ def calibrate(
         tensile_strength=index * unreinforced.peak / specimen.force(field.reactions),
         source=source,
     )
+    for what, value, sizes in (
+        ("modulus", result.modulus, MODULUS),
+        ("strength", result.tensile_strength, STRENGTH),
+    ):
+        doubt = sizes.about(f"the {what} that follows", value)
+        if doubt:
+            raise InputError(
+                f"{unreinforced.name}: {doubt.partition(': ')[0]}: check the units of the curve, "
+                "mm and N unless its first line names others, and that the part is the tested one"
+            )
     if reinforced is None or toolpaths is None:
         return result
     stiffer = reinforced.slope()

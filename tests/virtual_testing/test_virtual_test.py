@@ -321,8 +321,8 @@ def test_bad_input_is_refused():
     with pytest.raises(InputError, match="one or the other"):
         virtual_test(lines, solve(problem)["load"])
     held = dataclasses.replace(clamped(), loads={"held": (Force("x_min", (10.0, 0.0, 0.0)),)})
-    with pytest.raises(InputError, match="load case 'held' acts on nodes only that the supports"):
-        virtual_test(lines, solve(held)["held"])
+    with pytest.raises(InputError, match=r"load case 'held' .* acts on held nodes alone"):
+        solve(held)
     with pytest.raises(InputError, match="axial stiffness"):
         equilibrium(Specimen.of(field), cut_strands(lines, field.mesh), np.inf)
 
