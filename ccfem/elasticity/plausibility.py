@@ -70,9 +70,9 @@ _NONE = 1e-9
 """Part of the forces of a load case that moves something, below which none does."""
 _ALL, _SOME = 1.0 - 1e-9, 0.02
 """Shares of a load on held nodes from which it has no effect, and from which there is a remark."""
-_LONG = 2.0
-"""Edge over thickness of a wall of one quadratic cell from which there is a remark: the deflection
-of a plate is still right to 1 % at 3.3, the stress round its holes is not."""
+_LONG = 1.5
+"""Longest edge over thickness of a wall of one quadratic cell from which there is a remark, if the
+error is not known: the deflection of a plate is right to 1 % at 3.3, stress round holes is not."""
 
 
 def about_problem(
@@ -92,8 +92,8 @@ def about_problem(
     cases : iterable of str, optional
         Load cases to be looked at; default all.
     error : float, optional
-        Estimated error of the solution, if it is known: linear cells that leave little of it are
-        fine enough.
+        Estimated error of the solution, if it is known: cells that leave little of it are fine
+        enough.
 
     Returns
     -------
@@ -228,9 +228,9 @@ def _shared_facets(problem: Problem, cases: Iterable[str]) -> list[str]:
 
 def _about_walls(problem: Problem, error: float) -> str:
     """Say that walls have one cell across, where that spoils what is wanted of them."""
-    linear = problem.mesh.order == 1 and problem.order == 1
-    if linear and error <= LARGEST_ERROR:
+    if error <= LARGEST_ERROR:
         return ""
+    linear = problem.mesh.order == 1 and problem.order == 1
     wall = coarse_wall(problem.mesh)
     if wall is None or not (linear or wall.edge > _LONG * wall.thickness):
         return ""

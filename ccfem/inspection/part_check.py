@@ -145,9 +145,11 @@ def check(part: str | os.PathLike[str] | Case, **parameters: Any) -> Check:
     rows.sort(key=lambda row: order.index(row.case))
     if not problem.loads:
         found.lines.append("the part has no load case: give at least one load")
-    with found.noted():
+    layers = Mistakes()  # which keep the part from being planned on, not from being solved
+    with layers.noted():
         if isinstance(case.slicing, Planar):
             case.slicing.check(problem.mesh, case.build, case.machine)
+    doubts += layers.lines
     fibre: tuple[Layer, ...] = ()
     with found.noted():
         fibre = _fibre_layers(case)

@@ -1,4 +1,4 @@
-"""What cannot be, or cannot be meant, of a part and its solution: each refused, or said in a line."""
+"""What cannot be, or cannot be meant, of a part and its solution: refused, or said in a line."""
 
 from dataclasses import replace
 
@@ -24,7 +24,7 @@ from ccfem.elasticity import (
     Traction,
     solve,
 )
-from ccfem.elasticity.plausibility import about_problem, about_solution, check_balance
+from ccfem.elasticity.plausibility import about_problem, check_balance
 from ccfem.elasticity.supports import held
 from ccfem.elasticity.system import prepare
 from ccfem.errors import InputError, SolveError
@@ -70,9 +70,9 @@ def pulled(force):
 )
 def test_sizes_of_another_unit(sizes, value, refused, cure):
     if refused:
-        with pytest.raises(InputError, match=f"must be .* {sizes.unit}; got") as caught:
+        with pytest.raises(InputError, match=r"must be .*; got") as caught:
             sizes.check("it", value)
-        assert str(caught.value).endswith(cure.replace("^", "^"))
+        assert str(caught.value).endswith(cure)
     else:
         sizes.check("it", value)
         assert sizes.about("it", value).endswith(cure)
@@ -108,7 +108,7 @@ def test_impossible_numbers_are_refused_where_they_are_given():
     ):
         with pytest.raises(InputError, match=message):
             make()
-    with pytest.raises(InputError, match="mass density of gravity must be .* got 1240"):
+    with pytest.raises(InputError, match=r"mass density of gravity must be .* got 1240"):
         solve(bar(Gravity((0.0, 0.0, -9.81), 1240.0)))
 
 
@@ -136,7 +136,6 @@ def test_a_motion_as_a_whole_is_no_matter():
 def test_a_nearly_free_part_is_named_so():
     loose = (Spring("x_min", (1.0, 1.0, 1.0)),)
     across = Force("x_max", (0.0, 1.0, 0.0))
-    assert about_solution  # said below the size of the part, refused above it
     with pytest.raises(InputError, match="nearly as a rigid body, so hardly anything holds it"):
         solve(bar(across, loose))
     field = solve(bar(Force("x_max", (0.0, 0.02, 0.0)), loose))["pull"]
@@ -271,7 +270,7 @@ def test_parts_in_metres_and_inches():
         assert [said in line for line in lines] == [True] * bool(said)
 
 
-def test_the_same_words_everywhere(tmp_path, monkeypatch):
+def test_the_same_words_everywhere():
     """In `check`, in `solve`, and in a comparison."""
     soft = isotropic(3.5, 0.3, "plastic")
     problem = bar(Traction("x_max", (1e-4, 0.0, 0.0)), (Support("x_min"),), material=soft)
@@ -290,10 +289,12 @@ def test_the_same_words_everywhere(tmp_path, monkeypatch):
 def test_layers_thinner_than_a_strand_are_seen_by_check():
     problem = bar(pulled(1.0))
     case = Case("bar", "A bar", problem, slicing=Planar(count=500))
-    (line,) = ccfem.check(case).mistakes
+    (line,) = (x for x in ccfem.check(case).warnings if "layers" in x)
     assert line.startswith("layers must lie at least 0.1075 mm apart")
     assert line.endswith("use fewer layers")
-    (line,) = ccfem.check(replace(case, slicing=Planar(thickness=11.0))).mistakes
+    found = ccfem.check(replace(case, slicing=Planar(thickness=11.0)))
+    (line,) = (x for x in found.warnings if "thickness" in x)
+    assert not found.mistakes
     assert "at most the part's height 10 mm; got 11" in line
 
 

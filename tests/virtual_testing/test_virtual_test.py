@@ -108,10 +108,10 @@ def test_bar_with_straight_fibres_is_a_rod_in_a_matrix(mode, order):
 
 
 def test_combination_is_tested_as_a_load_case():
-    half = (Force("x_max", (150.0, 0.0, 0.0)),)
+    half, aside = (Force("x_max", (150.0, 0.0, 0.0)),), (Force("y_max", (0.0, 150.0, 0.0)),)
     problem = dataclasses.replace(
         stretched(length=0.0),
-        loads={"pull": half, "move": (Displacement("x_max", (0.005, 0.0, 0.0)),)},
+        loads={"pull": aside, "move": (Displacement("x_max", (0.005, 0.0, 0.0)),)},
         combinations={"both": {"move": 2.0}},
     )
     test = virtual_test(toolpaths(*grid_lines()), solve(problem)["both"], Strand(900.0 / MODULUS))
