@@ -163,10 +163,7 @@ def print_comparison(comparison: Comparison, where: Path, seconds: float) -> Non
     console.print(comparison.case.title, style="bold", markup=False)
     console.print(_headline_table(runs, best_values(comparison.runs, comparison.fibre_per_layer)))
     _print_load_cases(console, runs)
-    for line in comparison.case.findings:
-        console.print(f"mesh: {line}", style="dim", markup=False)
-    for line in comparison.stress.findings:
-        console.print(f"warning: {line}", style="dim", markup=False)
+    _print_findings(console, comparison.case.findings, comparison.stress)
     console.print(about_cells(comparison.stress), style="dim", markup=False)
     for line in comparison.remarks:
         console.print(line, style="dim", markup=False)
@@ -175,6 +172,18 @@ def print_comparison(comparison: Comparison, where: Path, seconds: float) -> Non
     if any(run.tested is not None for run in runs):
         console.print(HONEST_PROMISE, style="dim", markup=False)
     console.print(f"{where / 'report.html'}  ({seconds:.1f} s)", markup=False, soft_wrap=True)
+
+
+def _print_findings(
+    console: Console, of_mesh: Sequence[str], field: StressField, margin: str = ""
+) -> None:
+    """Print what was found in a mesh, then what is doubtful about the part and its solution."""
+    kinds = {"mesh": of_mesh, "warning": field.findings}
+    for kind, lines in kinds.items():
+        for line in lines:
+            console.print(
+                f"{margin}{kind}: {line}", style="dim", markup=False, soft_wrap=bool(margin)
+            )
 
 
 def _print_load_cases(console: Console, runs: Sequence[Run]) -> None:
@@ -211,6 +220,7 @@ def print_slicings(comparison: SlicingComparison, where: Path, seconds: float) -
     if len(shown) < len(heads):
         left = ", ".join(head.title for head in heads[len(shown) :])
         console.print(f"in the report: {left}", style="dim", markup=False)
+    _print_findings(console, comparison.case.findings, comparison.stress)
     for line in comparison.remarks:
         console.print(line, style="dim", markup=False)
     if comparison.verdict:
@@ -276,10 +286,7 @@ def print_solution(field: StressField, findings: Sequence[str], where: Path) -> 
     console.print(f"load case {field.case}", style="bold", markup=False)
     for line in lines:
         console.print(f"  {line}", markup=False, soft_wrap=True)
-    for line in findings:
-        console.print(f"  mesh: {line}", style="dim", markup=False, soft_wrap=True)
-    for line in field.findings:
-        console.print(f"  warning: {line}", style="dim", markup=False, soft_wrap=True)
+    _print_findings(console, findings, field, "  ")
     console.print(f"  {where}", markup=False, soft_wrap=True)
 
 

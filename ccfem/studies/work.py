@@ -153,9 +153,11 @@ def _run(
     """Outcome of one run."""
     run = Run("run", strategy, Toolpaths.empty(), None, failure=bench.stress.failure)
     bench.seconds = {}
+    findings: tuple[str, ...] = ()
     if not run.failure:
         try:
             solved = bench.solved_for(load_case)
+            findings = (*solved.case.findings, *solved.stress.findings)
             layers = bench.layers_of(solved, load_case, slicer)
             if not layers:
                 raise InputError("the slicing has no layer")
@@ -177,6 +179,7 @@ def _run(
         "why_not": run.why_not,
         "untested": run.untested,
         "note": run.note,
+        "findings": findings,
         "fails_in": run.fails_in,
         "empty_layers": run.empty_layers,
         "values": {name: _number(value) for name, value in headline_values(run).items()},

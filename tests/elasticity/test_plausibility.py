@@ -154,14 +154,13 @@ def test_stress_above_the_strength():
 
 
 def test_reactions_that_do_not_balance_are_refused():
-    problem = bar({"pull": (pulled(100.0),), "bend": (Force("x_max", (0.0, 0.0, 1.0)),)},
-                  (Support("x_min"),))  # fmt: skip
-    for case, field in solve(problem).items():
-        forces = prepare(problem).forces[case]
-        check_balance(problem, case, field.displacement, forces, field.reactions)
-        for wrong in (0.999 * field.reactions, field.reactions[::-1]):
-            with pytest.raises(SolveError, match=f"'{case}': the reactions leave .* not balance"):
-                check_balance(problem, case, field.displacement, forces, wrong)
+    problem = bar({"bend": (Force("x_max", (1.0, 0.0, 1.0)),)}, (Support("x_min"),))
+    field, forces = solve(problem)["bend"], prepare(problem).forces["bend"]
+    check_balance(problem, "bend", field.displacement, forces, field.reactions)
+    # A thousandth of the force is missing; then the force is right, at the wrong end of the bar.
+    for wrong in (0.999 * field.reactions, field.reactions[::-1]):
+        with pytest.raises(SolveError, match=r"'bend': the reactions leave .* do not balance"):
+            check_balance(problem, "bend", field.displacement, forces, wrong)
 
 
 def test_every_kind_of_support_balances():
@@ -304,8 +303,7 @@ def test_layers_thinner_than_a_strand_are_seen_by_check():
         ("bar", {"element_size": 2.5}),
         ("loop", {"element_size": 4.0}),
         ("open_hole", {"element_size": 2.0}),
-        ("arm_bracket", {"element_size": 3.0}),
-        ("lifting_eye", {"element_size": 8.0}),
+        ("arm_bracket", {}),
     ],
 )
 def test_shipped_cases_are_not_accused(name, parameters):
