@@ -7,9 +7,10 @@ What is improbable is said in a line, each with its cure; what cannot be right i
 
 * reactions that do not balance the loads, since equilibrium is a law;
 * a load case without effect, since its zero would pass for an answer;
-* a displacement larger than the part, since no part moves so and keeps its shape: either a unit is
-  wrong or hardly anything holds it. Solutions are proportional to the load, so a smaller one, at
-  which the part works, gives the same paths and the same ratios of stiffness.
+* a displacement of more than ten times the size of the part: either a unit is wrong or hardly
+  anything holds it. Between a twentieth and ten times there is a remark only, since solutions are
+  proportional to the load: paths and ratios of stiffness under a load of any size, as under a unit
+  load on a slender part, are those under the load at which it works.
 """
 
 from collections.abc import Iterable
@@ -58,12 +59,15 @@ __all__ = [
 _LINEAR = 0.05
 """Displacement over the size of the part, and strain, up to which linear theory holds: the tip of a
 cantilever that moves by a twentieth of its length is off by less than 1 %."""
+_FARTHEST = 10.0
+"""Displacement over the size of the part above which a solution is refused: a part that works moves
+by a hundredth or less, and units that are taken for each other differ by a thousand or more."""
 _DEGREES = 5.0
 """Rotation of a support up to which linear theory holds: sqrt(1 + angle^2) is 1.004."""
 _RIGID = 0.02
 """Deformation over displacement below which a part moves nearly as a rigid body."""
 _BALANCE = 1e-4
-"""Force and moment that reactions may leave, over the sum of all: as `contact` allows."""
+"""Force and moment that reactions may leave, over the sum of the forces: as `contact` allows."""
 _ROUNDING = 1e-12
 """The same over the sizes that cancel in the equations: stiffness of a cell times displacement."""
 _NONE = 1e-9
@@ -292,6 +296,7 @@ def check_balance(
     displacement: FloatArray,
     forces: FloatArray,
     reactions: FloatArray,
+    moved: bool,
 ) -> None:
     """Refuse a solution whose reactions do not balance its loads.
 
@@ -301,6 +306,8 @@ def check_balance(
     case : str
     displacement : (n, 3) array, mm
     forces, reactions : (n, 3) array, N
+    moved : bool
+        Whether supports move: the reactions are then loads, too.
 
     Raises
     ------
@@ -310,7 +317,9 @@ def check_balance(
     mesh, both = problem.mesh, forces + reactions
     arm = mesh.points - mesh.points[mesh.corners].mean(axis=(0, 1))
     cell = float(np.abs(problem.cell_stiffness).max()) * float(np.cbrt(mesh.volumes.max()))
-    sizes = float(np.linalg.norm(forces, axis=1).sum() + np.linalg.norm(reactions, axis=1).sum())
+    sizes = float(np.linalg.norm(forces, axis=1).sum())
+    if moved:
+        sizes += float(np.linalg.norm(reactions, axis=1).sum())
     most = _BALANCE * sizes + _ROUNDING * cell * float(np.linalg.norm(displacement, axis=1).sum())
     force = float(np.linalg.norm(both.sum(axis=0)))
     moment = float(np.linalg.norm(np.cross(arm, both).sum(axis=0)))
@@ -323,7 +332,7 @@ def check_balance(
 
 
 def check_size_of_motion(problem: Problem, case: str, displacement: FloatArray) -> None:
-    """Refuse a displacement (n, 3), mm, that is larger than the part: see the top of this module.
+    """Refuse a displacement (n, 3), mm, of more than ten times the part: see the top.
 
     Raises
     ------
@@ -331,7 +340,7 @@ def check_size_of_motion(problem: Problem, case: str, displacement: FloatArray) 
         That names a part which hardly anything holds as such.
     """
     far, size = _spread(displacement), _size(problem)
-    if not far <= size:
+    if not far <= _FARTHEST * size:
         raise InputError(f"load case '{case}': {_about_far(problem, displacement, far, size)}")
 
 

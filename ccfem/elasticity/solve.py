@@ -64,7 +64,7 @@ def solve(
     ------
     InputError
         For an invalid mesh, support, load or backend, load cases without effect, and displacements
-        larger than the part (`ccfem.elasticity.plausibility`).
+        far larger than the part (`ccfem.elasticity.plausibility`).
     SolveError
         When a solution is not accepted; the message names what makes the equations ill-conditioned.
         Also when reactions do not balance the loads.

@@ -142,10 +142,12 @@ class System:
         internal = (matrix @ displacement.reshape(-1)).reshape(-1, 3)
         forces, free = self.forces_in(case), free_strain(problem, case)
         mesh, soft = problem.mesh, soft_supports(problem)
-        reactions = self.held_in(case).supported(internal - forces)
+        held = self.held_in(case)
+        reactions = held.supported(internal - forces)
         if soft:
             reactions = reactions + spring_forces(mesh, soft, displacement)
-        check_balance(problem, case, displacement, forces, reactions)
+        moved = bool(held.value.any())
+        check_balance(problem, case, displacement, forces, reactions, moved)
         energy = 0.5 * float(np.vdot(displacement, internal))
         if free is not None:
             stress = times(scaled, free)
