@@ -4,7 +4,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from ccfem.arrays import FloatArray, IntArray, freeze
+from ccfem.arrays import BoolArray, FloatArray, IntArray, freeze
 from ccfem.mesh.tet_mesh import TetMesh
 
 __all__ = ["CoarseWall", "coarse_wall"]
@@ -89,7 +89,7 @@ def _across(mesh: TetMesh, facets: IntArray, normal: FloatArray) -> tuple[IntArr
     points, corners = mesh.points, mesh.corners
     outside = np.zeros(len(points), dtype=bool)
     outside[mesh.facets[facets]] = True
-    layer = outside[corners].all(axis=1)  # cells that may reach from face to face
+    layer: BoolArray = np.asarray(outside[corners].all(axis=1))  # may reach from face to face
     ray = np.flatnonzero(layer[facets // 4])
     cell, entry = facets[ray] // 4, facets[ray] % 4
     start = points[mesh.facets[facets]].mean(axis=1)
@@ -113,7 +113,7 @@ def _across(mesh: TetMesh, facets: IntArray, normal: FloatArray) -> tuple[IntArr
         way = left.argmin(axis=1)
         depth = depth + np.maximum(left[rows, way], 0.0)
         behind = mesh.partners[4 * cell + way]
-        out = behind < 0
+        out: BoolArray = np.asarray(behind < 0)
         ended.append(ray[out])
         thickness.append(depth[out])
         last.append((4 * cell + way)[out])

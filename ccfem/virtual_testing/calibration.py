@@ -124,11 +124,12 @@ def calibrate(
         raise InputError(
             "a reinforced test needs both its curve and its toolpaths; got only one of them"
         )
+    slope = unreinforced.slope()
+    stiffer = None if reinforced is None else reinforced.slope()
     field = _field(problem, case)
     specimen = Specimen.of(field)
     poisson = _poisson(problem)
     computed = specimen.stiffness(field.displacement, field.strain_energy)
-    slope = unreinforced.slope()
     index, _ = matrix_peak(field)
     source = f"{unreinforced.name}: {slope:.4g} N/mm, peak {unreinforced.peak:.4g} N"
     result = Calibration(
@@ -148,9 +149,8 @@ def calibrate(
                 f"{unreinforced.name}: {doubt.partition(': ')[0]}: check the units of the curve, "
                 "mm and N unless its first line names others, and that the part is the tested one"
             )
-    if reinforced is None or toolpaths is None:
+    if reinforced is None or toolpaths is None or stiffer is None:
         return result
-    stiffer = reinforced.slope()
     rho = _fit_rho(specimen, toolpaths, stiffer / slope, reinforced.name)
     return replace(result, rho=rho, source=f"{source}; {reinforced.name}: {stiffer:.4g} N/mm")
 
