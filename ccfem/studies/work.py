@@ -157,7 +157,7 @@ def _run(
     if not run.failure:
         try:
             solved = bench.solved_for(load_case)
-            findings = (*solved.case.findings, *solved.stress.findings)
+            findings = (*solved.case.findings, *solved.field.findings)
             layers = bench.layers_of(solved, load_case, slicer)
             if not layers:
                 raise InputError("the slicing has no layer")
