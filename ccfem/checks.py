@@ -3,15 +3,26 @@
 import math
 import re
 from collections.abc import Iterable, Mapping
-from dataclasses import is_dataclass
+from dataclasses import dataclass, is_dataclass
 from numbers import Real
 from typing import Any, Literal, TypeVar, get_args, get_origin, get_type_hints
 
 from ccfem.errors import InputError, known_names, shown
 
 __all__ = [
+    "ACCELERATION",
+    "BED",
+    "EXPANSION",
     "FARTHEST",
+    "FORCE",
+    "MASS_DENSITY",
+    "MODULUS",
+    "SPRING",
+    "STRENGTH",
+    "TRACTION",
+    "WARMTH",
     "KnownNames",
+    "Range",
     "check_choices",
     "check_fields",
     "check_instance",
@@ -79,6 +90,88 @@ def check_number(
         words = [f"a finite number of {unit}"]
     cure = f"give {'one in this range' if bounds else 'a number'}"
     raise InputError(f"{what} must be {', '.join(words)}; got {value!r}: {cure}")
+
+
+@dataclass(frozen=True)
+class Range:
+    """Sizes that a quantity can have, and those that it usually has.
+
+    Attributes
+    ----------
+    unit : str
+    possible : tuple of 2 floats
+        Beyond these no material, spring or load is: `check` refuses such a value.
+    usual : tuple of 2 floats
+        Of printed parts and what they carry: `about` remarks on a value beyond these.
+    others : mapping of str to float
+        Units that are taken for the right one by mistake, with their size in it.
+    """
+
+    unit: str
+    possible: tuple[float, float]
+    usual: tuple[float, float]
+    others: Mapping[str, float]
+
+    def check(self, what: str, value: float) -> None:
+        """Refuse a finite value, other than 0, of an impossible size.
+
+        Raises
+        ------
+        InputError
+
+        Examples
+        --------
+        >>> MASS_DENSITY.check("mass density", 1240.0)
+        Traceback (most recent call last):
+        ccfem.errors.InputError: mass density must be 0.0001 to 30 g/cm^3; got 1240: as kg/m^3 it \
+would be 1.24 g/cm^3, so give that
+        """
+        if value and not self.possible[0] <= abs(value) <= self.possible[1]:
+            low, high = self.possible
+            raise InputError(
+                f"{what} must be {low:g} to {high:g} {self.unit}; got {value:.6g}: "
+                f"{self._cure(value)}"
+            )
+
+    def about(self, what: str, value: float) -> str:
+        """Say that a value has an unusual size, and which unit it may be in; empty for a usual one.
+
+        Examples
+        --------
+        >>> MODULUS.about("modulus", 3.5)
+        'modulus is 3.5 MPa, where 5 to 1e+06 MPa are usual: as GPa it would be 3500 MPa, so give \
+that'
+        >>> MODULUS.about("modulus", 3500.0)
+        ''
+        """
+        low, high = self.usual
+        if not value or low <= abs(value) <= high:
+            return ""
+        return (
+            f"{what} is {value:.6g} {self.unit}, where {low:g} to {high:g} {self.unit} are usual: "
+            f"{self._cure(value)}"
+        )
+
+    def _cure(self, value: float) -> str:
+        """Name the unit that makes a value a usual one."""
+        for unit, size in self.others.items():
+            if self.usual[0] <= abs(value) * size <= self.usual[1]:
+                return f"as {unit} it would be {value * size:.4g} {self.unit}, so give that"
+        return f"give it in {self.unit}"
+
+
+MODULUS = Range("MPa", (1e-5, 1e8), (5.0, 1e6), {"GPa": 1e3, "Pa": 1e-6})
+"""From the softest gels to a hundred times diamond; from soft elastomers to carbon fibre."""
+STRENGTH = Range("MPa", (1e-5, 1e6), (0.1, 1e4), {"GPa": 1e3, "Pa": 1e-6})
+MASS_DENSITY = Range("g/cm^3", (1e-4, 30.0), (0.05, 20.0), {"kg/m^3": 1e-3, "t/mm^3": 1e9})
+"""From aerogel to osmium."""
+EXPANSION = Range("1/K", (1e-12, 0.1), (1e-9, 1e-3), {"1e-6/K": 1e-6})
+SPRING = Range("N/mm", (1e-6, 1e15), (1e-3, 1e9), {"N/m": 1e-3, "kN/mm": 1e3})
+BED = Range("MPa/mm", (1e-9, 1e15), (1e-5, 1e9), {"Pa/m": 1e-9, "GPa/mm": 1e3})
+FORCE = Range("N", (1e-12, 1e12), (1e-6, 1e6), {"mN": 1e-3, "kN": 1e3})
+TRACTION = Range("MPa", (1e-12, 1e12), (1e-9, 1e4), {"Pa": 1e-6})
+ACCELERATION = Range("m/s^2", (1e-12, 1e12), (1e-3, 5e3), {"mm/s^2": 1e-3})
+WARMTH = Range("K", (1e-12, 1e12), (1e-6, 1e3), {})
 
 
 def check_fields(value: object, *names: str, **bounds: Any) -> None:

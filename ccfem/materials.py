@@ -6,7 +6,16 @@ from dataclasses import dataclass
 import numpy as np
 
 from ccfem.arrays import FloatArray, freeze
-from ccfem.checks import check_fields, check_known, check_number
+from ccfem.checks import (
+    EXPANSION,
+    MASS_DENSITY,
+    MODULUS,
+    STRENGTH,
+    Range,
+    check_fields,
+    check_known,
+    check_number,
+)
 from ccfem.errors import InputError
 
 __all__ = [
@@ -88,6 +97,28 @@ class Material:
                 f"material '{self.name}': expansion must be finite numbers, 1/K; got "
                 f"{self.expansion}: give it as 7e-5"
             )
+        for what, value, sizes in self.sizes:
+            sizes.check(f"{what} of material '{self.name}'", value)
+
+    @property
+    def sizes(self) -> tuple[tuple[str, float, Range], ...]:
+        """Each number of the material: what it is, its value, and the range that it should have.
+
+        Of several moduli, and of several expansions, the least and the largest.
+        """
+        moduli = 1.0 / np.diag(np.linalg.inv(self.stiffness))[:3]
+        expansion = np.unique(self.expansion or ())
+        found = [("modulus", float(x), MODULUS) for x in np.unique([moduli.min(), moduli.max()])]
+        found += [("expansion", float(x), EXPANSION) for x in expansion[[0, -1][: len(expansion)]]]
+        optional = (
+            ("tensile strength", self.tensile_strength, STRENGTH),
+            ("compressive strength", self.compressive_strength, STRENGTH),
+            ("strength between layers", self.interlayer_tensile, STRENGTH),
+            ("shear strength between layers", self.interlayer_shear, STRENGTH),
+            ("mass density", self.mass_density, MASS_DENSITY),
+        )
+        found += [(what, x, sizes) for what, x, sizes in optional if x is not None]
+        return tuple(found)
 
 
 def isotropic(

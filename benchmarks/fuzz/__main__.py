@@ -1,10 +1,14 @@
 """Feed mutants of good files to the readers: each ends well, or in one line.
 
 Run ``python -m benchmarks.fuzz [COUNT] [SEED] [FORMATS,...]``: by default 3,000 mutants over all
-formats. Whatever else a file does is printed, and the file is kept under ``results/fuzz``.
+formats. The format ``sizes`` stands for part files with one size changed over twelve decades, which
+are solved: each is refused in one line, or its numbers are finite, balance, and are remarked on
+where the part moves by more than a twentieth of its size. Whatever else a file does is printed, and
+the file is kept under ``results/fuzz``.
 """
 
 import os
+import random
 import resource
 import signal
 import sys
@@ -16,8 +20,10 @@ from pathlib import Path
 
 import numpy as np
 
-from benchmarks.fuzz.mutants import MESH, good_files, mutants
+from benchmarks.fuzz.mutants import MESH, good_files, mutants, part_of_sizes
 from ccfem.cases.part_file import read_part
+from ccfem.elasticity import solve
+from ccfem.elasticity.system import prepare
 from ccfem.errors import InputError
 from ccfem.export.path_table import read_paths
 from ccfem.io import read_mesh, read_stress, read_surface
@@ -38,6 +44,19 @@ def read(path: Path) -> None:
         read_surface(path)
     else:
         read_mesh(path, check=False)
+
+
+def solve_sizes(path: Path) -> None:
+    """Solve a part file; raise where the answer cannot be right and nothing is said."""
+    case = read_part(path)
+    for field in solve(case.problem).values():
+        both = field.reactions + prepare(field.problem).forces_in(field.case)
+        sizes = np.abs(field.reactions).sum()
+        assert np.isfinite(field.displacement).all()
+        assert field.strain_energy >= 0.0
+        assert np.abs(both.sum(axis=0)).max() <= 1e-3 * sizes
+        far = np.ptp(field.displacement, axis=0) / np.ptp(field.mesh.points)
+        assert field.findings or np.linalg.norm(far) <= 0.06
 
 
 def verdict(path: Path, see: Callable[[Path], object] = read, limit: float = SECONDS) -> str:
@@ -95,6 +114,16 @@ def main(count: int = 3000, seed: str = "1", wanted: tuple[str, ...] = ()) -> in
     with tempfile.TemporaryDirectory() as name:
         folder = Path(name)
         files = [f for f in good_files(folder) if not wanted or f.suffix[1:] in wanted]
+        if not wanted or "sizes" in wanted:
+            chance, target = random.Random(seed), folder / "sizes.toml"
+            for k in range(count // (len(files) + 1)):
+                text, _ = part_of_sizes(chance)
+                target.write_text(text)
+                found = verdict(target, solve_sizes)
+                tally[f"sizes {found if found in ('read', 'refused') else 'WRONG'}"] += 1
+                if found not in ("read", "refused"):
+                    wrong += 1
+                    print(f"sizes {k}: {found}\n{text}", flush=True)
         for file in files:
             before = time.perf_counter()
             content = file.read_bytes()

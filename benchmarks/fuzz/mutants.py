@@ -9,7 +9,7 @@ import numpy as np
 from ccfem.io import write_mesh
 from ccfem.mesh import box_mesh
 
-__all__ = ["MESH", "frd", "good_files", "mutants"]
+__all__ = ["MESH", "SIZES", "frd", "good_files", "mutants", "part_of_sizes"]
 
 MESH = box_mesh((20.0, 10.0, 5.0), (4, 2, 1))
 """What the good files hold, and stress and paths are on."""
@@ -36,6 +36,40 @@ vector = [10, 0, 0]
 [machine]
 minimum_length = 45.0
 """
+SIZES = """name = "sizes"
+mesh = "box.npz"
+order = 1
+[material]
+modulus = 3500.0
+poisson = 0.35
+tensile_strength = 50.0
+mass_density = 1.24
+expansion = 7e-5
+[patches.foot]
+rule = "plane"
+normal = "x"
+offset = "min"
+[[supports]]
+kind = "spring"
+patch = "foot"
+stiffness = [2000.0, 2000.0, 2000.0]
+[[supports]]
+patch = "y_min"
+components = "y"
+value = [0.0, 0.01, 0.0]
+[[loads.pull]]
+kind = "force"
+patch = "x_max"
+vector = [10.0, 0, 0]
+[[loads.pull]]
+kind = "pressure"
+patch = "z_max"
+magnitude = 0.1
+[[loads.pull]]
+kind = "gravity"
+"""
+"""A part file in which every size of a material, a support and a load stands."""
+
 NUMBERS = (
     *("0", "-1", "1e308", "-1e308", "nan", "inf", "-inf", "1e-320", "4294967296", "2147483647"),
     *("1000000000", "99999999999999999999", "9" * 400, "0x10", "1.5", "''", "[]", "1e6"),
@@ -75,6 +109,18 @@ def good_files(folder: Path) -> list[Path]:
     rows = [f"S\nX2.0 Y{y}.0 Z2.5\nX18.0 Y{y}.5 Z2.5\nE" for y in range(1, 9)]
     (folder / "paths.txt").write_text("\n".join([";Layer_CCF: 0", *rows]) + "\n")
     return sorted(folder.iterdir())
+
+
+def part_of_sizes(chance: random.Random) -> tuple[str, float]:
+    """`SIZES` with one of its sizes times a factor over 12 decades, and the factor."""
+    import re
+
+    sizes = [each for each in re.finditer(r"\d+\.?\d*(e-\d+)?(?=[,\n])", SIZES)
+             if float(each[0]) not in (0.0, 1.0, 0.35)]  # fmt: skip
+    chosen = chance.choice(sizes)
+    factor = 10.0 ** chance.uniform(-6.0, 6.0)
+    value = f"{float(chosen[0]) * factor:.6g}"
+    return SIZES[: chosen.start()] + value + SIZES[chosen.end() :], factor
 
 
 def _deck(mesh) -> str:

@@ -5,7 +5,6 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
-import numpy as np
 import shapely
 
 from ccfem.checks import check_number
@@ -130,19 +129,8 @@ class Body:
                 f"the part measures {size:.3g} mm across; expected {_SMALLEST:g} to {_LARGEST:g} "
                 "mm: correct scale, which makes the coordinates mm"
             )
-        found = (*made, *report.findings, *self._about_edge_length(mesh))
+        found = (*made, *report.findings)
         return mesh.quadratic() if self.order == 2 else mesh, found
-
-    def _about_edge_length(self, mesh: TetMesh) -> tuple[str, ...]:
-        """Say where the edge length is longer than the part is thick."""
-        wanted = self.edge_length if self.planform is None else self.planform["edge_length"]
-        thin = float(np.ptp(mesh.bounds, axis=0).min())
-        if wanted is None or wanted <= thin:
-            return ()
-        return (
-            f"edge_length {wanted:g} mm is longer than the part is thick, {thin:.3g} mm: shorten "
-            "it for more than one cell across, and check that all lengths are in mm",
-        )
 
 
 @dataclass(frozen=True)

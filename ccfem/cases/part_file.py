@@ -251,7 +251,7 @@ from ccfem.cases.part_loads import (
 )
 from ccfem.cases.part_regions import region_rules_of, regions_of
 from ccfem.cases.part_slicing import slicing_of
-from ccfem.cases.part_tables import about_material, check_strategies, material_of, rules_of
+from ccfem.cases.part_tables import check_strategies, material_of, rules_of
 from ccfem.elasticity.load_kinds import patches_in_use
 from ccfem.elasticity.problem import Problem
 from ccfem.errors import InputError, Mistakes
@@ -377,7 +377,7 @@ def _case(content: Mapping[str, Any], path: Path) -> Case:
     body = numbered_faces(mesh) if len(bare.patches) < len(mesh.patches) else None
     mesh = bare
     build, slicing, machine, material = given.whole()
-    findings = (*findings, *about_patches(mesh, rules), *about_material(material))
+    findings = (*findings, *about_patches(mesh, rules))
     return Case(
         name=name,
         title=part.title or name,

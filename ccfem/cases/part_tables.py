@@ -3,8 +3,6 @@
 from collections.abc import Callable, Mapping
 from typing import Any
 
-import numpy as np
-
 from ccfem.errors import InputError, Mistakes, shown
 from ccfem.io.toml import from_table
 from ccfem.materials import (
@@ -19,7 +17,6 @@ from ccfem.mesh.patches import Box, Cylinder, Group, Nearest, PatchRule, Plane
 
 __all__ = [
     "RULES",
-    "about_material",
     "check_strategies",
     "material_of",
     "named_table",
@@ -36,9 +33,6 @@ RULES: dict[str, Callable[..., PatchRule]] = {
     "holes": Holes,
 }
 """Rules of patches by their name."""
-
-_SOFTEST, _STIFFEST = 5.0, 1e6
-"""Moduli, MPa, of the softest elastomers and the stiffest fibres; in GPa plastics are below."""
 
 
 def rules_of(tables: Mapping[str, Any], found: Mistakes) -> dict[str, PatchRule]:
@@ -79,19 +73,6 @@ def material_of(given: str | dict[str, Any] | None, where: str = "material") -> 
         return named_material(given)
     make = transversely_isotropic if "modulus_fibre" in given else isotropic
     return from_table(make, given, where)
-
-
-def about_material(material: Material) -> tuple[str, ...]:
-    """Say where the moduli of a material are those of another unit."""
-    moduli = 1.0 / np.diag(np.linalg.inv(material.stiffness))[:3]
-    for modulus in (float(moduli.min()), float(moduli.max())):
-        if not _SOFTEST <= modulus <= _STIFFEST:
-            return (
-                f"material '{material.name}' has a modulus of {modulus:.4g} MPa; printed "
-                f"materials have {_SOFTEST:g} to {_STIFFEST:g} MPa: give it in MPa (1 GPa = 1000 "
-                "MPa)",
-            )
-    return ()
 
 
 def check_strategies(tables: Mapping[str, Any], found: Mistakes) -> None:

@@ -92,6 +92,8 @@ def front(
         command = shlex.join(["ccfem", *sys.argv[1:]])
         (folder / "command.txt").write_text(command + "\n", encoding="utf-8")
     _say(found)
+    for line in dict.fromkeys(found.findings):
+        print(f"warning: {line}")
     trade = "trade.png, " if len(strengths) > 1 else ""
     print(f"\n{where}: front.png, {trade}front.csv")
 

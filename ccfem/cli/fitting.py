@@ -7,6 +7,7 @@ from typing import Any
 from ccfem.cases.case import Case
 from ccfem.comparison.engine import compare
 from ccfem.comparison.request import named_strategies
+from ccfem.elasticity.plausibility import about_problem
 from ccfem.errors import InputError
 from ccfem.io.whole import check_writable
 from ccfem.virtual_testing.calibration import calibrate
@@ -54,6 +55,8 @@ def fit_material(
         if not len(planned.toolpaths):
             raise InputError(f"{strategy} could not plan the part: {planned.failure}")
         paths = planned.toolpaths
+    for line in (*case.findings, *about_problem(case.problem)):
+        print(f"warning: {line}")
     found = calibrate(case.problem, without, with_fibre, paths, options["load_case"], out.stem)
     found.write(out)
     rho = "" if found.rho is None else f", rho {found.rho:.3g} mm^2"

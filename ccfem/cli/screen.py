@@ -198,8 +198,7 @@ def print_comparison(
     else:
         _print_in_columns(console, runs, lambda some: _headline_table(some, best, details))
     _print_load_cases(console, runs)
-    findings = (*comparison.case.findings, *comparison.stress.findings)
-    lines = [*(f"mesh: {line}" for line in findings), *comparison.remarks]
+    lines = [*_findings(comparison.case.findings, comparison.stress), *comparison.remarks]
     shown = lines if details else by_importance(lines)[:_REMARKS]
     if details:
         console.print(about_cells(comparison.stress), style="dim", markup=False)
@@ -220,6 +219,20 @@ def _print_where(console: Console, where: Path, seconds: float) -> None:
     report = where / "report.html"
     shown = report if report.exists() else where
     console.print(f"{shown}  ({seconds:.1f} s)", markup=False, soft_wrap=True)
+
+
+def _print_findings(
+    console: Console, of_mesh: Sequence[str], field: StressField, margin: str = ""
+) -> None:
+    """Print what was found in a mesh, then what is doubtful about the part and its solution."""
+    for line in _findings(of_mesh, field):
+        console.print(f"{margin}{line}", style="dim", markup=False, soft_wrap=bool(margin))
+
+
+def _findings(of_mesh: Sequence[str], field: StressField) -> list[str]:
+    """List what was found in a mesh, then what is doubtful about the part and its solution."""
+    kinds = {"mesh": of_mesh, "warning": field.findings}
+    return [f"{kind}: {line}" for kind, lines in kinds.items() for line in lines]
 
 
 def _print_load_cases(console: Console, runs: Sequence[Run]) -> None:
@@ -343,8 +356,7 @@ def print_solution(field: StressField, findings: Sequence[str], where: Path) -> 
     console.print(f"load case {field.case}", style="bold", markup=False)
     for line in lines:
         console.print(f"  {line}", markup=False, soft_wrap=True)
-    for line in (*findings, *field.findings):
-        console.print(f"  mesh: {line}", style="dim", markup=False, soft_wrap=True)
+    _print_findings(console, findings, field, "  ")
     console.print(f"  {where}", markup=False, soft_wrap=True)
 
 

@@ -167,6 +167,7 @@ def _front(name: str, comparison: Comparison) -> FibreFront:
         raise InputError(f"{name} finds no plan of '{case}': {why}")
     points = tuple(_point(run, comparison) for run in tested)
     fields = comparison.cases.fields
+    findings = (*comparison.case.findings, *comparison.stress.findings)
     if comparison.several_cases and not comparison.bounds:
         raise InputError(
             "a front over several load cases measures each by its bound, and supports that only "
@@ -174,10 +175,11 @@ def _front(name: str, comparison: Comparison) -> FibreFront:
         )
     if not comparison.several_cases:
         alone = ((x, b.ratio) for x, b in comparison.bounds.items() if isinstance(b, UpperBound))
-        return FibreFront(case, name, points, refused, _bare(fields[0]), tuple(alone))
+        bare = _bare(fields[0])
+        return FibreFront(case, name, points, refused, bare, tuple(alone), (), findings)
     together = tuple((x, b) for x, b in comparison.bounds.items() if isinstance(b, CasesBound))
     factor = min(_bare(field) / Specimen.of(field).force(field.reactions) for field in fields)
-    return FibreFront(case, name, points, refused, factor, cases_bounds=together)
+    return FibreFront(case, name, points, refused, factor, (), together, findings)
 
 
 def _bare(stress: StressField) -> float:

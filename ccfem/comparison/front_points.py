@@ -107,6 +107,8 @@ class FibreFront:
     cases_bounds : tuple of (float, CasesBound)
         Lengths, mm, and what no paths of that length exceed under several load cases; empty for
         one.
+    findings : tuple of str
+        What is doubtful about the mesh, the part and its solution, one line each.
     """
 
     case: str
@@ -116,6 +118,7 @@ class FibreFront:
     bare: float = float("nan")
     bounds: tuple[tuple[float, float], ...] = ()
     cases_bounds: tuple[tuple[float, CasesBound], ...] = ()
+    findings: tuple[str, ...] = ()
 
     def __post_init__(self) -> None:
         freeze(self, refused=dict)

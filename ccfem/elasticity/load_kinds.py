@@ -1,8 +1,11 @@
 """Kinds of loads: on patches, at points, in the volume, and by moving supports."""
 
+import re
 from collections.abc import Mapping
 from dataclasses import dataclass
 from typing import Any
+
+from ccfem.checks import ACCELERATION, FORCE, MASS_DENSITY, TRACTION, WARMTH, Range
 
 __all__ = [
     "Bearing",
@@ -16,9 +19,12 @@ __all__ = [
     "SurfaceLoad",
     "Temperature",
     "Traction",
+    "in_words",
+    "kind_of",
     "patches_in_use",
     "patches_of",
     "points_of",
+    "sizes_of",
 ]
 
 Vector = tuple[float, float, float]
@@ -111,6 +117,33 @@ class Displacement:
 
 SurfaceLoad = Force | Traction | Pressure | Bearing | PointForce
 Load = SurfaceLoad | BodyForce | Gravity | Temperature | Displacement
+
+
+def kind_of(value: object) -> str:
+    """Kind of a load or a support in words, as "point force"."""
+    return re.sub(r"(?<=[a-z])(?=[A-Z])", " ", type(value).__name__).lower()
+
+
+def in_words(load: Load) -> str:
+    """Name a load by its kind and patch, as "force on foot"."""
+    return " on ".join((kind_of(load), *patches_of(load)))
+
+
+def sizes_of(load: Load) -> tuple[tuple[str, float, Range], ...]:
+    """Each size of a load: what it is, its value, and the range that it should have."""
+    if isinstance(load, Gravity):
+        weight = [("acceleration of gravity", max(load.acceleration, key=abs), ACCELERATION)]
+        if load.mass_density is not None:
+            weight.append(("mass density of gravity", load.mass_density, MASS_DENSITY))
+        return tuple(weight)
+    if isinstance(load, Temperature):
+        return (("change of temperature", load.change, WARMTH),)
+    if isinstance(load, Pressure):
+        return ((in_words(load), load.magnitude, TRACTION),)
+    if isinstance(load, Force | Bearing | PointForce | Traction):
+        sizes = TRACTION if isinstance(load, Traction) else FORCE
+        return ((in_words(load), max(load.vector, key=abs), sizes),)
+    return ()
 
 
 def patches_of(kind: Any) -> tuple[str, ...]:

@@ -19,6 +19,7 @@ from ccfem.elasticity.load_kinds import (
     SurfaceLoad,
     Temperature,
     Traction,
+    sizes_of,
 )
 from ccfem.elasticity.nodes import facet_normals, nearest_node, patch_facets
 from ccfem.elasticity.problem import Problem
@@ -143,6 +144,8 @@ def check_load(load: Load) -> None:
     size = next(getattr(load, name) for name in sizes if hasattr(load, name))
     if np.max(np.abs(size)) < _SMALLEST and not isinstance(load, Displacement):
         raise InputError(f"a load must not be zero; got {load}: give it a size or leave it out")
+    for what, value, bounds in sizes_of(load):
+        bounds.check(what, value)
 
 
 def nodal_forces(mesh: LoadedBody, load: SurfaceLoad) -> FloatArray:

@@ -15,6 +15,7 @@ from ccfem.elasticity.conditioning import about_conditioning
 from ccfem.elasticity.contact import EXPECTED, Contact, find_contact
 from ccfem.elasticity.held import Held
 from ccfem.elasticity.order import LARGEST_ERROR, MOST_CELLS, linear_locks, on_quadratic
+from ccfem.elasticity.plausibility import check_size_of_motion
 from ccfem.elasticity.problem import Problem
 from ccfem.elasticity.solvers import LARGEST_DIRECT, Solver, direct_backend
 from ccfem.elasticity.stress_field import SolveRecord, StressField
@@ -64,9 +65,11 @@ def solve(
     Raises
     ------
     InputError
-        For an invalid mesh, support, load or backend.
+        For an invalid mesh, support, load or backend, load cases without effect, and displacements
+        far larger than the part (`ccfem.elasticity.plausibility`).
     SolveError
         When a solution is not accepted; the message names what makes the equations ill-conditioned.
+        Also when reactions do not balance the loads.
     """
     fields: dict[str, StressField] = {}
     sets = support_sets(problem)
@@ -114,6 +117,8 @@ def _solved_as_it_is(
         fields = solve_system(partial(prepare, problem), backend, tolerance)
     except SolveError as error:
         raise SolveError(f"{error}; {about_conditioning(problem)}") from error
+    for case, field in fields.items():
+        check_size_of_motion(problem, case, field.displacement)
     return {case: _with_error(field, why) for case, field in fields.items()}
 
 

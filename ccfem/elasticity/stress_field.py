@@ -11,11 +11,12 @@ from ccfem.checks import check_number
 from ccfem.display import Shown
 from ccfem.elasticity.error_estimate import ErrorEstimate, estimate_error
 from ccfem.elasticity.nodes import patch_nodes
-from ccfem.elasticity.order import about_error
 from ccfem.elasticity.part_stress import PartStress
+from ccfem.elasticity.plausibility import about_problem, about_solution
 from ccfem.elasticity.probe import Probe, displacement_at, located, support_forces
 from ccfem.elasticity.problem import Problem, patches_in_use
 from ccfem.elasticity.recovery import cell_strain, nodal_stress
+from ccfem.elasticity.supports import held
 from ccfem.elasticity.volume_loads import free_strain
 from ccfem.errors import InputError
 from ccfem.materials import Material
@@ -119,11 +120,14 @@ class StressField(Shown):
         free = free_strain(problem, self.case)
         return estimate_error(self.mesh, self.displacement, stiffness, free)
 
-    @property
+    @cached_property
     def findings(self) -> tuple[str, ...]:
-        """Remarks on the solution, one line each."""
-        found = about_error(self.record.error, self.problem)
-        return (found,) if found else ()
+        """Remarks on the part and its solution, one line each: `ccfem.elasticity.plausibility`."""
+        problem, error, cases = self.problem, self.record.error, self.problem.factors(self.case)
+        return (
+            *about_problem(problem, held(problem), cases, error),
+            *about_solution(problem, self.case, self.displacement, self.stress, error),
+        )
 
     @property
     def held_or_loaded(self) -> tuple[str, ...]:

@@ -5,6 +5,7 @@ from typing import Any
 
 import numpy as np
 
+from ccfem.checks import BED, SPRING, Range
 from ccfem.elasticity.load_kinds import Vector
 from ccfem.errors import InputError
 from ccfem.mesh.patches import unit_vector
@@ -24,6 +25,9 @@ __all__ = [
 ]
 
 _ZERO = (0.0, 0.0, 0.0)
+_LARGEST_ANGLE = 25.0
+"""Rotation, degrees, above which linear theory lengthens a part that turns by a tenth:
+``sqrt(1 + angle^2)``."""
 
 
 @dataclass(frozen=True)
@@ -157,7 +161,7 @@ class RigidPatch:
     value : tuple of 3 floats, mm, default zero
         Displacement that the held components take.
     angle : tuple of 3 floats, degrees, default zero
-        Rotation that the held rotations take; small.
+        Rotation that the held rotations take: small, at most 25.
     centre : tuple of 3 floats, mm, optional
         By default the centroid of the patch.
     """
@@ -177,6 +181,12 @@ class RigidPatch:
                     f"got '{letters}' on patch '{self.patch}'"
                 )
         _check_finite(self, "value", "angle", "centre")
+        if max(map(abs, self.angle)) > _LARGEST_ANGLE:
+            raise InputError(
+                f"a rigid patch must turn by at most {_LARGEST_ANGLE:g} degrees, for rotations are "
+                f"linear and a larger one stretches it by a tenth; got {self.angle} on patch "
+                f"'{self.patch}': turn it less, since stress is proportional to the angle"
+            )
 
 
 @dataclass(frozen=True)
@@ -223,7 +233,7 @@ class Spring:
     stiffness: Vector
 
     def __post_init__(self) -> None:
-        _check_stiffness(self, self.stiffness, f"the spring on patch '{self.patch}'", "N/mm")
+        _check_stiffness(self.stiffness, f"the spring on patch '{self.patch}'", SPRING)
 
 
 @dataclass(frozen=True)
@@ -242,7 +252,7 @@ class PointSpring:
 
     def __post_init__(self) -> None:
         _check_finite(self, "point")
-        _check_stiffness(self, self.stiffness, f"the spring at {self.point}", "N/mm")
+        _check_stiffness(self.stiffness, f"the spring at {self.point}", SPRING)
 
 
 @dataclass(frozen=True)
@@ -266,7 +276,7 @@ class Foundation:
 
     def __post_init__(self) -> None:
         both = (self.normal, self.tangential)
-        _check_stiffness(self, both, f"the foundation under patch '{self.patch}'", "MPa/mm")
+        _check_stiffness(both, f"the foundation under patch '{self.patch}'", BED)
 
 
 AnySupport = (
@@ -299,9 +309,11 @@ def _check_finite(support: Any, *names: str) -> None:
             )
 
 
-def _check_stiffness(support: Any, stiffness: tuple[float, ...], what: str, unit: str) -> None:
+def _check_stiffness(stiffness: tuple[float, ...], what: str, sizes: Range) -> None:
     if not np.isfinite(stiffness).all() or min(stiffness) < 0.0 or not any(stiffness):
         raise InputError(
-            f"stiffness of {what} must be numbers of at least 0 {unit}, not all zero; got "
+            f"stiffness of {what} must be numbers of at least 0 {sizes.unit}, not all zero; got "
             f"{stiffness}: give one above 0, or drop the support"
         )
+    for value in stiffness:
+        sizes.check(f"stiffness of {what}", value)

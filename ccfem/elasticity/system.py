@@ -13,6 +13,7 @@ from ccfem.elasticity.assembly import Pattern, assemble, pattern
 from ccfem.elasticity.held import Held
 from ccfem.elasticity.loads import load_cases
 from ccfem.elasticity.multigrid import Coarse
+from ccfem.elasticity.plausibility import check_balance, check_effect
 from ccfem.elasticity.problem import Problem
 from ccfem.elasticity.recovery import cell_stress, nodal_stress, times
 from ccfem.elasticity.solvers import Solver, factorise
@@ -33,8 +34,6 @@ class System:
     Attributes
     ----------
     problem : Problem
-    where : Pattern
-        Of the stiffness matrix.
     held : Held
         The supports, as far as no load case moves them.
     forces : dict of load case name to (n, 3) array, N
@@ -44,10 +43,14 @@ class System:
     """
 
     problem: Problem
-    where: Pattern
     held: Held
     forces: dict[str, FloatArray]
     moved: Mapping[str, FloatArray] = field(default_factory=dict)
+
+    @cached_property
+    def where(self) -> Pattern:
+        """Pattern of the stiffness matrix."""
+        return pattern(self.problem.mesh)
 
     @cached_property
     def stiffness(self) -> FloatArray:
@@ -139,9 +142,12 @@ class System:
         internal = (matrix @ displacement.reshape(-1)).reshape(-1, 3)
         forces, free = self.forces_in(case), free_strain(problem, case)
         mesh, soft = problem.mesh, soft_supports(problem)
-        reactions = self.held_in(case).supported(internal - forces)
+        held = self.held_in(case)
+        reactions = held.supported(internal - forces)
         if soft:
             reactions = reactions + spring_forces(mesh, soft, displacement)
+        moved = bool(held.value.any())
+        check_balance(problem, case, displacement, forces, reactions, moved)
         energy = 0.5 * float(np.vdot(displacement, internal))
         if free is not None:
             stress = times(scaled, free)
@@ -172,7 +178,8 @@ def prepare(problem: Problem) -> System:
     Raises
     ------
     InputError
-        For supports or loads that make no sense, and for load cases with different supports.
+        For supports or loads that make no sense, load cases with different supports, and those
+        under which nothing moves.
     """
     if problem.case_supports:
         raise InputError(
@@ -187,4 +194,11 @@ def prepare(problem: Problem) -> System:
         here = held_in(problem, case, at_rest)
         if here is not at_rest:
             moved[case] = here.value
-    return System(problem, pattern(problem.mesh), at_rest, forces, moved)
+    system = System(problem, at_rest, forces, moved)
+    for case in problem.cases:
+        size = sum(
+            abs(factor) * float(np.linalg.norm(forces[name], axis=1).sum())
+            for name, factor in problem.factors(case).items()
+        )
+        check_effect(problem, case, system.held_in(case), system.forces_in(case), size)
+    return system

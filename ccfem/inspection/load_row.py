@@ -1,6 +1,5 @@
 """What a load comes to: its resultant, where that acts, and how much of it falls on supports."""
 
-import re
 from dataclasses import dataclass
 
 import numpy as np
@@ -14,13 +13,14 @@ from ccfem.elasticity.load_kinds import (
     Load,
     SurfaceLoad,
     Temperature,
-    patches_of,
+    in_words,
 )
 from ccfem.elasticity.loads import nodal_forces
+from ccfem.elasticity.plausibility import held_share
 from ccfem.elasticity.problem import Problem
 from ccfem.elasticity.volume_loads import volume_forces
 
-__all__ = ["LoadRow", "kind_of", "load_row"]
+__all__ = ["LoadRow", "load_row"]
 
 _NONE = 1e-9
 """Resultant over the sum of the sizes of the nodal forces that counts as none."""
@@ -71,11 +71,10 @@ def load_row(problem: Problem, case: str, load: Load, held: Held | None) -> Load
     InputError
         For a load that its patch cannot take.
     """
-    kind = kind_of(load)
-    where = "".join(f" on {name}" for name in patches_of(load))
+    what = in_words(load)
     if isinstance(load, Displacement | Temperature):
         nothing = np.full(3, np.nan)
-        return LoadRow(case, f"{kind}{where}", nothing, nothing, nothing, 0.0)
+        return LoadRow(case, what, nothing, nothing, nothing, 0.0)
     if isinstance(load, SurfaceLoad):
         forces = nodal_forces(problem.mesh, load)
     else:
@@ -91,13 +90,5 @@ def load_row(problem: Problem, case: str, load: Load, held: Held | None) -> Load
     else:
         total = np.zeros(3)
     moment = turning - np.cross(point - middle, total)
-    lost = 0.0
-    if held is not None and held.ties is None and isinstance(load, SurfaceLoad):
-        free = np.linalg.norm(np.where(held.free[: len(forces)], forces, 0.0), axis=1)
-        lost = 1.0 - float(free.sum() / sizes.sum())
-    return LoadRow(case, f"{kind}{where}", total, moment, point, lost)
-
-
-def kind_of(value: object) -> str:
-    """Kind of a load or a support in words, as "point force"."""
-    return re.sub(r"(?<=[a-z])(?=[A-Z])", " ", type(value).__name__).lower()
+    lost = 0.0 if held is None else held_share(problem, load, held)
+    return LoadRow(case, what, total, moment, point, lost)

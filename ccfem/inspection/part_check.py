@@ -2,7 +2,7 @@
 
 import os
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
@@ -11,28 +11,26 @@ from ccfem.cases.case import Case
 from ccfem.cases.reading import read
 from ccfem.display import Shown
 from ccfem.elasticity.held import Held
-from ccfem.elasticity.load_kinds import patches_of
+from ccfem.elasticity.load_kinds import kind_of, patches_of
 from ccfem.elasticity.loads import load_case
+from ccfem.elasticity.plausibility import about_problem
 from ccfem.elasticity.problem import Problem
 from ccfem.elasticity.support_sets import support_sets
-from ccfem.elasticity.supports import held, held_in
+from ccfem.elasticity.supports import held
+from ccfem.elasticity.system import prepare
 from ccfem.errors import Mistakes
 from ccfem.inspection.cost import solve_costs
-from ccfem.inspection.load_row import LoadRow, kind_of, load_row
+from ccfem.inspection.load_row import LoadRow, load_row
 from ccfem.inspection.patch_row import PatchRow, patch_rows
 from ccfem.layers.layer import Layer
 from ccfem.layers.slicing.planar import Planar
 from ccfem.mesh.check import about_slivers
-from ccfem.mesh.facets import are_among
 from ccfem.mesh.measures import connected
 
 if TYPE_CHECKING:
     import pandas as pd
 
 __all__ = ["Check", "check"]
-
-_ALL, _SOME = 1.0 - 1e-9, 0.02
-"""Shares of a load on held nodes from which it has no effect, and from which there is a remark."""
 
 
 @dataclass(frozen=True)
@@ -143,19 +141,19 @@ def check(part: str | os.PathLike[str] | Case, **parameters: Any) -> Check:
     case = read(part, **parameters)
     problem, found = case.problem, Mistakes()
     rows: list[LoadRow] = []
+    doubts: list[str] = []
     sets = support_sets(problem)
-    for one in sets:
-        rows += _load_rows(one, found, len(sets) > 1)
+    for each in sets:
+        rows += _load_rows(each, found, doubts, len(sets) > 1)
     order = list(problem.loads)
     rows.sort(key=lambda row: order.index(row.case))
-    found.lines += [
-        f"load case '{row.case}': {row.what} acts on held nodes alone and does nothing: choose "
-        "another patch for the load, or for the support"
-        for row in rows
-        if row.held >= _ALL
-    ]
     if not problem.loads:
         found.lines.append("the part has no load case: give at least one load")
+    layers = Mistakes()  # which keep the part from being planned on, not from being solved
+    with layers.noted():
+        if isinstance(case.slicing, Planar):
+            case.slicing.check(problem.mesh, case.build, case.machine)
+    doubts += layers.lines
     fibre: tuple[Layer, ...] = ()
     with found.noted():
         fibre = _fibre_layers(case)
@@ -164,16 +162,19 @@ def check(part: str | os.PathLike[str] | Case, **parameters: Any) -> Check:
         (*_facts(case), *_about_fibre(case, fibre)),
         patch_rows(problem.mesh, _carried(case)),
         tuple(rows),
-        tuple(_warnings(case, rows)),
+        tuple(dict.fromkeys(_warnings(case, rows, doubts))),
         tuple(dict.fromkeys(found.lines)),
         fibre,
     )
 
 
-def _load_rows(problem: Problem, found: Mistakes, named: bool) -> list[LoadRow]:
-    """Rows of the loads on one set of supports; mistakes are recorded, with the case if named."""
+def _load_rows(problem: Problem, found: Mistakes, doubts: list[str], named: bool) -> list[LoadRow]:
+    """Rows of the loads on one set of supports; mistakes are recorded, with the case if named.
+
+    What is doubtful is added to `doubts`.
+    """
     at_rest: Held | None = None
-    rows = []
+    rows, sound = [], []
     with found.noted(f"load case '{next(iter(problem.loads))}': " if named else ""):
         at_rest = held(problem)
     for name, loads in problem.loads.items():
@@ -183,9 +184,16 @@ def _load_rows(problem: Problem, found: Mistakes, named: bool) -> list[LoadRow]:
                 rows.append(load_row(problem, name, load, at_rest))
         if len(found.lines) == before:
             with found.noted():
-                load_case(problem, name)
-                if at_rest is not None:
-                    held_in(problem, name, at_rest)
+                if at_rest is None:
+                    load_case(problem, name)
+                else:
+                    prepare(replace(problem, loads={name: loads}, combinations={}))
+        if len(found.lines) == before:
+            sound.append(name)
+    if at_rest is not None and len(sound) == len(problem.loads) and problem.combinations:
+        with found.noted():
+            prepare(problem)
+    doubts += about_problem(problem, at_rest, sound)
     return rows
 
 
@@ -256,26 +264,19 @@ def _carried(case: Case) -> dict[str, list[str]]:
     return carried
 
 
-def _warnings(case: Case, rows: Sequence[LoadRow]) -> list[str]:
+def _warnings(case: Case, rows: Sequence[LoadRow], doubts: Sequence[str]) -> list[str]:
     """List what may be unintended."""
     problem = case.problem
-    lines = [line for line in case.findings if not _only_told(line)]
+    lines = [line for line in case.findings if not _only_told(line)] + [*doubts]
     sliver = about_slivers(problem.mesh)
     if sliver:
         lines.append(sliver)
     for row in rows:
-        if row.held < _ALL and row.held > _SOME:
-            lines.append(
-                f"load case '{row.case}': {row.held:.0%} of {row.what} acts on held nodes and has "
-                "no effect: keep the patches of loads and supports apart"
-            )
         if row.size == 0.0:
             lines.append(
                 f"load case '{row.case}': {row.what} has no resultant because its parts cancel: "
                 "check that the patch faces one way"
             )
-    for each in support_sets(problem):
-        lines += [line for line in _shared(each) if line not in lines]
     unused = sorted(set(problem.mesh.patches) - set(problem.held_or_loaded))
     if unused and len(unused) <= 6:
         lines.append(f"patches without load or support: {', '.join(unused)}")
@@ -299,22 +300,6 @@ def _no_room(case: Case) -> list[str]:
             f"most {most:.4g} mm of {width:g} mm width; are all lengths in mm?"
         ]
     return []
-
-
-def _shared(problem: Problem) -> list[str]:
-    """Say which patches are loaded and held at once, on one set of supports."""
-    supported = {name for each in problem.supports for name in patches_of(each)}
-    loaded = {name for those in problem.loads.values() for x in those for name in patches_of(x)}
-    lines = []
-    for one in sorted(loaded):
-        for other in sorted(supported - {one}):
-            both = are_among(problem.mesh.patch(one), problem.mesh.patch(other))
-            if both.any():
-                lines.append(
-                    f"patches '{one}' (loaded) and '{other}' (held) share {int(both.sum())} of "
-                    f"{len(both)} facets: choose patches that do not overlap"
-                )
-    return lines
 
 
 def _numbers(values: Any, digits: int = 4, least: float = 0.0) -> str:

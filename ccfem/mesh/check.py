@@ -100,10 +100,6 @@ class MeshReport:
             ),
             (self.components > 1, f"the mesh falls into {self.components} separate pieces"),
             (
-                not 1.0 <= self.diagonal <= 1e4,
-                f"the part measures {self.diagonal:.3g} mm across: scale it if its unit is not mm",
-            ),
-            (
                 self.aspect > _SLIVER,
                 f"most cells are some {self.aspect:.3g} times as long as high: check that all "
                 "lengths are in mm",

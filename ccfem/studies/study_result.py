@@ -93,6 +93,8 @@ class StudyResult:
                 reasons.setdefault(f"failed: {outcome['failure']}", []).append(job.name)
             elif outcome.get("untested"):
                 reasons.setdefault(f"not tested: {outcome['untested']}", []).append(job.name)
+            for line in outcome.get("findings", ()):
+                reasons.setdefault(f"warning: {line}", []).append(job.name)
         found = [
             f"{names[0]}{f' and {len(names) - 1} more' if names[1:] else ''} {reason}"
             for reason, names in reasons.items()

@@ -155,9 +155,12 @@ def _run(
     """Outcome of one run."""
     stress, case = bench.stress, bench.stress.part.case
     bench.seconds = {}
+    findings: tuple[str, ...] = ()
     try:
         if stress.failure:
             raise InputError(stress.failure)
+        basis = bench.solved_for(load_case)
+        findings = (*case.findings, *basis.field.findings)
         part = bench.cut(load_case, slicer)
         if not part.layers:
             raise InputError("the slicing has no layer")
@@ -171,7 +174,7 @@ def _run(
             curve=False,
             bound=False,
         )
-        (run,) = answer(request, known=bench.solved_for(load_case), parts={"": part}).runs
+        (run,) = answer(request, known=basis, parts={"": part}).runs
     except InputError as error:
         run = Run("run", strategy, Toolpaths.empty(), None, failure=str(error))
     return {
@@ -182,6 +185,7 @@ def _run(
         "why_not": run.why_not,
         "untested": run.untested,
         "note": run.note,
+        "findings": findings,
         "fails_in": run.fails_in,
         "empty_layers": run.empty_layers,
         "values": {name: _number(value) for name, value in headline_values(run).items()},

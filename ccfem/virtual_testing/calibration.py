@@ -13,6 +13,7 @@ from pathlib import Path
 import numpy as np
 from scipy.optimize import brentq
 
+from ccfem.checks import MODULUS, STRENGTH
 from ccfem.elasticity.problem import Problem
 from ccfem.elasticity.solve import solve
 from ccfem.elasticity.stress_field import StressField
@@ -115,17 +116,19 @@ def calibrate(
     Raises
     ------
     InputError
-        For curves that do not suit each other or the part.
+        For curves that do not suit each other or the part, rows that leave their curve, and values
+        that no printed material has.
     """
     if (reinforced is None) != (toolpaths is None):
         raise InputError(
             "a reinforced test needs both its curve and its toolpaths; got only one of them"
         )
+    slope = unreinforced.slope()
+    stiffer = None if reinforced is None else reinforced.slope()
     field = _field(problem, case)
     specimen = Specimen.of(field)
     poisson = _poisson(problem)
     computed = specimen.stiffness(field.displacement, field.strain_energy)
-    slope = unreinforced.slope()
     index, _ = matrix_peak(field)
     source = f"{unreinforced.name}: {slope:.4g} N/mm, peak {unreinforced.peak:.4g} N"
     result = Calibration(
@@ -135,9 +138,18 @@ def calibrate(
         tensile_strength=index * unreinforced.peak / specimen.force(field.reactions),
         source=source,
     )
-    if reinforced is None or toolpaths is None:
+    for what, value, sizes in (
+        ("modulus", result.modulus, MODULUS),
+        ("strength", result.tensile_strength, STRENGTH),
+    ):
+        doubt = sizes.about(f"the {what} that follows", value)
+        if doubt:
+            raise InputError(
+                f"{unreinforced.name}: {doubt.partition(': ')[0]}: check the units of the curve, "
+                "mm and N unless its first line names others, and that the part is the tested one"
+            )
+    if reinforced is None or toolpaths is None or stiffer is None:
         return result
-    stiffer = reinforced.slope()
     rho = _fit_rho(specimen, toolpaths, stiffer / slope, reinforced.name)
     return replace(result, rho=rho, source=f"{source}; {reinforced.name}: {stiffer:.4g} N/mm")
 

@@ -1,12 +1,13 @@
 """Force-displacement curves of physical tests."""
 
 import csv
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from pathlib import Path
 
 import numpy as np
+from scipy.stats import theilslopes
 
-from ccfem.arrays import FloatArray, freeze
+from ccfem.arrays import FloatArray, IntArray, freeze, read_only
 from ccfem.errors import InputError
 from ccfem.io.whole import text_of
 
@@ -14,6 +15,12 @@ __all__ = ["Curve", "read_curve"]
 
 _LOW, _HIGH = 0.1, 0.4
 """Shares of the peak force between which the stiffness is taken (ISO 6891)."""
+_OFF = 0.25
+"""Distance of a row from the line of the others, over the length of the line, that is a mistake:
+slack, noise and yield leave a few hundredths."""
+_HIGH_PEAK, _STIFF = 2.0, 0.5
+"""A peak is a mistake that is so many times any other force, at such a share of the displacement
+that the line of the others has there: parts soften, they do not harden."""
 
 _UNITS = {
     "displacement": {"": 1.0, "mm": 1.0, "m": 1e3, "um": 1e-3},
@@ -31,14 +38,19 @@ class Curve:
     force : (k,) array, N
     name : str
         For messages.
+    lines : (k,) int array
+        Lines of the file that the rows come from, for messages; default 1, 2, ...
     """
 
     displacement: FloatArray
     force: FloatArray
     name: str = "curve"
+    lines: IntArray = field(default_factory=lambda: np.zeros(0, dtype=np.int64))
 
     def __post_init__(self) -> None:
         freeze(self, displacement=float, force=float)
+        given = self.lines if len(self.lines) else np.arange(1, len(self.force) + 1)
+        object.__setattr__(self, "lines", read_only(given, int))
         if self.displacement.shape != self.force.shape or self.force.ndim != 1:
             raise InputError(f"{self.name}: expected as many forces as displacements")
         if not (np.isfinite(self.force).all() and np.isfinite(self.displacement).all()):
@@ -61,8 +73,10 @@ class Curve:
         Raises
         ------
         InputError
-            For fewer than three points in that range, or a slope that is not positive.
+            For fewer than three points in that range, a row that leaves the curve, or a slope that
+            is not positive.
         """
+        self._check_peak()
         rising = np.arange(len(self.force)) <= self.force.argmax()
         used = rising & (self.force >= _LOW * self.peak) & (self.force <= _HIGH * self.peak)
         if used.sum() < 3 or not np.ptp(self.displacement[used]) > 0.0:
@@ -70,6 +84,12 @@ class Curve:
                 f"{self.name}: expected at least 3 rising points between {100 * _LOW:g} and "
                 f"{100 * _HIGH:g} % of the peak force; got {used.sum()}: record more points"
             )
+        rows = np.flatnonzero(used)
+        ease, start = _line(self.force[rows], self.displacement[rows])
+        gap = np.abs(self.displacement[rows] - start - ease * self.force[rows])
+        # Measured by the whole range, since rows may crowd at one of its ends.
+        if gap.max() > _OFF * abs(ease) * (_HIGH - _LOW) * self.peak:
+            raise InputError(self._off(int(rows[gap.argmax()])))
         slope = float(np.polyfit(self.displacement[used], self.force[used], 1)[0])
         if not slope > 0.0:
             raise InputError(
@@ -77,6 +97,31 @@ class Curve:
                 "sign of the displacement and the order of the points"
             )
         return slope
+
+    def _check_peak(self) -> None:
+        """Refuse a peak that lies far above the line of the other rows."""
+        row = int(self.force.argmax())
+        others = np.delete(np.arange(len(self.force)), row)
+        if len(others) < 3 or not self.peak > _HIGH_PEAK * self.force[others].max() > 0.0:
+            return
+        before = others[: max(int(self.force[others].argmax()) + 1, 3)]
+        ease, start = _line(self.force[before], self.displacement[before])
+        if self.displacement[row] - start < _STIFF * ease * self.peak:
+            raise InputError(self._off(row))
+
+    def _off(self, row: int) -> str:
+        """Say that a row leaves the curve."""
+        return (
+            f"{self.name}, line {self.lines[row]}: {self.displacement[row]:.6g} mm at "
+            f"{self.force[row]:.6g} N lies far off the line of the other rows: correct or delete "
+            "the line"
+        )
+
+
+def _line(x: FloatArray, y: FloatArray) -> tuple[float, float]:
+    """Slope and start of a line that up to a quarter of the points may miss (Theil and Sen)."""
+    found = theilslopes(y, x) if np.ptp(x) > 0.0 else (0.0, float(np.median(y)))
+    return float(found[0]), float(found[1])
 
 
 def read_curve(path: str | Path) -> Curve:
@@ -114,7 +159,7 @@ def read_curve(path: str | Path) -> Curve:
                 f"'{delimiter.join(row)}': correct or delete the line"
             ) from None
     displacement, force = np.array(values).T
-    return Curve(displacement, force, path.name)
+    return Curve(displacement, force, path.name, np.array([number for number, _ in lines[1:]]))
 
 
 def _column(names: list[str], kind: str, path: Path) -> tuple[int, float]:

@@ -16,13 +16,13 @@ from scipy.spatial import cKDTree
 
 from ccfem.arrays import FloatArray, freeze
 from ccfem.checks import check_number
+from ccfem.elasticity.ball import BALL, ball_averages
 from ccfem.elasticity.stress_field import StressField
+from ccfem.elasticity.zone import ZONE, distance_from_patches
 from ccfem.errors import InputError
 from ccfem.layers import Layer
 from ccfem.materials import Material
 from ccfem.mesh.tet_mesh import TetMesh
-from ccfem.virtual_testing.ball import BALL, ball_averages
-from ccfem.virtual_testing.zone import ZONE, distance_from_patches
 
 __all__ = ["ZONES", "Interlayer", "interlayer", "layer_normals"]
 
@@ -102,7 +102,7 @@ def interlayer(
     check_number("radius of the ball", radius, above=0.0, unit="mm")
     mesh = stress.mesh
     centroid = mesh.points[mesh.corners].mean(axis=1)
-    distance = distance_from_patches(stress, centroid, ZONE)
+    distance = distance_from_patches(stress.problem, stress.case, centroid, ZONE)
     if not (distance > ZONE).any():
         raise InputError(
             f"no cell lies farther than {ZONE:g} mm from the patches of loads and supports, so the "

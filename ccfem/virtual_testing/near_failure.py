@@ -15,15 +15,15 @@ from typing import TypeVar
 import numpy as np
 
 from ccfem.arrays import FloatArray, IntArray, in_brief
+from ccfem.elasticity.ball import BALL, ball_averages, ball_shares
 from ccfem.elasticity.recovery import cell_strain, times
 from ccfem.elasticity.stress_field import StressField
 from ccfem.elasticity.volume_loads import strain_forces
+from ccfem.elasticity.zone import ZONE, distance_from_patches
 from ccfem.errors import InputError
 from ccfem.tensor import from_voigt, to_voigt, von_mises
-from ccfem.virtual_testing.ball import BALL, ball_averages, ball_shares
 from ccfem.virtual_testing.strength import FIBRE_SHARE
 from ccfem.virtual_testing.strengths import Limits
-from ccfem.virtual_testing.zone import ZONE, distance_from_patches
 
 __all__ = ["POWER", "MatrixPeaks", "Peak", "check_stretched", "nearness", "stretched_index"]
 
@@ -152,8 +152,9 @@ class MatrixPeaks:
     @cached_property
     def judged(self) -> IntArray:
         """Cells outside the zone round loads and supports, as in `matrix_peak`."""
-        outside = np.isinf(distance_from_patches(self.part, self._centroids, ZONE))
-        return np.flatnonzero(outside)
+        part = self.part
+        distance = distance_from_patches(part.problem, part.case, self._centroids, ZONE)
+        return np.flatnonzero(np.isinf(distance))
 
     @cached_property
     def _stiffness(self) -> FloatArray:

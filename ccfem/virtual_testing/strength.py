@@ -12,15 +12,13 @@ import numpy as np
 
 from ccfem.arrays import FloatArray, freeze, in_brief
 from ccfem.elasticity.stress_field import StressField
+from ccfem.elasticity.zone import ZONE, averaged_mises
 from ccfem.errors import InputError
 from ccfem.layers import Layer
-from ccfem.tensor import von_mises
-from ccfem.virtual_testing.ball import BALL, ball_averages
 from ccfem.virtual_testing.interlayer import Interlayer, interlayer
 from ccfem.virtual_testing.strand import Strand
 from ccfem.virtual_testing.strengths import Limits
 from ccfem.virtual_testing.virtual_test import VirtualTest
-from ccfem.virtual_testing.zone import ZONE, distance_from_patches
 
 __all__ = ["FIBRE_SHARE", "FirstFailure", "fibre_peak", "first_failure", "matrix_peak"]
 
@@ -167,15 +165,11 @@ def matrix_peak(stress: StressField) -> tuple[float, FloatArray]:
     InputError
         When all cells are left out.
     """
-    mesh = stress.mesh
-    centroid = mesh.points[mesh.corners].mean(axis=1)
-    judged = np.flatnonzero(np.isinf(distance_from_patches(stress, centroid, ZONE)))
+    judged, average, centroid = averaged_mises(stress.problem, stress.case, stress.stress)
     if not len(judged):
         raise InputError(
             f"no cell lies farther than {ZONE:g} mm from the patches of loads and supports, so "
             "no matrix stress can be judged: the part is too small for this index"
         )
-    mises = von_mises(stress.stress)[:, None]
-    average = ball_averages(centroid, mises, mesh.volumes, judged, BALL)[:, 0]
     peak = average.argmax()
     return float(average[peak]), centroid[judged[peak]]

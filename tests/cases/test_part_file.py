@@ -11,6 +11,7 @@ from ccfem.elasticity.problem import Bearing, Force, PointForce, Pressure, Suppo
 from ccfem.elasticity.solve import solve
 from ccfem.elasticity.support_kinds import PressingSupport
 from ccfem.errors import InputError
+from ccfem.inspection import check
 from ccfem.io import write_mesh
 from ccfem.layers.slicing.planar import Planar
 from ccfem.mesh import TetMesh
@@ -329,22 +330,22 @@ def test_nothing_is_executed(folder):
     assert tomllib.loads(PART)["mesh"] == "body.npz"
 
 
-@pytest.mark.parametrize(("height", "said"), [(6.0, False), (2.0, False), (1.5, True)])
-def test_an_edge_longer_than_the_part_is_thick_is_pointed_out(folder, height, said):
+@pytest.mark.parametrize(("height", "said"), [(6.0, False), (2.0, True), (1.5, True)])
+def test_cells_longer_than_the_part_is_thick_are_pointed_out(folder, height, said):
     text = EXAMPLE.read_text().replace("height = 6.0", f"height = {height}")
     case = read(folder, text.replace("edge_length = 2.5", "edge_length = 2.0"))
-    about = [line for line in case.findings if "edge_length" in line]
+    about = [line for line in check(case).warnings if "one cell across" in line]
     assert len(about) == said
     if said:
-        assert about[0].startswith("edge_length 2 mm is longer than the part is thick, 1.5 mm: ")
+        assert about[0].startswith(f"walls of {height:g} mm, as at (")
 
 
-@pytest.mark.parametrize(("modulus", "said"), [(3500.0, False), (3.5, True), (3.5e9, True)])
+@pytest.mark.parametrize(("modulus", "said"), [(3500.0, ""), (3.5, "as GPa"), (1e7, "as Pa")])
 def test_a_modulus_in_another_unit_is_pointed_out(folder, modulus, said):
     material = f"\n[material]\nmodulus = {modulus}\npoisson = 0.35\n"
     case = read(folder, PART.replace('material = "pla"\n', "") + material)
-    about = [line for line in case.findings if "modulus" in line]
-    assert len(about) == said
+    about = [line for line in check(case).warnings if "modulus" in line]
+    assert len(about) == bool(said)
     if said:
-        assert f"a modulus of {modulus:.4g} MPa" in about[0]
-        assert about[0].endswith("give it in MPa (1 GPa = 1000 MPa)")
+        assert about[0].startswith(f"modulus of material 'isotropic' is {modulus:.6g} MPa, where 5")
+        assert f"usual: {said} it would be" in about[0]

@@ -47,6 +47,8 @@ def calibrated(tmp_path_factory: pytest.TempPathFactory) -> Path:
     folder = tmp_path_factory.mktemp("calibrate")
     curve(folder / "none.csv", 400.0, 900.0)
     curve(folder / "fibre.csv", 520.0, 1500.0)
+    rows = (folder / "none.csv").read_text().splitlines()
+    (folder / "row.csv").write_text("\n".join([*rows[:9], "1000000,320", *rows[9:]]))
     run = ccfem(
         "calibrate", "bar", *QUICK, "--unreinforced", "none.csv", "--reinforced", "fibre.csv",
         "--strategy", "isocurve", "--out", "printed.toml", folder=folder,
@@ -77,6 +79,10 @@ def test_the_calibrated_part_has_the_measured_stiffness(calibrated: Path) -> Non
     [
         (["--unreinforced", "no.csv"], "CSV file no.csv does not exist: check its name and folder"),
         (["--unreinforced", "none.csv", "--reinforced", "fibre.csv"], "belong together"),
+        (
+            ["--unreinforced", "row.csv"],
+            "row.csv, line 10: 1e+06 mm at 320 N lies far off",
+        ),
     ],
 )
 def test_bad_input_is_one_line(calibrated: Path, arguments: list[str], message: str) -> None:

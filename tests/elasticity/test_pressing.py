@@ -139,7 +139,8 @@ def test_a_pulled_block_leaves_its_support():
     with pytest.raises(InputError, match="lifts the part off its supports that only press"):
         solve(replace(problem, loads=pulled))
     # Between two tables it rests on the other one, and what it leaves carries nothing.
-    both = replace(problem, loads=pulled, supports=(*problem.supports, PressingSupport("z_max")))
+    pushed = {"case": (Force("z_min", (0.0, 0.0, 1.0)),)}
+    both = replace(problem, loads=pushed, supports=(*problem.supports, PressingSupport("z_max")))
     field = solve(both)["case"]
     np.testing.assert_allclose(field.support_forces["z_max"], [0.0, 0.0, -1.0], atol=1e-6)
     np.testing.assert_allclose(field.support_forces["z_min"], 0.0, atol=1e-6)

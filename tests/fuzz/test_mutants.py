@@ -1,12 +1,13 @@
 """Spoiled files of every format: read, or refused in one line. More: python -m benchmarks.fuzz."""
 
+import random
 import warnings
 
 import numpy as np
 import pytest
 
-from benchmarks.fuzz.__main__ import read
-from benchmarks.fuzz.mutants import good_files, mutants
+from benchmarks.fuzz.__main__ import read, solve_sizes
+from benchmarks.fuzz.mutants import good_files, mutants, part_of_sizes
 from ccfem.errors import InputError
 from ccfem.io import read_mesh
 from ccfem.mesh import box_mesh
@@ -45,6 +46,20 @@ def test_spoiled_files(folder, name, capfd):
     assert said or COUNTS[name] == 1
     assert not [line for line in said if "\n" in line or len(line) >= 2000]
     assert capfd.readouterr() == ("", "")
+
+
+def test_sizes_over_twelve_decades(folder):
+    """Each is refused in one line, or solved, and remarked on where it moves too far."""
+    chance, refused = random.Random("short"), []
+    for _ in range(20):
+        text, _ = part_of_sizes(chance)
+        (folder / "sizes.toml").write_text(text)
+        try:
+            solve_sizes(folder / "sizes.toml")
+        except InputError as error:
+            refused.append(str(error))
+    assert 0 < len(refused) < 20
+    assert not [line for line in refused if "\n" in line]
 
 
 def test_a_generated_set_of_a_thousand_million(folder):

@@ -22,7 +22,6 @@ from ccfem.elasticity import (
     Traction,
     solve,
 )
-from ccfem.elasticity.assembly import pattern
 from ccfem.elasticity.held import Held
 from ccfem.elasticity.loads import nodal_forces
 from ccfem.elasticity.stress_field import SolveRecord
@@ -64,7 +63,7 @@ def quarter_ring(outer, thickness=0.2):
 def solve_held(mesh, material, free, values, forces):
     """Solve with any component of any node held."""
     supports = Held(free, np.where(free, 0.0, values), np.flatnonzero(free.any(axis=1)))
-    system = System(Problem(mesh, material, ()), pattern(mesh), supports, {"case": forces})
+    system = System(Problem(mesh, material, ()), supports, {"case": forces})
     matrix = system.assemble()
     solution = system.factorise(matrix).solve(supports.right_hand_side(matrix, forces))
     record = SolveRecord("", solution.iterations, solution.residual, 0.0, 0.0, 0)
@@ -254,7 +253,7 @@ def test_a_loaded_hole_moves_the_way_it_is_pushed(kind):
     # A pin in the hole of a quarter plate presses outward: by Clapeyron the loads do work.
     mesh = mapped((4, 6, 1), quarter_ring(4.0))
     supports = (Support("x_max"),)
-    problem = Problem(mesh, isotropic(1.0, 0.3), supports, {"pin": (kind("x_min", (1, 1, 0)),)})
+    problem = Problem(mesh, isotropic(1e3, 0.3), supports, {"pin": (kind("x_min", (1, 1, 0)),)})
     field = solve(problem)["pin"]
     work = np.vdot(nodal_forces(mesh, problem.loads["pin"][0]), field.displacement)
     assert work == pytest.approx(2.0 * field.strain_energy, rel=1e-6)

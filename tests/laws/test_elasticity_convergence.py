@@ -10,7 +10,6 @@ from scipy.special import roots_jacobi
 
 from ccfem import tensor
 from ccfem.elasticity import Force, Problem, Support, solve
-from ccfem.elasticity.assembly import pattern
 from ccfem.elasticity.held import Held
 from ccfem.elasticity.system import System
 from ccfem.materials import transversely_isotropic
@@ -68,7 +67,7 @@ def l2_error(order, count):
     free = np.repeat(~outside[:, None], 3, axis=1)
     supports = Held(free, np.where(free, 0.0, exact(mesh.points)), np.flatnonzero(~outside))
     problem = Problem(mesh, MATERIAL, (), axes=np.tile(TURN, (len(mesh.cells), 1, 1)))
-    system = System(problem, pattern(mesh), supports, {"body": forces})
+    system = System(problem, supports, {"body": forces})
     matrix = system.assemble()
     rhs = supports.right_hand_side(matrix, forces)
     u = supports.expand(system.factorise(matrix).solve(rhs, tolerance=1e-10).values)
@@ -114,7 +113,7 @@ def test_turning_the_material_is_turning_the_part_and_its_load(seed):
     generator = np.random.default_rng(seed)
     turn = np.linalg.qr(generator.normal(size=(3, 3)))[0]
     turn *= np.sign(np.linalg.det(turn))
-    force = generator.normal(size=3)
+    force = 0.1 * generator.normal(size=3)
     mesh = box_mesh((4.0, 2.0, 1.0), (4, 2, 2))
     cells = len(mesh.cells)
     base = Problem(

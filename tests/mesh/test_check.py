@@ -166,11 +166,6 @@ def test_a_node_in_the_middle_of_a_facet_or_a_side_hangs():
         assert report.hanging == hangs
 
 
-def test_wrong_unit_is_pointed_out(box):
-    _, report = check_mesh(TetMesh(box.points / 1000, box.cells))
-    assert any("scale it" in line for line in report.findings)
-
-
 def test_what_nothing_can_follow_from(box):
     points = np.array(box.points)
     points[4, 1] = np.nan

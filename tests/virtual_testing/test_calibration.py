@@ -129,6 +129,54 @@ def test_missing_files_are_refused(tmp_path):
         read_calibration(path)
 
 
+TABLE = [(0.0, 0), (0.1, 210), (0.2, 432), (0.3, 640), (0.4, 861), (0.6, 1290), (0.9, 1820)]
+"""Displacement, mm, and force, N, of a curve: 2150 N/mm between 10 and 40 % of the peak."""
+
+
+@pytest.mark.parametrize(
+    ("place", "row", "wrong"),
+    [
+        (3, (1e6, 320), "1e+06 mm at 320 N"),
+        (1, (0.6, 250), "0.6 mm at 250 N"),
+        (4, (0.3, 1e6), "0.3 mm at 1e+06 N"),
+        (7, (0.9, 18200), "0.9 mm at 18200 N"),
+    ],
+)
+def test_a_row_that_leaves_the_curve_is_named(tmp_path, place, row, wrong):
+    path, rows = tmp_path / "none.csv", [*TABLE]
+    write = lambda: path.write_text(  # noqa: E731
+        "# tested\ndisplacement,force\n" + "".join(f"{d},{f}\n" for d, f in rows)
+    )
+    write()
+    assert read_curve(path).slope() == pytest.approx(2150.0, rel=1e-3)
+    rows.insert(place, row)
+    write()
+    with pytest.raises(InputError) as caught:
+        read_curve(path).slope()
+    assert str(caught.value) == (
+        f"none.csv, line {place + 3}: {wrong} lies far off the line of the other rows: correct or "
+        "delete the line"
+    )
+
+
+def test_noise_slack_and_yield_stay_on_the_curve():
+    noise = np.random.default_rng(1).normal(scale=0.02, size=62)
+    rough = curve(300.0, 900.0)
+    rough = dataclasses.replace(rough, displacement=rough.displacement * (1.0 + noise))
+    assert rough.slope() == pytest.approx(300.0, rel=0.1)
+    few = Curve(np.array([0.0, 0.1, 0.2, 0.3, 0.4, 1.0]), 100.0 * np.array([0, 1, 2, 3, 4, 9.0]))
+    assert few.slope() == pytest.approx(1000.0)
+
+
+@pytest.mark.parametrize(
+    ("stiffness", "peak", "said"),
+    [(1e-6, 1.0, "the modulus that follows is"), (1e3, 1e7, "the strength that follows is")],
+)
+def test_values_that_no_material_has_are_refused(stiffness, peak, said):
+    with pytest.raises(InputError, match=rf"none.csv: {said} .* usual: check the units of the"):
+        calibrate(pulled(), curve(stiffness * AREA / LENGTH, peak, "none.csv"))
+
+
 def test_curves_without_a_slope_are_refused():
     with pytest.raises(InputError, match=r"at least 3 rising points .* got 0: record more"):
         Curve(np.array([0.0, 1.0]), np.array([0.0, 5.0])).slope()

@@ -6,11 +6,11 @@ import numpy as np
 import pytest
 
 from ccfem.elasticity import Force, Problem, Support, solve
+from ccfem.elasticity.ball import ball_averages, ball_shares
 from ccfem.errors import InputError
 from ccfem.layers.slicing.planar import Planar
 from ccfem.materials import isotropic
 from ccfem.mesh.box import box_mesh
-from ccfem.virtual_testing.ball import ball_averages, ball_shares
 from ccfem.virtual_testing.interlayer import interlayer
 from ccfem.virtual_testing.near_failure import (
     MatrixPeaks,

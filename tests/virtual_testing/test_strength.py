@@ -69,11 +69,11 @@ def test_matrix_peak_is_the_largest_ball_average_away_from_the_patches():
 
 
 def test_a_point_force_has_its_zone_too(monkeypatch):
-    monkeypatch.setattr("ccfem.virtual_testing.strength.BALL", 0.1)
+    monkeypatch.setattr("ccfem.elasticity.zone.BALL", 0.1)
     node = np.array([12.0, 4.0 / 3.0, 4.0])
     field = solve(clamped((PointForce(tuple(node), (50.0, 0.0, 0.0)),)))["load"]
     _, far = matrix_peak(field)
-    monkeypatch.setattr("ccfem.virtual_testing.strength.ZONE", 0.5)
+    monkeypatch.setattr("ccfem.elasticity.zone.ZONE", 0.5)
     _, near = matrix_peak(field)
     assert np.linalg.norm(near - node) < 3.0 < np.linalg.norm(far - node)
 
@@ -134,7 +134,8 @@ def test_no_stretched_fibre_never_breaks():
 
 
 def test_a_part_within_the_zones_is_refused(monkeypatch):
-    monkeypatch.setattr("ccfem.virtual_testing.strength.ZONE", 12.0)
+    for module in ("elasticity.zone", "virtual_testing.strength"):
+        monkeypatch.setattr(f"ccfem.{module}.ZONE", 12.0)
     with pytest.raises(InputError, match=r"farther than 12 mm .* too small for this index"):
         matrix_peak(solve(clamped(BEND))["load"])
 

@@ -108,10 +108,10 @@ def test_bar_with_straight_fibres_is_a_rod_in_a_matrix(mode, order):
 
 
 def test_combination_is_tested_as_a_load_case():
-    half = (Force("x_max", (150.0, 0.0, 0.0)),)
+    half, aside = (Force("x_max", (150.0, 0.0, 0.0)),), (Force("y_max", (0.0, 150.0, 0.0)),)
     problem = dataclasses.replace(
         stretched(length=0.0),
-        loads={"pull": half, "move": (Displacement("x_max", (0.005, 0.0, 0.0)),)},
+        loads={"pull": aside, "move": (Displacement("x_max", (0.005, 0.0, 0.0)),)},
         combinations={"both": {"move": 2.0}},
     )
     test = virtual_test(toolpaths(*grid_lines()), solve(problem)["both"], Strand(900.0 / MODULUS))
@@ -321,8 +321,8 @@ def test_bad_input_is_refused():
     with pytest.raises(InputError, match="one or the other"):
         virtual_test(lines, solve(problem)["load"])
     held = dataclasses.replace(clamped(), loads={"held": (Force("x_min", (10.0, 0.0, 0.0)),)})
-    with pytest.raises(InputError, match="load case 'held' acts on nodes only that the supports"):
-        virtual_test(lines, solve(held)["held"])
+    with pytest.raises(InputError, match=r"load case 'held' .* acts on held nodes alone"):
+        solve(held)
     with pytest.raises(InputError, match="axial stiffness"):
         equilibrium(Specimen.of(field), cut_strands(lines, field.mesh), np.inf)
 

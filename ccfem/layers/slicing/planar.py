@@ -11,7 +11,7 @@ from ccfem.elasticity.part_stress import PartStress
 from ccfem.errors import InputError, shown
 from ccfem.layers.layer import Layer
 from ccfem.layers.level_cut import border_edges, chain, cut_at_zero, patch_edges
-from ccfem.layers.pitch import check_heights, check_pitch
+from ccfem.layers.pitch import check_heights
 from ccfem.layers.plane import Plane, plane_frame
 from ccfem.layers.slicer import Vector
 from ccfem.machine.machine import Machine
@@ -97,13 +97,18 @@ class Planar:
         InputError
             As of `cut`, and when layers are nearer than a strand of the machine is high.
         """
-        if self.heights is None:  # before thousands of layers are cut
-            check_heights(
-                self._stack(stress.mesh, plane_frame(_AXES.get(self.axis, build))), machine
-            )
-        layers = self.cut(stress.mesh, build)
-        check_pitch(layers, machine)
-        return layers
+        self.check(stress.mesh, build, machine)  # before thousands of layers are cut
+        return self.cut(stress.mesh, build)
+
+    def check(self, mesh: TetMesh, build: Vector, machine: Machine) -> None:
+        """Refuse layers nearer to each other than a strand of a machine is high.
+
+        Raises
+        ------
+        InputError
+            Also for a slab that is higher than the part.
+        """
+        check_heights(self._stack(mesh, plane_frame(_AXES.get(self.axis, build))), machine)
 
     def cut(self, mesh: TetMesh, build: Vector = (0.0, 0.0, 1.0)) -> tuple[Layer, ...]:
         """Cut a mesh into flat layers.

@@ -12,12 +12,12 @@ import numpy as np
 
 from ccfem.arrays import FloatArray
 from ccfem.comparison.result import Comparison
+from ccfem.elasticity.ball import BALL, ball_averages
 from ccfem.elasticity.stress_field import StressField
+from ccfem.elasticity.zone import ZONE, distance_from_patches
 from ccfem.layers.layer import Layer
 from ccfem.papers.fang_2024.planar_against_curved import ROWS
-from ccfem.virtual_testing.ball import BALL, ball_averages
 from ccfem.virtual_testing.interlayer import layer_normals
-from ccfem.virtual_testing.zone import ZONE, distance_from_patches
 
 __all__ = [
     "PAPER_LOADS",
@@ -80,7 +80,7 @@ def _opening(stress: StressField, layers: tuple[Layer, ...], force: float) -> Op
     """Load of each cell outside the zones of loads and supports, as `interlayer` judges it."""
     mesh, material = stress.mesh, stress.problem.material
     middle = mesh.points[mesh.corners].mean(axis=1)
-    judged = np.flatnonzero(distance_from_patches(stress, middle, ZONE) > ZONE)
+    judged = np.flatnonzero(distance_from_patches(stress.problem, stress.case, middle, ZONE) > ZONE)
     values = stress.stress.reshape(-1, 9)
     tensor = ball_averages(middle, values, mesh.volumes, judged, BALL).reshape(-1, 3, 3)
     normal = layer_normals(layers, middle[judged])

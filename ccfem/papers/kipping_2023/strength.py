@@ -7,6 +7,7 @@ import numpy as np
 
 from ccfem.arrays import FloatArray, IntArray
 from ccfem.cases.arm_bracket import HOLES
+from ccfem.elasticity.ball import BALL, ball_averages
 from ccfem.elasticity.solve import solve
 from ccfem.elasticity.stress_field import StressField
 from ccfem.elasticity.support_kinds import PressingSupport
@@ -16,7 +17,6 @@ from ccfem.materials import isotropic
 from ccfem.papers.kipping_2023.chain import Chain
 from ccfem.papers.kipping_2023.figures import blank
 from ccfem.plot.canvas import png
-from ccfem.virtual_testing.ball import BALL, ball_averages
 from ccfem.virtual_testing.interlayer import interlayer, layer_normals
 
 __all__ = ["SHEAR", "failure_loads", "on_pressing_supports", "sliding_picture", "strength_table"]

@@ -1,19 +1,21 @@
-"""Distance of the cells of a part from where it is held and loaded."""
+"""Where the stress of a part is judged: away from where it is held and loaded, averaged."""
 
 from typing import Any
 
 import numpy as np
 from scipy.spatial import cKDTree
 
-from ccfem.arrays import FloatArray
+from ccfem.arrays import FloatArray, IntArray
+from ccfem.elasticity.ball import BALL, ball_averages
 from ccfem.elasticity.load_kinds import patches_of, points_of
 from ccfem.elasticity.nodes import edge_nodes
-from ccfem.elasticity.stress_field import StressField
+from ccfem.elasticity.problem import Problem
 from ccfem.elasticity.support_kinds import AnySupport, EdgeSupport, Support
 from ccfem.mesh.facets import are_among
 from ccfem.mesh.tet_mesh import TetMesh
+from ccfem.tensor import von_mises
 
-__all__ = ["ZONE", "distance_from_patches"]
+__all__ = ["ZONE", "averaged_mises", "distance_from_patches"]
 
 ZONE = 3.0
 """Distance, mm, from patches of loads and supports within which stress is not judged."""
@@ -22,23 +24,52 @@ _SPACING = 0.5
 """Largest distance, mm, between points that stand for a patch."""
 
 
-def distance_from_patches(stress: StressField, centroid: FloatArray, most: float) -> FloatArray:
+def averaged_mises(
+    problem: Problem, case: str, stress: FloatArray
+) -> tuple[IntArray, FloatArray, FloatArray]:
+    """Von Mises stress of the cells averaged by volume over a ball of 2 mm radius, MPa.
+
+    Parameters
+    ----------
+    problem : Problem
+    case : str
+        The load case.
+    stress : (m, 3, 3) array, MPa
+        Of the cells.
+
+    Returns
+    -------
+    judged : (k,) int array
+        Cells at least 3 mm from the patches of loads and supports; the others count in averages.
+    average : (k,) array, MPa
+    centroid : (m, 3) array, mm
+        Of all cells.
+    """
+    mesh = problem.mesh
+    centroid = mesh.points[mesh.corners].mean(axis=1)
+    judged = np.flatnonzero(np.isinf(distance_from_patches(problem, case, centroid, ZONE)))
+    mises = von_mises(stress)[:, None]
+    return judged, ball_averages(centroid, mises, mesh.volumes, judged, BALL)[:, 0], centroid
+
+
+def distance_from_patches(
+    problem: Problem, case: str, centroid: FloatArray, most: float
+) -> FloatArray:
     """Distance, mm, of points (k, 3) from the patches of loads and supports of a load case.
 
     Infinite beyond `most`, which keeps the search short. A whole flat face that slides in its
     plane, as a plane of symmetry does, is no such patch: no stress peaks there.
     """
     bound = np.nextafter(most, np.inf)
-    tree = cKDTree(_held_and_loaded(stress))
+    tree = cKDTree(_held_and_loaded(problem, case))
     return np.asarray(tree.query(centroid, distance_upper_bound=bound)[0])
 
 
-def _held_and_loaded(stress: StressField) -> FloatArray:
+def _held_and_loaded(problem: Problem, case: str) -> FloatArray:
     """Points (k, 3) that cover the patches of the supports and of the load case."""
-    problem = stress.problem
     mesh = problem.mesh
     edges = [each.patches for each in problem.supports if isinstance(each, EdgeSupport)]
-    kinds: list[Any] = [*problem.loads_of(stress.case)]
+    kinds: list[Any] = [*problem.loads_of(case)]
     kinds += [
         each
         for each in problem.supports
