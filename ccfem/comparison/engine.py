@@ -245,6 +245,7 @@ def answer(
             parts, refused = _cut(request, basis)
     steps = (5 if request.print_plans else 4) * len(request.strategies) * len(parts) + 1
     tell = counted(progress, 0.1, steps)
+    wanted: Wanted
     if isinstance(request.amount, Stiffness):
         part, run, held = plan_to_stiffness(request, parts[""], basis.cut, tell)
         parts, runs, wanted = {"": part}, [run], held
@@ -263,9 +264,19 @@ def answer(
     said = tuple(
         f"{name}: {line}" if name else line for name, part in parts.items() for line in part.remarks
     )
-    shared = (request, basis.cases, stacks)
-    results = (tuple(runs), wanted, seconds, refused, basis.given, bounds, curve, said)
-    return Comparison(*shared, *results)
+    return Comparison(
+        request,
+        basis.cases,
+        stacks,
+        tuple(runs),
+        wanted,
+        seconds,
+        refused,
+        given=basis.given,
+        bounds=bounds,
+        curve=curve,
+        of_slicers=said,
+    )
 
 
 def _cut(request: Request, basis: Solved) -> tuple[dict[str, Part], dict[str, str]]:

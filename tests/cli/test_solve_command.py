@@ -81,7 +81,7 @@ def test_the_page_on_stress_of_another_program_works_as_written(ccfem, tmp_path)
     nodal = to_voigt(solve(read_part(tmp_path / "beam.toml").problem)["pull"].nodal)
     (tmp_path / "beam.frd").write_text(frd(mesh, nodal[: len(mesh.points), [0, 1, 2, 5, 3, 4]]))
     (command,) = re.findall(r"^    ccfem (compare beam.toml --stress .*)$", PAGE, flags=re.M)
-    assert f"    ccfem {command}\n" in (ROOT / "README.md").read_text()
+    assert f"    ccfem {command}\n" in (ROOT / "docs/how_to/commands.md").read_text()
     quick = ("--strategies", "zigzag", "--layers", 1, "--natural", "--no-virtual-test")
     code, out, _ = ccfem(*command.split(), *quick)
     assert code == 0

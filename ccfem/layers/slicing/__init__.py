@@ -88,6 +88,7 @@ def as_slicer(layers: "int | Sequence[float] | str | Slicer") -> Slicer:
         return from_text(layers)
     if isinstance(layers, type) or callable(layers):
         check_instance("slicer", layers)
+        assert isinstance(layers, Slicer)
         return layers
     if isinstance(layers, int):
         return Planar(count=layers)

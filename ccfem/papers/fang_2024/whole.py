@@ -56,7 +56,7 @@ def write_all(
     write_robot_waypoints(matrix, chain.matrix, sliced.layers, machine, MATRIX)
     field = field_study(sliced)
     print(f"\n{field_table(field)}", flush=True)
-    tests = {}
+    tests: dict[str, Comparison] = {}
     for load in loads:
         progress(f"comparing slicings under load {load}", 0.3 + 0.3 * len(tests))
         tests[load] = against(load)

@@ -3,7 +3,7 @@
 import json
 from pathlib import Path
 
-from ccfem.papers.kipping_2023.chain import PARTS, chain, table_1, table_2
+from ccfem.papers.kipping_2023.chain import PARTS, Chain, chain, table_1, table_2
 from ccfem.papers.kipping_2023.claims import quantities, support_table, verdicts
 from ccfem.papers.kipping_2023.figures import part_figures, senses_figure
 from ccfem.papers.kipping_2023.fiso_shapes import options_table, shapes_picture, shapes_table
@@ -23,7 +23,7 @@ __all__ = ["write_all"]
 def write_all(folder: Path, progress: Progress = silent) -> None:
     """Run the study, and write figures, tables and claims into a folder."""
     folder.mkdir(parents=True, exist_ok=True)
-    chains = {}
+    chains: dict[str, Chain] = {}
     for part, name in PARTS.items():
         progress(f"planning part {part}", len(chains) / len(PARTS))
         chains[part] = chain(name)

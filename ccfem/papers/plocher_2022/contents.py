@@ -38,6 +38,6 @@ CONTENTS = Contents(
         "table3": lambda study: case_table(study()[0]),
         "table5": lambda study: material_table(),
     },
-    figures=lambda study, number: figures(*study, number),
+    figures=lambda study, number: figures(study[0], study[1], number),
     numbers=(2, 3, 4, 6, 7, 8, 9, 10, 11, 12, 13, 14),
 )
