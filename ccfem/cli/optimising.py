@@ -173,7 +173,7 @@ def _write(found: "Optimised", files: Sequence[Path], case: str) -> None:
     import sys
 
     from ccfem.cases.part_writing import part_text
-    from ccfem.io.npz import write_npz
+    from ccfem.io.formats import npz
     from ccfem.io.whole import whole_file
     from ccfem.plot.canvas import png
     from ccfem.plot.design_picture import design_picture
@@ -202,7 +202,7 @@ def _write(found: "Optimised", files: Sequence[Path], case: str) -> None:
         to_history.write_text(
             "\n".join(["iteration,compliance_N_mm,largest_change", *rows, ""]), encoding="utf-8"
         )
-        write_npz(new.problem.mesh, to_mesh)
+        npz.write(new.problem.mesh, to_mesh)
         to_part.write_text(text, encoding="utf-8")
 
 

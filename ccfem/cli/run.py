@@ -39,9 +39,6 @@ __all__ = [
 
 _STARTED = time.perf_counter()
 
-_MESHES = (".msh", ".vtu", ".inp", ".tet", ".npz")
-"""Suffixes of files that hold a mesh."""
-
 _SOLVED = 0.75
 """Share of the progress bar at which the comparison is made and the pictures begin."""
 
@@ -82,11 +79,12 @@ def load(
 
 def _refuse_body(name: str) -> None:
     """Say what a part file is to who gives the body instead."""
+    from ccfem.io.formats import suffixes
     from ccfem.io.surface import is_surface
     from ccfem.meshing.cad import is_cad
 
     body = Path(name)
-    if is_surface(body) or is_cad(body) or body.suffix.lower() in _MESHES:
+    if is_surface(body) or is_cad(body) or body.suffix.lower() in suffixes():
         raise InputError(
             f"{name} is a body without material, loads and supports; a part file (TOML) adds "
             f"these: 'ccfem new {shlex.quote(name)}' writes one to fill in"

@@ -4,8 +4,8 @@ from pathlib import Path
 
 from ccfem.elasticity.stress_field import StressField
 from ccfem.errors import InputError
+from ccfem.io.formats import vtu
 from ccfem.io.vtk_xml import as_bytes
-from ccfem.io.vtu import write_vtu
 from ccfem.io.vtu_tensors import UNIT, VTK_COMPONENTS, vtk_tensors
 from ccfem.io.whole import whole_file
 from ccfem.tensor import principal
@@ -50,7 +50,7 @@ def write_result(field: StressField, path: str | Path) -> None:
     path = result_path(path)
     values, axes = principal(field.stress)
     with whole_file(path) as temporary:
-        write_vtu(
+        vtu.write(
             field.mesh,
             temporary,
             {

@@ -2,36 +2,19 @@
 
 import os
 import warnings
-from collections.abc import Callable
 from pathlib import Path
 
 import numpy as np
 
 from ccfem.checks import check_number
 from ccfem.errors import InputError
-from ccfem.io.abaqus import read_inp
-from ccfem.io.gmsh import read_msh
-from ccfem.io.npz import read_npz, write_npz
-from ccfem.io.tet import read_tet, write_tet
-from ccfem.io.vtu import read_vtu, write_vtu
+from ccfem.io.formats import format_of, suffixes
 from ccfem.io.whole import existing_file, whole_file
 from ccfem.mesh.check import check_mesh
 from ccfem.mesh.tet_mesh import TetMesh
 
 __all__ = ["check_mesh_name", "read_mesh", "write_mesh"]
 
-_READERS: dict[str, Callable[[Path], TetMesh]] = {
-    ".tet": read_tet,
-    ".msh": read_msh,
-    ".vtu": read_vtu,
-    ".inp": read_inp,
-    ".npz": read_npz,
-}
-_WRITERS: dict[str, Callable[[TetMesh, Path], None]] = {
-    ".vtu": write_vtu,
-    ".tet": write_tet,
-    ".npz": write_npz,
-}
 _SURFACES = (".stl", ".obj", ".ply")
 
 
@@ -41,9 +24,9 @@ def read_mesh(path: str | os.PathLike[str], scale: float = 1.0, check: bool = Tr
     Parameters
     ----------
     path : path
-        ``.tet`` (`ccfem.io.tet`), Gmsh ``.msh`` 2.2 or 4.1 (physical groups of triangles become
-        patches), ``.vtu``, Abaqus ``.inp`` (surfaces, node sets and sets of triangles become
-        patches) or ``.npz`` (`ccfem.io.npz`). Linear or quadratic.
+        One of the formats in `ccfem.io.formats`: ``.tet``, Gmsh ``.msh`` 2.2 or 4.1 (physical
+        groups of triangles become patches), ``.vtu``, Abaqus ``.inp`` (surfaces, node sets and sets
+        of triangles become patches) or ``.npz``. Linear or quadratic.
     scale : float, default 1
         Factor on the coordinates, to make them mm: 1000 for a file in metres.
     check : bool, default True
@@ -62,14 +45,14 @@ def read_mesh(path: str | os.PathLike[str], scale: float = 1.0, check: bool = Tr
             f"{path} is a surface, not a tetrahedral mesh: read it with read_surface and fill it "
             "with tetrahedralise, or name it as surface in the part file"
         )
-    if suffix not in _READERS:
+    if suffix not in suffixes():
         raise InputError(
             f"cannot tell the format of mesh file {path}: its name must end in "
-            f"{', '.join(sorted(_READERS))}"
+            f"{', '.join(suffixes())}"
         )
     check_number("mesh scale", scale, above=0.0)
     try:
-        mesh = _READERS[suffix](path)
+        mesh = format_of(suffix).read(path)
         if scale != 1.0:
             with np.errstate(over="ignore"):  # what overflows is refused as infinite
                 points = mesh.points * scale
@@ -105,7 +88,7 @@ def write_mesh(mesh: TetMesh, path: str | os.PathLike[str]) -> None:
     if not np.isfinite(mesh.points).all():
         raise InputError(f"cannot write {path}: the mesh has NaN or infinite coordinates")
     with whole_file(path) as temporary:
-        _WRITERS[suffix](mesh, temporary)
+        format_of(suffix).write(mesh, temporary)
 
 
 def check_mesh_name(path: Path) -> str:
@@ -117,8 +100,7 @@ def check_mesh_name(path: Path) -> str:
         For another suffix.
     """
     suffix = path.suffix.lower()
-    if suffix not in _WRITERS:
-        raise InputError(
-            f"cannot write a mesh to {path}: its name must end in {', '.join(sorted(_WRITERS))}"
-        )
+    known = suffixes(writable=True)
+    if suffix not in known:
+        raise InputError(f"cannot write a mesh to {path}: its name must end in {', '.join(known)}")
     return suffix

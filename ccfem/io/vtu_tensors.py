@@ -7,8 +7,8 @@ from numpy.typing import NDArray
 
 from ccfem.arrays import FloatArray
 from ccfem.errors import InputError
+from ccfem.io.formats.vtu import Grid, read_grid
 from ccfem.io.stress_data import COMPONENTS, StressData, component_order
-from ccfem.io.vtu import Grid, read_grid
 from ccfem.tensor import to_voigt
 
 __all__ = ["UNIT", "VTK_COMPONENTS", "vtk_tensors", "vtu_stress"]

@@ -18,7 +18,7 @@ from ccfem.isolated.process import ChildError
 from ccfem.mesh.patches import with_groups
 from ccfem.mesh.tet_mesh import TetMesh
 
-__all__ = ["Grid", "read_grid", "read_vtu", "write_vtu"]
+__all__ = ["Grid", "read", "read_grid", "write"]
 
 _PATCH = "patch:"
 _TYPES = {
@@ -41,10 +41,10 @@ _TAGS = ("patch", "gmsh:physical", "CellEntityIds", "PhysicalIds")
 """Integer cell data that number the groups of triangles in files of other programs."""
 
 
-def read_vtu(path: Path) -> TetMesh:
+def read(path: Path) -> TetMesh:
     """Read a VTK unstructured grid.
 
-    Patches come from the field data ``patch:NAME`` that `write_vtu` writes, and from triangle
+    Patches come from the field data ``patch:NAME`` that `write` writes, and from triangle
     cells with an integer cell array named patch, gmsh:physical, CellEntityIds or PhysicalIds
     (called by their number).
     """
@@ -133,7 +133,7 @@ def _tagged_triangles(grid: Grid) -> dict[str, IntArray]:
     return {name: np.concatenate(parts) for name, parts in groups.items()}
 
 
-def write_vtu(
+def write(
     mesh: TetMesh,
     path: Path,
     point: Mapping[str, ArrayLike] | None = None,

@@ -13,14 +13,14 @@ import numpy as np
 from ccfem.errors import InputError, shown
 from ccfem.mesh.tet_mesh import TetMesh
 
-__all__ = ["read_npz", "write_npz"]
+__all__ = ["read", "write"]
 
 _PATCH = "patch:"
 _SMALL, _PACKED = 10_000_000, 200
 """Bytes that any archive may unpack to, and how many times its size more."""
 
 
-def read_npz(path: Path) -> TetMesh:
+def read(path: Path) -> TetMesh:
     """Read a mesh from a NumPy archive."""
     try:
         _check_sizes(path)
@@ -67,7 +67,7 @@ def _check_sizes(path: Path) -> None:
         )
 
 
-def write_npz(mesh: TetMesh, path: Path) -> None:
+def write(mesh: TetMesh, path: Path) -> None:
     """Write a mesh with its patches to a compressed NumPy archive; equal meshes, equal bytes."""
     arrays: dict[str, Any] = {"points": mesh.points, "cells": mesh.cells.astype(np.int32)}
     for name in sorted(mesh.patches):

@@ -19,7 +19,7 @@ from ccfem.io.cells import tetrahedra
 from ccfem.mesh.patches import match_boundary
 from ccfem.mesh.tet_mesh import TetMesh
 
-__all__ = ["read_inp"]
+__all__ = ["read"]
 
 _KINDS = (
     (r"C3D4|DC3D4", "tetra", 4),
@@ -61,7 +61,7 @@ class _Deck:
     parts: int = 0
 
 
-def read_inp(path: Path) -> TetMesh:
+def read(path: Path) -> TetMesh:
     """Read an Abaqus or CalculiX input deck.
 
     Raises

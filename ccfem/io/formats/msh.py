@@ -12,10 +12,10 @@ from ccfem.isolated.process import ChildError
 from ccfem.mesh.patches import with_groups
 from ccfem.mesh.tet_mesh import TetMesh
 
-__all__ = ["read_msh"]
+__all__ = ["read"]
 
 
-def read_msh(path: Path) -> TetMesh:
+def read(path: Path) -> TetMesh:
     """Read a Gmsh mesh; physical groups of triangles become patches.
 
     A group without a name is called by its number. Quadratic tetrahedra come in VTK order: Gmsh

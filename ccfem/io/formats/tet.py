@@ -16,10 +16,10 @@ import numpy as np
 from ccfem.errors import InputError
 from ccfem.mesh.tet_mesh import TetMesh
 
-__all__ = ["read_tet", "write_tet"]
+__all__ = ["read", "write"]
 
 
-def read_tet(path: Path) -> TetMesh:
+def read(path: Path) -> TetMesh:
     """Read a ``.tet`` file.
 
     Raises
@@ -57,7 +57,7 @@ def read_tet(path: Path) -> TetMesh:
     return TetMesh(points, rows[:, 1:].astype(np.int64))
 
 
-def write_tet(mesh: TetMesh, path: Path) -> None:
+def write(mesh: TetMesh, path: Path) -> None:
     """Write the points, to the last bit, and cells of a linear mesh; patches are left out."""
     if mesh.order != 1:
         raise InputError("the .tet format holds linear tetrahedra only: write .vtu or .npz")
