@@ -26,7 +26,7 @@ from ccfem.cases.bridge import bridge_plate
 from ccfem.elasticity import solve
 from ccfem.plates import solve_plane
 from ccfem.evaluation import evaluate
-from ccfem.evaluation.matching import THRESHOLDS, matching_rate
+from ccfem.evaluation.indices.matching import THRESHOLDS, matching_rate
 from ccfem.evaluation.plane_paths import plane_paths
 from ccfem.virtual_testing.equilibrium import BONDED
 from ccfem.virtual_testing.strand import RHO, Strand

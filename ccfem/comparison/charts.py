@@ -10,7 +10,7 @@ from ccfem.comparison.curve import Curve
 from ccfem.comparison.headline import headline_values
 from ccfem.comparison.ranking import stiffness_ratio
 from ccfem.comparison.runs import Run
-from ccfem.evaluation.matching import THRESHOLDS, along_fibre, matching_curve
+from ccfem.evaluation.indices.matching import THRESHOLDS, along_fibre, matching_curve
 from ccfem.evaluation.plane_paths import pool
 from ccfem.virtual_testing.stiffer import RESOLUTION
 

@@ -38,7 +38,7 @@ class DrawnPaths:
     force : (P,) array, N
         Axial force in the piece from each point to the next one; NaN where it is not known.
     curvature : (P,) array, 1/mm
-        At the middle of that piece, as `ccfem.evaluation.curvature` samples it.
+        At the middle of that piece, as `ccfem.evaluation.indices.curvature` samples it.
     """
 
     points: FloatArray

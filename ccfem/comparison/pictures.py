@@ -12,7 +12,7 @@ from ccfem.comparison.result import Comparison
 from ccfem.comparison.runs import Run
 from ccfem.comparison.shown import caption, drawn_layers, middle_layer
 from ccfem.elasticity.stress_field import StressField
-from ccfem.evaluation.matching import THRESHOLDS, along_fibre, matching_curve
+from ccfem.evaluation.indices.matching import THRESHOLDS, along_fibre, matching_curve
 from ccfem.evaluation.plane_paths import pool
 from ccfem.fields.chart import chart_of, flat_view, in_charts
 from ccfem.inspection.part_check import check

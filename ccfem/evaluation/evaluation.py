@@ -1,8 +1,8 @@
 """The evaluator: every index of a set of paths, for each layer and in total."""
 
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass, replace
-from typing import TYPE_CHECKING, NamedTuple
+from dataclasses import dataclass
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
@@ -10,41 +10,14 @@ from ccfem.arrays import FloatArray, IntArray, freeze
 from ccfem.display import Shown
 from ccfem.elasticity.part_stress import PartStress
 from ccfem.errors import InputError
-from ccfem.evaluation import (
-    alignment,
-    containment,
-    coverage,
-    crossings,
-    curvature,
-    head,
-    links,
-    manufacture,
-    matching,
-    room,
-    sinuosity,
-    skin,
-    space,
-    spacing,
-    stiffness_alignment,
-    tension_across,
-)
-from ccfem.evaluation.alignment import AlignmentSamples
+from ccfem.evaluation import indices
 from ccfem.evaluation.column import Column
-from ccfem.evaluation.containment import ContainmentSamples
-from ccfem.evaluation.coverage import CoverageSamples
-from ccfem.evaluation.crossings import CrossingSamples
-from ccfem.evaluation.curvature import CurvatureSamples
-from ccfem.evaluation.head import HeadSamples
-from ccfem.evaluation.links import LinkSamples
-from ccfem.evaluation.manufacture import ManufactureSamples
+from ccfem.evaluation.indices.alignment import AlignmentSamples
+from ccfem.evaluation.indices.curvature import CurvatureSamples
+from ccfem.evaluation.layer_paths import Basis, LayerPaths
 from ccfem.evaluation.plane_paths import PlanePaths, plane_paths, pool
-from ccfem.evaluation.room import RoomSamples
+from ccfem.evaluation.printed_stack import Printed, printed
 from ccfem.evaluation.sensitivity import strand_lamina
-from ccfem.evaluation.sinuosity import SinuositySamples
-from ccfem.evaluation.skin import SkinSamples
-from ccfem.evaluation.space import SpaceSamples
-from ccfem.evaluation.spacing import SpacingSamples
-from ccfem.evaluation.tension_across import TensionSamples
 from ccfem.fields.chart import chart_of
 from ccfem.geometry.nearest_on_triangles import nearest_on_triangles
 from ccfem.layers.layer import Layer
@@ -60,23 +33,8 @@ if TYPE_CHECKING:
 
 __all__ = ["COLUMNS", "Evaluation", "FibreSamples", "evaluate"]
 
-COLUMNS: tuple[Column, ...] = (
-    *manufacture.COLUMNS,
-    *sinuosity.COLUMNS,
-    *curvature.COLUMNS,
-    *alignment.COLUMNS,
-    *matching.COLUMNS,
-    *stiffness_alignment.COLUMNS,
-    *spacing.COLUMNS,
-    *room.COLUMNS,
-    *coverage.COLUMNS,
-    *containment.COLUMNS,
-    *skin.COLUMNS,
-    *links.COLUMNS,
-    *crossings.COLUMNS,
-    *space.COLUMNS,
-    *tension_across.COLUMNS,
-    *head.COLUMNS,
+COLUMNS: tuple[Column, ...] = tuple(
+    column for module in indices.named().values() for column in module.COLUMNS
 )
 """Every index in the order of the tables."""
 
@@ -206,22 +164,24 @@ def evaluate(
     _check_layers(toolpaths, layers)
     fibre = toolpaths.of_kind(FIBRE).layer
     late = fibre[fibre < np.maximum.accumulate(fibre)]
-    stack = head.printed(layers, build)
+    stack = printed(layers, build)
     upright = _upright(layers, build)
 
-    def sampled(layer: Layer) -> _Samples:
+    def sampled(layer: Layer) -> dict[str, Any]:
         behind = int(np.count_nonzero(late == layer.index))
         on_layer = toolpaths.on_layer(layer.index)
         below = _below(layer, layers)
-        return _sample(on_layer, layer, stress, machine, below, behind, stack, upright)
+        view = _view(on_layer, layer, stress, machine, below, behind, stack, upright)
+        kinds = indices.named().items()
+        return {name: kind.sample(view) for name, kind in kinds if hasattr(kind, "sample")}
 
     samples = in_threads(sampled, layers)
-    material = _material(layers, stress, machine, strand or Strand())
-    rows = [_indices(each, machine, material) for each in (*samples, _pooled(samples))]
+    basis = Basis(machine, _material(layers, stress, machine, strand or Strand()))
+    rows = [_indices(each, basis) for each in (*samples, _pooled(samples))]
     return Evaluation(
         np.array([layer.index for layer in layers]),
         {column.name: np.array([row[column.name] for row in rows]) for column in COLUMNS},
-        tuple(FibreSamples(each.curvature, each.alignment) for each in samples),
+        tuple(FibreSamples(each["curvature"], each["alignment"]) for each in samples),
     )
 
 
@@ -263,67 +223,26 @@ def _below(layer: Layer, layers: Sequence[Layer]) -> Layer | None:
     return max(flat, key=lambda each: each.plane.height, default=None)
 
 
-class _Samples(NamedTuple):
-    """Samples of one layer, or of all layers together, from which every index is computed."""
-
-    manufacture: ManufactureSamples
-    sinuosity: SinuositySamples
-    curvature: CurvatureSamples
-    alignment: AlignmentSamples
-    spacing: SpacingSamples
-    room: RoomSamples
-    coverage: CoverageSamples
-    containment: ContainmentSamples
-    skin: SkinSamples
-    links: LinkSamples
-    crossings: CrossingSamples
-    space: SpaceSamples
-    tension: TensionSamples
-    head: HeadSamples
-
-
-def _sample(
+def _view(
     toolpaths: Toolpaths,
     layer: Layer,
     stress: PartStress,
     machine: Machine,
     below: Layer | None,
     late: int,
-    stack: head.Printed | None,
+    stack: Printed | None,
     build: FloatArray,
-) -> _Samples:
-    """Take the samples of one layer."""
-    width = machine.fibre_width
-    seen, view = toolpaths, layer
+) -> LayerPaths:
+    """See the paths of one layer in every way that an index may need."""
+    seen, flat = toolpaths, layer
     if layer.flat is None:
         chart = chart_of(layer)
-        seen, view = chart.flattened(toolpaths), chart.flat
-    paths = plane_paths(seen, view)
-    on_layer = stress_on(view, stress)
-    made = manufacture.sample_manufacture(paths, toolpaths, machine)
+        seen, flat = chart.flattened(toolpaths), chart.flat
+    paths = plane_paths(seen, flat)
     fibre = toolpaths.select(toolpaths.kind == FIBRE)
-    out = skin.sample_skin(fibre, layer, stress.mesh, machine)
-    if layer.flat is None:
-        made = replace(made, length=fibre.lengths[fibre.lengths > 0.0])
-    else:
-        fibre = _in_space(paths.in_part)
-    in_space = space.sample_space(fibre, layer, stress, width)
-    return _Samples(
-        made,
-        sinuosity.sample_sinuosity(paths, width),
-        curvature.sample_curvature(paths, width),
-        alignment.sample_alignment(paths, on_layer, width),
-        spacing.sample_spacing(paths, width),
-        room.sample_room(paths, machine, below, late),
-        coverage.sample_coverage(paths, on_layer, width),
-        containment.sample_containment(paths, width),
-        out,
-        links.sample_links(paths),
-        crossings.sample_crossings(paths),
-        in_space,
-        tension_across.sample_tension(layer, stress, build),
-        head.sample_head(fibre, layer, stack, machine),
-    )
+    inside = fibre if layer.flat is None else _in_space(paths.in_part)
+    about = (layer, stress_on(flat, stress), stress, machine, below, late, stack, build)
+    return LayerPaths(toolpaths, fibre, inside, paths, *about)
 
 
 def _in_space(paths: PlanePaths) -> Toolpaths:
@@ -332,9 +251,9 @@ def _in_space(paths: PlanePaths) -> Toolpaths:
     return Toolpaths.from_plane(lines, paths.layer, paths.closed.tolist())
 
 
-def _pooled(samples: Sequence[_Samples]) -> _Samples:
+def _pooled(samples: Sequence[Mapping[str, Any]]) -> dict[str, Any]:
     """Join the samples of all layers."""
-    return _Samples._make(pool(group) for group in zip(*samples, strict=True))
+    return {name: pool([each[name] for each in samples]) for name in samples[0]}
 
 
 def _material(
@@ -347,23 +266,9 @@ def _material(
     return strand_lamina(stress.material, strand.rho / section)
 
 
-def _indices(samples: _Samples, machine: Machine, material: Material) -> dict[str, float]:
+def _indices(samples: Mapping[str, Any], basis: Basis) -> dict[str, float]:
     """Value of each of `COLUMNS`."""
-    return {
-        **manufacture.manufacture_indices(samples.manufacture, machine),
-        **sinuosity.sinuosity_indices(samples.sinuosity),
-        **curvature.curvature_indices(samples.curvature, machine),
-        **alignment.alignment_indices(samples.alignment),
-        **matching.matching_indices(samples.alignment),
-        **stiffness_alignment.stiffness_alignment_indices(samples.alignment, material),
-        **spacing.spacing_indices(samples.spacing, machine),
-        **room.room_indices(samples.room),
-        **coverage.coverage_indices(samples.coverage),
-        **containment.containment_indices(samples.containment),
-        **skin.skin_indices(samples.skin),
-        **links.link_indices(samples.links),
-        **crossings.crossing_indices(samples.crossings),
-        **space.space_indices(samples.space),
-        **tension_across.tension_indices(samples.tension),
-        **head.head_indices(samples.head),
-    }
+    values: dict[str, float] = {}
+    for name, kind in indices.named().items():
+        values |= kind.indices(samples[getattr(kind, "SAMPLES", name)], basis)
+    return values

@@ -18,7 +18,7 @@ from ccfem.comparison.engine import compare
 from ccfem.comparison.files import write_results
 from ccfem.elasticity.problem import Force, Problem, Support
 from ccfem.evaluation import FibreSamples
-from ccfem.evaluation.matching import THRESHOLDS
+from ccfem.evaluation.indices.matching import THRESHOLDS
 from ccfem.export import layer_drawings
 from ccfem.layers.slicing import Planar
 from ccfem.machine import Machine

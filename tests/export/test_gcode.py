@@ -8,7 +8,7 @@ import pytest
 import shapely
 
 from ccfem.errors import InputError
-from ccfem.evaluation.manufacture import manufacture_indices, sample_manufacture
+from ccfem.evaluation.indices.manufacture import manufacture_indices, sample_manufacture
 from ccfem.evaluation.plane_paths import plane_paths
 from ccfem.export.gcode import gcode, write_gcode
 from ccfem.io.toml import from_table

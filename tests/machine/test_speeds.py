@@ -8,7 +8,7 @@ import pytest
 
 from ccfem.cases.part_file import read_part
 from ccfem.errors import InputError
-from ccfem.evaluation.manufacture import manufacture_indices, sample_manufacture
+from ccfem.evaluation.indices.manufacture import manufacture_indices, sample_manufacture
 from ccfem.evaluation.plane_paths import plane_paths
 from ccfem.geometry.polylines import pack
 from ccfem.io.toml import from_table

@@ -6,8 +6,8 @@ import numpy as np
 import pytest
 import shapely
 
+from ccfem.evaluation.indices.stiffness_alignment import agreement
 from ccfem.evaluation.plane_paths import plane_paths
-from ccfem.evaluation.stiffness_alignment import agreement
 from ccfem.layers.layer_stress import stress_on
 from ccfem.machine import Machine
 from ccfem.papers.plocher_2022.plane_study import bead_area

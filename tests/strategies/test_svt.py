@@ -10,7 +10,7 @@ from ccfem.cases import create_case
 from ccfem.elasticity import Force, Problem, Support, solve
 from ccfem.errors import InputError
 from ccfem.evaluation import evaluate
-from ccfem.evaluation.matching import matching_rate
+from ccfem.evaluation.indices.matching import matching_rate
 from ccfem.geometry.polylines import resample, turning_angles
 from ccfem.layers.layer_stress import stress_on
 from ccfem.layers.slicing.planar import Planar

@@ -10,10 +10,10 @@ from matplotlib.collections import LineCollection
 from matplotlib.figure import Figure
 
 from ccfem.arrays import FloatArray
+from ccfem.evaluation.indices.sinuosity import LONG
+from ccfem.evaluation.indices.stiffness_alignment import agreement
 from ccfem.evaluation.plane_paths import PlanePaths
 from ccfem.evaluation.sensitivity import OffAxis
-from ccfem.evaluation.sinuosity import LONG
-from ccfem.evaluation.stiffness_alignment import agreement
 from ccfem.materials import named_material
 from ccfem.papers.contents import drawn_of
 from ccfem.papers.plocher_2022.benchmark_figures import (

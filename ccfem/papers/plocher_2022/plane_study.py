@@ -8,10 +8,10 @@ import numpy as np
 import shapely
 
 from ccfem.arrays import BoolArray, FloatArray, read_only
+from ccfem.evaluation.indices.sinuosity import LONG
+from ccfem.evaluation.indices.stiffness_alignment import Reading, agreement, performance_index
 from ccfem.evaluation.plane_paths import PlanePaths
 from ccfem.evaluation.sensitivity import plane_compliance
-from ccfem.evaluation.sinuosity import LONG
-from ccfem.evaluation.stiffness_alignment import Reading, agreement, performance_index
 from ccfem.linking.print_order import nearest_end_order
 from ccfem.materials import Material
 from ccfem.papers.plocher_2022.fibre_map import FibreMap

@@ -15,9 +15,9 @@ import numpy as np
 
 from ccfem.elasticity.stress_field import StressField
 from ccfem.evaluation import evaluate
+from ccfem.evaluation.indices.sinuosity import path_sinuosity, sample_sinuosity, sinuosity_indices
+from ccfem.evaluation.indices.stiffness_alignment import READINGS
 from ccfem.evaluation.plane_paths import PlanePaths, plane_paths
-from ccfem.evaluation.sinuosity import path_sinuosity, sample_sinuosity, sinuosity_indices
-from ccfem.evaluation.stiffness_alignment import READINGS
 from ccfem.export.gcode import gcode
 from ccfem.geometry.polylines import lengths, pack
 from ccfem.layers.layer import Layer

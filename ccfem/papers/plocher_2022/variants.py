@@ -6,9 +6,9 @@ from typing import Any
 
 import numpy as np
 
+from ccfem.evaluation.indices.sinuosity import path_sinuosity, sample_sinuosity, sinuosity_indices
+from ccfem.evaluation.indices.stiffness_alignment import agreement
 from ccfem.evaluation.plane_paths import plane_paths
-from ccfem.evaluation.sinuosity import path_sinuosity, sample_sinuosity, sinuosity_indices
-from ccfem.evaluation.stiffness_alignment import agreement
 from ccfem.geometry.polylines import pack
 from ccfem.materials import named_material
 from ccfem.papers.plocher_2022.fibre_map import fibre_map

@@ -6,7 +6,7 @@ from pathlib import Path
 import numpy as np
 import shapely
 
-from ccfem.evaluation.matching import THRESHOLDS, matching_rate
+from ccfem.evaluation.indices.matching import THRESHOLDS, matching_rate
 from ccfem.geometry.medial_axis import medial_axis
 from ccfem.layers import LayerStress
 from ccfem.machine import SpeedTable

@@ -9,7 +9,7 @@ import shapely
 from matplotlib.figure import Figure
 from scipy.spatial import Voronoi
 
-from ccfem.evaluation.matching import THRESHOLDS
+from ccfem.evaluation.indices.matching import THRESHOLDS
 from ccfem.geometry.medial_axis import medial_axis
 from ccfem.linking.print_speed import step_speeds
 from ccfem.papers.contents import drawn_of

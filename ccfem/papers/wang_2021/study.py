@@ -21,8 +21,8 @@ from ccfem.cases.designed import ELEMENT_SIZE, DesignPlate
 from ccfem.cases.stored.build import DESIGNED
 from ccfem.elasticity import StressField, solve
 from ccfem.evaluation import evaluate
-from ccfem.evaluation.curvature import sample_curvature
-from ccfem.evaluation.matching import READINGS, matching_rate
+from ccfem.evaluation.indices.curvature import sample_curvature
+from ccfem.evaluation.indices.matching import READINGS, matching_rate
 from ccfem.evaluation.plane_paths import PlanePaths, plane_paths
 from ccfem.geometry.polylines import resample, turning_angles
 from ccfem.layers import LayerStress

@@ -8,8 +8,8 @@ from dataclasses import dataclass, replace
 
 from ccfem.cases.bridge import bridge_plate
 from ccfem.cases.designed import Hole, designed_case
-from ccfem.evaluation.curvature import sample_curvature
-from ccfem.evaluation.manufacture import sample_manufacture
+from ccfem.evaluation.indices.curvature import sample_curvature
+from ccfem.evaluation.indices.manufacture import sample_manufacture
 from ccfem.evaluation.plane_paths import PlanePaths, plane_paths
 from ccfem.papers.wang_2021.study import (
     BASELINES,

@@ -3,7 +3,7 @@
 from pathlib import Path
 from time import perf_counter
 
-from ccfem.evaluation.matching import READINGS, THRESHOLDS
+from ccfem.evaluation.indices.matching import READINGS, THRESHOLDS
 from ccfem.io.csv_table import write_csv
 from ccfem.papers.verdicts import claim_table
 from ccfem.papers.wang_2021.claims import quantities, verdicts
