@@ -13,6 +13,7 @@ import types
 import typing
 from pathlib import Path
 
+import pandas as pd
 import pytest
 
 import ccfem
@@ -158,3 +159,41 @@ def test_adding_a_slicer_works_as_told(copy):
     heights = json.loads((folder / "results/results.json").read_text())["case"]["heights"]
     # A bar 5 mm high: the middles of three steps of the unit interval, squared.
     assert heights == pytest.approx([5.0 * (k / 6.0) ** 2 for k in (1, 3, 5)])
+
+
+def python_of(section):
+    """The python block of a section of CONTRIBUTING.md, and the file that it is saved as."""
+    text = CONTRIBUTING.partition(f"## {section}\n")[2].partition("\n## ")[0]
+    (name,) = re.findall(r"`(ccfem/\S+\.py)`:\n", text)
+    (block,) = blocks(text, "python")
+    return text, name, block
+
+
+def test_adding_an_index_works_as_told(copy):
+    """One file: its column is in the table; a bar 5 mm high has middles at 1.25 and 3.75 mm."""
+    folder, run = copy
+    text, name, block = python_of("Add an index")
+    (folder / name).write_text(block)
+    (command,) = re.findall(r"^ +(ccfem compare .*)$", text, flags=re.M)
+    run(command)
+    table = pd.read_csv(folder / "levels/results.csv").set_index("layer")["mean_level"]
+    assert table[["0", "1", "total"]].tolist() == pytest.approx([1.25, 3.75, 2.5], abs=0.02)
+
+
+def test_adding_a_mesh_format_works_as_told(copy):
+    """One file: a mesh written and read again is the same, and messages name the suffix."""
+    folder, run = copy
+    _, name, block = python_of("Add a mesh format")
+    (folder / name).write_text(block)
+    program = folder / "both_ways.py"
+    program.write_text(
+        "from ccfem.io import read_mesh, write_mesh\n"
+        "from ccfem.io.formats import suffixes\n"
+        "from ccfem.mesh import box_mesh\n"
+        "mesh = box_mesh((2.0, 3.0, 4.0), (1, 1, 1))\n"
+        "write_mesh(mesh, 'box.nodes')\n"
+        "again = read_mesh('box.nodes')\n"
+        "print(again.volumes.sum(), len(again.cells), '.nodes' in suffixes())\n"
+    )
+    volume, cells, known = run("both_ways").split()
+    assert (float(volume), int(cells), known) == (pytest.approx(24.0), 6, "True")

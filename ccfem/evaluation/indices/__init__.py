@@ -3,7 +3,7 @@
 A module has
 
 * ``COLUMNS``, a tuple of `Column`: the name, unit, formula and range of each index;
-* ``sample(paths)``, which takes the samples of one layer from a `LayerPaths`: a dataclass of arrays,
+* ``sample(paths)``, which takes the samples of one layer from `LayerPaths`: a dataclass of arrays,
   which are joined over the layers; or ``SAMPLES``, the name of the module whose samples it takes;
 * ``indices(samples, basis)``, the value of each index by name, of one layer or of all together;
 * ``PLACE``, a number that says where its columns stand in tables; default behind all others.
