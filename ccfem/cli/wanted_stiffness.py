@@ -187,8 +187,7 @@ def _beyond(
 ) -> str:
     """Say why no paths of a length, mm, make the part so and so stiff; empty where some may."""
     from ccfem.elasticity.stress_field import StressField
-    from ccfem.fibre_aware.cases_bound import LEAST, cases_bound
-    from ccfem.fibre_aware.upper_bound import upper_bound
+    from ccfem.fibre_aware.upper_bound import LEAST, upper_bound
 
     asked = f"{ratio:.4g} times the stiffness without fibre was asked for"
     cure = "ask for less, or give the part more layers"
@@ -202,7 +201,7 @@ def _beyond(
         if bound < ratio:
             said = f"no paths on {len(layers)} layers exceed {bound:.4g} in '{field.case}'"
             return f"{asked}; {said}: {cure}"
-    most = 1.0 / cases_bound(stress, layers, length, machine, strand, LEAST).least
+    most = upper_bound(stress, layers, length, machine, strand, objective=LEAST).ratio
     said = f"no paths on {len(layers)} layers bring all of them above {most:.4g}"
     return f"{asked}; {said}: {cure}" if most < ratio else ""
 

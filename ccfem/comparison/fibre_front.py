@@ -26,9 +26,8 @@ from ccfem.comparison.stages import (
 from ccfem.elasticity.stress_field import StressField
 from ccfem.elasticity.weighted_cases import WeightedCases
 from ccfem.errors import InputError
-from ccfem.fibre_aware.cases_bound import CasesBound, cases_bound
 from ccfem.fibre_aware.plan_cases import plan_cases_to_lengths
-from ccfem.fibre_aware.upper_bound import upper_bound
+from ccfem.fibre_aware.upper_bound import UpperBound, upper_bound
 from ccfem.layers.slicing.planar import Planar
 from ccfem.planning.equal_fibre import plan_to_lengths
 from ccfem.planning.strategy import Strategy
@@ -217,9 +216,9 @@ def _most(stress: StressField, part: Part, length: float) -> float:
     return upper_bound(stress, part.layers, length, part.machine, part.strand).ratio
 
 
-def _most_of_cases(cases: WeightedCases, part: Part, length: float) -> CasesBound:
+def _most_of_cases(cases: WeightedCases, part: Part, length: float) -> UpperBound:
     """Return what no paths of a length, mm, exceed under several load cases."""
-    return cases_bound(cases, part.layers, length, part.machine, part.strand)
+    return upper_bound(cases, part.layers, length, part.machine, part.strand)
 
 
 def _of(solved: Solved) -> Tests:
@@ -252,7 +251,7 @@ def _planned(bare: Run, part: Part, lengths: Sequence[float]) -> list[tuple[floa
 
 
 def _points(
-    runs: Sequence[tuple[int, float, float, Run]], bounds: Mapping[float, float | CasesBound]
+    runs: Sequence[tuple[int, float, float, Run]], bounds: Mapping[float, float | UpperBound]
 ) -> tuple[FrontPoint, ...]:
     """Points of runs, each with the bound of the least length that is no less than its own."""
     least = (min(each for each in bounds if each >= run.length) for *_, run in runs)
@@ -260,13 +259,13 @@ def _points(
 
 
 def _point(
-    count: int, strength: float, asked: float, run: Run, bound: float | CasesBound
+    count: int, strength: float, asked: float, run: Run, bound: float | UpperBound
 ) -> FrontPoint:
     """Keep what the front shows of a run."""
     tested = run.tested
     assert tested is not None
     failure, ratio, cases = tested.failure, tested.bracket.tension.ratio, None
-    if isinstance(bound, CasesBound):
+    if isinstance(bound, UpperBound):
         assert tested.cases is not None
         cases = PointCases.of(tested.cases, bound)
         ratio, most = float(cases.ratios[cases.worst]), float(bound.singles[cases.worst])

@@ -23,7 +23,6 @@ from ccfem.elasticity.stress_field import StressField
 from ccfem.elasticity.support_kinds import PressingSupport
 from ccfem.elasticity.weighted_cases import WeightedCases
 from ccfem.errors import InputError
-from ccfem.fibre_aware.cases_bound import CasesBound, cases_bound
 from ccfem.fibre_aware.upper_bound import UpperBound, upper_bound
 from ccfem.layers import Layer
 from ccfem.layers.slicer import Slicer
@@ -170,7 +169,7 @@ def judged(
     )
 
 
-def _bounded_cases(run: Run, bound: CasesBound, wanted: float | None) -> Run:
+def _bounded_cases(run: Run, bound: UpperBound, wanted: float | None) -> Run:
     """Run with the bound of several load cases."""
     if run.tested is None or run.tested.cases is None or off_length(run, wanted):
         return run
@@ -239,14 +238,14 @@ def _bound_of_cases(
     wanted: float | None,
     tell: Tell,
     seconds: dict[str, float],
-) -> CasesBound | None:
+) -> UpperBound | None:
     """Bound what any paths can reach in all load cases together; None as in `_bound`."""
     longest = _longest_bounded(solved, part, runs, wanted)
     if longest is None or solved.tests is None:
         return None
     tell("bounding what any paths could reach in all load cases")
     with timed(seconds, "bound"):
-        return cases_bound(cases, part.layers, longest, part.machine, solved.tests.strand)
+        return upper_bound(cases, part.layers, longest, part.machine, solved.tests.strand)
 
 
 def _longest_bounded(

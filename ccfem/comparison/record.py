@@ -132,7 +132,7 @@ def record(comparison: Comparison, command: str, seconds: Mapping[str, float]) -
             "strain_energy": stress.strain_energy,
             "fibre_per_layer": comparison.fibre_per_layer,
             "upper_bound": None if comparison.bound is None else comparison.bound.ratio,
-            "upper_bound_gap": None if comparison.bound is None else comparison.bound.gap,
+            "upper_bound_gap": None if comparison.bound is None else comparison.bound.duality_gap,
             "load_cases": None if comparison.cases is None else _load_cases(comparison),
             "curve": None
             if comparison.curve is None
@@ -148,7 +148,11 @@ def _load_cases(comparison: Comparison) -> dict[str, Any]:
     cases, bound = comparison.cases, comparison.cases_bound
     assert cases is not None
     weights = dict(zip(cases.names, cases.weights.tolist(), strict=True))
-    return {"weights": weights, "bound": None if bound is None else vars(bound)}
+    if bound is None:
+        return {"weights": weights, "bound": None}
+    kept = ("objective", "singles", "case_weights", "least", "factors")
+    said = {name: getattr(bound, name) for name in kept} | {"reached": bound.attained}
+    return {"weights": weights, "bound": said}
 
 
 def _load(stress: StressField) -> list[float] | None:

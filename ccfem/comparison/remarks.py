@@ -196,7 +196,7 @@ def bound_remark(tested: Sequence[Run], bound: UpperBound) -> str:
     share = bound.share(stiffness_ratio(best))
     bonded = max(stiffness_ratio(run, "bonded") for run in tested)
     free = "; bonded fibres are not bounded" if bonded > bound.ratio else ""
-    loose = f"; it may be loose by {bound.gap:.1%}" if bound.gap > LOOSE else ""
+    loose = f"; it may be loose by {bound.duality_gap:.1%}" if bound.duality_gap > LOOSE else ""
     most = (
         f"paths of {length:.0f} mm a layer in {layers} layers can make the part "
         f"more than {bound.ratio:.2f} times as stiff (fibres carrying tension only"

@@ -20,7 +20,6 @@ from ccfem.comparison.views import front_picture, layer_view, shown_layer, told
 from ccfem.elasticity.part_stress import GivenStress, PartStress
 from ccfem.elasticity.stress_field import StressField
 from ccfem.elasticity.weighted_cases import WeightedCases
-from ccfem.fibre_aware.cases_bound import CasesBound
 from ccfem.fibre_aware.upper_bound import UpperBound
 from ccfem.layers import Layer
 from ccfem.plot.scenes import View, show
@@ -57,7 +56,7 @@ class Comparison:
     cases : WeightedCases, optional
         If paths are planned for several load cases. `stress` is then that of the case of largest
         weight, the first of several.
-    cases_bound : CasesBound, optional
+    cases_bound : UpperBound, optional
         What no paths can exceed in all load cases together.
     curve : Curve, optional
         The strategies at several lengths of fibre, if that was asked for, or if a strategy cannot
@@ -74,7 +73,7 @@ class Comparison:
     given: GivenStress | None = None
     curve: Curve | None = None
     cases: WeightedCases | None = None
-    cases_bound: CasesBound | None = None
+    cases_bound: UpperBound | None = None
 
     @property
     def planned_on(self) -> PartStress:

@@ -7,14 +7,13 @@ import numpy as np
 from ccfem.comparison.ranking import merit, off_length, order_of, ranking
 from ccfem.comparison.runs import Run, Wanted
 from ccfem.elasticity.weighted_cases import WeightedCases
-from ccfem.fibre_aware.cases_bound import LEAST, CasesBound
-from ccfem.fibre_aware.upper_bound import LOOSE
+from ccfem.fibre_aware.upper_bound import LEAST, LOOSE, UpperBound
 from ccfem.virtual_testing.stiffer import FIRST, RESOLUTION, SAME
 
 __all__ = ["cases_remarks", "cases_rows", "cases_verdict"]
 
 
-def cases_verdict(runs: Sequence[Run], wanted: Wanted, bound: CasesBound | None) -> str:
+def cases_verdict(runs: Sequence[Run], wanted: Wanted, bound: UpperBound | None) -> str:
     """Say in one sentence which strategy serves all load cases best; empty for fewer than two.
 
     Parameters
@@ -22,7 +21,7 @@ def cases_verdict(runs: Sequence[Run], wanted: Wanted, bound: CasesBound | None)
     runs : sequence of Run
     wanted : float, mm, InAll or None
         Length of fibre that all were held to.
-    bound : CasesBound, optional
+    bound : UpperBound, optional
     """
     order = [
         run
@@ -61,7 +60,7 @@ def cases_remarks(
     wanted: Wanted,
     cases: WeightedCases,
     reference: str,
-    bound: CasesBound | None,
+    bound: UpperBound | None,
     others: bool = False,
 ) -> list[str]:
     """Say how much each case counts, which case the other tables show, and what is possible.
@@ -73,7 +72,7 @@ def cases_remarks(
     cases : WeightedCases
     reference : str
         Name of the case that the other tables show.
-    bound : CasesBound, optional
+    bound : UpperBound, optional
     others : bool
         Whether the part has alternative supports.
     """

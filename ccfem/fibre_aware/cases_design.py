@@ -14,11 +14,11 @@ import scipy.sparse as sp
 
 from ccfem.arrays import FloatArray, freeze
 from ccfem.fibre_aware.border_levels import BorderLevels
-from ccfem.fibre_aware.cases_bound import LEAST, SUM, WORST
 from ccfem.fibre_aware.field_design import designed_fields
 from ccfem.fibre_aware.smeared import SmearedPart, SmearedSolution
 from ccfem.fibre_aware.stream_design import OVER_BUDGET, Laid, StreamProblem
 from ccfem.fibre_aware.stream_start import field_along, mixed_tension
+from ccfem.fibre_aware.upper_bound import LEAST, SUM, WORST
 from ccfem.fields.layer_tension import layer_tension
 from ccfem.layers.layer import Layer
 from ccfem.layers.layer_stress import stress_on

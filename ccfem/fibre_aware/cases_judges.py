@@ -7,10 +7,10 @@ import numpy as np
 
 from ccfem.arrays import FloatArray, freeze, in_brief
 from ccfem.checks import check_known
-from ccfem.fibre_aware.cases_bound import LEAST, OBJECTIVES, SUM, WORST
 from ccfem.fibre_aware.judges import Judge, Judged
 from ccfem.fibre_aware.strain_worth import StrainWorth
 from ccfem.fibre_aware.strength_value import Worth, layer_normal
+from ccfem.fibre_aware.upper_bound import LEAST, OBJECTIVES, SUM, WORST
 from ccfem.layers.layer import Layer
 from ccfem.machine.machine import Machine
 from ccfem.toolpaths import Toolpaths
@@ -39,7 +39,7 @@ class CasesGoal:
         Of the cases.
     bounds : (n,) array
         Stiffness ratio of each case that it is measured by, one that no paths exceed
-        (`ccfem.fibre_aware.cases_bound.measures`).
+        (`ccfem.fibre_aware.upper_bound.measures`).
     objective : {"worst", "sum", "least"}
         What counts: the case that is farthest below what it is measured by, or the weighted mean.
 

@@ -11,8 +11,8 @@ from ccfem.checks import check_number
 from ccfem.elasticity.stress_field import StressField
 from ccfem.elasticity.weighted_cases import WeightedCases
 from ccfem.errors import InputError
-from ccfem.fibre_aware.cases_bound import LEAST, WORST
 from ccfem.fibre_aware.plan_cases import plan_cases
+from ccfem.fibre_aware.upper_bound import LEAST, WORST
 from ccfem.layers.layer import Layer
 from ccfem.machine.machine import Machine
 from ccfem.planning.equal_fibre import plan_to_length

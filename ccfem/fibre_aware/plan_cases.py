@@ -10,10 +10,10 @@ from collections.abc import Sequence
 
 from ccfem.elasticity.weighted_cases import WeightedCases
 from ccfem.errors import InputError
-from ccfem.fibre_aware.cases_bound import WORST, measures
 from ccfem.fibre_aware.cases_judges import CasesGoal
 from ccfem.fibre_aware.layer_shares import layers_by_case
 from ccfem.fibre_aware.prune_cases import prune_cases
+from ccfem.fibre_aware.upper_bound import WORST, measures
 from ccfem.layers.layer import Layer
 from ccfem.machine.machine import Machine
 from ccfem.planning.equal_fibre import TOLERANCE, length_per_layer, plan_to_length

@@ -14,11 +14,11 @@ from ccfem.elasticity.part_stress import PartStress
 from ccfem.elasticity.stress_field import solved
 from ccfem.elasticity.weighted_cases import WeightedCases
 from ccfem.errors import InputError
-from ccfem.fibre_aware.cases_bound import measures
 from ccfem.fibre_aware.cases_judges import CasesGoal
 from ccfem.fibre_aware.cut_and_move import prune_and_move, prune_and_move_cases
 from ccfem.fibre_aware.plan_cases import plan_by_layers
 from ccfem.fibre_aware.shortening import TIGHT_SHARES
+from ccfem.fibre_aware.upper_bound import measures
 from ccfem.layers.layer import Layer
 from ccfem.machine.machine import Machine
 from ccfem.planning.equal_fibre import plan_to_length

@@ -16,7 +16,6 @@ from ccfem.checks import check_choices, check_fields
 from ccfem.elasticity.part_stress import PartStress
 from ccfem.elasticity.stress_field import StressField, solved
 from ccfem.elasticity.weighted_cases import WeightedCases
-from ccfem.fibre_aware.cases_bound import measures
 from ccfem.fibre_aware.cases_design import (
     DESIGN_POWERS,
     CasesDesign,
@@ -45,6 +44,7 @@ from ccfem.fibre_aware.stream_paths import Extraction, refined
 from ccfem.fibre_aware.stream_start import plane_axes, start_field
 from ccfem.fibre_aware.strength_design import design_for_strength
 from ccfem.fibre_aware.tension_check import check_tension
+from ccfem.fibre_aware.upper_bound import measures
 from ccfem.layers.layer import Layer
 from ccfem.machine.machine import Machine
 from ccfem.planning.strategy import Amount, LayerPlanner
@@ -303,7 +303,7 @@ class StreamFunction:
         """Design for several cases; return the problem, the group of each layer, and the design.
 
         `bounds` (n,) are the stiffness ratios that the cases are measured by
-        (`ccfem.fibre_aware.cases_bound.measures`).
+        (`ccfem.fibre_aware.upper_bound.measures`).
         """
         parts = smeared_cases(cases.fields, layers[0].plane.frame)
         alone, group = self._problem(parts, layers, machine)

@@ -8,7 +8,6 @@ import pytest
 from ccfem.elasticity.solve import solve
 from ccfem.elasticity.weighted_cases import WeightedCases
 from ccfem.errors import InputError
-from ccfem.fibre_aware.cases_bound import single_bounds
 from ccfem.fibre_aware.cases_design import CasesProblem, start_fields
 from ccfem.fibre_aware.cases_judges import CasesGoal, cases_strength_judge
 from ccfem.fibre_aware.heights import fibre_capacity
@@ -18,6 +17,7 @@ from ccfem.fibre_aware.spline_grid import SplineGrid
 from ccfem.fibre_aware.stream_design import StreamProblem
 from ccfem.fibre_aware.strength_design import StrengthProblem, design_for_strength
 from ccfem.fibre_aware.strength_value import Worth
+from ccfem.fibre_aware.upper_bound import WORST, measures
 from ccfem.machine import Machine
 from ccfem.strategies.pruned import Pruned
 from ccfem.strategies.stream_function import StreamFunction
@@ -181,7 +181,7 @@ def test_the_judge_weighs_what_each_test_alone_says(strong_plate):
 def test_planning_for_strength_is_worth_no_less_than_for_stiffness(strong_bends, strategy, weight):
     cases, layers = strong_bends
     parts, worth = specimens(cases), []
-    bounds = single_bounds(cases, layers, 400.0 * len(layers), SHORT)
+    bounds = measures(WORST, cases, layers, 400.0 * len(layers), SHORT)
     goal = CasesGoal(parts, cases.weights, bounds)
     for strength, moves in ((0.0, 0), (weight, 0), (weight, 3)):
         planned = replace(strategy, strength=strength, moves=moves)

@@ -190,3 +190,26 @@ def test_with_fewer_layers_than_cases_those_of_most_weight_get_a_field(two_bends
     planned = plan_cases(strategy, layers[:1], strong, MACHINE, 400.0)
     assert 380.0 < planned.length_per_layer <= 400.0
     assert set(planned.toolpaths.layer) == {layers[0].index}
+
+
+def test_strands_are_cut_alike_for_forces_and_moving_supports(pulled_and_moved, two_pulls):
+    # Equal strands along x and along y. Which of them go is a matter of rounding; what is left
+    # serves both cases about alike, whatever loads them.
+    (moved, layers), (forced, _) = pulled_and_moved, two_pulls
+    at = np.arange(1.5, 24.0, 3.0)
+    rows = [np.array([[0.5, y], [23.5, y]]) for y in at]
+    columns = [np.array([[x, 0.5], [x, 23.5]]) for x in at]
+    lines = (rows, columns, rows, columns)
+    paths = Toolpaths.concatenate(
+        Toolpaths.from_plane(those, layer) for those, layer in zip(lines, layers, strict=True)
+    )
+    machine, half, bounds = Machine(minimum_length=5.0), np.full(2, 0.5), np.full(2, 2.0)
+    worst = []
+    for cases in (moved, forced):
+        goal = CasesGoal(specimens(cases), half, bounds)
+        kept = prune_cases(paths, goal, 480.0, machine)
+        assert 470.0 < kept.lengths.sum() <= 480.0 + 1e-6
+        worst.append(virtual_tests(kept, cases).ratios.min())
+    # All of 736 mm would give each 1.63.
+    assert worst[0] == pytest.approx(worst[1], rel=0.05)
+    assert min(worst) > 1.0 + 0.8 * 480.0 / 736.0 * 0.63
