@@ -10,9 +10,9 @@ from collections.abc import Sequence
 
 from ccfem.elasticity.weighted_cases import WeightedCases
 from ccfem.errors import InputError
-from ccfem.fibre_aware.cases_judges import CasesGoal
+from ccfem.fibre_aware.judges import Goal
 from ccfem.fibre_aware.layer_shares import layers_by_case
-from ccfem.fibre_aware.prune_cases import prune_cases
+from ccfem.fibre_aware.prune import prune
 from ccfem.fibre_aware.upper_bound import WORST, measures
 from ccfem.layers.layer import Layer
 from ccfem.machine.machine import Machine
@@ -29,6 +29,9 @@ __all__ = ["plan_by_layers", "plan_cases", "plan_cases_to_lengths"]
 
 _TOO_MUCH = 1.15
 """Length that is planned over that kept."""
+
+_ROUNDS = 3
+"""Virtual tests under every case that say what is taken off."""
 
 _SLACK = 0.05
 """Share by which less may be planned: it is found in fewer steps."""
@@ -87,8 +90,8 @@ def plan_cases(
     too_much = plan_by_layers(strategy, layers, cases, machine, _TOO_MUCH * wanted)
     in_all = wanted * len(layers)
     bounds = measures(objective, cases, layers, in_all, machine, strand)
-    goal = CasesGoal(specimens(cases), cases.weights, bounds, objective)
-    paths = prune_cases(too_much, goal, in_all, machine, strand)
+    goal = Goal(specimens(cases), cases.weights, bounds, objective)
+    paths = prune(too_much, goal, in_all, machine, strand, _ROUNDS)
     return _told(strategy, paths, layers, machine, wanted)
 
 

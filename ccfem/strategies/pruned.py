@@ -14,8 +14,8 @@ from ccfem.elasticity.part_stress import PartStress
 from ccfem.elasticity.stress_field import solved
 from ccfem.elasticity.weighted_cases import WeightedCases
 from ccfem.errors import InputError
-from ccfem.fibre_aware.cases_judges import CasesGoal
-from ccfem.fibre_aware.cut_and_move import prune_and_move, prune_and_move_cases
+from ccfem.fibre_aware.cut_and_move import prune_and_move
+from ccfem.fibre_aware.judges import Goal
 from ccfem.fibre_aware.plan_cases import plan_by_layers
 from ccfem.fibre_aware.shortening import TIGHT_SHARES
 from ccfem.fibre_aware.upper_bound import measures
@@ -171,7 +171,7 @@ class Pruned:
     ) -> list[tuple["Pruned", LayerPlanner]]:
         """Plan each layer for one load case, and prune by tests under all cases.
 
-        Lengths as in `to_lengths`; tests of all say what goes (`ccfem.fibre_aware.prune_cases`).
+        Lengths as in `to_lengths`; tests of all say what goes (`ccfem.fibre_aware.prune`).
 
         Raises
         ------
@@ -187,12 +187,12 @@ class Pruned:
         paths = plan_by_layers(self._planner(), layers, cases, machine, planned)
         in_all = max(lengths) * len(layers)
         bounds = measures(self.objective, cases, layers, in_all, machine, strand)
-        goal = CasesGoal(specimens(cases), cases.weights, bounds, self.objective)
+        goal = Goal(specimens(cases), cases.weights, bounds, self.objective)
         cut_by = (max(self.rounds, 3), self.strength, self.moves, TIGHT_SHARES[self.turns])
         found: list[tuple[Pruned, LayerPlanner]] = []
         for length in lengths:
             wanted = length * len(layers)
-            kept = prune_and_move_cases((paths,), layers, goal, wanted, machine, strand, *cut_by)
+            kept = prune_and_move((paths,), layers, goal, wanted, machine, strand, *cut_by)
             coverage = length / full
             overfill = max(planned / full / coverage, 1.0)
             found.append((replace(self, coverage=coverage, overfill=overfill), WholePart(kept)))

@@ -23,8 +23,7 @@ from ccfem.fibre_aware.cases_design import (
     design_cases,
     start_fields,
 )
-from ccfem.fibre_aware.cases_judges import CasesGoal
-from ccfem.fibre_aware.cut_and_move import prune_and_move, prune_and_move_cases
+from ccfem.fibre_aware.cut_and_move import prune_and_move
 from ccfem.fibre_aware.design_in_steps import designed_in_steps
 from ccfem.fibre_aware.design_lengths import designed_to_lengths
 from ccfem.fibre_aware.heights import (
@@ -34,6 +33,7 @@ from ccfem.fibre_aware.heights import (
     middle_layers,
     nearest_layer,
 )
+from ccfem.fibre_aware.judges import Goal
 from ccfem.fibre_aware.layer_shares import layer_counts, layers_by_case
 from ccfem.fibre_aware.shortening import TIGHT_SHARES
 from ccfem.fibre_aware.smeared import SmearedPart, SmearedSolution, smeared_cases
@@ -363,7 +363,7 @@ class StreamFunction:
         bounds = measures(self.objective, cases, layers, max(in_all), machine, strand)
         problem, group, found = self.designed_for_cases(cases, layers, machine, bounds)
         specimens = tuple(part.specimen for part in problem.parts)
-        goal = CasesGoal(specimens, cases.weights, bounds, self.objective)
+        goal = Goal(specimens, cases.weights, bounds, self.objective)
         each = layers_by_case(cases.weights, layers) * problem.problem.groups + group
 
         def candidates(found: CasesDesign) -> list[list[Toolpaths]]:
@@ -383,7 +383,7 @@ class StreamFunction:
             tried = _with_first(candidates(strong), tried)
         cut_by = (_ROUNDS, self.strength, self.moves, TIGHT_SHARES[self.turns])
         return [
-            prune_and_move_cases(some, layers, goal, length, machine, strand, *cut_by)
+            prune_and_move(some, layers, goal, length, machine, strand, *cut_by)
             for some, length in zip(tried, in_all, strict=True)
         ]
 

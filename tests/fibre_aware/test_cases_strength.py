@@ -9,8 +9,8 @@ from ccfem.elasticity.solve import solve
 from ccfem.elasticity.weighted_cases import WeightedCases
 from ccfem.errors import InputError
 from ccfem.fibre_aware.cases_design import CasesProblem, start_fields
-from ccfem.fibre_aware.cases_judges import CasesGoal, cases_strength_judge
 from ccfem.fibre_aware.heights import fibre_capacity
+from ccfem.fibre_aware.judges import Goal, strength_judge
 from ccfem.fibre_aware.plan_cases import plan_cases
 from ccfem.fibre_aware.smeared import smeared_cases
 from ccfem.fibre_aware.spline_grid import SplineGrid
@@ -163,7 +163,7 @@ def test_a_design_for_strength_takes_all_cases_farther_from_failure(strong_bends
 
 def test_the_judge_weighs_what_each_test_alone_says(strong_plate):
     cases, layers = strong_plate
-    goal = CasesGoal(specimens(cases), cases.weights, np.array([2.0, 3.0]))
+    goal = Goal(specimens(cases), cases.weights, np.array([2.0, 3.0]))
     paths, strand = crossed(layers), Strand()
     alone = [virtual_test(paths, field, strand, span=(), machine=SHORT) for field in cases.fields]
     ratios = np.array([one.ratio for one in alone])
@@ -171,7 +171,7 @@ def test_the_judge_weighs_what_each_test_alone_says(strong_plate):
     # Force without fibre: that of the load along x, and along y of the reactions.
     bare = [goal.parts[k].force(field.reactions) for k, field in enumerate(cases.fields)]
     for strength in (0.0, 0.3, 1.0):
-        judge = cases_strength_judge(goal, layers, SHORT, strand, strength)
+        judge = strength_judge(goal, layers, SHORT, strand, strength)
         expected = goal.merit(ratios) ** (1.0 - strength) * (loads / bare).min() ** strength
         assert judge(paths).value == pytest.approx(expected, rel=1e-5)
 
@@ -182,7 +182,7 @@ def test_planning_for_strength_is_worth_no_less_than_for_stiffness(strong_bends,
     cases, layers = strong_bends
     parts, worth = specimens(cases), []
     bounds = measures(WORST, cases, layers, 400.0 * len(layers), SHORT)
-    goal = CasesGoal(parts, cases.weights, bounds)
+    goal = Goal(parts, cases.weights, bounds)
     for strength, moves in ((0.0, 0), (weight, 0), (weight, 3)):
         planned = replace(strategy, strength=strength, moves=moves)
         ((told, planner),) = planned.for_cases(cases, layers, SHORT, (400.0,))
