@@ -1,13 +1,11 @@
 import numpy as np
 import pytest
 
-from ccfem.fibre_aware.cases_design import CasesProblem, design_cases, start_fields
-from ccfem.fibre_aware.heights import fibre_capacity
-from ccfem.fibre_aware.layer_shares import layer_counts, layers_by_case
+from ccfem.fibre_aware.heights import fibre_capacity, layer_counts, layers_by_case
 from ccfem.fibre_aware.smeared import smeared_cases
 from ccfem.fibre_aware.spline_grid import SplineGrid
-from ccfem.fibre_aware.stream_design import StreamProblem
-from ccfem.fibre_aware.stream_start import mixed_tension
+from ccfem.fibre_aware.stream_design import StreamModel, StreamProblem, design
+from ccfem.fibre_aware.stream_start import mixed_tension, start_fields
 from ccfem.fields.tensile import Tension
 from ccfem.layers.slicing.planar import Planar
 from ccfem.machine import Machine
@@ -20,7 +18,7 @@ def problem_of(cases, layers, shares, size=3.0, coverage=0.4, power=1.0):
     parts = smeared_cases(cases.fields, layers[0].plane.frame)
     centres = parts[0].centroids @ parts[0].frame[:2].T
     capacity = fibre_capacity(parts[0], layers, MACHINE)
-    alone = StreamProblem(
+    model = StreamModel(
         part=parts[0],
         grid=SplineGrid.over(centres, centres.mean(axis=0), np.eye(2), size),
         group=np.zeros(len(centres), dtype=np.int64),
@@ -31,7 +29,7 @@ def problem_of(cases, layers, shares, size=3.0, coverage=0.4, power=1.0):
         budget=coverage * float(parts[0].mesh.volumes @ capacity),
     )
     bounds = np.array([2.0, 3.0])
-    return CasesProblem(alone, parts, cases.weights, bounds, np.array(shares), power)
+    return StreamProblem(model, parts, cases.weights, bounds, np.array(shares), power)
 
 
 @pytest.mark.parametrize(("scale", "power"), [(0.7, 1.0), (1.6, 1.0), (0.7, 4.0)])
@@ -56,8 +54,8 @@ def test_fields_of_their_own_case_stiffen_a_plate_by_their_share(two_pulls):
     # effect: each case gains rho / (2 * 2 mm * thickness).
     cases, layers = two_pulls
     problem = problem_of(cases, layers, [0.5, 0.5])
-    values = problem.problem.grid.values(problem.problem.centres).toarray()
-    centres = problem.problem.centres
+    values = problem.model.grid.values(problem.model.centres).toarray()
+    centres = problem.model.centres
     fields = [np.linalg.lstsq(values, 0.5 * centres[:, k], rcond=None)[0] for k in (1, 0)]
     found = problem.evaluate(np.concatenate(fields), tolerance=1e-9)
     exact = 1.0 + 4.0 * 0.5 * 0.5 / layers[0].thickness
@@ -70,10 +68,10 @@ def test_design_helps_both_cases(two_bends):
     problem = problem_of(cases, layers, [0.5, 0.5])
     start = start_fields(problem, cases.fields, layers[:1], 90.0, 0.75)
     before = problem.evaluate(start)
-    found = design_cases(problem, start, evaluations=12)
+    found = design(problem, start, evaluations=12)
     assert found.objective.value < before.value - 0.01
     assert (found.objective.ratio > 1.1).all()
-    assert found.fields.shape == (2, len(problem.problem.grid))
+    assert found.fields.shape == (2, len(problem.model.grid))
 
 
 def test_large_power_takes_the_worst_case(two_bends):
@@ -82,7 +80,7 @@ def test_large_power_takes_the_worst_case(two_bends):
     field = 0.5 * start_fields(problem, cases.fields, layers[:1], 90.0, 0.75)
     found = problem.evaluate(field)
     penalties = sum(
-        0.5 * sum(problem.problem.penalties(one, problem.problem.laid(one)))
+        0.5 * sum(problem.model.penalties(one, problem.model.laid(one)))
         for one in field.reshape(2, -1)
     )
     worst = np.log((problem.bounds / found.ratio).max())
@@ -97,7 +95,7 @@ def test_curvature_is_positive_definite_and_knows_each_field_alone(two_bends):
     matrix = problem.curvature(field, solutions).toarray()
     np.testing.assert_allclose(matrix, matrix.T, atol=1e-12 * matrix.max())
     assert np.linalg.eigvalsh(matrix).min() > 0.0
-    count = len(problem.problem.grid)
+    count = len(problem.model.grid)
     assert not matrix[:count, count:].any()
 
 
@@ -107,7 +105,7 @@ def test_curvature_of_one_case_in_all_layers_is_that_of_its_problem(two_bends):
     field = start_fields(problem, cases.fields, layers[:1], 90.0, 0.75)
     (one, _), half = problem.evaluate(field).solution, len(field) // 2
     found = problem.curvature(field, (one, one)).toarray()[:half, :half]
-    alone = problem.problem.curvature(field[:half], one).toarray()
+    alone = problem.model.curvature(field[:half], one).toarray()
     np.testing.assert_allclose(found, alone, rtol=1e-12, atol=1e-12 * alone.max())
 
 
@@ -117,9 +115,7 @@ def test_levels_of_all_fields_cost_what_each_does_by_its_share(two_bends, rng):
     field = start_fields(problem, cases.fields, layers[:1], 90.0, 0.75)
     (one, _), half = problem.evaluate(field).solution, len(field) // 2
     levels = problem.levels(field, (one, one))
-    each = [
-        problem.problem.levels(part, one).cost(part)[0] for part in (field[:half], field[half:])
-    ]
+    each = [problem.model.levels(part, one).cost(part)[0] for part in (field[:half], field[half:])]
     cost, slope = levels.cost(field)
     assert cost == pytest.approx(0.25 * each[0] + 0.75 * each[1], rel=1e-10)
     direction = rng.standard_normal(len(field))

@@ -8,13 +8,13 @@ import pytest
 from ccfem.elasticity.solve import solve
 from ccfem.elasticity.weighted_cases import WeightedCases
 from ccfem.errors import InputError
-from ccfem.fibre_aware.cases_design import CasesProblem, start_fields
 from ccfem.fibre_aware.heights import fibre_capacity
 from ccfem.fibre_aware.judges import Goal, strength_judge
 from ccfem.fibre_aware.plan_cases import plan_cases
 from ccfem.fibre_aware.smeared import smeared_cases
 from ccfem.fibre_aware.spline_grid import SplineGrid
-from ccfem.fibre_aware.stream_design import StreamProblem
+from ccfem.fibre_aware.stream_design import StreamModel, StreamProblem
+from ccfem.fibre_aware.stream_start import start_fields
 from ccfem.fibre_aware.strength_design import StrengthProblem, design_for_strength
 from ccfem.fibre_aware.strength_value import Worth
 from ccfem.fibre_aware.upper_bound import WORST, measures
@@ -105,7 +105,7 @@ def problem_of(cases, layers, shares):
     parts = smeared_cases(cases.fields, layers[0].plane.frame)
     centres = parts[0].centroids @ parts[0].frame[:2].T
     capacity = fibre_capacity(parts[0], layers, SHORT)
-    alone = StreamProblem(
+    model = StreamModel(
         part=parts[0],
         grid=SplineGrid.over(centres, centres.mean(axis=0), np.eye(2), 3.0),
         group=np.zeros(len(centres), dtype=np.int64),
@@ -116,7 +116,7 @@ def problem_of(cases, layers, shares):
         budget=0.4 * float(parts[0].mesh.volumes @ capacity),
     )
     bounds = np.array([2.0, 3.0])
-    problem = CasesProblem(alone, parts, cases.weights, bounds, np.array(shares), 4.0)
+    problem = StreamProblem(model, parts, cases.weights, bounds, np.array(shares), 4.0)
     return problem, 0.6 * start_fields(problem, cases.fields, layers[:1], 90.0, 0.75)
 
 

@@ -329,6 +329,15 @@ def test_cases_may_have_supports_of_their_own(two_bends):
     assert 1.0 < found.least <= found.attained
 
 
+def test_a_field_is_a_list_of_one_case(two_bends):
+    cases, _ = two_bends
+    one = WeightedCases.of(cases.fields[0])
+    assert one.fields == cases.fields[:1]
+    np.testing.assert_array_equal(one.weights, [1.0])
+    assert WeightedCases.of(cases) is cases
+    assert WeightedCases.of(cases, {"slant": 3.0}).names == ("slant",)
+
+
 def test_what_makes_no_sense_is_refused(two_bends):
     cases, layers = two_bends
     fields = {field.case: field for field in cases.fields}
