@@ -9,11 +9,8 @@ from ccfem.elasticity.solve import solve
 from ccfem.errors import InputError
 from ccfem.fibre_aware import strength_value
 from ccfem.fibre_aware.cut_and_move import best_cut
-from ccfem.fibre_aware.heights import fibre_capacity
 from ccfem.fibre_aware.prune import prune
-from ccfem.fibre_aware.smeared import SmearedPart
-from ccfem.fibre_aware.spline_grid import SplineGrid
-from ccfem.fibre_aware.stream_design import StreamModel, StreamProblem, design
+from ccfem.fibre_aware.stream_design import design
 from ccfem.fibre_aware.stream_start import start_fields
 from ccfem.fibre_aware.strength_design import StrengthProblem, design_for_strength
 from ccfem.fibre_aware.strength_value import Worth, raised
@@ -31,6 +28,8 @@ from ccfem.virtual_testing.strands import cut_strands
 from ccfem.virtual_testing.strength import first_failure
 from ccfem.virtual_testing.strengths import Limits
 from ccfem.virtual_testing.virtual_test import virtual_test
+
+from .test_stream_design import problem_of
 
 SHORT = Machine(minimum_length=10.0)
 
@@ -141,20 +140,7 @@ def test_shares_outside_zero_to_one_are_refused(strong_beam, strength):
 @pytest.fixture(scope="module")
 def problem(strong_beam):
     stress, layers = strong_beam
-    part = SmearedPart.of(stress, layers[0].plane.frame)
-    centres = part.centroids @ part.frame[:2].T
-    capacity = fibre_capacity(part, layers, SHORT)
-    model = StreamModel(
-        part=part,
-        grid=SplineGrid.over(centres, centres.mean(axis=0), np.eye(2), 2.5),
-        group=np.zeros(len(centres), dtype=int),
-        centres=centres,
-        capacity=capacity,
-        width=SHORT.fibre_width,
-        axial_stiffness=4.0 * part.modulus,
-        budget=0.4 * float(part.mesh.volumes @ capacity),
-    )
-    found = StreamProblem.alone(model)
+    found = problem_of(stress, layers)
     return found, start_fields(found, (stress,), layers[:1], cap=90.0)
 
 
