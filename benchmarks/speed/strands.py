@@ -38,8 +38,9 @@ def timed(name: str) -> dict[str, float]:
         return found
 
     problem, group, found = stage("design", lambda: strategy.designed(stress, layers, machine))
-    part, strained = problem.part.specimen, ((1.0, found.objective.solution.displacement),)
-    extraction = strategy.extraction(problem, (found.field,), strained, machine)
+    part, (solution,) = problem.parts[0].specimen, found.objective.solution
+    strained = ((1.0, solution.displacement),)
+    extraction = strategy.extraction(problem.model, found.fields, strained, machine)
     (whole,) = stage("levels", lambda: extraction.whole(layers, group, (length,)))
     kept = stage("pruning", lambda: prune(whole, part, length, machine, rounds=ROUNDS))
     mesh, judge = part.unreinforced.mesh, stiffness_judge(part, machine)

@@ -20,8 +20,8 @@ from benchmarks.studies.table import print_table
 from ccfem.cases.named import create_case
 from ccfem.elasticity.solve import solve
 from ccfem.elasticity.weighted_cases import WeightedCases
-from ccfem.fibre_aware.cases_bound import cases_bound
 from ccfem.fibre_aware.plan_cases import plan_cases
+from ccfem.fibre_aware.upper_bound import upper_bound
 from ccfem.planning.equal_fibre import plan_to_length
 from ccfem.planning.whole_part import full_length
 from ccfem.strategies.isocurve import Isocurve
@@ -72,7 +72,7 @@ def compared(name: str, parameters: Mapping[str, object], pictures: Path | None)
             for layer in range(2):
                 figure = planned.toolpaths.plot(layer=layer)
                 figure.savefig(pictures / f"{name}-{what}-{layer}.png", dpi=100)
-    bound = cases_bound(cases, layers, wanted * len(layers), machine)
+    bound = upper_bound(cases, layers, wanted * len(layers), machine)
     alone = np.mean([spent[f"for {field.case}"] for field in cases.fields])
     rows = []
     for what, found in tested.items():
@@ -86,7 +86,7 @@ def compared(name: str, parameters: Mapping[str, object], pictures: Path | None)
     most = (bound.singles / best).min() / bound.least
     rows.append(
         f"| {name} | bound | {singles} | {most:.3f} at most | {1.0 / bound.least:.3f} at most "
-        f"| {bound.reached / bound.least - 1.0:.1%} of the density found | | |"
+        f"| {bound.duality_gap:.1%} of the density found | | |"
     )
     return rows
 

@@ -23,9 +23,9 @@ from ccfem.fibre_aware.cut_and_move import prune_and_move
 from ccfem.fibre_aware.heights import nearest_layer
 from ccfem.fibre_aware.prune import prune
 from ccfem.fibre_aware.smeared import SmearedPart
-from ccfem.fibre_aware.stream_design import SLACK, design
+from ccfem.fibre_aware.stream_design import SLACK, StreamProblem, design
 from ccfem.fibre_aware.stream_paths import CLEARANCE, SHORTEST
-from ccfem.fibre_aware.stream_start import field_along, start_field
+from ccfem.fibre_aware.stream_start import field_along, start_fields
 from ccfem.fibre_aware.upper_bound import UpperBound, upper_bound
 from ccfem.fields.tensile import Tension
 from ccfem.layers.layer import Layer
@@ -98,23 +98,26 @@ def losses(
     coverage = length / len(layers) / full_length(layers, machine)
     strategy = StreamFunction(coverage=coverage)
     problem, group, found = strategy.designed(stress, layers, machine)
+    model = problem.model
     bound = upper_bound(stress, layers, length, machine)
     rows = {"bound": bound.ratio}
     rows["its density, in one direction"] = along_one_direction(
-        problem.part, bound, problem.axial_stiffness
+        model.part, bound, model.axial_stiffness
     )
-    inside = np.maximum(share_inside(problem.part, layers, 0.5 * width), _NONE)
-    exact = replace(problem, budget=problem.budget / strategy.overfill)
-    middle = [layers[len(layers) // 2]] * problem.groups
+    inside = np.maximum(share_inside(model.part, layers, 0.5 * width), _NONE)
+    exact = replace(problem, model=replace(model, budget=model.budget / strategy.overfill))
+    middle = [layers[len(layers) // 2]] * model.groups
     for what, share in (("designed field", 1.0), ("designed field, border left free", inside)):
-        posed = replace(exact, capacity=problem.capacity * share)
-        start = start_field(posed, stress, middle, strategy.cap)
-        rows[what] = design(posed, start, strategy.evaluations).objective.ratio
-    begun = [tension_of(bound, problem.capacity, layer) for layer in middle]
-    start = field_along(exact, middle, begun, 100.0)
-    rows["designed field, begun there"] = design(exact, start, strategy.evaluations).objective.ratio
-    strained = ((1.0, found.objective.solution.displacement),)
-    extraction = strategy.extraction(problem, (found.field,), strained, machine)
+        scaled = replace(exact.model, capacity=model.capacity * share)
+        posed = StreamProblem.alone(scaled)
+        start = start_fields(posed, (stress,), middle, strategy.cap)
+        rows[what] = float(design(posed, start, strategy.evaluations).objective.ratio[0])
+    begun = [tension_of(bound, model.capacity, layer) for layer in middle]
+    start = field_along(exact.model, middle, begun, 100.0)
+    begun_there = design(exact, start, strategy.evaluations)
+    rows["designed field, begun there"] = float(begun_there.objective.ratio[0])
+    strained = ((1.0, found.objective.solution[0].displacement),)
+    extraction = strategy.extraction(model, found.fields, strained, machine)
     one = len(layers) // 2
     shifts = np.arange(strategy.phases) / strategy.phases
     tried = [extraction.layer_paths(layers[one], extraction.fields[group[one]], x) for x in shifts]
@@ -123,8 +126,8 @@ def losses(
     shift = float(shifts[best])
 
     def tested(paths: Toolpaths, cutter: Machine) -> float:
-        cut = prune(paths, problem.part.specimen, length, cutter, rounds=3)
-        return virtual_test(cut, problem.part.specimen, machine=machine, span=()).ratio
+        cut = prune(paths, model.part.specimen, length, cutter, rounds=3)
+        return virtual_test(cut, model.part.specimen, machine=machine, span=()).ratio
 
     def stage(change: Callable[[list[FloatArray], Layer], list[FloatArray]]) -> float:
         laid = []
@@ -148,7 +151,7 @@ def losses(
     ]
     paths = Toolpaths.concatenate(whole)
     rows["linked and slid in: the paths"] = tested(paths, machine)
-    part, how = problem.part.specimen, (3, 0.0, MOVES)
+    part, how = model.part.specimen, (3, 0.0, MOVES)
     moved = prune_and_move((paths,), layers, part, length, machine, Strand(), *how)
     rows[f"moved in {MOVES} steps"] = tested(moved, machine)
     return rows

@@ -34,7 +34,7 @@ from ccfem.comparison.request import (
     Wanted,
     check_propped,
 )
-from ccfem.comparison.result import Bound, Comparison
+from ccfem.comparison.result import Comparison
 from ccfem.comparison.runs import Run
 from ccfem.comparison.stages import (
     Part,
@@ -56,7 +56,6 @@ from ccfem.elasticity.stress_field import StressField
 from ccfem.elasticity.support_kinds import PressingSupport
 from ccfem.elasticity.weighted_cases import WeightedCases
 from ccfem.errors import InputError
-from ccfem.fibre_aware.cases_bound import cases_bound
 from ccfem.fibre_aware.upper_bound import UpperBound, upper_bound
 from ccfem.io.stress_file import read_stress
 from ccfem.layers.slicer import Slicer, slicer_remarks
@@ -441,7 +440,7 @@ def _bounds(
     wanted: Wanted,
     tell: Tell,
     seconds: dict[str, float],
-) -> dict[float, Bound]:
+) -> dict[float, UpperBound]:
     """Bound what any paths can reach, by the length of fibre in all, mm.
 
     None if no run of the wanted length was tested, for curved layers, for supports that hold in
@@ -463,15 +462,13 @@ def _bounds(
     lengths = [max(laid)]
     if several_lengths:
         lengths = _lengths_to_bound(laid, _SAME_CASES_BOUND if several else _SAME_BOUND)
-    bounds: dict[float, Bound] = {}
+    bounds: dict[float, UpperBound] = {}
     with timed(seconds, "bound"):
         for length in lengths:
             of = " in all load cases" if several else ""
             tell(f"bounding what any paths of {1e-3 * length:.3g} m could reach{of}")
             about = (part.layers, length, part.machine, strand)
-            bounds[length] = (
-                cases_bound(basis.cases, *about) if several else upper_bound(basis.field, *about)
-            )
+            bounds[length] = upper_bound(basis.cases, *about)
     return bounds
 
 
@@ -488,17 +485,15 @@ def _lengths_to_bound(laid: Sequence[float], alike: float) -> list[float]:
     return sorted([*taken, *between])
 
 
-def _bounded(run: Run, bounds: Mapping[float, Bound], wanted: Wanted) -> Run:
+def _bounded(run: Run, bounds: Mapping[float, UpperBound], wanted: Wanted) -> Run:
     """Run with the most that paths of its length can reach."""
     length = float(run.toolpaths.lengths.sum())
     enough = [longer for longer in bounds if longer >= length]
     if not enough or run.tested is None or off_length(run, wanted):
         return run
     bound = bounds[min(enough)]
-    if isinstance(bound, UpperBound):
-        return replace(run, tested=replace(run.tested, most=bound.ratio))
     if run.tested.cases is None:
-        return run
+        return replace(run, tested=replace(run.tested, most=bound.ratio))
     return replace(run, tested=replace(run.tested, cases=replace(run.tested.cases, bound=bound)))
 
 

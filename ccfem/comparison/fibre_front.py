@@ -19,8 +19,6 @@ from ccfem.comparison.stages import Tests
 from ccfem.elasticity.stress_field import StressField
 from ccfem.elasticity.weighted_cases import WeightedCases
 from ccfem.errors import InputError
-from ccfem.fibre_aware.cases_bound import CasesBound
-from ccfem.fibre_aware.upper_bound import UpperBound
 from ccfem.layers.slicing.planar import Planar
 from ccfem.planning.strategy import Strategy
 from ccfem.progress import Progress, silent
@@ -174,10 +172,10 @@ def _front(name: str, comparison: Comparison) -> FibreFront:
             "press have none: hold the part otherwise, or name one load case"
         )
     if not comparison.several_cases:
-        alone = ((x, b.ratio) for x, b in comparison.bounds.items() if isinstance(b, UpperBound))
+        alone = ((length, bound.ratio) for length, bound in comparison.bounds.items())
         bare = _bare(fields[0])
         return FibreFront(case, name, points, refused, bare, tuple(alone), (), findings)
-    together = tuple((x, b) for x, b in comparison.bounds.items() if isinstance(b, CasesBound))
+    together = tuple(comparison.bounds.items())
     factor = min(_bare(field) / Specimen.of(field).force(field.reactions) for field in fields)
     return FibreFront(case, name, points, refused, factor, (), together, findings)
 

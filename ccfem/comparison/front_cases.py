@@ -8,7 +8,7 @@ from numpy.typing import ArrayLike
 
 from ccfem.arrays import FloatArray, freeze
 from ccfem.comparison.tested_cases import TestedCases
-from ccfem.fibre_aware.cases_bound import CasesBound
+from ccfem.fibre_aware.upper_bound import UpperBound
 
 __all__ = ["WORST", "PointCases", "stiffness_panels"]
 
@@ -29,20 +29,20 @@ class PointCases:
         Stiffness over that of the part without fibre, fibres in tension only.
     factors : (n,) array
         Load at first failure over the load of the case; NaN where that is not known.
-    bound : CasesBound
+    bound : UpperBound
         What no paths of this length exceed.
     """
 
     names: tuple[str, ...]
     ratios: FloatArray
     factors: FloatArray
-    bound: CasesBound
+    bound: UpperBound
 
     def __post_init__(self) -> None:
         freeze(self, names=tuple, ratios=float, factors=float)
 
     @classmethod
-    def of(cls, tested: TestedCases, bound: CasesBound) -> "PointCases":
+    def of(cls, tested: TestedCases, bound: UpperBound) -> "PointCases":
         """Keep what a front shows of the tests of a plan."""
         known, failure = tested.tension, tested.failure
         factors = np.full(len(known.names), np.nan) if failure is None else failure.factors
@@ -84,7 +84,7 @@ class PointCases:
 
 
 def stiffness_panels(
-    plans: Sequence[PointCases], bounds: Sequence[tuple[float, CasesBound]]
+    plans: Sequence[PointCases], bounds: Sequence[tuple[float, UpperBound]]
 ) -> tuple[dict[str, list[float]], Curves, Curves]:
     """Panels of a picture: what counts of the plans, then the stiffness in every case.
 
@@ -92,7 +92,7 @@ def stiffness_panels(
     ----------
     plans : sequence of PointCases
         At least one.
-    bounds : sequence of (float, CasesBound)
+    bounds : sequence of (float, UpperBound)
         By length, mm.
 
     Returns

@@ -10,7 +10,7 @@ from ccfem.arrays import BoolArray, freeze
 from ccfem.comparison.front import on_front
 from ccfem.comparison.front_cases import WORST, PointCases, stiffness_panels
 from ccfem.errors import InputError
-from ccfem.fibre_aware.cases_bound import CasesBound
+from ccfem.fibre_aware.upper_bound import UpperBound
 from ccfem.planning.equal_fibre import TOLERANCE
 from ccfem.plot.amount_curves import AmountPoint, TradePoint, amount_curves, trade_curves
 from ccfem.toolpaths import Toolpaths
@@ -104,7 +104,7 @@ class FibreFront:
     bounds : tuple of (float, float)
         Lengths, mm, and the ratios that no paths of that length exceed; empty for several load
         cases.
-    cases_bounds : tuple of (float, CasesBound)
+    cases_bounds : tuple of (float, UpperBound)
         Lengths, mm, and what no paths of that length exceed under several load cases; empty for
         one.
     findings : tuple of str
@@ -117,7 +117,7 @@ class FibreFront:
     refused: Mapping[int, str]
     bare: float = float("nan")
     bounds: tuple[tuple[float, float], ...] = ()
-    cases_bounds: tuple[tuple[float, CasesBound], ...] = ()
+    cases_bounds: tuple[tuple[float, UpperBound], ...] = ()
     findings: tuple[str, ...] = ()
 
     def __post_init__(self) -> None:

@@ -9,9 +9,8 @@ from ccfem.comparison.runs import Run
 from ccfem.comparison.stages import Part, Tell, with_plan
 from ccfem.elasticity.weighted_cases import WeightedCases
 from ccfem.errors import InputError
-from ccfem.fibre_aware.cases_bound import LEAST, cases_bound
 from ccfem.fibre_aware.least_fibre import LeastFibre, for_every_case, least_fibre
-from ccfem.fibre_aware.upper_bound import upper_bound
+from ccfem.fibre_aware.upper_bound import LEAST, upper_bound
 from ccfem.layers.slicer import Slicer
 from ccfem.layers.slicing.planar import Planar
 from ccfem.planning.strategy import Strategy
@@ -144,8 +143,8 @@ def _least_of(
             most = len(part.layers) * full_length(part.layers, part.machine)
         try:
             _check_within_bound(part, most, ratio)
-            stress = part.cases if part.several_cases else part.cases.heaviest
-            least = least_fibre(strategy, part.layers, stress, part.machine, ratio, part.strand)
+            about = (part.layers, part.cases, part.machine, ratio, part.strand)
+            least = least_fibre(strategy, *about)
         except InputError as error:
             refusal = refusal or error
             continue
@@ -174,7 +173,7 @@ def _check_within_bound(part: Part, length: float, ratio: float) -> None:
                 f"{wanted}; no paths on {len(layers)} layers exceed {bound:.4g}{where}: {cure}"
             )
     if several:
-        most = 1.0 / cases_bound(cases, layers, length, machine, strand, LEAST).least
+        most = upper_bound(cases, layers, length, machine, strand, objective=LEAST).ratio
         if most < ratio:
             raise InputError(
                 f"{wanted}; no paths on {len(layers)} layers bring all of them above {most:.4g}: "

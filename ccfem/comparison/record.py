@@ -15,7 +15,6 @@ from ccfem.comparison.headline import TEST_COLUMNS, headline_values
 from ccfem.comparison.result import Comparison
 from ccfem.comparison.runs import Run
 from ccfem.elasticity.stress_field import StressField
-from ccfem.fibre_aware.upper_bound import UpperBound
 from ccfem.io.csv_table import write_csv
 
 if TYPE_CHECKING:
@@ -147,11 +146,11 @@ def _of_strategies(comparison: Comparison) -> dict[str, Any]:
 
 def _of_bound(comparison: Comparison) -> dict[str, Any]:
     """Say what no paths exceed, and what was compared at several lengths."""
-    alone = comparison.bound if isinstance(comparison.bound, UpperBound) else None
+    alone = None if comparison.several_cases else comparison.bound
     curve = comparison.curve
     return {
         "upper_bound": None if alone is None else alone.ratio,
-        "upper_bound_gap": None if alone is None else alone.gap,
+        "upper_bound_gap": None if alone is None else alone.duality_gap,
         "load_cases": _load_cases(comparison) if comparison.several_cases else None,
         "curve": None if curve is None else curve.frame.to_dict(orient="records"),
     }
@@ -175,7 +174,11 @@ def _load_cases(comparison: Comparison) -> dict[str, Any]:
     """Say what each load case counts, and what no paths exceed."""
     cases, bound = comparison.cases, comparison.bound
     weights = dict(zip(cases.names, cases.weights.tolist(), strict=True))
-    return {"weights": weights, "bound": None if bound is None else vars(bound)}
+    if bound is None:
+        return {"weights": weights, "bound": None}
+    kept = ("objective", "singles", "case_weights", "least", "factors")
+    said = {name: getattr(bound, name) for name in kept} | {"reached": bound.attained}
+    return {"weights": weights, "bound": said}
 
 
 def _load(stress: StressField) -> list[float] | None:

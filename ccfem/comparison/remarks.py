@@ -218,7 +218,7 @@ def bound_remark(tested: Sequence[Run], bound: UpperBound) -> str:
     layers = 0 if best.evaluation is None else len(best.evaluation.layers)
     bonded = max(stiffness_ratio(run, "bonded") for run in tested)
     free = "; bonded fibres are not bounded" if bonded > bound.ratio else ""
-    loose = f"; it may be loose by {bound.gap:.1%}" if bound.gap > LOOSE else ""
+    loose = f"; it may be loose by {bound.duality_gap:.1%}" if bound.duality_gap > LOOSE else ""
     most = (
         f"no paths of {length:.0f} mm a layer in {layers} layers can make the part "
         f"more than {bound.ratio:.2f} times as stiff (fibres carrying tension only"

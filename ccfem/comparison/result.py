@@ -24,7 +24,6 @@ from ccfem.elasticity.part_stress import GivenStress, PartStress
 from ccfem.elasticity.stress_field import StressField
 from ccfem.elasticity.weighted_cases import WeightedCases
 from ccfem.errors import InputError
-from ccfem.fibre_aware.cases_bound import CasesBound
 from ccfem.fibre_aware.upper_bound import UpperBound
 from ccfem.layers import Layer
 from ccfem.plot.scenes import View, show
@@ -34,10 +33,7 @@ if TYPE_CHECKING:
     import pandas as pd
     from matplotlib.figure import Figure
 
-__all__ = ["Bound", "Comparison"]
-
-Bound = UpperBound | CasesBound
-"""What no paths can exceed, under one load case or several."""
+__all__ = ["Comparison"]
 
 
 @dataclass(frozen=True)
@@ -62,7 +58,7 @@ class Comparison:
         Slicings that could not cut the part, and why.
     given : GivenStress, optional
         Stress of another program, if paths are planned and evaluated on that.
-    bounds : mapping of float to UpperBound or CasesBound
+    bounds : mapping of float to UpperBound
         Stiffness that no paths can exceed, by the length of fibre in all, mm: the largest of the
         runs, and others where several lengths are asked for. Empty without virtual tests.
     of_slicers : tuple of str
@@ -80,7 +76,7 @@ class Comparison:
     seconds: Mapping[str, float]
     refused: Mapping[str, str]
     given: GivenStress | None = None
-    bounds: Mapping[float, Bound] = field(default_factory=dict)
+    bounds: Mapping[float, UpperBound] = field(default_factory=dict)
     curve: Curve | None = None
     of_slicers: tuple[str, ...] = ()
 
@@ -130,7 +126,7 @@ class Comparison:
         return self.stress if self.given is None else self.given
 
     @property
-    def bound(self) -> Bound | None:
+    def bound(self) -> UpperBound | None:
         """What no paths of the largest length can exceed; None without a bound."""
         return self.bounds[max(self.bounds)] if self.bounds else None
 
@@ -261,8 +257,7 @@ class Comparison:
     def verdict(self) -> str:
         """One sentence on which run is best; empty where there is none to compare."""
         if self.several_cases:
-            bound = self.bound if isinstance(self.bound, CasesBound) else None
-            return cases_verdict(self.runs, self.wanted, bound)
+            return cases_verdict(self.runs, self.wanted, self.bound)
         return verdict(self.runs, self.wanted)
 
     @property
@@ -282,14 +277,13 @@ class Comparison:
         if self.over_slicings:
             thick = (f"{name} {self._count(name)}" for name in self.stacks)
             lines.append(f"layers: {', '.join(thick)}")
-        alone = self.bound if isinstance(self.bound, UpperBound) else None
+        alone = None if self.several_cases else self.bound
         lines += remarks(self.runs, self.wanted, alone)
         if not self.over_slicings:
             lines += open_remarks(self.succeeded, self.layers, self.case.machine.fibre_width)
         if self.several_cases:
-            together = self.bound if isinstance(self.bound, CasesBound) else None
             others = bool(self.case.alternative_supports)
-            lines += cases_remarks(self.runs, self.wanted, self.cases, together, others)
+            lines += cases_remarks(self.runs, self.wanted, self.cases, self.bound, others)
         if self.given is not None:
             assumed = f"; {self.given.assumed}" if self.given.assumed else ""
             lines.append(

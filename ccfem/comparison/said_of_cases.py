@@ -10,14 +10,13 @@ from ccfem.comparison.request import Wanted
 from ccfem.comparison.runs import Run
 from ccfem.comparison.verdict import all_same, comparable, left_out
 from ccfem.elasticity.weighted_cases import WeightedCases
-from ccfem.fibre_aware.cases_bound import LEAST, CasesBound
-from ccfem.fibre_aware.upper_bound import LOOSE
+from ccfem.fibre_aware.upper_bound import LEAST, LOOSE, UpperBound
 from ccfem.virtual_testing.stiffer import FIRST, RESOLUTION
 
 __all__ = ["cases_remarks", "cases_rows", "cases_verdict"]
 
 
-def cases_verdict(runs: Sequence[Run], wanted: Wanted, bound: CasesBound | None) -> str:
+def cases_verdict(runs: Sequence[Run], wanted: Wanted, bound: UpperBound | None) -> str:
     """Say in one sentence which strategy serves all load cases best; empty for fewer than two.
 
     Parameters
@@ -25,7 +24,7 @@ def cases_verdict(runs: Sequence[Run], wanted: Wanted, bound: CasesBound | None)
     runs : sequence of Run
     wanted : float, mm, InAll or None
         Length of fibre that all were held to.
-    bound : CasesBound, optional
+    bound : UpperBound, optional
     """
     order = [run for run in comparable(runs, wanted) if is_tested(run)]
     if len(order) < 2:
@@ -62,7 +61,7 @@ def cases_remarks(
     runs: Sequence[Run],
     wanted: Wanted,
     cases: WeightedCases,
-    bound: CasesBound | None,
+    bound: UpperBound | None,
     others: bool = False,
 ) -> list[str]:
     """Say how much each case counts, which case the other tables show, and what is possible.
@@ -72,7 +71,7 @@ def cases_remarks(
     runs : sequence of Run
     wanted : float, mm, InAll or None
     cases : WeightedCases
-    bound : CasesBound, optional
+    bound : UpperBound, optional
     others : bool
         Whether the part has alternative supports.
     """

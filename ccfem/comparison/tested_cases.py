@@ -6,7 +6,7 @@ from dataclasses import dataclass
 from ccfem.arrays import FloatArray, in_brief
 from ccfem.elasticity.weighted_cases import WeightedCases
 from ccfem.errors import InputError
-from ccfem.fibre_aware.cases_bound import CasesBound
+from ccfem.fibre_aware.upper_bound import UpperBound
 from ccfem.layers import Layer
 from ccfem.virtual_testing.equilibrium import BONDED
 from ccfem.virtual_testing.several_cases import (
@@ -35,14 +35,14 @@ class TestedCases:
         Fibres that carry tension only, and bonded fibres.
     failure : CasesFailure or None
         Of the tests in tension; None where a strength is unknown.
-    bound : CasesBound, optional
+    bound : UpperBound, optional
         What no paths of the compared length can exceed; None without a bound.
     """
 
     tension: CasesTest
     bonded: CasesTest
     failure: CasesFailure | None
-    bound: CasesBound | None = None
+    bound: UpperBound | None = None
 
     __repr__ = in_brief
 

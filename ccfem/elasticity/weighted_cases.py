@@ -1,4 +1,4 @@
-"""Several load cases of one part with weights, as the basis of planning for all of them."""
+"""Load cases of one part with weights, as the basis of planning for all of them."""
 
 from collections.abc import Mapping
 from dataclasses import dataclass
@@ -16,7 +16,7 @@ __all__ = ["WeightedCases"]
 
 @dataclass(frozen=True)
 class WeightedCases:
-    """Solutions of one part without fibre under several load cases, and the weight of each.
+    """Solutions of one part without fibre under one or several load cases, and their weights.
 
     The cases may belong to one problem or to several, such as with other supports, on one mesh.
 
@@ -65,13 +65,16 @@ class WeightedCases:
 
     @classmethod
     def of(
-        cls, fields: Mapping[str, StressField], weights: Mapping[str, float] | None = None
+        cls,
+        fields: "StressField | WeightedCases | Mapping[str, StressField]",
+        weights: Mapping[str, float] | None = None,
     ) -> "WeightedCases":
-        """Cases by name, as `ccfem.solve` returns them, with weights.
+        """Cases by name, as `ccfem.solve` returns them, with weights; one case is a list of one.
 
         Parameters
         ----------
-        fields : mapping of name to StressField
+        fields : StressField, WeightedCases, or mapping of name to StressField
+            Weighted cases without other weights are returned as they are.
         weights : mapping of name to float, optional
             Positive; cases that are not named do not count. Default: all count equally.
 
@@ -80,6 +83,12 @@ class WeightedCases:
         InputError
             For weights of unknown cases, and as the class.
         """
+        if isinstance(fields, WeightedCases):
+            if weights is None:
+                return fields
+            fields = dict(zip(fields.names, fields.fields, strict=True))
+        if isinstance(fields, StressField):
+            fields = {fields.case: fields}
         chosen = weights or dict.fromkeys(fields, 1.0)
         for name, weight in chosen.items():
             check_known("load case", name, fields)

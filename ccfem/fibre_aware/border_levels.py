@@ -35,7 +35,7 @@ _SHARE = 0.5
 
 
 class _Posed(Protocol):
-    """The parts of `ccfem.fibre_aware.stream_design.StreamProblem` that are used here."""
+    """The parts of `ccfem.fibre_aware.stream_design.StreamModel` that are used here."""
 
     @property
     def part(self) -> SmearedPart: ...

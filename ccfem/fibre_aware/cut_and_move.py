@@ -7,10 +7,8 @@ the strength as asked for, and for half of that.
 
 from collections.abc import Callable, Sequence
 
-from ccfem.fibre_aware.cases_judges import CasesGoal, cases_judge, cases_strength_judge
-from ccfem.fibre_aware.judges import Judge, stiffest, stiffness_judge, strength_judge
+from ccfem.fibre_aware.judges import Goal, Judge, stiffest, stiffness_judge, strength_judge
 from ccfem.fibre_aware.prune import prune
-from ccfem.fibre_aware.prune_cases import prune_cases
 from ccfem.fibre_aware.strand_moves import kept_radius, moved
 from ccfem.layers.layer import Layer
 from ccfem.machine.machine import Machine
@@ -19,7 +17,7 @@ from ccfem.toolpaths import Toolpaths
 from ccfem.virtual_testing.specimen import Specimen
 from ccfem.virtual_testing.strand import Strand
 
-__all__ = ["best_cut", "prune_and_move", "prune_and_move_cases"]
+__all__ = ["best_cut", "prune_and_move"]
 
 _SHARES = (0.0, 0.5, 1.0)
 """Shares of the `strength` asked for with which fibre is cut."""
@@ -37,7 +35,7 @@ _Cut = Callable[[Toolpaths, float, int], Toolpaths]
 def prune_and_move(
     candidates: Sequence[Toolpaths],
     layers: Sequence[Layer],
-    part: Specimen,
+    part: Specimen | Goal,
     length: float,
     machine: Machine,
     strand: Strand,
@@ -53,47 +51,17 @@ def prune_and_move(
     chooses. Parameters as in `ccfem.fibre_aware.prune.prune` and
     `ccfem.fibre_aware.strand_moves.moved`.
     """
+    goal = Goal.of(part)
 
     def cut(toolpaths: Toolpaths, share: float, tests: int) -> Toolpaths:
-        return prune(toolpaths, part, length, machine, strand, tests, share, tight)
+        return prune(toolpaths, goal, length, machine, strand, tests, share, tight)
 
-    mesh = part.unreinforced.mesh
-    judges: tuple[Judge, ...] = (stiffness_judge(part, machine, strand),)
-    if strength:
-        how = (part, layers, machine, strand, strength)
-        judges = tuple(strength_judge(*how, for_both) for for_both in _FOR_BOTH)
-    kept = best_cut(candidates, cut, judges[0], strength, rounds)
-    return _moved(kept, layers, mesh, machine, cut, judges, moves, tight)
-
-
-def prune_and_move_cases(
-    candidates: Sequence[Toolpaths],
-    layers: Sequence[Layer],
-    goal: CasesGoal,
-    length: float,
-    machine: Machine,
-    strand: Strand,
-    rounds: int,
-    strength: float,
-    moves: int,
-    tight: float = 1.0,
-) -> Toolpaths:
-    """Cut fibre for several load cases, as `prune_and_move` does it for one.
-
-    Parameters as in `ccfem.fibre_aware.prune_cases.prune_cases`. For the strength, the load case
-    counts that fails first.
-    """
-
-    def cut(toolpaths: Toolpaths, share: float, tests: int) -> Toolpaths:
-        return prune_cases(toolpaths, goal, length, machine, strand, tests, share, tight)
-
-    mesh = goal.parts[0].unreinforced.mesh
-    judges: tuple[Judge, ...] = (cases_judge(goal, machine, strand),)
+    judges: tuple[Judge, ...] = (stiffness_judge(goal, machine, strand),)
     if strength:
         how = (goal, layers, machine, strand, strength)
-        judges = tuple(cases_strength_judge(*how, for_both) for for_both in _FOR_BOTH)
+        judges = tuple(strength_judge(*how, for_both) for for_both in _FOR_BOTH)
     kept = best_cut(candidates, cut, judges[0], strength, rounds)
-    return _moved(kept, layers, mesh, machine, cut, judges, moves, tight)
+    return _moved(kept, layers, goal.mesh, machine, cut, judges, moves, tight)
 
 
 def best_cut(

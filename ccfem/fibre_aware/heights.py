@@ -1,4 +1,4 @@
-"""Layers over the height of a part: which cells belong to each, and how much the layers differ."""
+"""Layers over the height of a part: their cells, how they differ, and the case that each serves."""
 
 from collections.abc import Sequence
 
@@ -10,7 +10,15 @@ from ccfem.layers.layer import Layer
 from ccfem.machine.machine import Machine
 from ccfem.tensor import in_plane
 
-__all__ = ["alike_share", "fibre_capacity", "group_layers", "middle_layers", "nearest_layer"]
+__all__ = [
+    "alike_share",
+    "fibre_capacity",
+    "group_layers",
+    "layer_counts",
+    "layers_by_case",
+    "middle_layers",
+    "nearest_layer",
+]
 
 
 def nearest_layer(part: SmearedPart, layers: Sequence[Layer]) -> IntArray:
@@ -72,3 +80,39 @@ def middle_layers(layers: Sequence[Layer], group: IntArray) -> list[Layer]:
     """Return the middle layer of each group, from the group (layers,) of every layer."""
     numbers = [np.flatnonzero(group == k) for k in range(int(group.max()) + 1)]
     return [layers[int(own[len(own) // 2])] for own in numbers]
+
+
+def layer_counts(weights: FloatArray, count: int) -> IntArray:
+    """Share out layers among cases by the largest remainder: the number of each, (n,).
+
+    Parameters
+    ----------
+    weights : (n,) array
+        Positive.
+    count : int
+        Of layers.
+    """
+    wanted = weights / weights.sum() * count
+    found = np.floor(wanted + 1e-9).astype(np.int64)
+    rest = np.argsort(-np.round(wanted - found, 9), kind="stable")
+    found[rest[: count - int(found.sum())]] += 1
+    return found
+
+
+def layers_by_case(weights: FloatArray, layers: Sequence[Layer]) -> IntArray:
+    """Case of each layer, (layers,); the layers of each case are spread evenly over the height.
+
+    From the bottom up each layer goes to the case that is farthest behind its share; if several
+    are, to the first of them.
+    """
+    count = len(layers)
+    counts = layer_counts(weights, count)
+    order = np.argsort([layer.plane.height for layer in layers], kind="stable")
+    given = np.zeros(len(counts), dtype=np.int64)
+    found = np.empty(count, dtype=np.int64)
+    for place, number in enumerate(order):
+        behind = np.round(counts * (place + 0.5) / count - given, 9)
+        k = int(np.argmax(np.where(given < counts, behind, -np.inf)))
+        given[k] += 1
+        found[number] = k
+    return found

@@ -1,6 +1,6 @@
 """How much fibre a wanted stiffness takes: the least length of a strategy that reaches it."""
 
-from collections.abc import Callable, Sequence
+from collections.abc import Sequence
 from dataclasses import dataclass, replace
 from typing import Any
 
@@ -11,19 +11,15 @@ from ccfem.checks import check_number
 from ccfem.elasticity.stress_field import StressField
 from ccfem.elasticity.weighted_cases import WeightedCases
 from ccfem.errors import InputError
-from ccfem.fibre_aware.cases_bound import LEAST, WORST
 from ccfem.fibre_aware.plan_cases import plan_cases
+from ccfem.fibre_aware.upper_bound import LEAST, WORST
 from ccfem.layers.layer import Layer
 from ccfem.machine.machine import Machine
-from ccfem.planning.equal_fibre import plan_to_length
 from ccfem.planning.planned import Planned
 from ccfem.planning.strategy import Strategy
 from ccfem.planning.whole_part import full_length
-from ccfem.toolpaths import Toolpaths
 from ccfem.virtual_testing.several_cases import specimens, virtual_tests
-from ccfem.virtual_testing.specimen import Specimen
 from ccfem.virtual_testing.strand import Strand
-from ccfem.virtual_testing.virtual_test import virtual_test
 
 __all__ = ["LeastFibre", "for_every_case", "least_fibre"]
 
@@ -110,18 +106,16 @@ def least_fibre(
         When the ratio is not above 1, or the most fibre that the strategy lays does not reach it.
     """
     check_number("stiffness over that without fibre", ratio, above=1.0)
-    if not isinstance(stress, StressField):
+    cases = WeightedCases.of(stress)
+    if len(cases) > 1:
         strategy = for_every_case(strategy)
-    test, most = _test(stress, machine, strand), _MOST * full_length(layers, machine)
+    parts, most = specimens(cases), _MOST * full_length(layers, machine)
     found: dict[float, LeastFibre] = {}
     tried: list[tuple[float, float]] = []
     length = _FIRST * most
     for _ in range(_PLANS):
-        if isinstance(stress, StressField):
-            planned = plan_to_length(strategy, layers, stress, machine, length)
-        else:
-            planned = plan_cases(strategy, layers, stress, machine, length, strand)
-        ratios = test(planned.toolpaths)
+        planned = plan_cases(strategy, layers, cases, machine, length, strand)
+        ratios = virtual_tests(planned.toolpaths, parts, strand, machine=machine).ratios
         reached = float(ratios.min())
         laid = planned.length_per_layer
         if laid in found:  # no other length lies between
@@ -139,9 +133,13 @@ def least_fibre(
     enough = [laid for laid, one in found.items() if one.ratio >= ratio]
     if not enough:
         best = max(found.values(), key=lambda one: one.ratio)
+        every, where = "", ""
+        if len(cases) > 1:
+            every = " in every load case"
+            where = f" in '{cases.names[int(np.argmin(best.ratios))]}'"
         raise InputError(
-            f"{ratio:.4g} times the stiffness without fibre was asked for{_of_every(stress)}; "
-            f"{_reached(best, stress)} is the most of {len(tried)} plans, with "
+            f"{ratio:.4g} times the stiffness without fibre was asked for{every}; "
+            f"{best.ratio:.4g}{where} is the most of {len(tried)} plans, with "
             f"{best.planned.length_per_layer:.0f} mm per layer: ask for less, or give the part "
             "more layers"
         )
@@ -156,32 +154,6 @@ def for_every_case(strategy: Strategy) -> Strategy:
     changed: Any = strategy
     told = getattr(strategy, "objective", None) == WORST
     return replace(changed, objective=LEAST) if told else strategy
-
-
-def _test(
-    stress: StressField | WeightedCases, machine: Machine, strand: Strand | None
-) -> Callable[[Toolpaths], FloatArray]:
-    """Return what finds the stiffness ratio of paths in each load case, (n,)."""
-    if isinstance(stress, StressField):
-        part = Specimen.of(stress)
-
-        def test(paths: Toolpaths) -> FloatArray:
-            return np.array([virtual_test(paths, part, strand, span=(), machine=machine).ratio])
-
-        return test
-    parts = specimens(stress)
-    return lambda paths: virtual_tests(paths, parts, strand, machine=machine).ratios
-
-
-def _of_every(stress: StressField | WeightedCases) -> str:
-    return "" if isinstance(stress, StressField) else " in every load case"
-
-
-def _reached(found: LeastFibre, stress: StressField | WeightedCases) -> str:
-    """Ratio of a plan, and the load case that it is of where there are several."""
-    if isinstance(stress, StressField):
-        return f"{found.ratio:.4g}"
-    return f"{found.ratio:.4g} in '{stress.names[int(np.argmin(found.ratios))]}'"
 
 
 def _next(tried: list[tuple[float, float]], ratio: float) -> float | None:

@@ -1,4 +1,4 @@
-"""Planning a part by any strategy for several load cases at once.
+"""Planning a part by any strategy for one load case, or for several at once.
 
 A strategy that plans for all cases does so itself (`CasesStrategy`). Of any other that follows the
 stress, each layer is planned for one case, the layers of a case spread evenly over the height; more
@@ -8,15 +8,21 @@ stress is planned as it is.
 
 from collections.abc import Sequence
 
+from ccfem.elasticity.stress_field import StressField
 from ccfem.elasticity.weighted_cases import WeightedCases
 from ccfem.errors import InputError
-from ccfem.fibre_aware.cases_bound import WORST, measures
-from ccfem.fibre_aware.cases_judges import CasesGoal
-from ccfem.fibre_aware.layer_shares import layers_by_case
-from ccfem.fibre_aware.prune_cases import prune_cases
+from ccfem.fibre_aware.heights import layers_by_case
+from ccfem.fibre_aware.judges import Goal
+from ccfem.fibre_aware.prune import prune
+from ccfem.fibre_aware.upper_bound import WORST, measures
 from ccfem.layers.layer import Layer
 from ccfem.machine.machine import Machine
-from ccfem.planning.equal_fibre import TOLERANCE, length_per_layer, plan_to_length
+from ccfem.planning.equal_fibre import (
+    TOLERANCE,
+    length_per_layer,
+    plan_to_length,
+    plan_to_lengths,
+)
 from ccfem.planning.plan import check_layers, plan, plan_layers
 from ccfem.planning.planned import Planned
 from ccfem.planning.short_pieces import about_short_pieces
@@ -30,6 +36,9 @@ __all__ = ["plan_by_layers", "plan_cases", "plan_cases_to_lengths"]
 _TOO_MUCH = 1.15
 """Length that is planned over that kept."""
 
+_ROUNDS = 3
+"""Virtual tests under every case that say what is taken off."""
+
 _SLACK = 0.05
 """Share by which less may be planned: it is found in fewer steps."""
 
@@ -37,20 +46,20 @@ _SLACK = 0.05
 def plan_cases(
     strategy: Strategy,
     layers: Sequence[Layer],
-    cases: WeightedCases,
+    stress: StressField | WeightedCases,
     machine: Machine,
     wanted: float | None = None,
     strand: Strand | None = None,
     objective: str = WORST,
 ) -> Planned:
-    """Plan a part for several load cases.
+    """Plan a part for one or several load cases.
 
     Parameters
     ----------
     strategy : Strategy
     layers : sequence of Layer
-        All flat layers of the part.
-    cases : WeightedCases
+        All layers of the part; flat ones for several load cases.
+    stress : StressField or WeightedCases
     machine : Machine
     wanted : float, mm, optional
         Fibre per layer, mean over the stack; default what the strategy lays by itself, of which
@@ -68,14 +77,15 @@ def plan_cases(
     check_layers(strategy, layers, machine)
     if wanted is None and isinstance(strategy, LengthStrategy):
         wanted = strategy.natural_length(layers, machine)
-    if isinstance(strategy, CasesStrategy) and wanted is not None:
-        return _by_itself(strategy, layers, cases, machine, (wanted,))[0]
-    if len(cases) == 1 or getattr(strategy, "ignores_stress", False):
+    cases = WeightedCases.of(stress)
+    if _is_of_one(strategy, cases):
         field = cases.heaviest
         if wanted is not None:
             return plan_to_length(strategy, layers, field, machine, wanted)
         paths = plan(strategy, layers, field, machine)
         return Planned(strategy, paths, length_per_layer(paths, layers))
+    if isinstance(strategy, CasesStrategy) and wanted is not None:
+        return _by_itself(strategy, layers, cases, machine, (wanted,))[0]
     curved = [layer.index for layer in layers if layer.flat is None]
     if curved:
         raise InputError(
@@ -87,28 +97,37 @@ def plan_cases(
     too_much = plan_by_layers(strategy, layers, cases, machine, _TOO_MUCH * wanted)
     in_all = wanted * len(layers)
     bounds = measures(objective, cases, layers, in_all, machine, strand)
-    goal = CasesGoal(specimens(cases), cases.weights, bounds, objective)
-    paths = prune_cases(too_much, goal, in_all, machine, strand)
+    goal = Goal(specimens(cases), cases.weights, bounds, objective)
+    paths = prune(too_much, goal, in_all, machine, strand, _ROUNDS)
     return _told(strategy, paths, layers, machine, wanted)
 
 
 def plan_cases_to_lengths(
     strategy: Strategy,
     layers: Sequence[Layer],
-    cases: WeightedCases,
+    stress: StressField | WeightedCases,
     machine: Machine,
     lengths: Sequence[float],
     strand: Strand | None = None,
 ) -> list[Planned]:
-    """Plan for several load cases to several lengths of fibre, mm per layer.
+    """Plan for one or several load cases to several lengths of fibre, mm per layer.
 
-    A strategy that plans for all cases does so for all lengths together (`CasesStrategy`); of any
-    other each length is planned on its own. Parameters and errors as in `plan_cases`.
+    For one case, and by a strategy that plans for all cases (`CasesStrategy`), all lengths are
+    planned together; by any other each length is planned on its own. Parameters and errors as in
+    `plan_cases`.
     """
+    cases = WeightedCases.of(stress)
+    if _is_of_one(strategy, cases):
+        return plan_to_lengths(strategy, layers, cases.heaviest, machine, lengths)
     if isinstance(strategy, CasesStrategy):
         check_layers(strategy, layers, machine)
         return _by_itself(strategy, layers, cases, machine, lengths)
     return [plan_cases(strategy, layers, cases, machine, each, strand) for each in lengths]
+
+
+def _is_of_one(strategy: Strategy, cases: WeightedCases) -> bool:
+    """Whether one load case says all that a plan follows."""
+    return len(cases) == 1 or getattr(strategy, "ignores_stress", False)
 
 
 def _by_itself(

@@ -1,8 +1,10 @@
 """Pruning: the fibre that carries least is removed until a wanted length is left.
 
-Removing a piece of stretched fibre increases the compliance, to first order, by ``EA eps^2`` per
-length. The paths are tested with their fibre and the pieces worth least are removed. The rest is
-tested again, since it takes over the load.
+Removing a piece of stretched fibre increases the compliance C_i of each load case, to first order,
+by ``EA eps_i^2`` per length. The paths are tested with their fibre under every case and the pieces
+worth least, by the sum of ``s_i eps_i^2 / C_i``, are removed. The weight s_i of a case grows with
+its compliance over the least compliance that any paths could reach in it alone (`Goal.counts`). The
+rest is tested again, since it takes over the load.
 """
 
 from dataclasses import replace
@@ -12,17 +14,23 @@ import numpy as np
 from ccfem.arrays import FloatArray, IntArray
 from ccfem.checks import check_number
 from ccfem.elasticity.stress_field import StressField
+from ccfem.fibre_aware.judges import Goal, equilibria
 from ccfem.fibre_aware.path_profile import Profile
 from ccfem.fibre_aware.shortening import shorten_bent, tight_share
 from ccfem.fibre_aware.strength_value import Worth, layer_normal, raised
 from ccfem.machine.machine import Machine
 from ccfem.toolpaths import FIBRE, Toolpaths
-from ccfem.virtual_testing.equilibrium import equilibrium
 from ccfem.virtual_testing.specimen import Specimen
 from ccfem.virtual_testing.strand import Strand
 from ccfem.virtual_testing.strands import Strands, cut_strands
 
 __all__ = ["fibre_length", "profiles", "prune", "taken_off"]
+
+_TOLERANCE = 1e-5
+"""Relative residual of the tests, and so the error of the strain that says what fibre is worth."""
+
+_FASTEST = 0.5
+"""Share of the excess that a round removes at least where there is one load case."""
 
 _STATION = 1.0
 """Length of path, mm, that is kept or removed as a whole."""
@@ -43,7 +51,7 @@ _ENOUGH = 0.95
 
 def prune(
     toolpaths: Toolpaths,
-    part: StressField | Specimen,
+    part: StressField | Specimen | Goal,
     length: float,
     machine: Machine,
     strand: Strand | None = None,
@@ -54,15 +62,16 @@ def prune(
     """Remove the least valuable fibre until no more than a wanted length is left.
 
     Paths are planned too long on purpose and pruned, so that the fibre that helps least is removed.
-    Each round tests the part with fibres that carry tension only, and removes half of the excess;
-    the last round removes all of it.
+    Each round tests the part under every load case with fibres that carry tension only, and removes
+    half of the excess, the last round all of it. Under several load cases the rounds remove equal
+    parts: fibre of one case may be all that goes in a large step.
 
     Parameters
     ----------
     toolpaths : Toolpaths
         Of any strategy; paths of other kinds than fibre stay as they are.
-    part : StressField or Specimen
-        The part without fibres, under the load that counts.
+    part : StressField, Specimen or Goal
+        The part without fibres under the load that counts; for several loads the goal.
     length : float, mm
         Largest total length of fibre that remains.
     machine : Machine
@@ -70,9 +79,9 @@ def prune(
     strand : Strand, optional
         Stiffness of a strand; default rho = EA/E = 4 mm^2.
     rounds : int, default 2
-        Virtual tests, at least 1.
+        Virtual tests under every case, at least 1.
     strength : float in [0, 1], default 0
-        Weight of the load at first failure against the stiffness
+        Weight of the load at first failure, in the case that fails first, against the stiffness
         (`ccfem.fibre_aware.strength_value`).
     tight : float in [0, 1], default 1
         Largest share of the fibre's length in bends tighter than the machine's radius. Where the
@@ -95,18 +104,20 @@ def prune(
     laid = fibre_length(toolpaths)
     if laid <= length and (tight >= 1.0 or tight_share(toolpaths, machine) <= tight):
         return toolpaths
-    specimen = Specimen.of(part) if isinstance(part, StressField) else part
-    axial = (Strand() if strand is None else strand).stiffness(specimen.modulus)
-    worth = Worth.of((specimen,), strand, strength) if strength else None
-    known: tuple[FloatArray, ...] = ()
+    goal, known = Goal.of(part), None
+    worth = Worth.of(goal.parts, strand, strength) if strength else None
     for k in range(rounds):
-        strands = cut_strands(toolpaths, specimen.unreinforced.mesh)
-        found = equilibrium(specimen, strands, axial, known=known, tolerance=1e-5)
-        known = (found.displacement,)
-        value = np.where(found.carries, found.strain, 0.0) ** 2
+        strands = cut_strands(toolpaths, goal.mesh)
+        tested = equilibria(goal, strands, strand, known, _TOLERANCE)
+        known, counts = tested.displacements, goal.counts(tested.ratios)
         if worth is not None:
-            value = worth(strands, (found,), layer_normal(toolpaths))
-        wanted = length if k == rounds - 1 else length + max(0.5 * (laid - length), 0.0)
+            value = worth(strands, tested.found, layer_normal(toolpaths), counts)
+        else:
+            value = np.zeros(len(strands.length))
+            for share, one in zip(counts / tested.work, tested.found, strict=True):
+                value += share * np.where(one.carries, one.strain, 0.0) ** 2
+        share = max(1.0 / (rounds - k), _FASTEST if len(goal.parts) == 1 else 0.0)
+        wanted = length + (1.0 - share) * max(laid - length, 0.0)
         toolpaths = taken_off(toolpaths, strands, value, wanted, machine, tight)
         laid = fibre_length(toolpaths)
         if laid <= length:

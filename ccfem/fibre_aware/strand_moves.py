@@ -71,7 +71,7 @@ def moved(
         Of the part.
     machine : Machine
     judge : callable
-        Tests toolpaths: one of `ccfem.fibre_aware.judges` or `ccfem.fibre_aware.cases_judges`.
+        Tests toolpaths: one of `ccfem.fibre_aware.judges`.
     moves : int
         Number of steps that are tested, at least 0.
     inset : float, default 0.5

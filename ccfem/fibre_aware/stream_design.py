@@ -1,35 +1,45 @@
-"""Design of a stream function: a scalar field whose isocurves make the part stiff.
+"""Design of stream functions: scalar fields whose isocurves make the part stiff.
 
 The unknown is the field itself. Its gradient g determines the fibre laid along its unit levels: the
 fibre runs normal to g with |g| strands a mm, so that a layer of thickness h holds ``|g| / h`` mm of
-fibre in a mm^3. One solve gives the compliance of the part with that fibre and its gradient; L-BFGS
-minimises it.
+fibre in a mm^3. Each load case has a field in its share of the layers, spread evenly over the
+height, so every cell contains fibre of all fields. One solve for each case gives the compliance of
+the part with that fibre and its gradient; L-BFGS minimises the objective by all fields at once.
 """
 
-from dataclasses import dataclass
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass, replace
 from functools import cached_property
-from typing import Any
+from typing import Any, TypeAlias
 
 import numpy as np
 import scipy.sparse as sp
 
-from ccfem.arrays import FloatArray, IntArray
+from ccfem.arrays import FloatArray, IntArray, freeze
 from ccfem.fibre_aware.border_levels import BorderLevels
 from ccfem.fibre_aware.field_bends import FieldBends
-from ccfem.fibre_aware.field_design import designed_fields
+from ccfem.fibre_aware.field_descent import designed_fields
 from ccfem.fibre_aware.smeared import SmearedPart, SmearedSolution
 from ccfem.fibre_aware.spline_grid import SplineGrid
+from ccfem.fibre_aware.upper_bound import LEAST, SUM, WORST
 
 __all__ = [
     "DENSEST",
+    "DESIGN_POWERS",
     "OVER_BUDGET",
     "SLACK",
     "Laid",
     "Objective",
+    "Pull",
     "StreamDesign",
+    "StreamModel",
     "StreamProblem",
     "design",
+    "designed_in_steps",
 ]
+
+DESIGN_POWERS = {WORST: 4.0, SUM: 1.0, LEAST: 4.0}
+"""Power of ``bound / ratio`` in the sum over the cases, for each objective."""
 
 DENSEST = 0.975
 """Strands a width that should not be exceeded."""
@@ -56,27 +66,17 @@ _BENT, _HELD = 0.02, 1e-6
 """Terms of the curvature against bends of the field and its constant, over its mean diagonal."""
 
 
-@dataclass(frozen=True)
-class Objective:
-    """The objective at one field.
+_USUAL = 0.45 * (1.0 + 1e-9)
+"""Coverage up to which fields are designed in one step."""
 
-    Attributes
-    ----------
-    value : float
-    gradient : (c,) array
-        With respect to the coefficients of the fields.
-    ratio : float
-        Stiffness over that of the part without fibre.
-    length : float, mm
-        Of fibre.
-    solution : SmearedSolution
-    """
+_FIRST = 0.5
+"""Share of the room for fibre that is designed for first, with a tenth more as budget."""
 
-    value: float
-    gradient: FloatArray
-    ratio: float
-    length: float
-    solution: SmearedSolution
+_THEN = 0.6
+"""Evaluations of the second step, over those of the first."""
+
+Pull: TypeAlias = tuple[FloatArray, FloatArray]
+"""Derivatives (m,) by the two components of a field's gradient in the cells."""
 
 
 @dataclass(frozen=True)
@@ -108,16 +108,17 @@ class Laid:
 
 
 @dataclass(frozen=True)
-class StreamProblem:
-    """Objective that a stream function is designed for.
+class StreamModel:
+    """The fibre that a stream function lays in a part if it is in all layers, and what it costs.
 
-    Minimised is ``-log(stiffness) + 20 max(length / budget - 1, 0)^2 + 100 mean(max(|g| - 0.975,
-    0)^2) + 0.001 mean((Laplacian s)^2)``, g in strands a width, means over the part and over the
-    coefficients. With a radius the cost of tighter bends (`FieldBends`) is added.
+    The penalties are ``100 mean(max(|g| - 0.975, 0)^2) + 0.001 mean((Laplacian s)^2)``, g in
+    strands a width, means over the part and over the coefficients. With a radius the cost of
+    tighter bends (`FieldBends`) is added.
 
     Attributes
     ----------
     part : SmearedPart
+        Under any of the load cases.
     grid : SplineGrid
         Of every field.
     group : (m,) int array
@@ -188,30 +189,6 @@ class StreamProblem:
         """Fibre length (m,), mm, of each cell at one strand a width."""
         return self.part.mesh.volumes * self.capacity
 
-    def evaluate(
-        self, field: FloatArray, start: SmearedSolution | None = None, tolerance: float = 1e-5
-    ) -> Objective:
-        """Evaluate the objective and its gradient.
-
-        Parameters
-        ----------
-        field : (c,) array
-        start : SmearedSolution, optional
-            Where the solve starts: the solution of a field like this one.
-        tolerance : float
-            Relative residual of the solve.
-        """
-        laid = self.laid(field)
-        solution = self.part.solve(laid.stiffness, start, tolerance)
-        ratio = self.part.ratio(solution.work)
-        length = self.length(laid)
-        over = max(length / self.budget - 1.0, 0.0)
-        value = -np.log(ratio) + OVER_BUDGET * over**2
-        for penalty in self.penalties(field, laid):
-            value += penalty
-        gradient = self.gradient(field, laid, self.pull(laid, solution), over)
-        return Objective(float(value), gradient, ratio, length, solution)
-
     def penalties(self, field: FloatArray, laid: Laid) -> tuple[float, float, float]:
         """Penalties of too dense fibre, of a rough field (c,), and of bends."""
         excess, rough = np.maximum(laid.size - DENSEST, 0.0), self.laplacian @ field
@@ -219,9 +196,7 @@ class StreamProblem:
         steep = _STEEP * float(self.mean @ excess**2)
         return steep, _ROUGH * float(rough @ rough) / len(rough), bends
 
-    def gradient(
-        self, field: FloatArray, laid: Laid, pull: tuple[FloatArray, FloatArray], over: float
-    ) -> FloatArray:
+    def gradient(self, field: FloatArray, laid: Laid, pull: Pull, over: float) -> FloatArray:
         """Gradient (c,) by the coefficients, with penalties.
 
         Parameters
@@ -296,7 +271,7 @@ class StreamProblem:
             gx, gy, size, along, strength[:, None, None] * along[:, :, None] * along[:, None, :]
         )
 
-    def pull(self, laid: Laid, solution: SmearedSolution) -> tuple[FloatArray, FloatArray]:
+    def pull(self, laid: Laid, solution: SmearedSolution) -> Pull:
         """Return the derivatives (m,) of -log(stiffness) by the components of g."""
         stretch = np.einsum("ci,ci->c", laid.along, solution.strain)
         share = np.where(stretch > 0.0, 1.0, SLACK)
@@ -311,37 +286,264 @@ class StreamProblem:
 
 
 @dataclass(frozen=True)
+class Objective:
+    """The objective at some fields.
+
+    Attributes
+    ----------
+    value : float
+    gradient : (n * c,) array
+        With respect to the coefficients, field after field.
+    ratio : (n,) array
+        Stiffness of each case over that of the part without fibre.
+    length : float, mm
+        Of fibre.
+    solution : tuple of SmearedSolution
+        Of each case.
+    """
+
+    value: float
+    gradient: FloatArray
+    ratio: FloatArray
+    length: float
+    solution: tuple[SmearedSolution, ...]
+
+
+@dataclass(frozen=True)
+class StreamProblem:
+    """What fields are designed for, one for each load case.
+
+    Minimised is ``log(sum of w_i (bound_i / ratio_i)^p) / p + 20 max(length / budget - 1, 0)^2``
+    plus the penalties of `StreamModel`, those of each field weighted by its share of the layers.
+
+    Attributes
+    ----------
+    model : StreamModel
+        Of each field alone.
+    parts : tuple of SmearedPart
+        One for each case.
+    weights : (n,) array
+        Of the cases; their sum is 1.
+    bounds : (n,) array
+        Stiffness ratio that each case is measured by (`ccfem.fibre_aware.upper_bound.measures`).
+    shares : (n,) array
+        Of the layers, of each field; their sum is 1.
+    power : float, default 1
+        The p above: the larger, the more the worst case counts.
+    """
+
+    model: StreamModel
+    parts: tuple[SmearedPart, ...]
+    weights: FloatArray
+    bounds: FloatArray
+    shares: FloatArray
+    power: float = 1.0
+
+    def __post_init__(self) -> None:
+        freeze(self, weights=float, bounds=float, shares=float)
+
+    @classmethod
+    def alone(cls, model: StreamModel) -> "StreamProblem":
+        """Problem of one load case, of one field in all layers."""
+        one = np.ones(1)
+        return cls(model, (model.part,), one, one, one)
+
+    @cached_property
+    def laplacian(self) -> Any:
+        """Graph Laplacian of all fields."""
+        return sp.block_diag(len(self.shares) * [self.model.laplacian], format="csr")
+
+    def evaluate(
+        self,
+        field: FloatArray,
+        start: tuple[SmearedSolution, ...] | None = None,
+        tolerance: float = 1e-5,
+    ) -> Objective:
+        """Evaluate the objective and its gradient.
+
+        Parameters
+        ----------
+        field : (n * c,) array
+            Coefficients, field after field.
+        start : tuple of SmearedSolution, optional
+            Where the solves start.
+        tolerance : float
+            Relative residual of the solves.
+        """
+        laid = self.laid(field)
+        found = self.solve(laid, start, tolerance)
+        value, counts = self.worth(self.ratios(found))
+        return self.objective(field, laid, found, value, self.pulls(laid, found, counts))
+
+    def laid(self, field: FloatArray) -> tuple[Laid, ...]:
+        """Fibre that each field lays."""
+        return tuple(self.model.laid(one) for one in field.reshape(len(self.shares), -1))
+
+    def stiffness(self, laid: Sequence[Laid], strain: FloatArray) -> FloatArray:
+        """Stiffness (m, 3, 3), MPa, of the fibre of all fields at strains (m, 3)."""
+        found = self.shares[0] * laid[0].stiffness(strain)
+        for share, one in zip(self.shares[1:], laid[1:], strict=True):
+            found += share * one.stiffness(strain)
+        return found
+
+    def solve(
+        self,
+        laid: Sequence[Laid],
+        start: tuple[SmearedSolution, ...] | None = None,
+        tolerance: float = 1e-5,
+    ) -> tuple[SmearedSolution, ...]:
+        """Solve each case; parameters as in `evaluate`."""
+        starts = start if start is not None else (None,) * len(self.parts)
+        return tuple(
+            part.solve(lambda strain: self.stiffness(laid, strain), one, tolerance)
+            for part, one in zip(self.parts, starts, strict=True)
+        )
+
+    def ratios(self, solutions: Sequence[SmearedSolution]) -> FloatArray:
+        """Stiffness (n,) of each case over that of the part without fibre."""
+        found = [part.ratio(one.work) for part, one in zip(self.parts, solutions, strict=True)]
+        return np.array(found)
+
+    def worth(self, ratios: FloatArray) -> tuple[float, FloatArray]:
+        """Objective at stiffness ratios (n,) without penalties, and the weight of each case."""
+        shares = ratios / self.bounds
+        powers = self.weights * (shares.min() / shares) ** self.power
+        value = np.log(powers.sum()) / self.power - np.log(shares.min())
+        return float(value), powers / powers.sum()
+
+    def pulls(
+        self, laid: Sequence[Laid], solutions: Sequence[SmearedSolution], counts: FloatArray
+    ) -> list[Pull]:
+        """Derive -log(stiffness), the cases weighted (n,), by each field if in all layers."""
+        found = []
+        for one in laid:
+            x, y = zip(*(self.model.pull(one, each) for each in solutions), strict=True)
+            found.append((counts @ np.stack(x), counts @ np.stack(y)))
+        return found
+
+    def objective(
+        self,
+        field: FloatArray,
+        laid: Sequence[Laid],
+        solutions: tuple[SmearedSolution, ...],
+        value: float,
+        pulls: Sequence[Pull],
+    ) -> Objective:
+        """Objective from a value without penalties.
+
+        Parameters
+        ----------
+        field : (n * c,) array
+        laid, solutions
+            Fibre of the field, and the solution of each case with it.
+        value : float
+        pulls : sequence of two (m,) arrays
+            Derivatives of the value by the gradient of each field, if it were in all layers.
+        """
+        model, fields, shares = self.model, field.reshape(len(self.shares), -1), self.shares
+        length = sum(share * model.length(one) for share, one in zip(shares, laid, strict=True))
+        over = max(length / model.budget - 1.0, 0.0)
+        value, gradient = value + OVER_BUDGET * over**2, []
+        for share, one, coefficients, pull in zip(shares, laid, fields, pulls, strict=True):
+            for penalty in model.penalties(coefficients, one):
+                value += share * penalty
+            gradient.append(share * model.gradient(coefficients, one, pull, over))
+        ratios = self.ratios(solutions)
+        return Objective(float(value), np.concatenate(gradient), ratios, float(length), solutions)
+
+    def _counts(self, solutions: Sequence[SmearedSolution]) -> FloatArray:
+        """How much each case counts (n,)."""
+        return self.worth(self.ratios(solutions))[1]
+
+    def curvature(self, field: FloatArray, solutions: tuple[SmearedSolution, ...]) -> Any:
+        """Matrix with a block for each field: mean over the cases of `StreamModel.curvature`."""
+        counts, blocks = self._counts(solutions), []
+        for share, own in zip(self.shares, field.reshape(len(self.shares), -1), strict=True):
+            each = [self.model.curvature(own, one) for one in solutions]
+            mean = sum(count * one for count, one in zip(counts, each, strict=True))
+            blocks.append((share or 1.0) * mean)  # a field without layers changes nothing
+        return sp.block_diag(blocks, format="csc")
+
+    def levels(self, field: FloatArray, solutions: tuple[SmearedSolution, ...]) -> BorderLevels:
+        """Cost, over all cases, of levels that lie farther from the border than they need to."""
+        counts, found = self._counts(solutions), []
+        for share, own in zip(self.shares, field.reshape(len(self.shares), -1), strict=True):
+            each = [self.model.levels(own, one) for one in solutions]
+            weight = share * (counts @ np.stack([one.weight for one in each]))
+            found.append(replace(each[0], weight=weight))
+        return BorderLevels.side_by_side(found)
+
+
+@dataclass(frozen=True)
 class StreamDesign:
     """Designed fields.
 
     Attributes
     ----------
-    field : (c,) array
-        Coefficients; unit levels are paths.
+    fields : (n, c) array
+        Coefficients of each field; unit levels are paths.
     objective : Objective
-        At that field.
-    ratios : tuple of float
-        Stiffness ratio at every evaluation.
+        At these fields.
+    ratios : tuple of (n,) arrays
+        Stiffness ratios of the cases at every evaluation.
     """
 
-    field: FloatArray
+    fields: FloatArray
     objective: Objective
-    ratios: tuple[float, ...]
+    ratios: tuple[FloatArray, ...]
 
 
 def design(problem: StreamProblem, start: FloatArray, evaluations: int = 50) -> StreamDesign:
-    """Improve fields by `ccfem.fibre_aware.field_design.designed_fields`.
+    """Improve fields by `ccfem.fibre_aware.field_descent.designed_fields`.
+
+    The unknowns are scaled with the curvature of all cases. The levels of each field are drawn to
+    the borders that any case stretches along it.
 
     Parameters
     ----------
     problem : StreamProblem
-    start : (c,) array
+    start : (n * c,) array
     evaluations : int, default 50
-        Maximum number of evaluations of the objective, one or a few solves each; at least 1.
+        Maximum number of evaluations of the objective, one or a few solves of each case; at least
+        1.
 
     Returns
     -------
     StreamDesign
         The best of all evaluations.
     """
-    return StreamDesign(*designed_fields(problem, start, evaluations))
+    field, found, ratios = designed_fields(problem, start, evaluations)
+    return StreamDesign(field.reshape(len(problem.shares), -1), found, ratios)
+
+
+def designed_in_steps(
+    problem: StreamProblem,
+    start: Callable[[StreamProblem], FloatArray],
+    evaluations: int,
+    coverage: float,
+) -> StreamDesign:
+    """Design fields for half of the room first, and for much fibre from there.
+
+    A field that starts at high density has strands everywhere, even where nothing is stretched.
+    They block each other: no small change of the field turns them or thins them out, and the result
+    is softer than a design for less fibre. Once that design has converged there is room for the
+    rest. Fields of several load cases do not gain by this, and are designed in one step.
+
+    Parameters
+    ----------
+    problem : StreamProblem
+    start : callable
+        Coefficients (n * c,) of the first fields for a problem.
+    evaluations : int
+        Largest number of evaluations of the objective in the first step. A second step has 0.6
+        times as many.
+    coverage : float
+        Share of the layers to be covered. The budget is larger, since some fibre is cut off later.
+    """
+    most = _FIRST * float(problem.model.room.sum())
+    if len(problem.parts) > 1 or coverage <= _USUAL or problem.model.budget <= most:
+        return design(problem, start(problem), evaluations)
+    less = replace(problem, model=replace(problem.model, budget=most))
+    first = design(less, start(less), evaluations)
+    found = design(problem, first.fields.ravel(), int(np.ceil(_THEN * evaluations)))
+    return replace(found, ratios=first.ratios + found.ratios)

@@ -1,6 +1,6 @@
 """Design of stream functions for stiffness and the load at first failure together.
 
-As `ccfem.fibre_aware.cases_design`, but the objective also contains how near the part is to its
+As `ccfem.fibre_aware.stream_design`, but the objective also contains how near the part is to its
 first failure (`ccfem.virtual_testing.near_failure`), under one load case or under any of several,
 one at a time. At every evaluation an adjoint solve for each case gives the gradient.
 """
@@ -13,10 +13,16 @@ import numpy as np
 from ccfem.arrays import FloatArray, in_brief
 from ccfem.elasticity.volume_loads import strain_forces
 from ccfem.fibre_aware.border_levels import BorderLevels
-from ccfem.fibre_aware.cases_design import CasesDesign, CasesObjective, CasesProblem, Pull
-from ccfem.fibre_aware.field_design import drawn_to_borders
+from ccfem.fibre_aware.field_descent import drawn_to_borders
 from ccfem.fibre_aware.smeared import SmearedSolution
-from ccfem.fibre_aware.stream_design import SLACK, Laid
+from ccfem.fibre_aware.stream_design import (
+    SLACK,
+    Laid,
+    Objective,
+    Pull,
+    StreamDesign,
+    StreamProblem,
+)
 from ccfem.tensor import to_voigt
 from ccfem.virtual_testing.near_failure import (
     POWER,
@@ -54,12 +60,12 @@ class _CasePeaks:
 class StrengthProblem:
     """Objective of a stream function where strength counts.
 
-    It is that of `CasesProblem`, with ``w log(nearness to failure) + (1 - w) x`` in place of its
+    It is that of `StreamProblem`, with ``w log(nearness to failure) + (1 - w) x`` in place of its
     stiffness term x. The nearness to failure is the largest index of all load cases.
 
     Attributes
     ----------
-    problem : CasesProblem
+    problem : StreamProblem
     limits : Limits
     strength : float in [0, 1]
         The share w.
@@ -69,7 +75,7 @@ class StrengthProblem:
         Index over norm of fibre, matrix and bond in each case, by `at`.
     """
 
-    problem: CasesProblem
+    problem: StreamProblem
     limits: Limits
     strength: float
     judges: tuple[MatrixPeaks, ...]
@@ -80,7 +86,7 @@ class StrengthProblem:
     @classmethod
     def at(
         cls,
-        problem: CasesProblem,
+        problem: StreamProblem,
         limits: Limits,
         strength: float,
         field: FloatArray,
@@ -114,8 +120,8 @@ class StrengthProblem:
         field: FloatArray,
         start: tuple[SmearedSolution, ...] | None = None,
         tolerance: float = 1e-5,
-    ) -> CasesObjective:
-        """Evaluate the objective and its gradient; parameters as in `CasesProblem.evaluate`."""
+    ) -> Objective:
+        """Evaluate the objective and its gradient; parameters as in `StreamProblem.evaluate`."""
         problem, w = self.problem, self.strength
         laid = problem.laid(field)
         solutions = problem.solve(laid, start, tolerance)
@@ -140,7 +146,7 @@ class StrengthProblem:
         self, laid: tuple[Laid, ...], solutions: tuple[SmearedSolution, ...]
     ) -> list[_CasePeaks]:
         """Find the indices under each load case, for the load on the part without fibre."""
-        problem, alone = self.problem, self.problem.problem
+        problem, alone = self.problem, self.problem.model
         limit = self.limits.fibre / alone.axial_stiffness
         size = np.stack([one.size for one in laid])
         length = (problem.shares[:, None] * alone.room * size).ravel()
@@ -166,7 +172,7 @@ class StrengthProblem:
 
     def _forces(self, by_strain: FloatArray) -> FloatArray:
         """Turn a derivative by the strains (m, 3) in the plane into one by the displacement."""
-        part = self.problem.problem.part
+        part = self.problem.model.part
         a, b, _ = part.frame
         pairs = np.stack([np.outer(a, a), np.outer(b, b), np.outer(a, b) + np.outer(b, a)])
         tensor = np.einsum("ci,ijk->cjk", by_strain / part.mesh.volumes[:, None], pairs)
@@ -193,7 +199,7 @@ class StrengthProblem:
                 share = max(float(problem.shares[f]), _NONE)
                 dx, dy = self._nearer(fibre, solution.strain, adjoint, own[f] / share)
                 if moved:
-                    softer = problem.problem.pull(fibre, solution)
+                    softer = problem.model.pull(fibre, solution)
                     dx, dy = dx + moved * softer[0], dy + moved * softer[1]
                 pulls[f] = (pulls[f][0] + dx, pulls[f][1] + dy)
         return near, pulls
@@ -210,7 +216,7 @@ class StrengthProblem:
         own : (m,) array
             Weight of the fibre of each cell in the index of the fibre itself.
         """
-        alone = self.problem.problem
+        alone = self.problem.model
         stretch, other = (np.einsum("ci,ci->c", laid.along, one) for one in (strain, adjoint))
         gx, gy, size = laid.gx, laid.gy, laid.size
         share = np.where(stretch > 0.0, 1.0, SLACK)
@@ -233,17 +239,17 @@ def _turned(laid: Laid, strain: FloatArray) -> Pull:
 
 
 def design_for_strength(
-    problem: CasesProblem,
+    problem: StreamProblem,
     field: FloatArray,
     solutions: tuple[SmearedSolution, ...],
     strength: float,
     evaluations: int = 50,
-) -> CasesDesign:
+) -> StreamDesign:
     """Improve a design for stiffness with regard to the load at first failure too.
 
     Parameters
     ----------
-    problem : CasesProblem
+    problem : StreamProblem
     field : (n * c,) array
         Designed for stiffness alone, field after field.
     solutions : tuple of SmearedSolution
@@ -261,4 +267,4 @@ def design_for_strength(
     limits = Limits.of(problem.parts[0].specimen.system.problem.material, Strand())
     whole = StrengthProblem.at(problem, limits, strength, field, solutions)
     field, found, ratios = drawn_to_borders(whole, field, solutions, evaluations)
-    return CasesDesign(field.reshape(len(problem.shares), -1), found, tuple(ratios))
+    return StreamDesign(field.reshape(len(problem.shares), -1), found, tuple(ratios))

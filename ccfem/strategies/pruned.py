@@ -14,19 +14,17 @@ from ccfem.elasticity.part_stress import PartStress
 from ccfem.elasticity.stress_field import solved
 from ccfem.elasticity.weighted_cases import WeightedCases
 from ccfem.errors import InputError
-from ccfem.fibre_aware.cases_bound import measures
-from ccfem.fibre_aware.cases_judges import CasesGoal
-from ccfem.fibre_aware.cut_and_move import prune_and_move, prune_and_move_cases
+from ccfem.fibre_aware.cut_and_move import prune_and_move
+from ccfem.fibre_aware.judges import Goal
 from ccfem.fibre_aware.plan_cases import plan_by_layers
 from ccfem.fibre_aware.shortening import TIGHT_SHARES
+from ccfem.fibre_aware.upper_bound import measures
 from ccfem.layers.layer import Layer
 from ccfem.machine.machine import Machine
-from ccfem.planning.equal_fibre import plan_to_length
 from ccfem.planning.strategy import Amount, LayerPlanner, Strategy
 from ccfem.planning.whole_part import WholePart, full_length
 from ccfem.strategies import create
 from ccfem.virtual_testing.several_cases import specimens
-from ccfem.virtual_testing.specimen import Specimen
 from ccfem.virtual_testing.strand import RHO, Strand
 
 __all__ = ["Pruned"]
@@ -34,8 +32,8 @@ __all__ = ["Pruned"]
 _BASES: Mapping[str, Mapping[str, Any]] = {"isocurve": {"link_limit": 10.0}}
 """Base parameters with which a strategy plans better when its fibre is pruned afterwards."""
 
-_SLACK = 0.05
-"""Share by which the planned length may exceed what the overfill asks for: this saves plans."""
+_CASES_ROUNDS = 3
+"""Least number of virtual tests for several load cases."""
 
 
 @dataclass(frozen=True)
@@ -56,7 +54,8 @@ class Pruned:
     overfill : float, default 1.25
         Planned fibre length over the length kept, at least 1; up to 5 % more may be planned.
     rounds : int, default 2
-        Virtual tests. Each removes half of the excess, the last one all of it.
+        Virtual tests; with several load cases at least 3, which remove equal parts of the
+        excess. Of one case each removes half of the excess, the last one all of it.
     rho : float, mm^2, default 4
         Axial stiffness of a strand over Young's modulus of the matrix.
     strength : float, default 0
@@ -132,35 +131,15 @@ class Pruned:
         machine: Machine,
         lengths: Sequence[float],
     ) -> list[tuple["Pruned", LayerPlanner]]:
-        """Plan once for the largest of the lengths, mm per layer, and prune that plan to each.
-
-        Lengths that need more than the largest coverage are reduced to that coverage.
+        """Plan for one load case by `for_cases`.
 
         Raises
         ------
         InputError
             As `for_part`.
         """
-        full = full_length(layers, machine)
-        most = max(self.amount.most, self.coverage) * full
-        lengths = [min(length, most) for length in lengths]
-        planned = self.overfill * max(lengths)
-        whole = plan_to_length(
-            self._planner(), layers, stress, machine, (1.0 + _SLACK) * planned, tolerance=_SLACK
-        )
-        paths = whole.toolpaths
-        found: list[tuple[Pruned, LayerPlanner]] = []
-        for length in lengths:
-            kept = paths
-            if len(paths):
-                part, strand = Specimen.of(solved(stress, "pruned")), Strand(self.rho)
-                wanted = length * len(layers)
-                cut_by = (self.rounds, self.strength, self.moves, TIGHT_SHARES[self.turns])
-                kept = prune_and_move((paths,), layers, part, wanted, machine, strand, *cut_by)
-            coverage = length / full
-            overfill = max(planned / full / coverage, 1.0)
-            found.append((replace(self, coverage=coverage, overfill=overfill), WholePart(kept)))
-        return found
+        cases = WeightedCases.of(solved(stress, "pruned"))
+        return self.for_cases(cases, layers, machine, lengths)
 
     def for_cases(
         self,
@@ -169,17 +148,16 @@ class Pruned:
         machine: Machine,
         lengths: Sequence[float],
     ) -> list[tuple["Pruned", LayerPlanner]]:
-        """Plan each layer for one load case, and prune by tests under all cases.
+        """Plan once for the largest of the lengths, mm per layer, and prune that plan to each.
 
-        Lengths as in `to_lengths`; tests of all say what goes (`ccfem.fibre_aware.prune_cases`).
+        Each layer is planned for one load case, and tests under all cases say what goes. Lengths
+        that need more than the largest coverage are reduced to that coverage.
 
         Raises
         ------
         InputError
             Whatever the base strategy raises.
         """
-        if len(cases) == 1:
-            return self.to_lengths(cases.fields[0], layers, machine, lengths)
         full, strand = full_length(layers, machine), Strand(self.rho)
         most = max(self.amount.most, self.coverage) * full
         lengths = [min(length, most) for length in lengths]
@@ -187,12 +165,13 @@ class Pruned:
         paths = plan_by_layers(self._planner(), layers, cases, machine, planned)
         in_all = max(lengths) * len(layers)
         bounds = measures(self.objective, cases, layers, in_all, machine, strand)
-        goal = CasesGoal(specimens(cases), cases.weights, bounds, self.objective)
-        cut_by = (max(self.rounds, 3), self.strength, self.moves, TIGHT_SHARES[self.turns])
+        goal = Goal(specimens(cases), cases.weights, bounds, self.objective)
+        rounds = self.rounds if len(cases) == 1 else max(self.rounds, _CASES_ROUNDS)
+        cut_by = (rounds, self.strength, self.moves, TIGHT_SHARES[self.turns])
         found: list[tuple[Pruned, LayerPlanner]] = []
         for length in lengths:
             wanted = length * len(layers)
-            kept = prune_and_move_cases((paths,), layers, goal, wanted, machine, strand, *cut_by)
+            kept = prune_and_move((paths,), layers, goal, wanted, machine, strand, *cut_by)
             coverage = length / full
             overfill = max(planned / full / coverage, 1.0)
             found.append((replace(self, coverage=coverage, overfill=overfill), WholePart(kept)))

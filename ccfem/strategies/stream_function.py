@@ -16,36 +16,37 @@ from ccfem.checks import check_choices, check_fields
 from ccfem.elasticity.part_stress import PartStress
 from ccfem.elasticity.stress_field import StressField, solved
 from ccfem.elasticity.weighted_cases import WeightedCases
-from ccfem.fibre_aware.cases_bound import measures
-from ccfem.fibre_aware.cases_design import (
-    DESIGN_POWERS,
-    CasesDesign,
-    CasesProblem,
-    design_cases,
-    start_fields,
-)
-from ccfem.fibre_aware.cases_judges import CasesGoal
-from ccfem.fibre_aware.cut_and_move import prune_and_move, prune_and_move_cases
-from ccfem.fibre_aware.design_in_steps import designed_in_steps
+from ccfem.errors import InputError
+from ccfem.fibre_aware.cut_and_move import prune_and_move
 from ccfem.fibre_aware.design_lengths import designed_to_lengths
 from ccfem.fibre_aware.heights import (
     alike_share,
     fibre_capacity,
     group_layers,
+    layer_counts,
+    layers_by_case,
     middle_layers,
     nearest_layer,
 )
-from ccfem.fibre_aware.layer_shares import layer_counts, layers_by_case
+from ccfem.fibre_aware.judges import Goal
 from ccfem.fibre_aware.shortening import TIGHT_SHARES
-from ccfem.fibre_aware.smeared import SmearedPart, SmearedSolution, smeared_cases
+from ccfem.fibre_aware.smeared import SmearedPart, smeared_cases
 from ccfem.fibre_aware.spline_grid import SplineGrid
 from ccfem.fibre_aware.strand_moves import kept_radius
-from ccfem.fibre_aware.stream_design import StreamDesign, StreamProblem
+from ccfem.fibre_aware.stream_design import (
+    DESIGN_POWERS,
+    StreamDesign,
+    StreamModel,
+    StreamProblem,
+    designed_in_steps,
+)
 from ccfem.fibre_aware.stream_paths import Extraction, refined
-from ccfem.fibre_aware.stream_start import plane_axes, start_field
+from ccfem.fibre_aware.stream_start import plane_axes, start_fields
 from ccfem.fibre_aware.strength_design import design_for_strength
-from ccfem.fibre_aware.tension_check import check_tension
+from ccfem.fibre_aware.upper_bound import measures
+from ccfem.fields.layer_tension import layer_tension
 from ccfem.layers.layer import Layer
+from ccfem.layers.layer_stress import stress_on
 from ccfem.machine.machine import Machine
 from ccfem.planning.strategy import Amount, LayerPlanner
 from ccfem.planning.whole_part import WholePart, full_length
@@ -89,7 +90,7 @@ class StreamFunction:
         Axial stiffness of a strand over Young's modulus of the matrix.
     evaluations : int, default 80
         Evaluations of the stiffness in the design. If the coverage is above 0.45, 0.6 times as many
-        follow (`ccfem.fibre_aware.design_in_steps`).
+        follow for one load case (`ccfem.fibre_aware.stream_design.designed_in_steps`).
     groups : int, default 0
         Number of fields over the height of the part; 0 for one field, or for at most six where the
         stress differs over the height.
@@ -176,8 +177,9 @@ class StreamFunction:
         InputError
             When no layer has a tensile direction.
         """
+        cases = WeightedCases.of(solved(stress, "stream_function"))
         length = self.natural_length(layers, machine)
-        return WholePart(self._cut(stress, layers, machine, (length,))[0])
+        return WholePart(self._cut(cases, layers, machine, (length,))[0])
 
     def to_lengths(
         self,
@@ -186,26 +188,15 @@ class StreamFunction:
         machine: Machine,
         lengths: Sequence[float],
     ) -> list[tuple["StreamFunction", LayerPlanner]]:
-        """Design for the largest of the lengths, mm per layer; cut it to lengths near that one.
-
-        Lengths that need more than the largest coverage are reduced to that coverage. If the paths
-        of the design are too short in total, it is repeated with proportionally more fibre. Much
-        shorter lengths get a design of their own: a design cut far below its length would end
-        strands where they carry load.
+        """Plan for one load case by `for_cases`.
 
         Raises
         ------
         InputError
             As `for_part`.
         """
-        return designed_to_lengths(
-            self,
-            layers,
-            machine,
-            lengths,
-            lambda one, some: one._cut(stress, layers, machine, some),
-            again=self.turns == "tight",
-        )
+        cases = WeightedCases.of(solved(stress, "stream_function"))
+        return self.for_cases(cases, layers, machine, lengths)
 
     def for_cases(
         self,
@@ -217,107 +208,112 @@ class StreamFunction:
         """Design one field for each load case, all together, and cut by tests under all cases.
 
         Each layer follows the field of one case. The number of layers of a case follows from its
-        weight, and they are spread evenly over the height. A single case is planned as by
-        `to_lengths`.
+        weight, and they are spread evenly over the height.
+
+        The design is for the largest of the lengths, mm per layer, and cut to lengths near that
+        one. Lengths that need more than the largest coverage are reduced to that coverage. If the
+        paths of the design are too short in total, it is repeated with proportionally more fibre.
+        Much shorter lengths get a design of their own: a design cut far below its length would end
+        strands where they carry load.
 
         Raises
         ------
         InputError
             When no layer has a tensile direction in any case.
         """
-        if len(cases) == 1:
-            return self.to_lengths(cases.fields[0], layers, machine, lengths)
+        least = 1.0 if len(cases) == 1 else _CASES_OVERFILL
         return designed_to_lengths(
-            replace(self, overfill=max(self.overfill, _CASES_OVERFILL)),
+            replace(self, overfill=max(self.overfill, least)),
             layers,
             machine,
             lengths,
-            lambda one, some: one._cut_cases(cases, layers, machine, some),
+            lambda one, some: one._cut(cases, layers, machine, some),
             again=self.turns == "tight",
         )
 
     def _cut(
         self,
-        stress: PartStress,
+        cases: WeightedCases,
         layers: Sequence[Layer],
         machine: Machine,
         lengths: Sequence[float],
     ) -> list[Toolpaths]:
-        """Design for this coverage, and cut by tests to each of the lengths, mm per layer."""
-        check_tension((stress,), layers)
-        field = solved(stress, "stream_function")
-        problem, group, found = self.designed(field, layers, machine)
+        """Design for this coverage, and cut by tests of all cases to lengths, mm per layer."""
+        _check_tension(cases.fields, layers)
         in_all, strand = [length * len(layers) for length in lengths], Strand(self.rho)
+        bounds = measures(self.objective, cases, layers, max(in_all), machine, strand)
+        problem, group, found = self.designed(cases, layers, machine, bounds)
+        specimens = tuple(part.specimen for part in problem.parts)
+        goal = Goal(specimens, cases.weights, bounds, self.objective)
+        fields_of = layers_by_case(cases.weights, layers) * problem.model.groups + group
 
-        def candidates(field: FloatArray, solution: SmearedSolution) -> list[list[Toolpaths]]:
-            drawn = self.extraction(problem, (field,), ((1.0, solution.displacement),), machine)
-            return drawn.candidates(layers, group, in_all)
+        def candidates(design: StreamDesign) -> list[list[Toolpaths]]:
+            counts, solutions = goal.counts(design.objective.ratio), design.objective.solution
+            strained = [
+                (float(share) / one.work, one.displacement)
+                for share, one in zip(counts, solutions, strict=True)
+            ]
+            drawn = self.extraction(problem.model, tuple(design.fields), strained, machine)
+            return drawn.candidates(layers, fields_of, in_all)
 
-        tried = candidates(found.field, found.objective.solution)
+        tried = candidates(found)
         if self.strength:
-            alone, solutions = CasesProblem.alone(problem), (found.objective.solution,)
+            fields, solutions = found.fields.ravel(), found.objective.solution
             how = (self.strength, self.evaluations)
-            strong = design_for_strength(alone, found.field, solutions, *how)
-            tried = _with_first(candidates(strong.fields[0], strong.objective.solution[0]), tried)
-        part = problem.part.specimen
+            strong = design_for_strength(problem, fields, solutions, *how)
+            tried = _with_first(candidates(strong), tried)
         cut_by = (_ROUNDS, self.strength, self.moves, TIGHT_SHARES[self.turns])
         return [
-            prune_and_move(some, layers, part, length, machine, strand, *cut_by)
+            prune_and_move(some, layers, goal, length, machine, strand, *cut_by)
             for some, length in zip(tried, in_all, strict=True)
         ]
 
     def extraction(
         self,
-        problem: StreamProblem,
+        model: StreamModel,
         fields: Sequence[FloatArray],
         strains_of: Sequence[tuple[float, FloatArray]],
         machine: Machine,
     ) -> Extraction:
         """Paths along the fields; each field has a block of coefficients for every group."""
-        blocks = [
-            problem.signed(field, group) for field in fields for group in range(problem.groups)
-        ]
-        mesh, widths = problem.part.mesh, (self.inset, self.link_limit)
+        blocks = [model.signed(field, group) for field in fields for group in range(model.groups)]
+        mesh, widths = model.part.mesh, (self.inset, self.link_limit)
         radius = kept_radius(machine, TIGHT_SHARES[self.turns])
         return Extraction(
-            tuple(blocks), problem.grid, mesh, strains_of, machine, self.phases, *widths, radius
+            tuple(blocks), model.grid, mesh, strains_of, machine, self.phases, *widths, radius
         )
 
     def designed(
-        self, stress: StressField, layers: Sequence[Layer], machine: Machine
+        self,
+        stress: StressField | WeightedCases,
+        layers: Sequence[Layer],
+        machine: Machine,
+        bounds: FloatArray | None = None,
     ) -> tuple[StreamProblem, IntArray, StreamDesign]:
-        """Design for stiffness; return the problem, the group of each layer, and the design."""
-        part = SmearedPart.of(stress, layers[0].plane.frame)
-        problem, group = self._problem((part,), layers, machine)
+        """Design for stiffness; return the problem, the group of each layer, and the design.
+
+        `bounds` (n,) are the stiffness ratios that the cases are measured by
+        (`ccfem.fibre_aware.upper_bound.measures`), by default 1.
+        """
+        cases = WeightedCases.of(stress)
+        parts = smeared_cases(cases.fields, layers[0].plane.frame)
+        model, group = self._model(parts, layers, machine)
+        shares = layer_counts(cases.weights, len(layers)) / len(layers)
+        measured = np.ones(len(cases)) if bounds is None else bounds
+        power = DESIGN_POWERS[self.objective]
+        problem = StreamProblem(model, parts, cases.weights, measured, shares, power)
         chosen = middle_layers(layers, group)
 
         def start(posed: StreamProblem) -> FloatArray:
-            return start_field(posed, stress, chosen, self.cap)
+            return start_fields(posed, cases.fields, chosen, self.cap, self.tilt)
 
         found = designed_in_steps(problem, start, self.evaluations, self.coverage)
         return problem, group, found
 
-    def designed_for_cases(
-        self, cases: WeightedCases, layers: Sequence[Layer], machine: Machine, bounds: FloatArray
-    ) -> tuple[CasesProblem, IntArray, CasesDesign]:
-        """Design for several cases; return the problem, the group of each layer, and the design.
-
-        `bounds` (n,) are the stiffness ratios that the cases are measured by
-        (`ccfem.fibre_aware.cases_bound.measures`).
-        """
-        parts = smeared_cases(cases.fields, layers[0].plane.frame)
-        alone, group = self._problem(parts, layers, machine)
-        shares = layer_counts(cases.weights, len(layers)) / len(layers)
-        power = DESIGN_POWERS[self.objective]
-        problem = CasesProblem(alone, parts, cases.weights, bounds, shares, power)
-        chosen = middle_layers(layers, group)
-        start = start_fields(problem, cases.fields, chosen, self.cap, self.tilt)
-        return problem, group, design_cases(problem, start, self.evaluations)
-
-    def _problem(
+    def _model(
         self, parts: Sequence[SmearedPart], layers: Sequence[Layer], machine: Machine
-    ) -> tuple[StreamProblem, IntArray]:
-        """Return the problem of one field for the first case, and each layer's group."""
+    ) -> tuple[StreamModel, IntArray]:
+        """Return the fibre of one field, and each layer's group."""
         part, mesh = parts[0], parts[0].mesh
         centres = part.centroids @ part.frame[:2].T
         size = max(self.grid * machine.fibre_width, float(np.cbrt(6.0 * mesh.volumes.mean())))
@@ -332,12 +328,9 @@ class StreamFunction:
         for layer in layers:
             points += [refined(layer)[0], layer.plane.points[layer.triangles].mean(axis=1)]
         energies = [mesh.volumes * np.einsum("cij,cij->c", each, each) for each in stresses]
-        energy = energies[0]
-        if len(parts) > 1:
-            energy = np.sum([each / each.sum() for each in energies], axis=0)
-        grid = SplineGrid.over(np.concatenate(points), *plane_axes(part, energy), size)
+        grid = SplineGrid.over(np.concatenate(points), *plane_axes(part, energies), size)
         capacity = fibre_capacity(part, layers, machine)
-        problem = StreamProblem(
+        model = StreamModel(
             part=part,
             grid=grid,
             group=group[nearest_layer(part, layers)],
@@ -348,44 +341,7 @@ class StreamFunction:
             budget=self.overfill * self.coverage * float(mesh.volumes @ capacity),
             radius=_WIDE[self.turns] * machine.minimum_radius,
         )
-        return problem, group
-
-    def _cut_cases(
-        self,
-        cases: WeightedCases,
-        layers: Sequence[Layer],
-        machine: Machine,
-        lengths: Sequence[float],
-    ) -> list[Toolpaths]:
-        """Design for this coverage, and cut by tests of all cases to lengths, mm per layer."""
-        check_tension(cases.fields, layers)
-        in_all, strand = [length * len(layers) for length in lengths], Strand(self.rho)
-        bounds = measures(self.objective, cases, layers, max(in_all), machine, strand)
-        problem, group, found = self.designed_for_cases(cases, layers, machine, bounds)
-        specimens = tuple(part.specimen for part in problem.parts)
-        goal = CasesGoal(specimens, cases.weights, bounds, self.objective)
-        each = layers_by_case(cases.weights, layers) * problem.problem.groups + group
-
-        def candidates(found: CasesDesign) -> list[list[Toolpaths]]:
-            counts, solutions = goal.counts(found.objective.ratio), found.objective.solution
-            strained = [
-                (float(share) / one.work, one.displacement)
-                for share, one in zip(counts, solutions, strict=True)
-            ]
-            drawn = self.extraction(problem.problem, tuple(found.fields), strained, machine)
-            return drawn.candidates(layers, each, in_all)
-
-        tried = candidates(found)
-        if self.strength:
-            fields, solutions = found.fields.ravel(), found.objective.solution
-            how = (self.strength, self.evaluations)
-            strong = design_for_strength(problem, fields, solutions, *how)
-            tried = _with_first(candidates(strong), tried)
-        cut_by = (_ROUNDS, self.strength, self.moves, TIGHT_SHARES[self.turns])
-        return [
-            prune_and_move_cases(some, layers, goal, length, machine, strand, *cut_by)
-            for some, length in zip(tried, in_all, strict=True)
-        ]
+        return model, group
 
 
 def _with_first(
@@ -396,3 +352,15 @@ def _with_first(
     Each sequence holds the candidates for one length.
     """
     return [[one[0], *others] for one, others in zip(strong, stiff, strict=True)]
+
+
+def _check_tension(stresses: Sequence[StressField], layers: Sequence[Layer]) -> None:
+    """Refuse a part that is under tension nowhere, in no load case."""
+    for stress in stresses:
+        if any(layer_tension(stress_on(layer, stress)).defined.any() for layer in layers):
+            return
+    largest = max(float(np.linalg.eigvalsh(stress.stress).max()) for stress in stresses)
+    raise InputError(
+        "expected tension that fibre can carry; the largest tensile stress found is "
+        f"{largest:.3g} MPa, outweighed by compression: turn the load round"
+    )

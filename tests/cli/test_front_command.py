@@ -5,7 +5,7 @@ import pytest
 from ccfem.cli import fibre_amounts
 from ccfem.comparison.front_cases import PointCases
 from ccfem.comparison.front_points import FibreFront, FrontPoint
-from ccfem.fibre_aware.cases_bound import CasesBound
+from ccfem.fibre_aware.upper_bound import UpperBound
 from ccfem.toolpaths import Toolpaths
 
 QUICK = ["bar", "--set-case", "element_size=4.0", "--strategy", "zigzag", "--layers", "2"]
@@ -43,7 +43,7 @@ def test_a_plan_that_lays_less_than_asked_is_said_to(capsys, asked, said):
 
 
 def test_the_table_of_several_load_cases_says_every_ratio_with_its_bound(capsys):
-    bound = CasesBound("worst", [4.0, 2.0], [0.5, 0.5], 1.25, 1.26, [0.5, 0.5])
+    bound = UpperBound("worst", [4.0, 2.0], [0.5, 0.5], 1.25, 1.26, [0.5, 0.5])
     cases = PointCases(("pull", "side"), [2.4, 1.5], [3.0, 2.5], bound)
     plan = (2.4, 2500.0, "fibre", 4.0, "", Toolpaths.empty(), 0.0, cases)
     found = FibreFront(

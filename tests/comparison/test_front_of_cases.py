@@ -12,8 +12,8 @@ from ccfem.comparison.front_cases import PointCases
 from ccfem.comparison.front_points import FibreFront, FrontPoint
 from ccfem.elasticity import Force, Problem, Support, solve
 from ccfem.elasticity.weighted_cases import WeightedCases
-from ccfem.fibre_aware.cases_bound import CasesBound, cases_bound
 from ccfem.fibre_aware.plan_cases import plan_cases
+from ccfem.fibre_aware.upper_bound import UpperBound, upper_bound
 from ccfem.layers.slicing.planar import Planar
 from ccfem.machine import Machine
 from ccfem.materials import printed_pla
@@ -73,7 +73,7 @@ def test_bounds_are_those_of_several_load_cases(part, front):
     case, cases = part
     layers = case.fibre_layers(cases.heaviest, Planar(count=4))
     length, bound = front.cases_bounds[-1]
-    found = cases_bound(cases, layers, length, case.machine)
+    found = upper_bound(cases, layers, length, case.machine)
     assert found.least == bound.least
     np.testing.assert_array_equal(found.singles, bound.singles)
     # More fibre never lowers what is possible in a case.
@@ -120,7 +120,7 @@ def test_one_case_in_the_list_gives_the_numbers_of_one(part):
 
 
 def point(length, ratios, singles, least=1.1, factors=(2.0, 3.0), why_not=""):
-    bound = CasesBound("worst", singles, [0.5, 0.5], least, least, [0.5, 0.5])
+    bound = UpperBound("worst", singles, [0.5, 0.5], least, least, [0.5, 0.5])
     cases = PointCases(("a", "b"), ratios, factors, bound)
     return FrontPoint(
         1, length, length, min(ratios), 9.0, "fibre", 9.0, why_not, Toolpaths.empty(), 0.0, cases

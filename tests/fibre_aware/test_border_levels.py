@@ -12,9 +12,9 @@ from ccfem.fibre_aware.stream_design import design
 from .test_stream_design import problem_of, started
 
 
-def sloped(problem, slope, constant=0.0):
+def sloped(model, slope, constant=0.0):
     """Coefficients of the field ``slope . x + constant``: splines hold it by their middles."""
-    grid = problem.grid
+    grid = model.grid
     middles = grid.centre + grid.size * (grid.used + 0.5) @ grid.axes
     return middles @ np.asarray(slope) + constant
 
@@ -22,26 +22,26 @@ def sloped(problem, slope, constant=0.0):
 def test_cost_of_strands_along_a_pulled_bar(pulled_bar):
     # 60 mm long, four layers: a strand along one side carries EA * eps^2 * length of the work.
     stress, layers = pulled_bar
-    problem = problem_of(stress, layers)
-    solution = problem.part.unreinforced
-    levels = BorderLevels.of(problem, sloped(problem, (0.0, 0.5)), solution)
+    model = problem_of(stress, layers).model
+    solution = model.part.unreinforced
+    levels = BorderLevels.of(model, sloped(model, (0.0, 0.5)), solution)
     strand = 60.0 * len(layers)
-    energy = problem.axial_stiffness * strand * solution.strain[:, 0].mean() ** 2
+    energy = model.axial_stiffness * strand * solution.strain[:, 0].mean() ** 2
     assert levels.weight.sum() == pytest.approx(2 * 0.5 * energy / solution.work, rel=0.02)
 
 
 def test_strands_that_end_on_the_border_cost_nothing(pulled_bar):
-    problem = problem_of(*pulled_bar)
+    model = problem_of(*pulled_bar).model
     oblique = np.tan(np.radians(25.0)) * 0.5
     for slope in ((oblique, 0.5), (0.5, 0.5)):
-        levels = BorderLevels.of(problem, sloped(problem, slope), problem.part.unreinforced)
+        levels = BorderLevels.of(model, sloped(model, slope), model.part.unreinforced)
         assert levels.weight.sum() < 1e-4
 
 
 def test_cost_has_the_derivative_of_finite_differences(bent_beam, rng):
     problem, field = started(*bent_beam, groups=2)
-    solution = problem.evaluate(field).solution
-    levels = BorderLevels.of(problem, field, solution)
+    (solution,) = problem.evaluate(field).solution
+    levels = BorderLevels.of(problem.model, field, solution)
     assert levels.weight.sum() > 0.0
     assert (levels.weight >= 0.0).all()
     direction = rng.standard_normal(len(field))
@@ -52,9 +52,9 @@ def test_cost_has_the_derivative_of_finite_differences(bent_beam, rng):
 
 def test_lifted_field_has_a_level_where_the_first_strand_is_to_lie(pulled_bar):
     # Of 20 mm of width 18.94 mm lie between the first strands: 19 strands fit on both sides.
-    problem = problem_of(*pulled_bar)
-    field = sloped(problem, (0.0, 18.0 / 18.94), 0.3)
-    levels = BorderLevels.of(problem, field, problem.part.unreinforced)
+    model = problem_of(*pulled_bar).model
+    field = sloped(model, (0.0, 18.0 / 18.94), 0.3)
+    levels = BorderLevels.of(model, field, model.part.unreinforced)
     before, after = levels.cost(field)[0], levels.cost(levels.lifted(field))[0]
     assert after < 0.05 * levels.weight.sum() < before
     change = levels.lifted(field) - field
@@ -64,9 +64,10 @@ def test_lifted_field_has_a_level_where_the_first_strand_is_to_lie(pulled_bar):
 def test_design_draws_levels_to_the_border(bent_beam):
     problem, field = started(*bent_beam)
     found = design(problem, field, evaluations=40)
-    levels = BorderLevels.of(problem, found.field, found.objective.solution)
+    (designed,), (solution,) = found.fields, found.objective.solution
+    levels = BorderLevels.of(problem.model, designed, solution)
     shares = [
-        levels.cost(found.field + constant)[0] / levels.weight.sum()
+        levels.cost(designed + constant)[0] / levels.weight.sum()
         for constant in np.linspace(0.0, 1.0, 11)
     ]
     assert shares[0] < 0.5

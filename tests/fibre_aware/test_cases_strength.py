@@ -8,16 +8,12 @@ import pytest
 from ccfem.elasticity.solve import solve
 from ccfem.elasticity.weighted_cases import WeightedCases
 from ccfem.errors import InputError
-from ccfem.fibre_aware.cases_bound import single_bounds
-from ccfem.fibre_aware.cases_design import CasesProblem, start_fields
-from ccfem.fibre_aware.cases_judges import CasesGoal, cases_strength_judge
-from ccfem.fibre_aware.heights import fibre_capacity
+from ccfem.fibre_aware.judges import Goal, strength_judge
 from ccfem.fibre_aware.plan_cases import plan_cases
-from ccfem.fibre_aware.smeared import smeared_cases
-from ccfem.fibre_aware.spline_grid import SplineGrid
-from ccfem.fibre_aware.stream_design import StreamProblem
+from ccfem.fibre_aware.stream_start import start_fields
 from ccfem.fibre_aware.strength_design import StrengthProblem, design_for_strength
 from ccfem.fibre_aware.strength_value import Worth
+from ccfem.fibre_aware.upper_bound import WORST, measures
 from ccfem.machine import Machine
 from ccfem.strategies.pruned import Pruned
 from ccfem.strategies.stream_function import StreamFunction
@@ -30,6 +26,7 @@ from ccfem.virtual_testing.strength import first_failure
 from ccfem.virtual_testing.strengths import Limits
 from ccfem.virtual_testing.virtual_test import virtual_test
 
+from .test_stream_design import problem_of
 from .test_strength import near_of, work_of
 
 SHORT = Machine(minimum_length=6.0)
@@ -101,29 +98,15 @@ def test_value_agrees_with_finite_differences(request, part, limits):
         assert (chosen * strands.length) @ value == pytest.approx(expected, rel=1e-3)
 
 
-def problem_of(cases, layers, shares):
-    parts = smeared_cases(cases.fields, layers[0].plane.frame)
-    centres = parts[0].centroids @ parts[0].frame[:2].T
-    capacity = fibre_capacity(parts[0], layers, SHORT)
-    alone = StreamProblem(
-        part=parts[0],
-        grid=SplineGrid.over(centres, centres.mean(axis=0), np.eye(2), 3.0),
-        group=np.zeros(len(centres), dtype=np.int64),
-        centres=centres,
-        capacity=capacity,
-        width=SHORT.fibre_width,
-        axial_stiffness=4.0 * parts[0].modulus,
-        budget=0.4 * float(parts[0].mesh.volumes @ capacity),
-    )
-    bounds = np.array([2.0, 3.0])
-    problem = CasesProblem(alone, parts, cases.weights, bounds, np.array(shares), 4.0)
+def started(cases, layers, shares):
+    problem = problem_of(cases, layers, shares, np.array([2.0, 3.0]), 4.0, size=3.0)
     return problem, 0.6 * start_fields(problem, cases.fields, layers[:1], 90.0, 0.75)
 
 
 @pytest.mark.parametrize("part", ["strong_bends", "strong_plate"])
 @pytest.mark.parametrize("limits", [(86.0, 50.0), (1.0, 1e4), (1e4, 1.0)])
 def test_gradient_agrees_with_finite_differences(request, rng, part, limits, monkeypatch):
-    problem, field = problem_of(*request.getfixturevalue(part), [0.25, 0.75])
+    problem, field = started(*request.getfixturevalue(part), [0.25, 0.75])
     monkeypatch.setattr("ccfem.fibre_aware.strength_design._TOLERANCE", 1e-10)
     solutions = problem.evaluate(field, tolerance=1e-12).solution
     whole = StrengthProblem.at(problem, Limits(*limits, (18.0, 18.0)), 0.7, field, solutions)
@@ -138,7 +121,7 @@ def test_gradient_agrees_with_finite_differences(request, rng, part, limits, mon
 
 def test_two_fields_in_half_of_the_layers_each_are_as_near_to_failure_as_one(strong_bends):
     # Alike, they are that one in all layers: the same indices, whatever the shares.
-    problem, field = problem_of(*strong_bends, [0.25, 0.75])
+    problem, field = started(*strong_bends, [0.25, 0.75])
     alike = np.tile(field[: len(field) // 2], 2)
     limits, near = Limits(86.0, 50.0, (18.0, 18.0)), []
     for shares in ([0.25, 0.75], [0.6, 0.4], [1.0, 0.0]):
@@ -152,7 +135,7 @@ def test_two_fields_in_half_of_the_layers_each_are_as_near_to_failure_as_one(str
 
 
 def test_a_design_for_strength_takes_all_cases_farther_from_failure(strong_bends):
-    problem, field = problem_of(*strong_bends, [0.5, 0.5])
+    problem, field = started(*strong_bends, [0.5, 0.5])
     solutions = problem.evaluate(field).solution
     second = design_for_strength(problem, field, solutions, 0.8, 10)
     limits = Limits.of(problem.parts[0].specimen.system.problem.material)
@@ -163,7 +146,7 @@ def test_a_design_for_strength_takes_all_cases_farther_from_failure(strong_bends
 
 def test_the_judge_weighs_what_each_test_alone_says(strong_plate):
     cases, layers = strong_plate
-    goal = CasesGoal(specimens(cases), cases.weights, np.array([2.0, 3.0]))
+    goal = Goal(specimens(cases), cases.weights, np.array([2.0, 3.0]))
     paths, strand = crossed(layers), Strand()
     alone = [virtual_test(paths, field, strand, span=(), machine=SHORT) for field in cases.fields]
     ratios = np.array([one.ratio for one in alone])
@@ -171,7 +154,7 @@ def test_the_judge_weighs_what_each_test_alone_says(strong_plate):
     # Force without fibre: that of the load along x, and along y of the reactions.
     bare = [goal.parts[k].force(field.reactions) for k, field in enumerate(cases.fields)]
     for strength in (0.0, 0.3, 1.0):
-        judge = cases_strength_judge(goal, layers, SHORT, strand, strength)
+        judge = strength_judge(goal, layers, SHORT, strand, strength)
         expected = goal.merit(ratios) ** (1.0 - strength) * (loads / bare).min() ** strength
         assert judge(paths).value == pytest.approx(expected, rel=1e-5)
 
@@ -181,8 +164,8 @@ def test_the_judge_weighs_what_each_test_alone_says(strong_plate):
 def test_planning_for_strength_is_worth_no_less_than_for_stiffness(strong_bends, strategy, weight):
     cases, layers = strong_bends
     parts, worth = specimens(cases), []
-    bounds = single_bounds(cases, layers, 400.0 * len(layers), SHORT)
-    goal = CasesGoal(parts, cases.weights, bounds)
+    bounds = measures(WORST, cases, layers, 400.0 * len(layers), SHORT)
+    goal = Goal(parts, cases.weights, bounds)
     for strength, moves in ((0.0, 0), (weight, 0), (weight, 3)):
         planned = replace(strategy, strength=strength, moves=moves)
         ((told, planner),) = planned.for_cases(cases, layers, SHORT, (400.0,))

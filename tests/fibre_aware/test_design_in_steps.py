@@ -7,10 +7,9 @@ import pytest
 
 from benchmarks.studies import confirmed_gain
 from ccfem.elasticity.solve import solve
-from ccfem.fibre_aware.design_in_steps import designed_in_steps
 from ccfem.fibre_aware.heights import middle_layers
-from ccfem.fibre_aware.stream_design import design
-from ccfem.fibre_aware.stream_start import start_field
+from ccfem.fibre_aware.stream_design import design, designed_in_steps
+from ccfem.fibre_aware.stream_start import start_fields
 from ccfem.layers.slicing.planar import Planar
 from ccfem.machine import Machine
 from ccfem.strategies.stream_function import StreamFunction
@@ -28,13 +27,14 @@ def posed(part, coverage):
     """Problem of the lever for a coverage, and what makes the first field of such a problem."""
     stress, layers = part
     problem, group, _ = StreamFunction(evaluations=1).designed(stress, layers, MACHINE)
-    room = float(problem.room.sum())
+    model = problem.model
     chosen = middle_layers(layers, group)
 
     def start(one):
-        return start_field(one, stress, chosen, 90.0)
+        return start_fields(one, (stress,), chosen, 90.0)
 
-    return replace(problem, budget=1.1 * coverage * room), start
+    budget = 1.1 * coverage * float(model.room.sum())
+    return replace(problem, model=replace(model, budget=budget)), start
 
 
 def test_a_field_for_much_fibre_is_stiffer_by_way_of_less(lever):
@@ -49,8 +49,8 @@ def test_usual_amounts_are_designed_in_one_step(lever):
     problem, start = posed(lever, 0.45)
     found = designed_in_steps(problem, start, 4, 0.45)
     once = design(problem, start(problem), 4)
-    np.testing.assert_array_equal(found.field, once.field)
+    np.testing.assert_array_equal(found.fields, once.fields)
     # However much of it is to be cut off.
-    much = replace(problem, budget=2.0 * problem.budget)
+    much = replace(problem, model=replace(problem.model, budget=2.0 * problem.model.budget))
     found, once = designed_in_steps(much, start, 4, 0.45), design(much, start(much), 4)
-    np.testing.assert_array_equal(found.field, once.field)
+    np.testing.assert_array_equal(found.fields, once.fields)

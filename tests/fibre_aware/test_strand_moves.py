@@ -7,8 +7,7 @@ import pytest
 import shapely
 
 from ccfem.errors import InputError
-from ccfem.fibre_aware.cases_judges import CasesGoal, cases_judge
-from ccfem.fibre_aware.judges import stiffness_judge
+from ccfem.fibre_aware.judges import Goal, stiffness_judge
 from ccfem.fibre_aware.strain_worth import StrainWorth
 from ccfem.fibre_aware.strand_lines import strand_lines
 from ccfem.fibre_aware.strand_moves import moved
@@ -208,7 +207,7 @@ def test_all_load_cases_move_strands_together(two_bends):
     parts = specimens(cases)
     bounds = np.array([2.0, 2.0])
     paths = straight(layers, 6.0, 8.0, 16.0, 18.0)
-    judge = cases_judge(CasesGoal(parts, cases.weights, bounds), MACHINE)
+    judge = stiffness_judge(Goal(parts, cases.weights, bounds), MACHINE)
     found = moved(paths, layers, parts[0].unreinforced.mesh, MACHINE, judge, 3)
 
     def worst(each):
@@ -225,7 +224,7 @@ def test_worth_of_strain_in_several_cases_is_the_slope_of_the_value(two_bends):
     paths = straight(layers, 4.0, 12.0)
     values = []
     for rho in (4.0, 4.001):
-        judge = cases_judge(CasesGoal(parts, cases.weights, bounds, "sum"), MACHINE, Strand(rho))
+        judge = stiffness_judge(Goal(parts, cases.weights, bounds, "sum"), MACHINE, Strand(rho))
         values.append(judge(paths))
     strands = cut_strands(paths, parts[0].unreinforced.mesh)
     pieces = bars(strands, parts[0].unreinforced.mesh)
@@ -235,3 +234,13 @@ def test_worth_of_strain_in_several_cases_is_the_slope_of_the_value(two_bends):
     )
     slope = (np.log(values[1].value) - np.log(values[0].value)) / (0.001 * parts[0].modulus)
     assert slope == pytest.approx(energy, rel=1e-3)
+
+
+@pytest.mark.parametrize("objective", ["worst", "sum", "least"])
+def test_value_of_one_case_is_its_stiffness_ratio(bent_beam, objective):
+    stress, layers = bent_beam
+    paths = straight(layers, 4.0, 12.0)
+    ratio = virtual_test(paths, stress, machine=MACHINE, span=()).ratio
+    goal = replace(Goal.of(stress), objective=objective)
+    assert stiffness_judge(goal, MACHINE)(paths).value == pytest.approx(ratio, rel=1e-7)
+    assert goal.counts(np.array([ratio])) == pytest.approx(1.0)

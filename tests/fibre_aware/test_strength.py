@@ -8,14 +8,10 @@ import pytest
 from ccfem.elasticity.solve import solve
 from ccfem.errors import InputError
 from ccfem.fibre_aware import strength_value
-from ccfem.fibre_aware.cases_design import CasesProblem
 from ccfem.fibre_aware.cut_and_move import best_cut
-from ccfem.fibre_aware.heights import fibre_capacity
 from ccfem.fibre_aware.prune import prune
-from ccfem.fibre_aware.smeared import SmearedPart
-from ccfem.fibre_aware.spline_grid import SplineGrid
-from ccfem.fibre_aware.stream_design import StreamProblem, design
-from ccfem.fibre_aware.stream_start import start_field
+from ccfem.fibre_aware.stream_design import design
+from ccfem.fibre_aware.stream_start import start_fields
 from ccfem.fibre_aware.strength_design import StrengthProblem, design_for_strength
 from ccfem.fibre_aware.strength_value import Worth, raised
 from ccfem.machine import Machine
@@ -32,6 +28,8 @@ from ccfem.virtual_testing.strands import cut_strands
 from ccfem.virtual_testing.strength import first_failure
 from ccfem.virtual_testing.strengths import Limits
 from ccfem.virtual_testing.virtual_test import virtual_test
+
+from .test_stream_design import problem_of
 
 SHORT = Machine(minimum_length=10.0)
 
@@ -142,27 +140,14 @@ def test_shares_outside_zero_to_one_are_refused(strong_beam, strength):
 @pytest.fixture(scope="module")
 def problem(strong_beam):
     stress, layers = strong_beam
-    part = SmearedPart.of(stress, layers[0].plane.frame)
-    centres = part.centroids @ part.frame[:2].T
-    capacity = fibre_capacity(part, layers, SHORT)
-    found = StreamProblem(
-        part=part,
-        grid=SplineGrid.over(centres, centres.mean(axis=0), np.eye(2), 2.5),
-        group=np.zeros(len(centres), dtype=int),
-        centres=centres,
-        capacity=capacity,
-        width=SHORT.fibre_width,
-        axial_stiffness=4.0 * part.modulus,
-        budget=0.4 * float(part.mesh.volumes @ capacity),
-    )
-    return found, start_field(found, stress, layers[:1], cap=90.0)
+    found = problem_of(stress, layers)
+    return found, start_fields(found, (stress,), layers[:1], cap=90.0)
 
 
 @pytest.mark.parametrize("limits", [(86.0, 50.0), (1.0, 1e4), (1e4, 1.0)])
 def test_gradient_agrees_with_finite_differences(problem, rng, limits, monkeypatch):
-    alone, field = problem
+    one, field = problem
     monkeypatch.setattr("ccfem.fibre_aware.strength_design._TOLERANCE", 1e-10)
-    one = CasesProblem.alone(alone)
     solution = one.evaluate(field, tolerance=1e-12).solution
     whole = StrengthProblem.at(one, Limits(*limits, (18.0, 18.0)), 0.7, field, solution)
     found = whole.evaluate(field, solution, 1e-12)
@@ -175,13 +160,13 @@ def test_gradient_agrees_with_finite_differences(problem, rng, limits, monkeypat
 
 
 def test_a_design_for_strength_takes_the_part_farther_from_failure(problem):
-    alone, start = problem
-    first = design(alone, start, 6)
-    one, solutions = CasesProblem.alone(alone), (first.objective.solution,)
-    second = design_for_strength(one, first.field, solutions, 0.8, 8)
-    limits = Limits.of(alone.part.specimen.system.problem.material)
-    judged = StrengthProblem.at(one, limits, 1.0, first.field, solutions)
-    before, after = (judged.evaluate(each).value for each in (first.field, second.fields[0]))
+    one, start = problem
+    first = design(one, start, 6)
+    field, solutions = first.fields[0], first.objective.solution
+    second = design_for_strength(one, field, solutions, 0.8, 8)
+    limits = Limits.of(one.parts[0].specimen.system.problem.material)
+    judged = StrengthProblem.at(one, limits, 1.0, field, solutions)
+    before, after = (judged.evaluate(each).value for each in (field, second.fields[0]))
     assert after < before - 0.01
     assert second.objective.ratio > 1.0
 
