@@ -248,7 +248,6 @@ class Request:
             raise InputError("name at least one strategy to compare; got none")
         for strategy in self.strategies.values():
             check_instance("strategy", strategy)
-        self._check_load_case()
         if self.curve and self.strand is None:
             raise InputError("the curve is one of stiffness: leave the virtual test in, or it out")
         if self.named:
@@ -262,6 +261,7 @@ class Request:
             raise InputError("support is laid in a print: plan that too (print_plans, --gcode)")
         for slicing in self.slicings.values():
             check_propped(slicing.slicer or self.case.slicing, self.support)
+        self._check_load_case()
 
     def _check_load_case(self) -> None:
         known = self.case.problem.cases

@@ -155,6 +155,8 @@ def guidance_field(
     place = np.full(n, -1)
     place[used] = np.arange(len(used))
     cells, points = place[cells], mesh.points[used]
+    if not weights.joints > 0.0:  # joints without weight leave the field to the stress
+        joints = ()
     groups = _groups(points, cells, joints, form, slab)
     count = len(used) + sum(number for _, _, number in groups)
     stress = weights.stress * volume * importance

@@ -16,6 +16,8 @@ from ccfem.mesh.tet_mesh import TetMesh
 
 __all__ = ["Joint", "joining_pairs", "joint_of", "joints_of"]
 
+_AGREE = np.cos(np.radians(20.0))
+"""Cosine of the angle up to which a stated axis and that of the wall are the same one."""
 _FLAT = 0.02
 """Share of a patch's squared normals that may lie along the axis of a cylinder."""
 _ROUND = 0.05
@@ -91,8 +93,10 @@ def joint_of(
         wall = _whole_wall(mesh, wall, axis, centre, radius)
     elif (rough := _rough_cylinder(mesh, facets)) is not None:
         axis, radius = rough
-    if name in mesh.axes:
-        axis = mesh.axes[name] * np.sign(mesh.axes[name][np.argmax(np.abs(mesh.axes[name]))])
+    # Where the mesh was turned after its patches were named, the wall contradicts what they state.
+    stated = mesh.axes.get(name)
+    if stated is not None and (axis is None or abs(stated @ axis) > _AGREE):
+        axis = stated * np.sign(stated[np.argmax(np.abs(stated))])
     if direction is not None:
         axis = np.asarray(direction, dtype=np.float64)
         if axis.shape != (3,) or not 0.0 < np.linalg.norm(axis) < np.inf:

@@ -57,7 +57,7 @@ def part(load=1.0, turned=False):
     found = level_surfaces(replace(mesh, points=bent), height, np.array([2.2]), 0.5, 0.6, 5.0)
     # The same triangles, turned: cleaning collapses edges in an order that rounding decides.
     layers = tuple(replace(layer, points=layer.points @ rotation.T) for layer in found.layers)
-    mesh = replace(mesh, points=bent @ rotation.T)
+    mesh = replace(mesh, points=bent @ rotation.T, axes={})  # bent, the bores lean
     pull = load * rotation @ [300.0, 60.0, -150.0]
     loads = {"pull": (Force("pulled", tuple(pull)),)}
     problem = Problem(mesh, isotropic(3500.0, 0.35), (Support("held"),), loads)
@@ -100,7 +100,7 @@ def test_neither_the_load_nor_another_run_changes_the_paths(name):
     stress, layers = part()
     again = plan(create(name), layers, stress, MACHINE)
     np.testing.assert_array_equal(again.points, paths_of(name).points)
-    stress, layers = part(load=1e3)
+    stress, layers = part(load=1e-3)
     scaled = plan(create(name), layers, stress, MACHINE)
     np.testing.assert_array_equal(scaled.offsets, paths_of(name).offsets)
     np.testing.assert_allclose(scaled.points, paths_of(name).points, atol=1e-3)
@@ -127,21 +127,26 @@ def plane_of(paths, layer):
     return [line[:, :2] for line in flat]
 
 
-def test_curved_slicing_turns_with_the_part():
-    """Same number of layers, each where it was."""
+@pytest.mark.parametrize(("joints", "farthest"), [(0.0, 0.2), (1.0, 0.5)])
+def test_curved_slicing_turns_with_the_part(joints, farthest):
+    """Same number of layers, each where it was; between bores that lean against each other, mostly.
+
+    The bores of the bent link lean by 30 degrees to either side: layers square to both are steep.
+    """
     stress, _ = part()
     other, _ = part(turned=True)
-    slicer = Spatial(thickness=1.0)
+    slicer = Spatial(thickness=1.0, joint_weight=joints)
     build = np.array([0.0, 0.0, 1.0])
     first = slicer(stress, tuple(build), MACHINE)
     second = slicer(other, tuple(turn() @ build), MACHINE)
     assert len(first) == len(second) >= 3
     for one, two in zip(first, second, strict=True):
-        assert two.areas.sum() == pytest.approx(one.areas.sum(), rel=0.01, abs=0.5)
+        # The first and the last layer, of 70 mm^2, end at a slope: a cell more or less is 1 mm^2.
+        assert two.areas.sum() == pytest.approx(one.areas.sum(), rel=0.01, abs=1.0)
         back = two.points @ turn()
         away = nearest_on_triangles(one.points, one.triangles, back).distance
         # Rounding decides in which order cleaning collapses edges, and on which side of a corner a
         # stress line passes: within a fifth of the thickness, and mostly half of that.
         assert np.quantile(away, 0.5) < 0.1
-        assert np.quantile(away, 0.99) < 0.2
+        assert np.quantile(away, 0.99) < farthest
         assert np.einsum("d,td,t->", build, one.normals, one.areas) > 0.0

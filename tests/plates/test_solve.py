@@ -328,7 +328,7 @@ def test_a_pin_presses_on_half_of_a_hole():
     problem = PlaneProblem(mesh, STEEL, 0.5, (Support("rim"),), loads)
     forces = prepare(problem).forces["pin"]
     np.testing.assert_allclose(forces.sum(axis=0), [3.0, 0.0], atol=1e-9)
-    assert not forces[inner.nonzero()[0][np.cos(angle) < -0.1]].any()
+    assert np.abs(forces[inner.nonzero()[0][np.cos(angle) < -0.1]]).max() < 1e-15 * 3.0
     # The pressure is a cosine: 4 F / (pi d t) at its middle.
     middle = forces[0, 0] / (2 * 2.0 * np.sin(np.pi / around) * 0.5)
     assert middle == pytest.approx(4 * 3.0 / (np.pi * 4.0 * 0.5), rel=0.01)

@@ -4,12 +4,11 @@ from types import SimpleNamespace
 
 import numpy as np
 import pytest
-from ccfem.comparison.judging import Solved
 from scipy.spatial import cKDTree
 from scipy.spatial.transform import Rotation
 
 from ccfem.cases.case import Case
-from ccfem.comparison.engine import compare
+from ccfem.comparison.engine import Solved, compare
 from ccfem.elasticity import Problem
 from ccfem.errors import InputError
 from ccfem.export.gcode import gcode
@@ -126,12 +125,12 @@ def test_support_is_printed_below_the_part_and_before_it(part, kind):
 def test_flat_layers_are_not_propped_in_the_file(part):
     mesh = part[0]
     problem = Problem(mesh, isotropic(1.0, 0.3), (), {})
-    solved = Solved(Case("flat", "", problem), SimpleNamespace(mesh=mesh))
+    solved = Solved(Case("flat", "", problem), SimpleNamespace(heaviest=SimpleNamespace(mesh=mesh)))
 
     def flat(stress, build, machine):
         return Planar(count=2).cut(stress.mesh, build)
 
-    assert len(solved.cut(flat)[0]) == 2
+    assert len(solved.cut(flat).layers) == 2
     with pytest.raises(InputError, match="below curved layers alone; these are flat"):
         solved.cut(flat, support=True)
     with pytest.raises(InputError, match="support is laid in a print"):
@@ -145,7 +144,9 @@ def test_layers_without_a_field_are_not_propped_in_the_file(part):
     """Those of the slicer `surfaces`, say: their support was left out without a word."""
     mesh, layers, _ = part
     problem = Problem(mesh, isotropic(1.0, 0.3), (), {})
-    solved = Solved(Case("curved", "", problem), SimpleNamespace(mesh=mesh))
+    solved = Solved(
+        Case("curved", "", problem), SimpleNamespace(heaviest=SimpleNamespace(mesh=mesh))
+    )
     with pytest.raises(InputError, match="were given without one: leave out support"):
         solved.cut(lambda *_: layers, support=True)
 
